@@ -1,0 +1,87 @@
+"""
+The errors that a user can meet.
+
+::
+
+    PerError
+    ├── RecordRejected   a record cannot be used; the run goes on without it
+    ├── CatalogError     a file that the run needs (configuration, table, folder) is wrong; the run stops
+    └── ServiceError     a service did not answer; try later
+
+Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error it amounts to.
+"""
+
+from typing import NamedTuple
+
+
+class PerError(Exception):
+    """Anything that is wrong with the user's input rather than with the program."""
+
+
+class RecordRejected(PerError, ValueError):
+    """
+    A record is unfit for spectra, for one reason or several.
+
+    Parameters
+    ----------
+    record : str
+        What was refused: a file or the identifier of a trace.
+    *reasons : str
+        Every reason, each naming the field and the value.
+    """
+
+    def __init__(self, record: str, *reasons: str) -> None:
+        super().__init__(record, *reasons)
+        self.record, self.reasons = record, reasons
+
+    def __str__(self) -> str:
+        return f"{self.record}: {'; '.join(self.reasons)}"
+
+
+class CatalogError(PerError, ValueError):
+    """
+    A configuration, table or folder is wrong as a whole.
+
+    Parameters
+    ----------
+    source : str
+        The file or folder.
+    problem : str
+        What is wrong, naming field and value.
+    """
+
+    def __init__(self, source: str, problem: str) -> None:
+        super().__init__(source, problem)
+        self.source, self.problem = source, problem
+
+    def __str__(self) -> str:
+        return f"{self.source}: {self.problem}"
+
+
+class ServiceError(PerError, ConnectionError):
+    """A service cannot be reached or answers with an error."""
+
+
+class Rejection(NamedTuple):
+    """
+    One row of ``rejected.csv``: something that was left out, with every reason.
+
+    Attributes
+    ----------
+    kind : str
+        ``"record"``, ``"pair"``, ``"file"`` or ``"station"``.
+    name : str
+        Identifier of the trace, station or pair.
+    source : str
+        The file it came from.
+    row : int or None
+        Line of the file, for tables (the header is line 1).
+    reasons : tuple of str
+        Each names the field and the value.
+    """
+
+    kind: str
+    name: str
+    source: str
+    row: int | None
+    reasons: tuple[str, ...]

@@ -1,0 +1,1 @@
+"""Buildings and pairs: schema, reading and checking, periods, masses, participation, simulated inventories."""

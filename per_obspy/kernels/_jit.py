@@ -1,0 +1,9 @@
+"""The one place where compiler options are chosen."""
+
+import numba
+
+#: Threads run free (``nogil``), compiled code is kept on disk, and division by zero gives infinity as in NumPy.
+#: ``contract`` allows fused multiply-add and ``nsz`` ignores the sign of zero; the full ``fastmath`` would make
+#: ``isnan`` find nothing. No ``parallel=True``: two threads that call such kernels abort the process on Numba's
+#: workqueue layer, so the only threads are one level above the kernels.
+kernel = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"}, boundscheck=False)

@@ -1,0 +1,17 @@
+"""What several test modules share: where the real records are."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Folder of real records: PER_OBSPY_DATA, or ``shared/data`` beside the checkout."""
+    folder = Path(os.environ.get("PER_OBSPY_DATA", CHECKOUT.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"real records are not at {folder}: set PER_OBSPY_DATA")
+    return folder
