@@ -1,7 +1,7 @@
-"""A structure as a single-degree-of-freedom oscillator, linear or bilinear."""
+"""A building as the single-degree-of-freedom structure that pounding sees: at its contact level."""
 
-import math
 from dataclasses import dataclass
+from math import inf, pi
 
 from per_obspy import checks
 
@@ -9,45 +9,59 @@ from per_obspy import checks
 @dataclass(frozen=True)
 class Structure:
     """
-    Oscillator that stands for a building, a bridge deck or an isolated superstructure.
+    Single-degree-of-freedom structure at its contact level, linear or bilinear.
 
     Parameters
     ----------
     period : float
-        Undamped elastic period, s.
+        Undamped natural period (of the elastic branch), s.
     damping : float
-        Fraction of critical, at least 0 and below 1, dimensionless.
+        Viscous damping as a fraction of critical of the elastic branch, at least 0 and below 1.
     mass : float
-        Impact mass (generalised mass normalised at the contact level), kg; infinity is a wall.
-    yield_displacement : float, optional
-        Displacement at first yield, m; infinity is a linear structure.
-    hardening : float, optional
-        Stiffness after yielding over elastic stiffness, at least 0 and below 1, dimensionless.
-    participation : float, optional
-        Contact displacement over oscillator displacement, dimensionless.
+        Generalised mass at the contact level, kg; infinite for a wall.
+    yield_displacement : float
+        Displacement at first yield, m; infinite for a linear structure.
+    hardening : float
+        Stiffness after yielding over elastic stiffness, at least 0 and below 1.
+    participation : float
+        The contact level is driven by ``participation`` times the ground acceleration, dimensionless;
+        0 for a wall that moves with the ground.
 
     Raises
     ------
     ValueError
-        If a field is out of range; the message names it.
+        If a number is outside its range.
+
+    Examples
+    --------
+    >>> tower = Structure(period=2.0, damping=0.05, mass=4e5)
+    >>> round(tower.frequency, 6)
+    3.141593
     """
 
     period: float
     damping: float
     mass: float
-    yield_displacement: float = math.inf
+    yield_displacement: float = inf
     hardening: float = 0.0
     participation: float = 1.0
 
     def __post_init__(self) -> None:
-        checks.number("period", self.period, checks.positive)
-        checks.number("damping", self.damping, checks.fraction_of_critical)
-        checks.number("mass", self.mass, checks.positive_or_infinite)
-        checks.number("yield_displacement", self.yield_displacement, checks.positive_or_infinite)
-        checks.number("hardening", self.hardening, checks.fraction_of_critical)
-        checks.number("participation", self.participation, checks.positive)
+        """Replace each argument by the checked float."""
+        for name, check in _CHECKS.items():
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), check))
 
     @property
     def frequency(self) -> float:
-        """Undamped circular frequency, rad/s."""
-        return 2.0 * math.pi / self.period
+        """Undamped circular frequency of the elastic branch, rad/s."""
+        return 2.0 * pi / self.period
+
+
+_CHECKS = {
+    "period": checks.positive,
+    "damping": checks.fraction_of_critical,
+    "mass": checks.positive_or_infinite,
+    "yield_displacement": checks.positive_or_infinite,
+    "hardening": checks.fraction_of_critical,
+    "participation": checks.not_negative,
+}
