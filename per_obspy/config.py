@@ -52,7 +52,7 @@ class Processing(Section):
     order: int = Field(5, ge=1, le=20, description="n of the Butterworth amplitude 1/sqrt(1+(f_hp/f)^2n)")
     taper: float = Field(0.05, ge=0, le=0.5, description="fraction of the record at each end, Hann")
     usable: float = Field(0.8, gt=0, le=1, description="longest usable period = usable / f_hp")
-    pre_event: float = Field(0.0, ge=0, description="s before the event that count as noise; 0: mean of the whole record")
+    pre_event: float = Field(0.0, ge=0, description="s of noise before the event; 0: mean of the whole record")
 
 
 class Spectra(Section):
@@ -78,7 +78,7 @@ class Building(Section):
 class Screening(Section):
     """How pairs find their ground motion and how risk is named."""
 
-    largest_distance: float = Field(20_000.0, gt=0, description="m from station to pair; beyond it the pair is rejected")
+    largest_distance: float = Field(20_000.0, gt=0, description="m from station to pair; pairs beyond are rejected")
     flag_distance: float = Field(5_000.0, gt=0, description="m, flagged beyond")
     per_to_sd: float = Field(1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large")
     classes: dict[str, float] = Field(

@@ -1,1 +1,5 @@
-"""The physics of a pair of buildings: correlation, critical gap, impact, single hit, histories, mitigation, probability."""
+"""
+The physics of a pair of buildings.
+
+Correlation, critical gap, impact, single hit, exact histories, linearization, mitigation, probability.
+"""

@@ -1,1 +1,3 @@
-"""From arrays to spectra (one component, by azimuth, inelastic), from a Stream to a station's Dataset, to netCDF and back."""
+"""
+Arrays to spectra (one component, by azimuth, inelastic), a Stream to a station's Dataset, to netCDF and back.
+"""
