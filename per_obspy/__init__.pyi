@@ -1,1 +1,5 @@
 # One line a module; ``__init__.py`` reads this file to know where each public name lives.
+from .pounding.correlation import ddc_correlation as ddc_correlation
+from .pounding.gap import absolute_gap as absolute_gap, critical_gap as critical_gap, srss_gap as srss_gap
+from .pounding.impact import post_impact_velocities as post_impact_velocities, transfer_energies as transfer_energies
+from .pounding.structure import Structure as Structure
