@@ -1,0 +1,130 @@
+"""PEER AT2 (acceleration, g), VT2 (velocity, cm/s) and DT2 (displacement, cm): one component a file."""
+
+import re
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core.trace import Stats
+
+from ._text import Text, WaveformFile, count, free_block, head_lines, interval, line_at, read_text, refuse
+from .vocabulary import STANDARD_GRAVITY, orientation, trace, utc
+
+_QUANTITY = re.compile(r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b")
+_NUMBER = r"([-+\d.Ee*]+)"
+_NAMED_SIZE = re.compile(rf"\s*NPTS\s*=\s*{_NUMBER}\s*,\s*DT\s*=\s*{_NUMBER}", re.IGNORECASE)
+_PLAIN_SIZE = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.IGNORECASE)
+#: event, date, perhaps a time of unknown zone, station, orientation
+_TITLE = re.compile(r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)")
+_CORNERS = {
+    name: re.compile(rf"\b{word}\s*=\s*(\d*\.?\d+)\s*HZ") for name, word in (("highpass", "HP"), ("lowpass", "LP"))
+}
+
+#: quantity and unit of the header -> unit of the samples, factor to it
+_UNITS = {
+    ("ACCELERATION", "G"): ("m/s2", STANDARD_GRAVITY),
+    ("VELOCITY", "CM/S"): ("m/s", 0.01),
+    ("DISPLACEMENT", "CM"): ("m", 0.01),
+}
+
+
+def is_at2(file: WaveformFile) -> bool:
+    """Tell whether a file starts like a PEER record."""
+    lines = head_lines(file, 1000)
+    return (
+        len(lines) > 3
+        and lines[0].startswith("PEER")
+        and bool(_QUANTITY.match(lines[2].strip()))
+        and "NPTS" in lines[3].upper()
+    )
+
+
+def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
+    """Read one PEER record: a Stream of one trace in m/s2, m/s or m, processed as PEER did."""
+    text = read_text(file)
+    units = _QUANTITY.match(line_at(text, 2, "units").strip())
+    if units is None or units.groups() not in _UNITS:
+        refuse(text, 2, "units", f"{text.lines[2].strip()!r} is not a PEER quantity and unit")
+    unit, factor = _UNITS[units.group(1), units.group(2)]
+    samples, dt = _size(text)
+    values = factor * free_block(text, 4, None, samples)
+    words = {"units": unit, "quantity": units.group(1).lower(), "processing_level": "processed"}
+    return Stream([trace(values, dt, words | _title(text) | {"corners": _corners(text.lines[2])})])
+
+
+def _size(text: Text) -> tuple[int, float]:
+    line = line_at(text, 3, "NPTS, DT")
+    size = _NAMED_SIZE.match(line) or _PLAIN_SIZE.match(line)
+    if size is None:
+        refuse(text, 3, "NPTS, DT", f"{line.strip()!r} names no number of samples and no interval")
+    return count(text, 3, "NPTS", size[1]), interval(text, 3, "DT", size[2])
+
+
+def _title(text: Text) -> dict[str, Any]:
+    """Event, date, station and orientation of the second line; strong-motion records begin in 1933."""
+    title = _TITLE.fullmatch(text.lines[1].strip())
+    if title is None:
+        name = text.lines[1].split(",")[0].strip()
+        return {"station": _code(name), "station_name": name}
+    event, month, day, year, station, component = title.groups()
+    century = 0 if len(year) == 4 else 2000 if int(year) < 33 else 1900
+    start = utc(text, 1, "date", (century + int(year), int(month), int(day)))
+    named = {"station": _code(station), "station_name": station.strip(), "event": {"name": event or None}}
+    return named | {"starttime": start} | orientation(component)
+
+
+def _code(name: str) -> str:
+    return re.sub(r"[^A-Z0-9]", "", name.upper())
+
+
+def _corners(line: str) -> dict[str, float]:
+    found = {name: pattern.search(line.upper()) for name, pattern in _CORNERS.items()}
+    return {name: float(match[1]) for name, match in found.items() if match}
+
+
+def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -> None:
+    """
+    Write one trace of acceleration in m/s2 as PEER AT2, to seven digits.
+
+    Raises
+    ------
+    ValueError
+        If the stream has not exactly one trace, or it is not acceleration in m/s2 (``stats.units``).
+    """
+    if len(stream) != 1:
+        raise ValueError(f"an AT2 file holds one trace, got {len(stream)}")
+    content = _at2_text(stream[0]).encode("ascii", "replace")
+    if hasattr(filename, "write"):
+        filename.write(content)
+    else:
+        Path(filename).write_bytes(content)
+
+
+def _at2_text(component: Trace) -> str:
+    stats = component.stats
+    if stats.get("units") != "m/s2":
+        raise ValueError(f"an AT2 file holds acceleration, stats.units must be 'm/s2', got {stats.get('units')!r}")
+    if not np.isfinite(component.data).all():
+        raise ValueError(f"{component.id} has samples that are not finite")
+    station = stats.get("station_name", stats.station).replace(",", " ")
+    dated = "" if stats.starttime == UTCDateTime(0) else f"{stats.get('event', {}).get('name', '')}, {_date(stats)}, "
+    values = [f"{value:15.7E}" for value in component.data / STANDARD_GRAVITY]
+    rows = ["".join(values[first : first + 5]) for first in range(0, len(values), 5)]
+    top = [
+        "PEER NGA STRONG MOTION DATABASE RECORD",
+        f"{dated}{station}, {_component(stats)}",
+        "ACCELERATION TIME SERIES IN UNITS OF G",
+        f"NPTS= {len(values):6d}, DT= {stats.delta:.9g} SEC",
+    ]
+    return "\n".join(top + rows) + "\n"
+
+
+def _component(stats: Stats) -> str:
+    if "sensor_dip" in stats:
+        return "UP" if stats.sensor_dip < 0 else "DWN"
+    return f"{stats.sensor_azimuth:03.0f}" if "sensor_azimuth" in stats else stats.channel
+
+
+def _date(stats: Stats) -> str:
+    return f"{stats.starttime.month}/{stats.starttime.day}/{stats.starttime.year}"
