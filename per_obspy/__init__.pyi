@@ -3,3 +3,7 @@ from .pounding.correlation import ddc_correlation as ddc_correlation
 from .pounding.gap import absolute_gap as absolute_gap, critical_gap as critical_gap, srss_gap as srss_gap
 from .pounding.impact import post_impact_velocities as post_impact_velocities, transfer_energies as transfer_energies
 from .pounding.structure import Structure as Structure
+from .processing.chain import process as process
+from .inventory.periods import asce7_period as asce7_period, ec8_period as ec8_period
+from .inventory.reading import read_pairs as read_pairs
+from .inventory.shear_building import equivalent_sdof as equivalent_sdof, shear_building as shear_building

@@ -52,7 +52,9 @@ class Processing(Section):
     order: int = Field(5, ge=1, le=20, description="n of the Butterworth amplitude 1/sqrt(1+(f_hp/f)^2n)")
     taper: float = Field(0.05, ge=0, le=0.5, description="fraction of the record at each end, Hann")
     usable: float = Field(0.8, gt=0, le=1, description="longest usable period = usable / f_hp")
-    pre_event: float = Field(0.0, ge=0, description="s of noise before the event; 0: mean of the whole record")
+    pre_event: float = Field(0.0, ge=0, description="s at the start that are noise; 0: mean of the whole record")
+    gain_tolerance: float = Field(0.1, gt=0, description="between product of stage gains and sensitivity, relative")
+    overlap: float = Field(0.8, gt=0, le=1, description="part of the longer horizontal that both must cover")
 
 
 class Spectra(Section):
@@ -69,10 +71,13 @@ class Building(Section):
     """What is assumed of a building where the inventory is silent; each use is marked as derived."""
 
     damping: float = Field(0.05, ge=0, lt=1, description="fraction of critical")
+    damping_log_std: float = Field(0.3, ge=0, description="log-standard deviation of an assumed damping")
     storey_height: float = Field(3.0, gt=0, description="m")
     mass_per_area: float = Field(1000.0, gt=0, description="kg/m2 and floor")
+    area: float = Field(200.0, gt=0, description="floor area, m2; only the ratio of the masses matters")
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
-    period_formula: str = Field("asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8, theory: medians")
+    floor_tolerance: float = Field(0.6, ge=0, description="m; floors further apart than 2 ft misalign (FEMA P-154)")
+    period_formula: str = Field("asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds")
 
 
 class Screening(Section):

@@ -1,0 +1,123 @@
+"""
+From a building to its oscillator at contact height: participation, generalised mass, misaligned floors.
+
+Equal floor masses and a first mode that grows linearly with height are assumed; for a building with a model of its
+own use ``shear_building.equivalent_sdof``.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+
+
+def _ratio(contact_height: ArrayLike, height: ArrayLike) -> FloatArray:
+    contact = checks.positive("contact_height", contact_height)
+    total = checks.positive("height", height)
+    ratio: FloatArray = np.asarray(contact / total)
+    if np.any(ratio > 1.0):
+        raise ValueError(f"contact_height must not be above the building, got {ratio.max():.6g} times its height")
+    return ratio
+
+
+def contact_participation(storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike) -> FloatArray:
+    """
+    Displacement at contact height over that of the oscillator, ``q = 3N/(2N+1) z_c/H``.
+
+    Parameters
+    ----------
+    storeys : array_like
+        Number of storeys N.
+    height : array_like
+        From ground to roof H, m.
+    contact_height : array_like
+        Height of contact z_c, m; at most the height.
+
+    Returns
+    -------
+    participation : ndarray
+        Dimensionless.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or the contact lies above the building.
+
+    Notes
+    -----
+    First-mode participation factor times mode shape at the contact, ``sum(m phi) / sum(m phi**2) * phi_c``, for N
+    equal masses and ``phi = z/H``. It is 1 for one storey and tends to 1.5.
+
+    Examples
+    --------
+    >>> contact_participation([1, 2, 3, 5, 10], 30.0, 30.0).round(2)
+    array([1.  , 1.2 , 1.29, 1.36, 1.43])
+    """
+    count = checks.positive("storeys", storeys)
+    participation: FloatArray = 3.0 * count / (2.0 * count + 1.0) * _ratio(contact_height, height)
+    return participation
+
+
+def contact_mass(mass: ArrayLike, storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike) -> FloatArray:
+    """
+    Generalised first-mode mass at contact height, ``m*_c = M (N+1)(2N+1)/(6 N**2) (H/z_c)**2``.
+
+    It is ``sum(m phi**2) / phi_c**2`` with the assumptions of :func:`contact_participation`: the mass that takes part
+    in an impact, neither the effective modal mass nor the mass of a floor.
+
+    Parameters
+    ----------
+    mass : array_like
+        Total mass M, kg.
+    storeys : array_like
+        Number of storeys N.
+    height : array_like
+        From ground to roof H, m.
+    contact_height : array_like
+        Height of contact z_c, m; at most the height.
+
+    Returns
+    -------
+    mass : ndarray
+        kg.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or the contact lies above the building.
+
+    Examples
+    --------
+    >>> float(contact_mass(300e3, 1, 3.0, 3.0))
+    300000.0
+    """
+    total, count = checks.positive("mass", mass), checks.positive("storeys", storeys)
+    ratio = _ratio(contact_height, height)
+    generalised: FloatArray = total * (count + 1.0) * (2.0 * count + 1.0) / (6.0 * count**2) / ratio**2
+    return generalised
+
+
+def floor_offset(height_1: ArrayLike, storeys_1: ArrayLike, height_2: ArrayLike, storeys_2: ArrayLike) -> FloatArray:
+    """
+    Height between the roof of the lower building and the nearest floor of the taller one, in m.
+
+    Floors are taken as equally high within a building. Every argument may be an array (m and numbers of storeys).
+
+    Examples
+    --------
+    >>> float(floor_offset(9.0, 3, 16.0, 4))  # floors of the taller one at 4, 8, 12, 16 m
+    1.0
+    """
+    first, second = checks.positive("height_1", height_1), checks.positive("height_2", height_2)
+    storey_1 = first / checks.positive("storeys_1", storeys_1)
+    storey_2 = second / checks.positive("storeys_2", storeys_2)
+    lower, storey = np.minimum(first, second), np.where(first >= second, storey_1, storey_2)
+    nearest = np.maximum(np.rint(lower / storey), 1.0)
+    offset: FloatArray = np.abs(lower - nearest * storey)
+    return offset
+
+
+def floors_misaligned(offset: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
+    """Return where a floor offset (m) exceeds the tolerance (m): floors may then hit columns, outside the method."""
+    return np.asarray(np.abs(checks.finite("offset", offset)) > tolerance)

@@ -1,0 +1,132 @@
+"""
+The one schema of the pair table: every column with its kind, unit, meaning and allowed range.
+
+Readers check against it, writers order by it, simulated inventories obey it and the documentation prints it.
+One row is one pair of neighbouring buildings; ``_1`` and ``_2`` are the two, and the axis points from 1 to 2.
+"""
+
+from math import inf
+from typing import NamedTuple
+
+#: Structural systems for which period formulas exist; masonry and anything unknown is ``other``.
+SYSTEMS = ("steel_mrf", "concrete_mrf", "ebf_brbf", "other")
+
+#: Where in its row of houses the pair stands: ``end`` if either building has no further neighbour.
+POSITIONS = ("end", "inside")
+
+
+class Column(NamedTuple):
+    """
+    One column of the pair table.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file.
+    dtype : str
+        ``"float64"``, or ``"str"`` for text.
+    unit : str
+        SI unit, ``"1"`` if dimensionless, empty for text.
+    meaning : str
+        One line for people.
+    required : bool
+        Whether every file must have the column and every row a value in it.
+    low, high : float
+        Closed range of numbers, in the column's unit.
+    choices : tuple of str
+        The texts allowed; empty if any text is.
+    hint : str
+        What is usually behind a value out of range.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    meaning: str
+    required: bool = False
+    low: float = -inf
+    high: float = inf
+    choices: tuple[str, ...] = ()
+    hint: str = ""
+
+
+#: Smallest quantity that counts as above zero: a tenth of a millimetre, a tenth of a millisecond.
+TINY = 1e-4
+
+_PAIR = (
+    Column("pair_id", "str", "", "identifier of the pair, unique in its file", required=True),
+    Column("gap", "float64", "m", "clear distance between the buildings at the contact height, 0 if they touch",
+           required=True, low=0.0, high=10.0, hint="given in millimetres or centimetres by mistake?"),
+    Column("gap_std", "float64", "m", "standard deviation of the gap", low=0.0, high=1.0, hint="in millimetres?"),
+    Column("azimuth", "float64", "degrees", "direction from building 1 to building 2, clockwise from north",
+           low=0.0, high=360.0),
+    Column("contact_height", "float64", "m", "height at which the buildings meet first", low=TINY, high=1000.0),
+    Column("floor_offset", "float64", "m", "height between a floor of one building and the nearest floor of the other",
+           low=-20.0, high=20.0),
+    Column("facing_length", "float64", "m", "length over which the walls face each other", low=0.0, high=1000.0),
+    Column("position", "str", "", "whether the pair stands at the end of its row of buildings", choices=POSITIONS),
+    Column("restitution", "float64", "1", "coefficient of restitution of impact", low=0.0, high=1.0),
+    Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground", low=30.0, high=4000.0),
+    Column("site_class", "str", "", "site class of the ground, compared with that of the station"),
+    Column("observed", "float64", "1", "1 if pounding was seen in the event, 0 if looked for and not seen",
+           low=0.0, high=1.0),
+)  # fmt: skip
+
+_BUILDING = (
+    Column("building_id", "str", "", "identifier of the building"),
+    Column("longitude", "float64", "degrees", "east", required=True, low=-180.0, high=180.0),
+    Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
+           hint="longitude and latitude swapped?"),
+    Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0, hint="metres above ground expected"),
+    Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
+    Column("system", "str", "", "structural system", choices=SYSTEMS),
+    Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0),
+    Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period", low=0.0, high=2.0),
+    Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=1.0 - 1e-9,
+           hint="a fraction is expected, not per cent"),
+    Column("damping_log_std", "float64", "1", "logarithmic standard deviation of the damping", low=0.0, high=2.0),
+    Column("mass", "float64", "kg", "total mass", low=1.0, high=1e12),
+    Column("area", "float64", "m2", "floor area of one storey", low=1.0, high=1e6),
+    Column("participation", "float64", "1", "displacement at contact height / displacement of the oscillator",
+           low=TINY, high=3.0),
+    Column("yield_displacement", "float64", "m", "of the equivalent oscillator; infinite if it stays linear", low=TINY),
+    Column("yield_coefficient", "float64", "1", "yield strength / weight", low=TINY, high=10.0),
+    Column("hardening", "float64", "1", "stiffness after yield / stiffness before", low=0.0, high=1.0),
+    Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),
+    Column("importance", "float64", "1", "importance factor", low=0.0, high=10.0),
+)  # fmt: skip
+
+
+def _of_building(column: Column, index: int) -> Column:
+    return column._replace(name=f"{column.name}_{index}", meaning=f"building {index}: {column.meaning}")
+
+
+#: Every column that a pair table may have with a meaning of ours, by name; others are carried through.
+COLUMNS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        *_PAIR,
+        *(_of_building(column, 1) for column in _BUILDING),
+        *(_of_building(column, 2) for column in _BUILDING),
+    )
+}
+
+#: Of each of these groups a file must have at least one column, and each row at least one value.
+ONE_OF = tuple((f"height_{i}", f"storeys_{i}", f"period_{i}") for i in (1, 2))
+
+#: What ``completed_pairs`` adds beyond the columns above.
+COMPLETED: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("longitude", "float64", "degrees", "of the middle between the two buildings, east"),
+        Column("latitude", "float64", "degrees", "of the middle between the two buildings, north"),
+        *(
+            Column(f"contact_mass_{i}", "float64", "kg", f"building {i}: generalised first-mode mass at contact height")
+            for i in (1, 2)
+        ),
+        Column(
+            "floors_misaligned", "bool", "", "floors of one building may hit columns of the other: outside the method"
+        ),
+        Column("derived", "str", "", "columns of this row that were derived or assumed, not given"),
+    )
+}
