@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from obspy import Inventory, Stream, Trace, UTCDateTime, read, read_inventory
+from obspy.core import AttribDict
+
+from per_obspy.config import Processing
+from per_obspy.errors import RecordRejected
+from per_obspy.processing.chain import process, process_station
+
+RATE, COUNT = 100.0, 6000
+SETTINGS = Processing()
+
+
+def pulse(offset=0.0):
+    """Return an earthquake of 20 s between quiet ends, m/s2."""
+    time = np.arange(COUNT) / RATE
+    rng = np.random.default_rng(4)
+    return rng.normal(size=COUNT) * np.exp(-(((time - 30) / 6) ** 2)) + offset
+
+
+def trace(channel="HNE", samples=None, station="STA", **stats):
+    header = {"network": "XX", "station": station, "channel": channel, "sampling_rate": RATE, "units": "m/s2"}
+    data = pulse() if samples is None else samples
+    return Trace(data, header | {"starttime": UTCDateTime(2020, 1, 1)} | stats)
+
+
+def station(**stats):
+    return Stream([trace(channel, **stats) for channel in ("HNE", "HNN", "HNZ")])
+
+
+def test_the_offset_of_the_baseline_does_not_matter():
+    plain, shifted = process(station()), process(station(samples=pulse(offset=3.0)))
+    for one, other in zip(plain, shifted, strict=True):
+        assert_allclose(other.data, one.data, atol=1e-12)  # rounding of numbers near 3
+
+
+def test_the_result_is_proportional_to_the_motion():
+    for one, other in zip(process(station()), process(station(samples=-2 * pulse())), strict=True):
+        assert_allclose(other.data, -2 * one.data, atol=1e-12)
+
+
+def test_every_number_and_step_is_recorded():
+    out = process(station())[0]
+    kept = out.stats.per_obspy
+    assert (kept.highpass, kept.lowpass) == (SETTINGS.highpass, 37.5)  # 0.75 of Nyquist
+    assert kept.longest_period == pytest.approx(0.8 / SETTINGS.highpass)
+    assert all(type(value) in (str, int, float) for value in kept.values())
+    steps = " | ".join(out.stats.processing)
+    order = [steps.index(word) for word in ("mean", "trend", "tapered", "zeros before", "Butterworth", "usable")]
+    assert order == sorted(order)
+
+
+def test_horizontals_have_the_same_times_after_padding():
+    out = process(Stream([trace("HNE"), trace("HNN", starttime=UTCDateTime(2020, 1, 1) + 1.003)]))
+    assert out[0].stats.starttime == out[1].stats.starttime
+    assert out[0].stats.npts == out[1].stats.npts
+
+
+def test_records_processed_already_pass_through():
+    corners = AttribDict(highpass=0.1, lowpass=30.0)
+    out = process(station(processing_level="processed", corners=corners))[0]
+    assert_array_equal(out.data, pulse())
+    assert (out.stats.per_obspy.highpass, out.stats.per_obspy.lowpass) == (0.1, 30.0)
+    assert out.stats.per_obspy.highpass_source == "header"
+
+
+def test_silent_headers_leave_the_duration_as_the_limit():
+    out = process(station(processing_level="processed"))[0].stats.per_obspy
+    assert out.highpass == pytest.approx(RATE / COUNT)
+    assert out.longest_period == pytest.approx(0.8 * COUNT / RATE)
+    assert "silent" in out.highpass_source
+
+
+def test_one_bad_trace_never_loses_the_others():
+    stream = station()
+    stream[0].data[5] = np.nan
+    stream[2].stats.units = "gal"
+    kept, rejected = process_station(stream, SETTINGS)
+    assert [one.stats.channel for one in kept] == ["HNN"]
+    assert {row.name: row.reasons for row in rejected}.keys() == {"XX.STA..HNE", "XX.STA..HNZ"}
+
+
+def test_the_preferred_instrument_goes_first_and_the_other_is_named():
+    stream = station() + Stream([trace("BNE"), trace("BNN")])
+    kept, rejected = process_station(stream, SETTINGS)
+    assert {one.stats.channel for one in kept} == {"HNE", "HNN", "HNZ"}
+    assert [row.name for row in rejected] == ["XX.STA..BNE", "XX.STA..BNN"]
+    assert "goes first" in rejected[0].reasons[0]
+
+
+def test_a_whole_instrument_goes_before_half_a_preferred_one():
+    kept, rejected = process_station(Stream([trace("HNE"), trace("BNE"), trace("BNN")]), SETTINGS)
+    assert {one.stats.channel for one in kept} == {"BNE", "BNN"}
+    assert [row.name for row in rejected] == ["XX.STA..HNE"]
+
+
+def test_a_vertical_alone_is_of_no_use_and_named():
+    kept, rejected = process_station(Stream([trace("HNZ")]), SETTINGS)
+    assert not kept
+    assert rejected[0].reasons == ("no horizontal of its instrument is usable",)
+
+
+def test_nothing_left_is_an_error_with_every_reason():
+    stream = Stream([trace("HNE", units="gal"), trace("HNN", samples=np.full(COUNT, np.nan))])
+    with pytest.raises(RecordRejected, match=r"units 'gal'.*|not finite") as caught:
+        process(stream)
+    assert len(caught.value.reasons) == 2
+    with pytest.raises(RecordRejected, match="empty stream: no traces"):
+        process(Stream())
+
+
+def test_stations_do_not_mix():
+    out = process(station() + station(station="STB"))
+    assert [one.stats.station for one in out].count("STB") == 3
+
+
+def test_inputs_stay_unchanged():
+    stream = station()
+    before = stream.copy()
+    process(stream)
+    assert stream == before
+
+
+@pytest.fixture(scope="module")
+def ridgecrest(real_data):
+    folder = real_data / "records" / "ridgecrest2019_mseed"
+    inventory = sum((read_inventory(path) for path in sorted(folder.glob("*.xml"))), Inventory())
+    stream = read(str(folder / "*.mseed"))
+    for one in stream:
+        one.stats.response = inventory.get_response(one.id, one.stats.starttime)
+        direction = inventory.get_orientation(one.id, one.stats.starttime)
+        one.stats.sensor_azimuth, one.stats.sensor_dip = direction["azimuth"], direction["dip"]
+    return stream
+
+
+@pytest.mark.real_data
+def test_ridgecrest_gives_sane_motion_at_all_stations(ridgecrest):
+    out = process(ridgecrest)
+    assert len(out) == 33
+    for one in out:
+        velocity = np.cumsum(one.data) * one.stats.delta
+        displacement = np.cumsum(velocity) * one.stats.delta
+        assert 0.2 < np.abs(one.data).max() < 6.0  # m/s2: the strongest station is known to have 0.57 g
+        # a filtered record ends at rest: the pads hold 1.5 n periods of the corner
+        assert abs(velocity[-1]) < 1e-3 * np.abs(velocity).max()
+        assert abs(displacement[-1]) < 0.01 * np.abs(displacement).max()
