@@ -121,7 +121,7 @@ def _at2_text(component: Trace) -> str:
 
 
 def _component(stats: Stats) -> str:
-    if "sensor_dip" in stats:
+    if abs(stats.get("sensor_dip", 0.0)) == 90:
         return "UP" if stats.sensor_dip < 0 else "DWN"
     return f"{stats.sensor_azimuth:03.0f}" if "sensor_azimuth" in stats else stats.channel
 

@@ -12,7 +12,8 @@ units                          ``"m/s2"``, ``"m/s"``, ``"m"``, or ``"counts"`` w
 quantity                       ``"acceleration"``, ``"velocity"`` or ``"displacement"``
 processing_level               ``"raw"`` or ``"processed"``
 coordinates                    latitude, longitude (degrees), elevation (m)
-sensor_azimuth, sensor_dip     degrees clockwise from north (horizontals); degrees down from horizontal (up is -90)
+sensor_azimuth, sensor_dip     degrees clockwise from north (horizontals only); degrees down from horizontal (0; up
+                               is -90)
 corners                        highpass, lowpass: corners of the filter that was applied, Hz
 instrument                     model, serial, natural_frequency (Hz), damping (fraction of critical),
                                sensitivity (V/(m/s2))
@@ -62,19 +63,24 @@ def orientation(words: str) -> dict[str, float]:
     Return ``sensor_azimuth`` or ``sensor_dip`` from words such as ``N21E``, ``NS``, ``UP``, else nothing.
 
     >>> orientation("S 16 E"), orientation("Up"), orientation("270 DEG")
-    ({'sensor_azimuth': 164.0}, {'sensor_dip': -90.0}, {'sensor_azimuth': 270.0})
+    ({'sensor_azimuth': 164.0, 'sensor_dip': 0.0}, {'sensor_dip': -90.0}, {'sensor_azimuth': 270.0, 'sensor_dip': 0.0})
     """
     word = words.strip().upper().removesuffix("DEG").rstrip(" .")
     if word in VERTICAL_DIPS:
         return {"sensor_dip": VERTICAL_DIPS[word]}
     if word in COMPASS_AZIMUTHS:
-        return {"sensor_azimuth": COMPASS_AZIMUTHS[word]}
+        return horizontal(COMPASS_AZIMUTHS[word])
     if quadrant := _QUADRANT.fullmatch(word):
         start, sign = _QUADRANT_AZIMUTHS[quadrant[1] + quadrant[3]]
-        return {"sensor_azimuth": (start + sign * float(quadrant[2])) % 360}
+        return horizontal(start + sign * float(quadrant[2]))
     if re.fullmatch(r"\d{1,3}(\.\d*)?", word) and float(word) <= 360:
-        return {"sensor_azimuth": float(word) % 360}
+        return horizontal(float(word))
     return {}
+
+
+def horizontal(azimuth: float) -> dict[str, float]:
+    """Return the words of a horizontal sensor, degrees clockwise from north."""
+    return {"sensor_azimuth": azimuth % 360, "sensor_dip": 0.0}
 
 
 def channel_code(sampling_rate: float, orientation: Mapping[str, float]) -> str:
@@ -84,12 +90,12 @@ def channel_code(sampling_rate: float, orientation: Mapping[str, float]) -> str:
     North and east within 5 degrees are N and E; otherwise 1 is the horizontal nearer to the north-south line.
     An unknown orientation gives only band and instrument.
 
-    >>> channel_code(200, {"sensor_azimuth": 0.0}), channel_code(50, {"sensor_azimuth": 118.0})
-    ('HNN', 'BN2')
+    >>> channel_code(200, horizontal(0)), channel_code(50, horizontal(118)), channel_code(100, {"sensor_dip": -90})
+    ('HNN', 'BN2', 'HNZ')
     """
     bands = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
     band = next(code for rate, code in bands if round(sampling_rate, 3) >= rate)
-    if "sensor_dip" in orientation:
+    if abs(orientation.get("sensor_dip", 0.0)) == 90:
         return f"{band}NZ"
     if "sensor_azimuth" not in orientation:
         return f"{band}N"

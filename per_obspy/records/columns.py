@@ -9,13 +9,13 @@ from obspy import Stream, UTCDateTime
 from .. import checks
 from ..checks import FloatArray
 from ..errors import CatalogError, RecordRejected
-from ..formats.vocabulary import GAL, STANDARD_GRAVITY, coordinates, trace
+from ..formats.vocabulary import GAL, STANDARD_GRAVITY, coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
 UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
 
 #: last letter of a SEED channel code -> orientation
-_LETTERS = {"N": {"sensor_azimuth": 0.0}, "E": {"sensor_azimuth": 90.0}, "Z": {"sensor_dip": -90.0}}
+_LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
 
 #: how far a time may lie from even spacing, as a fraction of the interval (tables round their times)
 _UNEVENNESS = 0.05
@@ -117,7 +117,7 @@ def _directions(channels: Mapping[str, int], azimuths: Mapping[str, float]) -> d
         raise ValueError(f"azimuths must belong to channels, got {sorted(unknown)}")
     if unclear := [code for code in channels if code not in azimuths and code[-1:] not in _LETTERS]:
         raise ValueError(f"azimuths must tell the direction of {unclear}, whose codes do not end in N, E or Z")
-    given = {code: {"sensor_azimuth": float(azimuth) % 360} for code, azimuth in azimuths.items()}
+    given = {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
     return {code: given.get(code) or _LETTERS[code[-1]] for code in channels}
 
 

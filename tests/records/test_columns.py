@@ -41,7 +41,7 @@ def test_columns_become_channels_in_metres_per_second_squared(table: Path):
     assert stream[0].stats.delta == 0.02
     assert stream[0].stats.coordinates == {"latitude": 19.39, "longitude": -99.15}
     assert [trace.stats.get("sensor_azimuth") for trace in stream] == [0, 90, None]
-    assert stream[2].stats.sensor_dip == -90
+    assert [trace.stats.sensor_dip for trace in stream] == [0, 0, -90]
 
 
 @pytest.mark.parametrize("units", UNITS)

@@ -1,0 +1,197 @@
+"""A folder of records: every file that ObsPy and its plugins understand, with StationXML beside them or elsewhere."""
+
+import glob
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from functools import reduce
+from operator import add
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import obspy
+from obspy import Inventory, Stream
+from obspy.core.event import Event
+
+from ..errors import CatalogError, PerError, RecordRejected, Rejection
+from .metadata import with_metadata
+
+_MARKS = {b"<FDSNStationXML": "inventory", b"quakeml": "event"}
+
+
+class FolderContents(NamedTuple):
+    """
+    What a folder holds.
+
+    Attributes
+    ----------
+    stations : dict
+        ``"NET.STA"`` -> the files that hold records of the station, sorted.
+    inventory : Inventory or None
+        All StationXML, merged; None if there is none.
+    rejected : tuple of Rejection
+        Files that are neither records nor metadata, each with its reason.
+    """
+
+    stations: dict[str, tuple[Path, ...]]
+    inventory: Inventory | None
+    rejected: tuple[Rejection, ...]
+
+
+def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> FolderContents:
+    """
+    Find the stations that have records in a folder and its subfolders, from headers only.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Any mixture of waveform files; StationXML among them is used, QuakeML is passed over.
+    stationxml : str or Path, optional
+        A StationXML file, or a folder of them, in addition.
+
+    Raises
+    ------
+    CatalogError
+        If the folder is missing, empty or without any record, or the named StationXML cannot be read.
+    """
+    files = _files(Path(folder))
+    kinds = {path: _kind(path) for path in files}
+    stations: dict[str, list[Path]] = defaultdict(list)
+    rejected = []
+    for path in (path for path in files if kinds[path] == "record"):
+        try:
+            for station in sorted(
+                {f"{trace.stats.network}.{trace.stats.station}" for trace in _read(path, headonly=True)}
+            ):
+                stations[station].append(path)
+        except RecordRejected as rejection:
+            rejected.append(_rejected_file(path, rejection))
+    inventories = [] if stationxml is None else _named_inventories(Path(stationxml))
+    for path in (path for path in files if kinds[path] == "inventory"):
+        try:
+            inventories.append(_read_inventory(path))
+        except RecordRejected as rejection:
+            rejected.append(_rejected_file(path, rejection))
+    if not stations:
+        raise CatalogError(str(folder), _nothing_found(files, rejected))
+    found = {station: tuple(paths) for station, paths in sorted(stations.items())}
+    return FolderContents(found, reduce(add, inventories) if inventories else None, tuple(rejected))
+
+
+def read_station(
+    paths: Iterable[Path], inventory: Inventory | None, station: str | None = None
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """
+    Read the files of one station, with coordinates, orientation and response attached.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        From ``FolderContents.stations``.
+    inventory : Inventory or None
+        From ``FolderContents.inventory``.
+    station : str, optional
+        ``"NET.STA"``: keep only its traces, for files that hold several stations.
+
+    Returns
+    -------
+    stream : Stream
+        Traces in the words of ``formats/vocabulary.py``; each remembers its file in ``stats.source``.
+    rejected : tuple of Rejection
+        Files that cannot be read and traces whose metadata is insufficient; the rest goes on.
+    """
+    stream, rejected = Stream(), []
+    for path in paths:
+        try:
+            traces = _read(path, headonly=False)
+        except RecordRejected as rejection:
+            rejected.append(_rejected_file(path, rejection))
+            continue
+        for trace in traces:
+            if station not in (None, f"{trace.stats.network}.{trace.stats.station}"):
+                continue
+            try:
+                stream += with_metadata(trace, inventory)
+                stream[-1].stats.source = str(path)
+            except RecordRejected as rejection:
+                rejected.append(Rejection("record", trace.id, str(path), None, rejection.reasons))
+    return stream, tuple(rejected)
+
+
+def read_event(path: str | Path) -> Event:
+    """
+    Read the one event of a QuakeML file.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read or does not hold exactly one event with an origin.
+    """
+    try:
+        events = _foreign(obspy.read_events, Path(path))
+    except RecordRejected as rejection:
+        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
+    if len(events) != 1:
+        raise CatalogError(str(path), f"must hold one event, holds {len(events)}")
+    if not events[0].origins:
+        raise CatalogError(str(path), f"the event {events[0].resource_id} has no origin")
+    return events[0]
+
+
+def _files(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        raise CatalogError(str(folder), "is not a folder" if folder.exists() else "no such folder")
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    if not files:
+        raise CatalogError(str(folder), "the folder is empty")
+    return files
+
+
+def _kind(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            start = file.read(1000)
+    except OSError:
+        return "record"  # reading it says why it cannot be read
+    return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
+
+
+def _read(path: Path, *, headonly: bool) -> Stream:
+    if not path.stat().st_size:
+        raise RecordRejected(str(path), "the file is empty")
+    return _foreign(obspy.read, path, headonly=headonly)
+
+
+def _read_inventory(path: Path) -> Inventory:
+    return _foreign(obspy.read_inventory, path)
+
+
+def _named_inventories(stationxml: Path) -> list[Inventory]:
+    paths = sorted(stationxml.rglob("*.xml")) if stationxml.is_dir() else [stationxml]
+    if not paths:
+        raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
+    try:
+        return [_read_inventory(path) for path in paths]
+    except RecordRejected as rejection:
+        raise CatalogError(rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}") from rejection
+
+
+def _foreign(reader: Callable[..., Any], path: Path, **options: bool) -> Any:
+    """Call a reader of ObsPy: the one place where its errors, which have no common class, become a rejection."""
+    try:
+        return reader(glob.escape(str(path)), **options)
+    except PerError:
+        raise
+    except Exception as error:  # ObsPy's readers raise bare Exception, and whatever the libraries below them gave
+        reason = " ".join(str(error).split())
+        raise RecordRejected(str(path), f"ObsPy cannot read it: {type(error).__name__}: {reason}") from error
+
+
+def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
+    return Rejection("file", path.name, str(path), None, rejection.reasons)
+
+
+def _nothing_found(files: list[Path], rejected: list[Rejection]) -> str:
+    problem = f"none of its {len(files)} files is a record"
+    if not rejected:
+        return f"{problem}: there is only metadata"
+    return f"{problem}; {rejected[0].name}: {'; '.join(rejected[0].reasons)}"
