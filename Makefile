@@ -1,1 +1,51 @@
+# `make demo` and `make test` need Python 3.11 or newer and nothing else; they install into .venv.
 PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test check wheel benchmark clean
+
+demo: .venv/run
+	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
+	$(BIN)/per-obspy run workflows/demo.toml
+
+test: .venv/test
+	@echo "== tests, doctests and README"
+	$(BIN)/python -m pytest -q
+	@echo "== the kernels' tests once more without the compiler"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/kernels
+
+check: .venv/check
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+wheel: .venv/check
+	@echo "== build the wheel, install it into an empty environment, use it in an empty folder"
+	rm -rf dist .venv/wheel
+	$(BIN)/python -m build --outdir dist . >/dev/null
+	$(PYTHON) -m venv .venv/wheel
+	.venv/wheel/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
+
+benchmark: .venv/benchmark
+	$(BIN)/python tests/benchmarks/spectra.py
+
+.venv/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "per_obspy needs Python 3.11 or newer; name one with PYTHON=..."; exit 1; }
+	@echo "== make a virtual environment in .venv"
+	$(PYTHON) -m venv .venv
+
+.venv/run: .venv/bin/python pyproject.toml
+	@echo "== install per_obspy and what it needs (a minute or two)"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+.venv/%: .venv/run
+	@echo "== install what '$*' needs"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$*]'
+	@touch $@
+
+clean:
+	rm -rf .venv dist output
