@@ -5,9 +5,39 @@ Only ``run.py`` and ``cli.py`` see a configuration as a whole. Rooms below take 
 configuration are relative to the folder of its file.
 """
 
+import os
+import tomllib
 from pathlib import Path
+from typing import Annotated, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    SerializationInfo,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import ErrorDetails
+
+from per_obspy.errors import CatalogError
+
+
+def _from_folder(path: Path, info: ValidationInfo) -> Path:
+    """Return a path of a configuration seen from the folder of its file."""
+    return Path(os.path.normpath(info.context["folder"] / path)) if info.context else path
+
+
+def _to_folder(path: Path, info: SerializationInfo) -> str:
+    """Return the path as a configuration in that folder would write it."""
+    return os.path.relpath(path, info.context["folder"]) if info.context else str(path)
+
+
+RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to_folder)]
 
 
 class Section(BaseModel):
@@ -19,7 +49,7 @@ class Section(BaseModel):
 class Columns(Section):
     """How to read a plain table of samples (``records/columns.py``)."""
 
-    file: Path = Field(description="text file, one row a sample")
+    file: RelativePath = Field(description="text file, one row a sample")
     network: str = Field("", description="SEED network code")
     station: str = Field(description="SEED station code")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
@@ -38,9 +68,9 @@ class Columns(Section):
 class Records(Section):
     """Where the records are."""
 
-    folder: Path | None = Field(None, description="folder of waveform files, with StationXML beside them")
-    stationxml: Path | None = Field(None, description="StationXML file or folder, if not beside the records")
-    event: Path | None = Field(None, description="QuakeML file; no event is fine")
+    folder: RelativePath | None = Field(None, description="folder of waveform files, with StationXML beside them")
+    stationxml: RelativePath | None = Field(None, description="StationXML file or folder, if not beside the records")
+    event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
 
 
@@ -76,8 +106,50 @@ class Building(Section):
     mass_per_area: float = Field(1000.0, gt=0, description="kg/m2 and floor")
     area: float = Field(200.0, gt=0, description="floor area, m2; only the ratio of the masses matters")
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
-    floor_tolerance: float = Field(0.6, ge=0, description="m; floors further apart than 2 ft misalign (FEMA P-154)")
+    floor_tolerance: float = Field(0.61, ge=0, description="m; floors further apart than 2 ft misalign (FEMA P-154)")
     period_formula: str = Field("asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds")
+
+
+class Scenario(Section):
+    """A simulated earthquake and the stations that record it (stochastic method, Boore 2003)."""
+
+    seed: int = Field(20, ge=0, description="of every random number; the same seed gives the same samples")
+    name: str = Field("Simulated earthquake", description="of the event")
+    magnitude: float = Field(7.0, ge=4, le=8.5, description="moment magnitude")
+    origin_time: str = Field("2000-01-01T00:00:00", description="ISO 8601, UTC")
+    latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
+    longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
+    depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
+    stress_drop: float = Field(10e6, gt=0, description="Pa; 100 bar (Boore 2003)")
+    density: float = Field(2800.0, gt=0, description="kg/m3 at the source (Boore 2003)")
+    shear_velocity: float = Field(3500.0, gt=0, description="m/s at the source (Boore 2003)")
+    quality: float = Field(180.0, gt=0, description="Q at 1 Hz (Raoof and others 1999)")
+    quality_exponent: float = Field(0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)")
+    kappa: float = Field(0.035, ge=0, description="s; generic rock (Boore & Joyner 1997)")
+    stations: int = Field(24, ge=1, le=999, description="number of stations")
+    city_latitude: float = Field(0.0, ge=-90, le=90, description="centre of the stations, degrees north")
+    city_longitude: float = Field(0.3, ge=-180, le=180, description="centre of the stations, degrees east")
+    city_radius: float = Field(12_000.0, gt=0, description="m")
+    lakebed_latitude: float = Field(0.0, ge=-90, le=90, description="centre of the lakebed, degrees north")
+    lakebed_longitude: float = Field(0.3, ge=-180, le=180, description="centre of the lakebed, degrees east")
+    lakebed_radius: float = Field(6_000.0, ge=0, description="m; 0: no lakebed")
+    lakebed_frequency: float = Field(0.5, gt=0, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6")
+    lakebed_damping: float = Field(0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical")
+    lakebed_scatter: float = Field(0.1, ge=0, description="log-standard deviation of its frequency between stations")
+    correlation: float = Field(0.3, ge=-1, le=1, description="between the north and east components")
+    vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum on rock")
+    noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
+    pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
+    dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")
+
+
+class SimulatedPairs(Section):
+    """A simulated inventory around the stations of a run."""
+
+    count: int = Field(2000, ge=1, description="pairs")
+    seed: int = Field(20, ge=0, description="of every random number")
+    radius: float = Field(2000.0, gt=0, description="m, largest distance of a pair from its station")
+    touching: float = Field(0.5, ge=0, le=1, description="share of pairs without a gap")
 
 
 class Screening(Section):
@@ -90,3 +162,82 @@ class Screening(Section):
         {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
         description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
     )
+
+    @field_validator("classes")
+    @classmethod
+    def _ascending(cls, classes: dict[str, float]) -> dict[str, float]:
+        thresholds = list(classes.values())
+        if not thresholds or thresholds != sorted(thresholds):
+            raise ValueError(f"thresholds must be in ascending order, got {classes}")
+        return classes
+
+
+class Pairs(Section):
+    """Where the pairs of buildings come from: a stored table, or a simulated one around the stations."""
+
+    file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
+    simulated: SimulatedPairs | None = Field(None, description="simulated inventory around the stations")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (self.simulated is None):
+            raise ValueError("give either file or simulated")
+        return self
+
+
+class Run(Section):
+    """Everything one run needs."""
+
+    name: str = Field(min_length=1, description="title of tables and figures")
+    output: RelativePath = Field(description="folder of the results")
+    workers: int = Field(0, ge=0, description="processes; 0: one a processor")
+    scenario: RelativePath | None = Field(None, description="TOML file of an event to simulate instead of records")
+    records: Records | None = Field(None, description="where the records are")
+    pairs: Pairs = Field(description="where the pairs come from")
+    processing: Processing = Processing()
+    spectra: Spectra = Spectra()
+    building: Building = Building()
+    screening: Screening = Screening()
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.scenario is None) == (self.records is None):
+            raise ValueError("give either scenario or records")
+        return self
+
+
+SectionType = TypeVar("SectionType", bound=Section)
+
+
+def load(path: Path, section: type[SectionType]) -> SectionType:
+    """
+    Read a configuration.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file; paths in it are relative to its folder.
+    section : type of Section
+        What the file holds: :class:`Run` or :class:`Scenario`.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read, or naming every key that is unknown, missing or has a wrong value.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise CatalogError(str(path), f"cannot be read as TOML: {error}") from error
+    try:
+        return section.model_validate(content, context={"folder": path.resolve().parent})
+    except ValidationError as error:
+        raise CatalogError(str(path), "; ".join(_fault(fault) for fault in error.errors())) from error
+
+
+def _fault(fault: ErrorDetails) -> str:
+    """Return one fault of a configuration: key, what is wrong, value."""
+    key = ".".join(map(str, fault["loc"])) or "the file"
+    given = "" if fault["type"] in {"missing", "value_error"} else f" (got {fault['input']!r:.60})"
+    unknown = "unknown key" if fault["type"] == "extra_forbidden" else fault["msg"]
+    return f"{key}: {unknown}{given}"
