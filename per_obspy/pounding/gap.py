@@ -46,7 +46,7 @@ def critical_gap(per_1: ArrayLike, per_2: ArrayLike, correlation: ArrayLike) -> 
     correlation = checks.between("correlation", correlation, -1.0, 1.0)
     difference = np.abs(per_1 - per_2)
     gap = np.hypot(difference, np.sqrt(2.0 * (1.0 - correlation)) * np.sqrt(per_1) * np.sqrt(per_2))
-    return np.clip(gap, difference, per_1 + per_2)
+    return np.minimum(np.maximum(gap, difference), per_1 + per_2)
 
 
 def srss_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:

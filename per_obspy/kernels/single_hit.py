@@ -1,0 +1,275 @@
+"""
+Single-hit estimate of many pairs: grazing state, first earlier contact, impact, and the bound over all phases.
+
+Structure 1 stands left; ``u1 - u2`` reaches the critical gap at the grazing state. Pairs are worked on in blocks: the
+iteration outside, the pairs of a block inside, so that the compiler puts several pairs into one instruction.
+"""
+
+import math
+
+import numpy as np
+
+from per_obspy.kernels._jit import kernel
+
+PAIRS = 32  # of a block: its arrays stay in the first-level cache
+OK, NO_POUNDING, NO_GRAZING_STATE, INCONSISTENT_CRITICAL_GAP = 0, 1, 2, 3
+FIELDS = 13  # time, then displacement, velocity, velocity after, radius after, amplification, energy of 1, then of 2
+ULPS = 2e-15  # rounding that a tangent state may carry, relative to the radii
+STILL = 1e-15  # an advance in time that no longer matters, relative to the time
+TURN, TURN_REMAINDER = 6.283185307179586, 2.4492935982947064e-16  # 2 pi in two parts
+TURNS_PER_RADIAN = 1.0 / TURN
+SINE = tuple((-1.0) ** n / math.factorial(2 * n + 1) for n in range(1, 8))  # up to |y| = pi/4
+COSINE = tuple((-1.0) ** n / math.factorial(2 * n) for n in range(1, 9))
+# phases of the scan for the bound: even on the left; towards the right end, where a narrow peak can stand, ever denser
+FINEST = 2.0**-11
+NODES = np.array([-1.0, -0.6, -0.3, 0.0, 0.2, 0.4, 0.55] + [1.0 - 2.0 ** (-n / 2) for n in range(3, 23)] + [1.0])
+WIDTH = 0.25  # of the first parabola, relative to the distance from the right end
+ROUNDS = 4  # of parabolas
+
+
+@kernel
+def estimate(arguments, status, branches, bounds):
+    """
+    Fill ``status`` (n), ``branches`` (2, 13, n) and ``bounds`` (2, n).
+
+    ``arguments`` (9, n): radii 1 and 2, circular frequencies 1 and 2, (1 + e) m2/M and (1 + e) m1/M (the part of the
+    velocity difference that 1 and 2 receive), (1 + e) m1 m2/M, critical gap, gap; M = m1 + m2.
+    """
+    states = np.empty((4, PAIRS))
+    constants = np.empty((11, PAIRS))
+    work = np.empty((6, PAIRS))
+    count = status.size
+    for first in range(0, count, PAIRS):
+        pairs = min(PAIRS, count - first)
+        for pair in range(pairs):
+            status[first + pair] = _grazing_state(arguments, first + pair, states, pair)
+        for branch in range(2):
+            _load(arguments, first, pairs, states, 1.0 - 2.0 * branch, constants)
+            _first_contact(constants, work, pairs)
+            _impact(arguments, first, pairs, constants, work[0], branches[branch])
+            for index in range(first, first + pairs):
+                if status[index] != OK:
+                    _no_impact(status[index], arguments, index, branches[branch])
+        for body in range(2):
+            _largest_radius(arguments, body, first, pairs, constants, work, bounds)
+
+
+@kernel
+def _grazing_state(arguments, index, states, pair):
+    """Store x, v, and the critical gap less the gap, of the state that only just touches; return the status."""
+    radius_1, radius_2 = arguments[0, index], arguments[1, index]
+    stiffness_1, stiffness_2 = arguments[2, index] ** 2, arguments[3, index] ** 2
+    gap, reach = arguments[7, index], radius_1 + radius_2
+    states[0, pair] = states[1, pair] = states[3, pair] = 0.0
+    if arguments[8, index] >= gap:
+        return NO_POUNDING
+    if gap > reach * (1.0 + ULPS):
+        return INCONSISTENT_CRITICAL_GAP
+    gap = min(gap, reach)
+    a = stiffness_2 - stiffness_1
+    b = stiffness_2 * gap
+    c = stiffness_1 * radius_1**2 + stiffness_2 * (gap - radius_2) * (gap + radius_2)
+    discriminant = b * b - a * c
+    if discriminant < -ULPS * b * b:
+        return NO_GRAZING_STATE
+    x = c / (b + math.sqrt(max(discriminant, 0.0)))
+    low, high = max(-radius_1, gap - radius_2), min(radius_1, gap + radius_2)
+    if x < low - ULPS * reach or x > high + ULPS * reach:
+        return NO_GRAZING_STATE
+    x = min(max(x, low), high)
+    square_1 = stiffness_1 * (radius_1 - x) * (radius_1 + x)
+    square_2 = stiffness_2 * (radius_2 - (x - gap)) * (radius_2 + (x - gap))
+    states[0, pair], states[1, pair] = x, x - gap
+    states[2, pair] = math.sqrt(max(min(square_1, square_2), 0.0))
+    states[3, pair] = gap - arguments[8, index]
+    return OK
+
+
+@kernel
+def _load(arguments, first, pairs, states, sign, constants):
+    """Gather what the backward motion of a block needs; pairs without a state get a motion that is over at once."""
+    for pair in range(pairs):
+        omega_1, omega_2 = arguments[2, first + pair], arguments[3, first + pair]
+        velocity = sign * states[2, pair]
+        constants[0, pair], constants[1, pair] = omega_1, omega_2
+        constants[2, pair], constants[3, pair] = states[0, pair], states[1, pair]
+        constants[4, pair] = velocity
+        constants[5, pair], constants[6, pair] = velocity / omega_1, velocity / omega_2
+        constants[7, pair], constants[8, pair] = omega_1 * states[0, pair], omega_2 * states[1, pair]
+        constants[9, pair] = states[3, pair]
+        curvature = omega_1**2 * arguments[0, first + pair] + omega_2**2 * arguments[1, first + pair]
+        constants[10, pair] = curvature if states[3, pair] > 0.0 else 1.0
+
+
+@kernel
+def _sine_products(phase):
+    """Return sin² and sin·cos of half the phase, by Taylor series to rounding, which the compiler can vectorise."""
+    turns = math.floor(phase * TURNS_PER_RADIAN + 0.5)
+    y = 0.25 * (phase - turns * TURN - turns * TURN_REMAINDER)
+    z = y * y
+    s0, s1, s2, s3, s4, s5, s6 = SINE
+    c0, c1, c2, c3, c4, c5, c6, c7 = COSINE
+    sine = y * (1.0 + z * (s0 + z * (s1 + z * (s2 + z * (s3 + z * (s4 + z * (s5 + z * s6)))))))
+    cosine = 1.0 + z * (c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * (c6 + z * c7)))))))
+    twice_sine, twice_cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return twice_sine * twice_sine, twice_sine * twice_cosine
+
+
+@kernel
+def _first_contact(constants, work, pairs):
+    """
+    Find the smallest time before the grazing state at which the pair is the actual gap apart: ``work[0]``.
+
+    The distance to contact d has |d''| <= K2, so the step 2 d/(d' + sqrt(d'² + 2 K2 d)) never passes the first root.
+    """
+    for pair in range(pairs):
+        work[0, pair] = 0.0
+    moving = True
+    while moving:
+        for pair in range(pairs):
+            time = work[0, pair]
+            square_1, product_1 = _sine_products(constants[0, pair] * time)
+            square_2, product_2 = _sine_products(constants[1, pair] * time)
+            velocity, x_1, x_2 = constants[4, pair], constants[2, pair], constants[3, pair]
+            swing = product_1 * constants[5, pair] - product_2 * constants[6, pair]
+            distance = max(constants[9, pair] - 2.0 * (x_1 * square_1 - x_2 * square_2 + swing), 0.0)
+            turn = constants[7, pair] * product_1 - constants[8, pair] * product_2
+            closing = 2.0 * (turn - velocity * (square_1 - square_2))
+            root = math.sqrt(closing * closing + 2.0 * constants[10, pair] * distance)
+            above = 2.0 * distance if closing > 0.0 else root - closing
+            below = closing + root if closing > 0.0 else constants[10, pair]
+            advance = above / below if distance > 0.0 else 0.0
+            work[0, pair] = time + advance
+            work[1, pair] = advance - STILL * time
+        moving = False
+        for pair in range(pairs):
+            moving = moving or work[1, pair] > 0.0
+
+
+@kernel
+def _impact(arguments, first, pairs, constants, times, branch):
+    """Store the states of a block at the actual contact and after it."""
+    for pair in range(pairs):
+        index, time = first + pair, times[pair]
+        square_1, product_1 = _sine_products(constants[0, pair] * time)
+        square_2, product_2 = _sine_products(constants[1, pair] * time)
+        velocity = constants[4, pair]
+        velocity_1 = velocity * (1.0 - 2.0 * square_1) + 2.0 * constants[7, pair] * product_1
+        velocity_2 = velocity * (1.0 - 2.0 * square_2) + 2.0 * constants[8, pair] * product_2
+        branch[0, index] = time
+        branch[1, index] = constants[2, pair] * (1.0 - 2.0 * square_1) - 2.0 * constants[5, pair] * product_1
+        branch[2, index] = velocity_1
+        branch[3, index] = velocity_1 - arguments[4, index] * (velocity_1 - velocity_2)
+        branch[7, index] = constants[3, pair] * (1.0 - 2.0 * square_2) - 2.0 * constants[6, pair] * product_2
+        branch[8, index] = velocity_2
+        branch[9, index] = velocity_2 + arguments[5, index] * (velocity_1 - velocity_2)
+    for body in range(2):
+        _after(arguments, body, first, pairs, branch)
+
+
+@kernel
+def _after(arguments, body, first, pairs, branch):
+    """Store radius, amplification and transfer energy; a structure at rest that stays so has amplification 1."""
+    field = 6 * body
+    for index in range(first, first + pairs):
+        displacement, before, after = branch[1 + field, index], branch[2 + field, index], branch[3 + field, index]
+        shifted = after / arguments[2 + body, index]
+        radius = math.sqrt(displacement * displacement + shifted * shifted)
+        resting = radius == 0.0 and arguments[body, index] == 0.0
+        impulse = arguments[6, index] * (branch[2, index] - branch[8, index]) * (1.0 - 2.0 * body)
+        branch[4 + field, index] = radius
+        branch[5 + field, index] = 1.0 if resting else radius / arguments[body, index]
+        branch[6 + field, index] = impulse * 0.5 * (before + after)
+
+
+@kernel
+def _no_impact(status, arguments, index, branch):
+    """Store what a pair without impact keeps, and NaN where there is no answer."""
+    known = status == NO_POUNDING
+    branch[:, index] = math.nan
+    for body in range(2):
+        branch[4 + 6 * body, index] = arguments[body, index] if known else math.nan
+        branch[5 + 6 * body, index] = 1.0 if known else math.nan
+        branch[6 + 6 * body, index] = 0.0 if known else math.nan
+
+
+@kernel
+def _largest_radius(arguments, body, first, pairs, constants, work, bounds):
+    """
+    Store the largest radius that contact at the actual gap can leave to one structure, whatever the phases.
+
+    For every contact displacement x one of the two velocity signs of equal direction closes the gap, and so does that
+    of opposite direction: the largest |v'| is the sum of both contributions. What remains is a maximum over x, with at
+    most two peaks in all cases tried: the two highest of a scan are refined.
+    """
+    _load_bound(arguments, body, first, pairs, constants)
+    for pair in range(pairs):
+        work[0, pair] = work[1, pair] = 0.0  # nodes of the highest and of the second peak
+        work[2, pair] = work[3, pair] = work[4, pair] = 0.0  # their heights, and the height before
+        work[5, pair] = _radius_squared(constants, pair, NODES[0])
+    for node in range(NODES.size):
+        following = NODES[min(node + 1, NODES.size - 1)]
+        for pair in range(pairs):
+            left, here, right = work[4, pair], work[5, pair], _radius_squared(constants, pair, following)
+            height = here if here >= left and here >= right else 0.0
+            highest, second = height > work[2, pair], height > work[3, pair]
+            work[3, pair] = work[2, pair] if highest else (height if second else work[3, pair])
+            work[1, pair] = work[0, pair] if highest else (NODES[node] if second else work[1, pair])
+            work[2, pair] = height if highest else work[2, pair]
+            work[0, pair] = NODES[node] if highest else work[0, pair]
+            work[4, pair], work[5, pair] = here, right
+    for peak in range(2):
+        _refine(constants, work[peak], work[2 + peak], pairs)
+    for pair in range(pairs):
+        square = max(work[2, pair], work[3, pair])
+        bounds[body, first + pair] = max(math.sqrt(square), arguments[body, first + pair])
+
+
+@kernel
+def _load_bound(arguments, body, first, pairs, constants):
+    """Gather what the bound of one structure needs; a pair that cannot touch gets an interval and shares of zero."""
+    for pair in range(pairs):
+        radius, other = arguments[body, first + pair], arguments[1 - body, first + pair]
+        gap, received = arguments[8, first + pair], arguments[4 + body, first + pair]
+        low, high = max(-radius, gap - other), min(radius, gap + other)
+        touching = low <= high
+        constants[0, pair] = 0.5 * (low + high) if touching else 0.0
+        constants[1, pair] = 0.25 * (high - low) if touching else 0.0
+        constants[2, pair] = radius
+        constants[3, pair] = other
+        constants[4, pair] = gap
+        constants[5, pair] = abs(1.0 - received) if touching else 0.0
+        share = received * arguments[3 - body, first + pair] / arguments[2 + body, first + pair]
+        constants[6, pair] = share if touching else 0.0
+
+
+@kernel
+def _refine(constants, places, heights, pairs):
+    """Climb to the vertex of the parabola through three phases, ever closer together."""
+    closeness = WIDTH
+    for _ in range(ROUNDS):
+        for pair in range(pairs):
+            y, here = places[pair], heights[pair]
+            width = closeness * min(1.0 - y + FINEST, 1.0)
+            left = _radius_squared(constants, pair, max(y - width, -1.0))
+            right = _radius_squared(constants, pair, min(y + width, 1.0))
+            bend = min(left - 2.0 * here + right, -1e-300)
+            shift = min(max(0.5 * width * (left - right) / bend, -2.0 * width), 2.0 * width)
+            vertex = min(max(y + shift, -1.0), 1.0)
+            there = _radius_squared(constants, pair, vertex)
+            places[pair] = vertex if there > here else y
+            heights[pair] = max(here, there)
+        closeness *= 0.125
+
+
+@kernel
+def _radius_squared(constants, pair, y):
+    """Return the squared radius after contact at the phase y in [-1, 1] (ends flattened, as a cosine would)."""
+    radius, other = constants[2, pair], constants[3, pair]
+    x = constants[0, pair] + constants[1, pair] * y * (3.0 - y * y)
+    behind = x - constants[4, pair]
+    own = max((radius - x) * (radius + x), 0.0)
+    given = max((other - behind) * (other + behind), 0.0)
+    own_share, given_share = constants[5, pair], constants[6, pair]
+    both = 2.0 * own_share * given_share * math.sqrt(own * given)
+    return x * x + own_share * own_share * own + given_share * given_share * given + both

@@ -1,0 +1,166 @@
+"""Single-hit estimate of what pounding does to a pair: grazing state, earlier contact, impact, radius after it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.single_hit import NO_POUNDING, estimate
+from per_obspy.pounding.impact import mass_shares
+
+#: gap/critical gap below which several impacts make the estimate unreliable (see the table of `single_hit`)
+RELIABLE_GAP_RATIO = 0.6
+
+STATUS = np.array(["ok", "no_pounding", "no_grazing_state", "inconsistent_critical_gap"])
+
+
+class SingleHitBranches(NamedTuple):
+    """
+    Both possible impacts; first axis: both structures move towards 2 at the grazing state (+), then towards 1 (-).
+
+    ``time_before`` is the time from the actual contact to the grazing state, s. Displacements and radii are in m,
+    velocities in m/s, transfer energies in J (positive leaves the structure), amplifications dimensionless.
+    """
+
+    time_before: FloatArray
+    displacement_1: FloatArray
+    velocity_1: FloatArray
+    velocity_after_1: FloatArray
+    per_after_1: FloatArray
+    amplification_1: FloatArray
+    transfer_energy_1: FloatArray
+    displacement_2: FloatArray
+    velocity_2: FloatArray
+    velocity_after_2: FloatArray
+    per_after_2: FloatArray
+    amplification_2: FloatArray
+    transfer_energy_2: FloatArray
+
+
+class SingleHit(NamedTuple):
+    """
+    Single-hit estimate of each pair.
+
+    ``status`` is ``"ok"``, ``"no_pounding"`` (gap at least critical), ``"no_grazing_state"`` (this critical gap is no
+    distance at which the two radii only just touch) or ``"inconsistent_critical_gap"`` (larger than the sum of the
+    radii). ``amplification_i`` is the radius after impact over the radius before, never below 1 because the radius
+    before was reached anyway; ``per_after_i`` (m) and ``impact_velocity`` (v1 - v2, m/s) are the largest of the two
+    branches. They are NaN unless the status is ``ok``, and 1, the radius before, and 0 for ``no_pounding``.
+    ``envelope_i`` (m) bounds the radius after impact over all phases of both structures and is never NaN.
+    """
+
+    status: NDArray[np.str_]
+    amplification_1: FloatArray
+    amplification_2: FloatArray
+    per_after_1: FloatArray
+    per_after_2: FloatArray
+    impact_velocity: FloatArray
+    branches: SingleHitBranches
+    envelope_1: FloatArray
+    envelope_2: FloatArray
+
+
+def single_hit(
+    per_1: ArrayLike,
+    per_2: ArrayLike,
+    period_1: ArrayLike,
+    period_2: ArrayLike,
+    mass_1: ArrayLike,
+    mass_2: ArrayLike,
+    restitution: ArrayLike,
+    critical_gap: ArrayLike,
+    gap: ArrayLike,
+) -> SingleHit:
+    """
+    Estimate the amplification of both structures of a pair by one impact at full energy.
+
+    Parameters
+    ----------
+    per_1, per_2 : array_like
+        Pseudo Energy Radius of each structure at contact level, m; 0 is a wall or a structure at rest.
+    period_1, period_2 : array_like
+        Undamped periods, s.
+    mass_1, mass_2 : array_like
+        Impact masses, kg; one of the two may be infinite.
+    restitution : array_like
+        Coefficient of restitution, from 0 to 1, dimensionless.
+    critical_gap : array_like
+        Gap at which the pair would only just touch, m.
+    gap : array_like
+        Actual gap, m.
+
+    Returns
+    -------
+    SingleHit
+        Arrays of the broadcast shape; those of ``branches`` have the branch as an additional first axis.
+
+    Raises
+    ------
+    ValueError
+        If a radius or gap is negative, a period or mass is not positive, or the restitution is outside [0, 1].
+
+    Notes
+    -----
+    At the grazing state both structures have the same velocity v, lie on their energy circles and stand at x and
+    x - g_cr: with ``A = w2² - w1²``, ``B = w2² g_cr``, ``C = w1² r1² - w2² r2² + w2² g_cr²`` the only root at which the
+    gap is smallest is ``x = C/(B + sqrt(B² - A C))``. The sign of v is not determined, so both branches are followed
+    back along their circles to the first contact at the actual gap, where the impact takes place.
+
+    Predicted over actual largest PER of the governing structure; median, standard deviation of the logarithm, share of
+    cases under-predicted by more than 1 % (8 strong-motion records, damping 5 %, restitution 0.65, exact critical gap):
+
+    ========  ====================  ====================  ===================  ===================
+    g/g_cr    broad band, m2 = m1   Mexico City, m2 = m1  broad, m2 = 5 m1     broad, m2 = 0.2 m1
+    ========  ====================  ====================  ===================  ===================
+    0.95      1.24, 0.10, 0.03      1.37, 0.16, 0.02      1.28, 0.12, 0.00     1.23, 0.17, 0.07
+    0.80      1.28, 0.16, 0.08      1.41, 0.16, 0.00      1.42, 0.15, 0.00     1.17, 0.22, 0.20
+    0.50      1.15, 0.19, 0.22      1.33, 0.22, 0.09      1.41, 0.15, 0.00     1.03, 0.20, 0.41
+    0.05      1.02, 0.21, 0.43      1.28, 0.36, 0.22      1.26, 0.17, 0.08     1.16, 0.16, 0.15
+    ========  ====================  ====================  ===================  ===================
+
+    Near the critical gap the estimate is conservative; below 0.6 of it several impacts make it unreliable. A small
+    change of the gap can then change the estimate by a jump.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), 11WCEE, section "Estimating pounding effects" and figure 5.
+
+    Examples
+    --------
+    Equal periods: the impact takes place where the relative motion has left ``w sqrt(g_cr² - g²)``.
+
+    >>> hit = single_hit(0.3, 0.4, 1.0, 1.0, 1e6, 1e6, 0.65, 0.5, 0.4)
+    >>> print(hit.status, round(float(hit.impact_velocity / (2 * np.pi)), 6))
+    ok 0.3
+    """
+    radii = checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)
+    frequencies = 2 * np.pi / checks.positive("period_1", period_1), 2 * np.pi / checks.positive("period_2", period_2)
+    share_1, share_2, reduced_mass = mass_shares(mass_1, mass_2)
+    impulse = 1.0 + checks.between("restitution", restitution, 0.0, 1.0)
+    gaps = checks.not_negative("critical_gap", critical_gap), checks.not_negative("gap", gap)
+    shares = impulse * share_2, impulse * share_1, impulse * reduced_mass
+    broadcast = np.broadcast_arrays(*radii, *frequencies, *shares, *gaps)
+    return _estimate(np.stack([array.ravel() for array in broadcast]), broadcast[0].shape)
+
+
+def _estimate(arguments: FloatArray, shape: tuple[int, ...]) -> SingleHit:
+    """Call the kernel and give its numbers names and shape."""
+    count = arguments.shape[1]
+    status = np.empty(count, dtype=np.int8)
+    fields, envelope = np.empty((2, 13, count)), np.empty((2, count))
+    estimate(arguments, status, fields, envelope)
+    branches = SingleHitBranches(*(fields[:, field].reshape(2, *shape) for field in range(13)))
+    velocity = np.max(branches.velocity_1 - branches.velocity_2, axis=0)
+    return SingleHit(
+        status=STATUS[status].reshape(shape),
+        amplification_1=np.maximum(np.max(branches.amplification_1, axis=0), 1.0),
+        amplification_2=np.maximum(np.max(branches.amplification_2, axis=0), 1.0),
+        per_after_1=np.max(branches.per_after_1, axis=0),
+        per_after_2=np.max(branches.per_after_2, axis=0),
+        impact_velocity=np.where(status.reshape(shape) == NO_POUNDING, 0.0, velocity),
+        branches=branches,
+        envelope_1=envelope[0].reshape(shape),
+        envelope_2=envelope[1].reshape(shape),
+    )
