@@ -74,17 +74,60 @@ class Records(Section):
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
 
 
+class Check(Section):
+    """One check of a record: where it fails, and what a failure means."""
+
+    threshold: float = Field(description="in the unit that the check names")
+    level: str = Field(pattern="^(reject|warn|note)$", description="reject leaves the trace out; warn, note: recorded")
+
+
+class Checks(Section):
+    """Thresholds of ``processing/quality.py``, ``processing/outcome.py`` and ``processing/corners.py``."""
+
+    sampling_rate: Check = Check(threshold=20.0, level="reject")  # Hz, at least
+    duration: Check = Check(threshold=5.0, level="reject")  # s, at least
+    levels: Check = Check(threshold=16, level="reject")  # different values a sample takes, at least
+    clipped_run: Check = Check(threshold=5, level="reject")  # equal samples at an extreme, fewer than
+    counter_use: Check = Check(threshold=0.8, level="warn")  # peak over full scale of a 24-bit counter, at most
+    dropout: Check = Check(threshold=0.3, level="reject")  # s without change during the shaking, less than
+    spike: Check = Check(threshold=15.0, level="reject")  # jump of one sample over others within 0.5 s, at most
+    zero_crossings: Check = Check(threshold=0.1, level="reject")  # a second, at least
+    outlier: Check = Check(threshold=5.0, level="reject")  # peak over the largest peak of two sisters, at most
+    late_trigger: Check = Check(threshold=0.1, level="warn")  # motion of the first second over the peak, at most
+    cut_off: Check = Check(threshold=0.1, level="warn")  # motion of the last second over the peak, at most
+    second_event: Check = Check(threshold=0.3, level="warn")  # later peak after quiet over the peak, at most
+    signal_to_noise: Check = Check(threshold=2.0, level="reject")  # somewhere at least
+    clear_band: Check = Check(threshold=2.0, level="warn")  # signal to noise over ``required_band``, at least
+    final_velocity: Check = Check(threshold=0.1, level="reject")  # over its peak, at most
+    final_displacement: Check = Check(threshold=0.2, level="reject")  # over its peak, at most
+
+
 class Processing(Section):
     """The chain from raw record to one that spectra may be computed from (Boore 2005; gmprocess 2.8)."""
 
-    highpass: float = Field(0.08, gt=0, description="corner, Hz")
-    lowpass: float = Field(40.0, gt=0, description="corner, Hz; never above 0.75 of Nyquist")
+    highpass: float | None = Field(None, gt=0, description="corner, Hz; not given: found for each record")
+    lowpass: float | None = Field(None, gt=0, description="corner, Hz; not given: found; never above 0.75 of Nyquist")
     order: int = Field(5, ge=1, le=20, description="n of the Butterworth amplitude 1/sqrt(1+(f_hp/f)^2n)")
     taper: float = Field(0.05, ge=0, le=0.5, description="fraction of the record at each end, Hann")
     usable: float = Field(0.8, gt=0, le=1, description="longest usable period = usable / f_hp")
-    pre_event: float = Field(0.0, ge=0, description="s at the start that are noise; 0: mean of the whole record")
+    pre_event: float | None = Field(None, ge=0, description="s of noise at the start; not given: until the first wave")
     gain_tolerance: float = Field(0.1, gt=0, description="between product of stage gains and sensitivity, relative")
     overlap: float = Field(0.8, gt=0, le=1, description="part of the longer horizontal that both must cover")
+    onset_margin: float = Field(0.5, ge=0, description="s before the first wave where the noise ends")
+    shortest_noise: float = Field(2.0, gt=0, description="s of noise that tell something; fewer count as none")
+    pick_tolerance: float = Field(10.0, gt=0, description="s between a pick and the computed travel time of P")
+    smoothing: float = Field(20.0, gt=0, description="b of the Konno-Ohmachi window")
+    required_band: tuple[float, float] = Field((0.2, 10.0), description="Hz, where the signal should clear the noise")
+    highest_lowpass: float = Field(40.0, gt=0, description="Hz, where the noise does not ask for less")
+    highpass_range: tuple[float, float] = Field((0.001, 0.5), description="Hz; never below 1 / duration")
+    drift: float = Field(0.02, gt=0, lt=1, description="polynomial part of the displacement that counts as clean")
+    drifting: float = Field(0.2, gt=0, description="Hz; a clean corner above it makes the chain try other baselines")
+    fallback_highpass: dict[float, float] = Field(
+        {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
+        description="without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)",
+    )
+    unknown_highpass: float = Field(0.08, gt=0, description="Hz, without noise to measure and without magnitude")
+    checks: Checks = Checks()
 
 
 class Spectra(Section):
@@ -185,15 +228,22 @@ class Pairs(Section):
         return self
 
 
+class Simulation(Section):
+    """A simulated earthquake, its stations, and the pairs of buildings around them."""
+
+    scenario: Scenario = Scenario()
+    pairs: SimulatedPairs = SimulatedPairs()
+
+
 class Run(Section):
     """Everything one run needs."""
 
     name: str = Field(min_length=1, description="title of tables and figures")
     output: RelativePath = Field(description="folder of the results")
     workers: int = Field(0, ge=0, description="processes; 0: one a processor")
-    scenario: RelativePath | None = Field(None, description="TOML file of an event to simulate instead of records")
+    simulation: RelativePath | None = Field(None, description="TOML file of an event to simulate instead of records")
     records: Records | None = Field(None, description="where the records are")
-    pairs: Pairs = Field(description="where the pairs come from")
+    pairs: Pairs | None = Field(None, description="where the pairs come from, if not from the simulation")
     processing: Processing = Processing()
     spectra: Spectra = Spectra()
     building: Building = Building()
@@ -201,8 +251,10 @@ class Run(Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if (self.scenario is None) == (self.records is None):
-            raise ValueError("give either scenario or records")
+        if (self.simulation is None) == (self.records is None):
+            raise ValueError("give either simulation or records")
+        if self.records is not None and self.pairs is None:
+            raise ValueError("give pairs: a file, or how to simulate them")
         return self
 
 
@@ -218,7 +270,7 @@ def load(path: Path, section: type[SectionType]) -> SectionType:
     path : Path
         TOML file; paths in it are relative to its folder.
     section : type of Section
-        What the file holds: :class:`Run` or :class:`Scenario`.
+        What the file holds: :class:`Run` or :class:`Simulation`.
 
     Raises
     ------

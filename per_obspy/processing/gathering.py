@@ -61,11 +61,20 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     rejected : tuple of Rejection
         The channels that cannot be joined.
     """
-    pieces: dict[str, Stream] = defaultdict(Stream)
+    pieces: dict[tuple[str, bool], Stream] = defaultdict(Stream)
     for trace in stream:
-        pieces[trace.id] += trace
+        pieces[_channel(trace)] += trace
     firsts = Stream([parts[0] for parts in pieces.values()])
-    return surviving(lambda first: _joined(first[0].id, pieces[first[0].id]), firsts)
+    return surviving(lambda first: _joined(first[0].id, pieces[_channel(first[0])]), firsts)
+
+
+def is_processed(trace: Trace) -> bool:
+    """Tell whether others have processed a trace."""
+    return bool(trace.stats.get("processing_level") == "processed")
+
+
+def _channel(trace: Trace) -> tuple[str, bool]:
+    return trace.id, is_processed(trace)
 
 
 def _joined(name: str, pieces: Stream) -> Stream:
@@ -91,7 +100,7 @@ def _in_float64(trace: Trace) -> Trace:
 
 def _differences(pieces: Iterable[Trace]) -> list[tuple[str, str]]:
     found = []
-    for field in ("sampling_rate", "calib", "units", "processing_level"):
+    for field in ("sampling_rate", "calib", "units"):
         values = {piece.stats.get(field) for piece in pieces}
         if len(values) > 1:
             found.append((field, ", ".join(sorted(map(str, values)))))
@@ -148,11 +157,12 @@ def instruments(stream: Stream) -> list[Stream]:
 
     An instrument is a location code with a band and instrument code (SEED), or with the number at the end of other
     codes (KiK-net: EW1 in the borehole, EW2 at the surface). Order: HN, BN, HH, BH, then the rest by name; of the
-    numbered ones the highest, which is the surface.
+    numbered ones the highest, which is the surface. Where a record is there raw and processed by others, these are
+    two, the raw one first: its corners will be known.
     """
-    groups: dict[tuple[str, str], Stream] = defaultdict(Stream)
+    groups: dict[tuple[bool, str, str], Stream] = defaultdict(Stream)
     for trace in stream:
-        groups[trace.stats.location, _family(trace.stats.channel)] += trace
+        groups[is_processed(trace), trace.stats.location, _family(trace.stats.channel)] += trace
     return [groups[key] for key in sorted(groups, key=_rank)]
 
 
@@ -162,10 +172,10 @@ def _family(channel: str) -> str:
     return "" if AZIMUTH_CODE.fullmatch(channel) else channel[len(channel.rstrip("0123456789")) :]
 
 
-def _rank(key: tuple[str, str]) -> tuple[int, int, str, str]:
-    location, family = key
+def _rank(key: tuple[bool, str, str]) -> tuple[bool, int, int, str, str]:
+    processed, location, family = key
     order = PREFERENCE.index(family) if family in PREFERENCE else len(PREFERENCE)
-    return order, -int(family) if family.isdigit() else 0, family, location
+    return processed, order, -int(family) if family.isdigit() else 0, family, location
 
 
 def paired(instrument: Stream, overlap: float = 0.8) -> tuple[Stream, tuple[Rejection, ...]]:

@@ -1,0 +1,95 @@
+"""The baseline and the corners of one record, chosen together: the first baseline whose displacement comes clean."""
+
+from collections.abc import Iterator
+
+from obspy import Stream, Trace
+
+from per_obspy.config import Processing
+from per_obspy.errors import RecordRejected
+from per_obspy.processing.baseline import mean_removed, trend_removed
+from per_obspy.processing.corners import (
+    Corner,
+    clean_corner,
+    fallback_highpass,
+    highest_corner,
+    lowest_highpass,
+    measured_noise,
+)
+from per_obspy.processing.filtering import tapered
+from per_obspy.processing.findings import Finding, below, judged
+from per_obspy.processing.noise import NoiseSpectra, clear_band, weakest_ratio
+from per_obspy.processing.provenance import noted, remembered
+
+
+def corners_noted(stream: Stream, settings: Processing, magnitude: float | None) -> Stream:
+    """
+    Return a copy of one record without its baseline, tapered, that knows the corners of its filter.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        One trace, m/s2, with ``noise`` (s) in ``stats.per_obspy``.
+    settings : Processing
+        Every number of the chain.
+    magnitude : float or None
+        Of the event.
+
+    Returns
+    -------
+    obspy Stream
+
+    Raises
+    ------
+    RecordRejected
+        If the signal never clears the noise, or no corner cleans the displacement.
+    """
+    level = trend_removed(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
+    spectra = measured_noise(level[0], settings.smoothing)
+    checked = judged(level[0], _noise_findings(spectra, settings))
+    lowest, lowpass = _limits(checked[0], spectra, settings, magnitude)
+    if settings.highpass is not None:
+        return _noted(tapered(checked, settings.taper), Corner(settings.highpass, "configuration"), lowpass)
+    candidate = tapered(checked, settings.taper)
+    highpass = clean_corner(candidate[0], lowest, settings.highpass_range[1], settings.drift, settings.order)
+    if highpass is None:
+        reason = f"displacement still drifts with the corner at {settings.highpass_range[1]:g} Hz"
+        raise RecordRejected(candidate[0].id, reason)
+    return _noted(candidate, highpass, lowpass)
+
+
+def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Iterator[Finding]:
+    checks = settings.checks
+    if spectra is None:
+        return
+    yield from below(
+        "signal_to_noise", checks.signal_to_noise, float(spectra.ratio.max()), "largest signal-to-noise ratio"
+    )
+    low, high = settings.required_band
+    ratio = weakest_ratio(spectra, settings.required_band)
+    yield from below("clear_band", checks.clear_band, ratio, f"signal-to-noise ratio in {low:g}-{high:g} Hz")
+
+
+def _limits(
+    trace: Trace, spectra: NoiseSpectra | None, settings: Processing, magnitude: float | None
+) -> tuple[Corner, Corner]:
+    """Return the lowest high-pass and the highest low-pass corner that the record allows, noting its noise."""
+    highest = highest_corner(trace, settings.highest_lowpass)
+    shortest = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
+    band = clear_band(spectra, settings.checks.signal_to_noise.threshold) if spectra else None
+    if spectra is None or band is None:
+        fallback = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
+        lowest, lowpass = max(fallback, shortest), highest
+    else:
+        remembered(trace, clear_from=band[0], clear_to=band[1], signal_to_noise=float(spectra.ratio.max()))
+        lowest, lowpass = max(Corner(band[0], "noise"), shortest), min(Corner(band[1], "noise"), highest)
+    if settings.lowpass is not None:
+        lowpass = min(Corner(settings.lowpass, "configuration"), highest_corner(trace, settings.lowpass))
+    return lowest, lowpass
+
+
+def _noted(stream: Stream, highpass: Corner, lowpass: Corner) -> Stream:
+    out = stream.copy()
+    for name, corner in (("highpass", highpass), ("lowpass", lowpass)):
+        noted(out[0], f"{name} corner {corner.frequency:.4g} Hz: {corner.reason}")
+        remembered(out[0], **{name: corner.frequency}, **{f"{name}_source": corner.reason})
+    return out

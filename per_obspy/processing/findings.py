@@ -1,0 +1,78 @@
+"""What checks find: every failed check adds a reason with its figure, and none stops another."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from obspy import Stream, Trace
+
+from per_obspy.config import Check
+from per_obspy.errors import RecordRejected
+from per_obspy.processing.provenance import remembered
+
+
+class Finding(NamedTuple):
+    """
+    A failed check.
+
+    Attributes
+    ----------
+    check : str
+        Its name in the configuration.
+    level : str
+        reject, warn or note.
+    reason : str
+        With the figure and the threshold.
+    """
+
+    check: str
+    level: str
+    reason: str
+
+
+def below(check: str, setting: Check, figure: float, meaning: str) -> list[Finding]:
+    """Return a finding if the figure is below the threshold."""
+    if figure >= setting.threshold:
+        return []
+    return [Finding(check, setting.level, f"{meaning} {figure:.4g}, needs {setting.threshold:g}")]
+
+
+def above(check: str, setting: Check, figure: float, meaning: str) -> list[Finding]:
+    """Return a finding if the figure is above the threshold."""
+    if figure <= setting.threshold:
+        return []
+    return [Finding(check, setting.level, f"{meaning} {figure:.4g}, allowed {setting.threshold:g}")]
+
+
+def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
+    """
+    Return a copy of a trace that knows its warnings and notes; raise with every reason if one of them rejects.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+    findings : iterable of Finding
+
+    Returns
+    -------
+    obspy Stream
+        Of one trace, with ``warnings`` and ``notes`` in ``stats.per_obspy``: reasons joined by semicolons.
+
+    Raises
+    ------
+    RecordRejected
+        With the reasons that reject first, then the warnings.
+    """
+    found = list(findings)
+    reject, warn, note = ([one.reason for one in found if one.level == level] for level in ("reject", "warn", "note"))
+    if reject:
+        raise RecordRejected(trace.id, *reject, *_earlier(trace, "warnings"), *warn)
+    out = trace.copy()
+    for name, reasons in (("warnings", warn), ("notes", note)):
+        if reasons:
+            remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})
+    return Stream([out])
+
+
+def _earlier(trace: Trace, name: str) -> list[str]:
+    text = trace.stats.get("per_obspy", {}).get(name)
+    return [text] if text else []

@@ -1,0 +1,137 @@
+"""The steps of one instrument in their order: checks, m/s2, noise, baseline, corners, filter, usable periods."""
+
+from collections.abc import Callable, Iterable
+from functools import partial, reduce
+
+from obspy import Stream
+from obspy.core import AttribDict
+
+from per_obspy.config import Processing
+from per_obspy.errors import Rejection
+from per_obspy.processing.automatic import corners_noted
+from per_obspy.processing.corners import LOWPASS_OF_NYQUIST, corners_shared
+from per_obspy.processing.filtering import filtered, padded
+from per_obspy.processing.findings import judged
+from per_obspy.processing.gathering import is_horizontal, is_processed, paired, surviving
+from per_obspy.processing.outcome import final_findings
+from per_obspy.processing.physical import in_acceleration
+from per_obspy.processing.provenance import noted, remembered
+from per_obspy.processing.quality import outlier_findings, raw_findings
+from per_obspy.processing.usable import usable_periods_noted
+from per_obspy.processing.windows import Source, noise_window_noted
+
+Step = Callable[[Stream], Stream]
+
+
+def process_instrument(
+    instrument: Stream, settings: Processing, source: Source | None
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """
+    Return the processed components of one instrument, and a row for each that was left out.
+
+    Parameters
+    ----------
+    instrument : obspy Stream
+        Whole, oriented traces, all raw or all processed by others.
+    settings : Processing
+        Every number of the chain.
+    source : Source or None
+        The event, if known.
+
+    Returns
+    -------
+    processed : obspy Stream
+    rejected : tuple of Rejection
+    """
+    if instrument and is_processed(instrument[0]):
+        pair, rejected = paired(instrument, settings.overlap)
+        return passed_through(pair, settings), rejected
+    physical, unfit = _in_turn(instrument, _before(settings))
+    pair, unpaired = paired(physical, settings.overlap)
+    windowed = noise_window_noted(
+        pair, settings.onset_margin, settings.shortest_noise, settings.pick_tolerance, source, settings.pre_event
+    )
+    outliers = outlier_findings(windowed, settings.checks)
+    magnitude = source.magnitude if source else None
+    ready, undecided = _in_turn(
+        windowed,
+        (
+            lambda stream: judged(stream[0], outliers.get(stream[0].id, [])),
+            partial(corners_noted, settings=settings, magnitude=magnitude),
+        ),
+    )
+    horizontals = corners_shared(Stream([trace for trace in ready if is_horizontal(trace)]))
+    verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
+    done, restless = _in_turn(horizontals + verticals, _after(settings))
+    return done, (*unfit, *unpaired, *undecided, *restless)
+
+
+def _in_turn(stream: Stream, steps: Iterable[Step]) -> tuple[Stream, tuple[Rejection, ...]]:
+    return surviving(lambda one: reduce(lambda record, step: step(record), steps, one), stream)
+
+
+def _before(settings: Processing) -> tuple[Step, ...]:
+    return (
+        lambda stream: judged(stream[0], raw_findings(stream[0], settings.checks)),
+        partial(in_acceleration, gain_tolerance=settings.gain_tolerance),
+    )
+
+
+def _after(settings: Processing) -> tuple[Step, ...]:
+    return (
+        partial(_padded_and_filtered, order=settings.order),
+        partial(usable_periods_noted, usable=settings.usable),
+        lambda stream: judged(stream[0], final_findings(stream[0], settings.checks)),
+        _marked,
+    )
+
+
+def _padded_and_filtered(stream: Stream, order: int) -> Stream:
+    corners = stream[0].stats.per_obspy
+    return filtered(padded(stream, corners.highpass, order), corners.highpass, corners.lowpass, order)
+
+
+def _marked(stream: Stream) -> Stream:
+    """Return a copy that says it is processed, with its corners, so that a second pass leaves it alone."""
+    out = stream.copy()
+    for trace in out:
+        corners = trace.stats.per_obspy
+        trace.stats.processing_level = "processed"
+        trace.stats.corners = AttribDict(highpass=corners.highpass, lowpass=corners.lowpass)
+    return out
+
+
+def passed_through(stream: Stream, settings: Processing) -> Stream:
+    """
+    Return a copy of records that others have processed, with their corners and usable periods.
+
+    A header that tells no corner leaves one cycle in the record, and 0.75 of the Nyquist frequency, as the limits.
+    Velocity or displacement that does not come to rest is a warning: the samples are not ours to change.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        Acceleration, m/s2.
+    settings : Processing
+        Every number of the chain.
+
+    Returns
+    -------
+    obspy Stream
+    """
+    out = stream.copy()
+    for trace in out:
+        told = trace.stats.get("corners", {})
+        guesses = {
+            "highpass": (1 / (trace.stats.npts * trace.stats.delta), "one cycle in the record, the header is silent"),
+            "lowpass": (LOWPASS_OF_NYQUIST * trace.stats.sampling_rate / 2, "0.75 Nyquist, the header is silent"),
+        }
+        noted(trace, "processed already, passed through")
+        for name, (guess, reason) in guesses.items():
+            source = {f"{name}_source": "header" if name in told else reason}
+            remembered(trace, **{name: float(told.get(name, guess))}, **source)
+    checked = Stream()
+    for trace in usable_periods_noted(out, settings.usable):
+        findings = [one._replace(level="warn") for one in final_findings(trace, settings.checks)]
+        checked += judged(trace, findings)
+    return checked
