@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# the first example of a test may compile a kernel, which takes seconds
+settings.register_profile("compiling", deadline=None)
+settings.load_profile("compiling")
 
 CHECKOUT = Path(__file__).parents[1]
 
