@@ -166,7 +166,7 @@ def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
         height, storeys = _column(pairs, f"height_{index}"), _column(pairs, f"storeys_{index}")
         with np.errstate(divide="ignore", invalid="ignore"):
             storey = height / storeys
-        for i in _rows((storeys > 0) & ((storey < low) | (storey > high))):
+        for i in _rows((height > 0) & (storeys > 0) & ((storey < low) | (storey > high))):
             yield (
                 i,
                 f"height_{index} = {height[i]:g} m with storeys_{index} = {storeys[i]:g} makes floors of "

@@ -96,7 +96,7 @@ def _undecodable(file: Path) -> str | None:
             try:
                 line.decode("utf-8")
             except UnicodeDecodeError as error:
-                return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} in column {error.start + 1})"
+                return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} at position {error.start + 1})"
     return None
 
 

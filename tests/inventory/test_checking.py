@@ -1,0 +1,156 @@
+"""Each fault that a row can have, its wording, and that all faults of a row are told."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.checking import checked_pairs
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF
+
+
+def _row(**changes):
+    row = {"pair_id": "a", "gap": 0.1, "longitude_1": 10.0, "latitude_1": 50.0, "height_1": 12.0, "storeys_1": 4.0}
+    row |= {"longitude_2": 10.0001, "latitude_2": 50.0, "height_2": 9.0, "storeys_2": 3.0}
+    return row | changes
+
+
+def _reasons(**changes):
+    (rejection,) = checked_pairs(pd.DataFrame([_row(**changes)]), "pairs.csv").attrs["rejected"]
+    assert rejection[:4] == ("pair", changes.get("pair_id", "a"), "pairs.csv", 2)
+    return rejection.reasons
+
+
+def test_a_good_row_in_the_order_of_the_schema():
+    row = dict(reversed(_row(extra="kept").items()))
+    pairs = checked_pairs(pd.DataFrame([row]), "pairs.csv")
+    assert pairs.attrs["rejected"] == ()
+    assert list(pairs.columns) == [*(name for name in COLUMNS if name in row), "extra"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"gap": -0.01}, "gap = -0.01 m is outside 0 to 10 m"),
+        ({"gap": 50.0}, "gap = 50 m is outside 0 to 10 m (given in millimetres or centimetres by mistake?)"),
+        ({"gap": np.nan}, "gap is empty"),
+        ({"gap": np.inf}, "gap = inf m is outside 0 to 10 m (given in millimetres or centimetres by mistake?)"),
+        ({"gap": "a lot"}, "gap = 'a lot' is not a number"),
+        ({"pair_id": ""}, "pair_id is empty"),
+        ({"height_1": 0.0, "storeys_1": np.nan}, "height_1 = 0 m is outside 2 to 1000 m"),
+        ({"height_2": 28.0, "storeys_2": 1.0},
+         "height_2 = 28 m with storeys_2 = 1 makes floors of 28 m, outside 2 to 12 m"),
+        ({"height_2": 9.0, "storeys_2": 9.0},
+         "height_2 = 9 m with storeys_2 = 9 makes floors of 1 m, outside 2 to 12 m"),
+        ({"period_1": 0.0}, "period_1 = 0 s is outside 0.01 to 20 s"),
+        ({"damping_2": 1.0}, "damping_2 = 1 is outside 0 to 1 (a fraction is expected, not per cent)"),
+        ({"damping_2": 5.0}, "damping_2 = 5 is outside 0 to 1 (a fraction is expected, not per cent)"),
+        ({"damping_1": -0.1}, "damping_1 = -0.1 is outside 0 to 1"),
+        ({"mass_1": 0.0}, "mass_1 = 0 kg is outside 1 to 1e+12 kg"),
+        ({"system_1": "masonry"},
+         "system_1 = 'masonry' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
+        ({"system_2": 3}, "system_2 = '3' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
+        ({"position": "middle"}, "position = 'middle' is unknown, expected end, inside"),
+        ({"restitution": 1.2}, "restitution = 1.2 is outside 0 to 1"),
+        ({"contact_height": 9.5}, "contact_height = 9.5 m is above the lower building, 9 m"),
+        ({"azimuth": -10.0}, "azimuth = -10 degrees is outside 0 to 360 degrees"),
+        ({"yield_displacement_1": 0.0}, "yield_displacement_1 = 0 m is outside 0.0001 m or more"),
+        ({"observed": 0.5}, "observed = 0.5 is neither 0 nor 1"),
+        ({"building_id_1": "b7", "building_id_2": "b7"},
+         "building_id_1 = building_id_2 = 'b7': a building has no gap to itself"),
+    ],
+)  # fmt: skip
+def test_one_fault(changes, reason):
+    assert _reasons(**changes) == (reason,)
+
+
+def test_swapped_coordinates_outside_their_range_are_suspected():
+    reasons = _reasons(longitude_1=19.4, latitude_1=-99.1, longitude_2=19.4, latitude_2=-99.1)
+    hint = "is outside -90 to 90 degrees (longitude and latitude swapped?)"
+    assert reasons == (f"latitude_1 = -99.1 degrees {hint}", f"latitude_2 = -99.1 degrees {hint}")
+
+
+def test_one_building_swapped_within_range_is_found_by_its_neighbour():
+    (reason,) = _reasons(longitude_1=50.0, latitude_1=10.0)
+    assert "km apart" in reason
+    assert "longitude_1 = 50, latitude_1 = 10" in reason
+
+
+def test_zero_zero_is_no_place():
+    reasons = _reasons(longitude_1=0.0, latitude_1=0.0, longitude_2=0.0, latitude_2=0.0)
+    assert [reason.split(" = 0 is")[0] for reason in reasons] == [
+        "longitude_1 = latitude_1",
+        "longitude_2 = latitude_2",
+    ]
+
+
+def test_neighbours_across_the_date_line():
+    table = pd.DataFrame([_row(longitude_1=179.9999, longitude_2=-179.9999)])
+    assert checked_pairs(table, "pairs.csv").attrs["rejected"] == ()
+
+
+def test_every_reason_of_a_row_is_told():
+    # would catch a check that stops at the first fault
+    reasons = _reasons(gap=-1.0, period_1=0.0, system_1="wood", height_2=0.0, damping_1="five")
+    assert [reason.split(" = ")[0] for reason in reasons] == ["gap", "system_1", "period_1", "damping_1", "height_2"]
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_building_of_unknown_size(index):
+    empty = dict.fromkeys(ONE_OF[index], np.nan)
+    assert _reasons(**empty) == (f"{', '.join(ONE_OF[index])} are all empty, one is needed",)
+
+
+@pytest.mark.parametrize("name", ONE_OF[0])
+def test_any_one_size_is_enough(name):
+    sizes = dict.fromkeys(ONE_OF[0], np.nan) | {name: 4.0}
+    assert checked_pairs(pd.DataFrame([_row(**sizes)]), "pairs.csv").attrs["rejected"] == ()
+
+
+def test_duplicates_after_the_first_are_rejected():
+    table = pd.DataFrame([_row(), _row(pair_id="b"), _row(gap=0.3), _row(gap=0.2)])
+    pairs = checked_pairs(table, "pairs.csv")
+    assert pairs["gap"].tolist() == [0.1, 0.1]
+    assert [one.row for one in pairs.attrs["rejected"]] == [4, 5]
+    assert pairs.attrs["rejected"][0].reasons == ("pair_id = 'a' stands in an earlier row already",)
+
+
+def test_good_rows_survive_bad_ones():
+    table = pd.DataFrame([_row(pair_id=str(i), gap=-1.0 if i % 3 == 0 else 0.1) for i in range(9)])
+    pairs = checked_pairs(table, "pairs.csv")
+    assert pairs["pair_id"].tolist() == ["1", "2", "4", "5", "7", "8"]
+    assert pairs.index.tolist() == list(range(6))
+
+
+@pytest.mark.parametrize("empty", ["", " ", "NA", "nan", "null", "-", None])
+def test_an_empty_cell_of_an_optional_column_is_missing(empty):
+    pairs = checked_pairs(pd.DataFrame([_row(damping_1=empty), _row(pair_id="b", damping_1="0.1")]), "pairs.csv")
+    assert pairs.attrs["rejected"] == ()
+    assert np.isnan(pairs["damping_1"][0])
+    assert pairs["damping_1"][1] == 0.1
+
+
+def test_an_infinite_yield_displacement_is_a_linear_building():
+    pairs = checked_pairs(pd.DataFrame([_row(yield_displacement_1=np.inf)]), "pairs.csv")
+    assert pairs["yield_displacement_1"][0] == np.inf
+
+
+def test_the_table_stays_as_it_was():
+    table = pd.DataFrame([_row(gap="0.1"), _row(gap="x")])
+    before = table.copy(deep=True)
+    checked_pairs(table, "pairs.csv")
+    pd.testing.assert_frame_equal(table, before)
+
+
+def test_whole_table_faults():
+    with pytest.raises(CatalogError, match=r"pairs.csv: missing column gap \(columns found: pair_id, longitude_1"):
+        checked_pairs(pd.DataFrame([_row()]).drop(columns="gap"), "pairs.csv")
+    with pytest.raises(CatalogError, match=r"pairs.csv: the table has no rows"):
+        checked_pairs(pd.DataFrame([_row()]).iloc[:0], "pairs.csv")
+
+
+def test_every_column_has_a_unit_and_a_meaning():
+    for column in (*COLUMNS.values(), *COMPLETED.values()):
+        assert column.meaning
+        assert bool(column.unit) == (column.dtype == "float64")
+        assert column.low <= column.high

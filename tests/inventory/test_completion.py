@@ -1,0 +1,156 @@
+"""Completion of the pair table: what is given stays, what is not is derived, and each derived value is marked."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from per_obspy import asce7_period, ec8_period
+from per_obspy.config import Building
+from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.contact import contact_participation
+from per_obspy.inventory.schema import COLUMNS, COMPLETED
+
+PLACE = {"pair_id": "a", "gap": 0.1, "longitude_1": 10.0, "latitude_1": 50.0, "longitude_2": 10.001, "latitude_2": 50.0}
+SIZES = {"height_1": 12.0, "height_2": 9.0}
+
+
+def _completed(building=None, **columns):
+    table = pd.DataFrame([PLACE | columns])
+    return completed_pairs(table, building or Building()).iloc[0]
+
+
+def test_what_is_given_stays_and_is_not_marked():
+    given = {}
+    for i, scale in ((1, 1.0), (2, 1.1)):
+        given |= {
+            f"height_{i}": 12.0 * scale,
+            f"storeys_{i}": 4.0,
+            f"system_{i}": "steel_mrf",
+            f"period_{i}": 0.7 * scale,
+        }
+        given |= {f"damping_{i}": 0.02 * scale, f"mass_{i}": 4e5 * scale, f"participation_{i}": 1.1 * scale}
+        given |= {f"yield_displacement_{i}": 0.03 * scale, f"hardening_{i}": 0.05 * scale}
+        given |= {f"period_log_std_{i}": 0.1 * scale, f"damping_log_std_{i}": 0.2 * scale}
+    given |= {"contact_height": 11.0, "floor_offset": 0.2, "restitution": 0.4, "gap_std": 0.01, "azimuth": 30.0}
+    row = _completed(**given)
+    assert row["derived"] == ""
+    assert {name: row[name] for name in given} == given
+
+
+def test_a_bare_row_is_marked_where_it_was_filled():
+    row = _completed(**SIZES)
+    both = ("system", "storeys", "period", "damping", "participation", "mass")
+    expected = {f"{name}_{i}" for name in both for i in (1, 2)} | {"contact_height", "restitution"}
+    assert set(row["derived"].split()) == expected
+    assert row["storeys_1"], row["storeys_2"] == (4.0, 3.0)
+    assert row["contact_height"] == 9.0
+    assert_allclose(row["mass_1"] / row["mass_2"], 4 / 3, rtol=1e-14)  # equal areas are assumed
+    assert row[["damping_1", "restitution", "gap_std", "hardening_1"]].tolist() == [0.05, 0.65, 0.0, 0.0]
+    assert row["yield_displacement_1"] == np.inf
+    assert np.isnan(row["azimuth"])
+
+
+def test_marks_belong_to_their_row():
+    # would catch marks of one row written into another
+    table = pd.DataFrame([PLACE | SIZES, PLACE | SIZES | {"period_1": 0.5}, PLACE | SIZES])
+    derived = completed_pairs(table, Building())["derived"]
+    assert derived[0] == derived[2]
+    assert set(derived[0].split()) - set(derived[1].split()) == {"period_1"}
+
+
+def test_heights_and_storeys_from_each_other():
+    row = _completed(storeys_1=5.0, height_2=10.4)
+    assert row["height_1"] == 15.0
+    assert row["storeys_2"] == 3.0
+    assert {"height_1", "storeys_2"} <= set(row["derived"].split())
+    assert _completed(height_1=2.2, height_2=2.2)["storeys_1"] == 1.0  # never less than one
+
+
+@pytest.mark.parametrize(("formula", "function"), [("asce7", asce7_period), ("ec8", ec8_period)])
+def test_periods_come_from_the_configured_formula(formula, function):
+    row = _completed(Building(period_formula=formula), **SIZES, system_1="steel_mrf")
+    assert row["period_1"] == function(12.0, "steel_mrf")
+    assert row["period_2"] == function(9.0, "other")
+    assert (row["period_log_std_1"], row["period_log_std_2"]) == (0.3, 0.4)
+
+
+def test_given_periods_are_taken_as_certain_unless_the_table_says_otherwise():
+    row = _completed(**SIZES, period_1=0.4, damping_2=0.03, period_2=0.3, period_log_std_2=0.15)
+    assert (row["period_log_std_1"], row["period_log_std_2"]) == (0.0, 0.15)
+    assert (row["damping_log_std_1"], row["damping_log_std_2"]) == (0.3, 0.0)
+
+
+def test_participation_is_seen_at_the_roof_of_the_lower_building():
+    row = _completed(height_1=30.0, storeys_1=10.0, height_2=9.0, storeys_2=3.0)
+    assert_allclose(row["participation_1"], contact_participation(10, 30.0, 9.0), rtol=1e-15)
+    assert_allclose(row["participation_2"], 9 / 7, rtol=1e-15)
+
+
+def test_a_building_of_unknown_size_is_a_plain_oscillator():
+    row = _completed(period_1=0.8, height_2=9.0, mass_2=3e5)
+    assert row["participation_1"] == 1.0
+    assert_allclose(row["participation_2"], 9 / 7, rtol=1e-15)
+    assert row["mass_1"] == row["contact_mass_1"] == 3e5  # as heavy as its neighbour
+    assert {"participation_1", "mass_1"} <= set(row["derived"].split())
+    assert np.isnan([row["height_1"], row["storeys_1"]]).all()
+    nothing = _completed(period_1=0.8, period_2=0.9)
+    assert nothing["mass_1"] == nothing["mass_2"] > 0
+    assert np.isnan(nothing["contact_height"])
+
+
+def test_mass_from_area_and_storeys():
+    row = _completed(Building(mass_per_area=800.0), storeys_1=4.0, area_1=100.0, height_2=9.0)
+    assert row["mass_1"] == 800.0 * 100.0 * 4
+    assert "mass_1" in row["derived"].split()
+
+
+def test_yield_displacement_from_coefficient():
+    # a period of 2 pi makes u_y = C_y g
+    row = _completed(**SIZES, period_1=2 * np.pi, yield_coefficient_1=0.1)
+    assert_allclose(row["yield_displacement_1"], 0.980665, rtol=1e-14)
+    assert "yield_displacement_1" in row["derived"].split()
+    assert "yield_displacement_2" not in row["derived"].split()
+
+
+@pytest.mark.parametrize(
+    ("columns", "misaligned"),
+    [
+        ({"storeys_1": 4.0, "storeys_2": 3.0}, False),
+        ({"storeys_1": 3.0, "storeys_2": 3.0}, True),  # floors of the first at 4, 8, 12 m; roof of the second at 9 m
+        ({}, False),  # derived storeys do not say where floors are
+        ({"floor_offset": -1.0}, True),
+    ],
+)
+def test_misaligned_floors(columns, misaligned):
+    assert _completed(**SIZES, **columns)["floors_misaligned"] == misaligned
+
+
+def test_middle_of_the_pair():
+    row = _completed(**SIZES)
+    assert_allclose([row["longitude"], row["latitude"]], [10.0005, 50.0], rtol=1e-13)  # turned by 180 degrees and back
+    across = _completed(**SIZES | {"longitude_1": 179.9998, "longitude_2": -179.9996})
+    assert_allclose(across["longitude"], -179.9999, rtol=1e-12)  # would catch a mean of 0.0001 degrees
+
+
+def test_swapping_the_buildings_swaps_the_columns():
+    # would catch an index 1 where 2 is meant
+    first = {"height": 30.0, "storeys": 10.0, "system": "steel_mrf", "area": 300.0, "yield_coefficient": 0.1}
+    second = {"height": 9.0, "period": 0.4, "damping": 0.02}
+    one = _completed(**{f"{k}_1": v for k, v in first.items()}, **{f"{k}_2": v for k, v in second.items()})
+    two = _completed(**{f"{k}_2": v for k, v in first.items()}, **{f"{k}_1": v for k, v in second.items()})
+    for name in ("period", "mass", "contact_mass", "participation", "damping", "yield_displacement", "storeys"):
+        assert (one[f"{name}_1"], one[f"{name}_2"]) == (two[f"{name}_2"], two[f"{name}_1"])
+
+
+def test_everything_the_physics_needs_is_there_and_named_in_the_schema():
+    table = completed_pairs(pd.DataFrame([PLACE | SIZES | {"note": "kept"}]), Building())
+    assert set(COMPLETED) <= set(table.columns)
+    assert set(table.columns) <= {*COLUMNS, *COMPLETED, "note"}
+
+
+def test_the_input_stays():
+    table = pd.DataFrame([PLACE | SIZES])
+    before = table.copy(deep=True)
+    completed_pairs(table, Building())
+    pd.testing.assert_frame_equal(table, before)

@@ -1,0 +1,120 @@
+"""Files of pairs: what is read, and each kind of file that cannot be."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from pandas.testing import assert_frame_equal
+
+from per_obspy import read_pairs
+from per_obspy.errors import CatalogError
+
+HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note"
+GOOD = "007,0.05,-67.95,-20.35,12,-67.9501,-20.35,9.5,corner shop"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(content: str | bytes, name: str = "pairs.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+def test_a_good_row(write):
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD}\n"))
+    assert pairs.loc[0, "pair_id"] == "007"  # an identifier is text, whatever it looks like
+    assert pairs.loc[0, ["gap", "height_1", "height_2"]].tolist() == [0.05, 12.0, 9.5]
+    assert pairs.loc[0, "note"] == "corner shop"
+    assert pairs.attrs["rejected"] == ()
+
+
+def test_unknown_columns_of_numbers_stay_numbers(write):
+    pairs = read_pairs(write(f"{HEADER},floor area ratio\n{GOOD},2.5\n"))
+    assert pairs["floor area ratio"].dtype == np.float64
+
+
+def test_parquet_gives_the_same_as_csv(write, tmp_path):
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD}\n{GOOD.replace('007', '008')}\n"))
+    pairs.attrs.clear()
+    pairs.to_parquet(tmp_path / "pairs.parquet")
+    assert_frame_equal(read_pairs(tmp_path / "pairs.parquet"), pairs)
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_byte_order_mark_line_endings_blank_lines_and_spaces(write, ending):
+    content = ending.join(["\ufeff" + HEADER.replace("gap", " gap"), "", GOOD.replace("0.05", " 0.05 "), "", ""])
+    pairs = read_pairs(write(content))
+    assert len(pairs) == 1
+    assert pairs.loc[0, "gap"] == 0.05
+
+
+def test_a_row_names_its_line_also_after_blank_and_broken_lines(write):
+    # would catch line numbers counted from the rows that were read
+    pairs = read_pairs(write(f"{HEADER}\n\n{GOOD}\n008,0.1\n{GOOD.replace('0.05', '-1').replace('007', '009')}\n"))
+    assert len(pairs) == 1
+    assert [(one.name, one.row) for one in pairs.attrs["rejected"]] == [("008", 4), ("009", 5)]
+    assert pairs.attrs["rejected"][0].reasons == ("2 columns, the header has 9",)
+    assert pairs.attrs["rejected"][1].reasons == ("gap = -1 m is outside 0 to 10 m",)
+
+
+def test_a_comma_inside_quotes_is_no_separator(write):
+    row = GOOD.replace("corner shop", '"shop, corner"')
+    pairs = read_pairs(write(f"{HEADER}\n{row}\n"))
+    assert pairs.loc[0, "note"] == "shop, corner"
+
+
+def test_text_in_a_column_of_numbers_is_named_with_its_row(write):
+    bad = GOOD.replace("0.05", "five").replace("007", "008")
+    (rejection,) = read_pairs(write(f"{HEADER}\n{GOOD}\n{bad}\n")).attrs["rejected"]
+    assert rejection[:4] == ("pair", "008", str(rejection.source), 3)
+    assert rejection.reasons == ("gap = 'five' is not a number",)
+
+
+def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
+    table = pd.DataFrame({"pair_id": ["a"], "gap": ["1,5"], "longitude_1": [1.0], "latitude_1": [1.0]})
+    table = table.assign(longitude_2=1.0, latitude_2=1.0, height_1=3.0, height_2=3.0)
+    table.to_parquet(tmp_path / "pairs.parquet")
+    pairs = read_pairs(tmp_path / "pairs.parquet")
+    assert pairs.empty
+    assert pairs.attrs["rejected"][0].reasons == ("gap = '1,5' is not a number",)
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "message"),
+    [
+        (b"", "pairs.csv", "Empty CSV file"),
+        (f"{HEADER}\n", "pairs.csv", "the table has no rows"),
+        (f"{HEADER}\n\n\n", "pairs.csv", "the table has no rows"),
+        (f"{HEADER.replace('gap,', '')}\n{GOOD.replace('0.05,', '')}\n", "pairs.csv", "missing column gap "),
+        (
+            f"{HEADER.replace('height_2', 'hoehe_2')}\n{GOOD}\n",
+            "pairs.csv",
+            "missing column height_2 or storeys_2 or period_2 ",
+        ),
+        (f"{HEADER}\n{GOOD}\n".replace(",", ";"), "pairs.csv", r"missing column pair_id.*columns found: pair_id;gap"),
+        (f"{HEADER},gap\n{GOOD},0.1\n", "pairs.csv", "column gap stands more than once"),
+        (f"{HEADER}\n{GOOD.replace('shop', 'café')}\n".encode("latin-1"), "pairs.csv",
+         "line 2 is not UTF-8 .byte 0xe9 at position 57"),
+        (f"{HEADER}\n{GOOD}\n".encode("utf-16"), "pairs.csv", "line 1 is not UTF-8"),
+        (f"{HEADER}é\n{GOOD}\n".encode("latin-1"), "pairs.csv", "line 1 is not UTF-8"),
+        (b"PAR1 no, it is not", "pairs.parquet", "not a Parquet table"),
+        (b"", "pairs.parquet", "not a Parquet table"),
+        (b"x", "pairs.xlsx", r"unknown suffix '.xlsx', expected .csv or .parquet"),
+    ],
+)  # fmt: skip
+def test_files_that_are_wrong_as_a_whole(write, content, name, message):
+    path = write(content, name)
+    with pytest.raises(CatalogError, match=message) as error:
+        read_pairs(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert "\n" not in str(error.value)
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(CatalogError, match="no such file"):
+        read_pairs(tmp_path / "nowhere.csv")
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(CatalogError, match="no such file"):
+        read_pairs(tmp_path / "folder.csv")
