@@ -1,0 +1,213 @@
+"""
+The work of one station, from its files to its shard; stations do not know of each other.
+
+A shard is a netCDF file beside a small JSON file that tells what it was made from and what was left out on the way.
+Where that still holds, nothing is done again.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from functools import partial
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from per_obspy.config import Columns, Processing, Spectra
+from per_obspy.errors import PerError, Rejection
+from per_obspy.files import file_hash, written_whole
+from per_obspy.processing.chain import process_station
+from per_obspy.records.columns import read_columns
+from per_obspy.records.folder import read_station
+from per_obspy.spectra.station import station_spectra
+from per_obspy.spectra.storage import write_spectra
+
+if TYPE_CHECKING:
+    from obspy import Inventory, Stream
+
+
+class Job(NamedTuple):
+    """
+    One station to do.
+
+    Attributes
+    ----------
+    station : str
+        ``NETWORK.STATION``.
+    source : tuple of Path or Columns
+        Its waveform files, or the description of a plain table.
+    inventory : Inventory or None
+        Its metadata.
+    processing, spectra : Processing, Spectra
+        Settings.
+    shard : Path
+        Where its Dataset goes.
+    simulated : bool
+        Whether the motion was made by a scenario.
+    """
+
+    station: str
+    source: tuple[Path, ...] | Columns
+    inventory: "Inventory | None"
+    processing: Processing
+    spectra: Spectra
+    shard: Path
+    simulated: bool
+
+
+class Done(NamedTuple):
+    """
+    What became of a station.
+
+    Attributes
+    ----------
+    station : str
+        ``NETWORK.STATION``.
+    shard : Path or None
+        Its Dataset; None if nothing usable was left.
+    rejected : tuple of Rejection
+        What was left out, with every reason.
+    resumed : bool
+        Whether an earlier run had done it.
+    """
+
+    station: str
+    shard: Path | None
+    rejected: tuple[Rejection, ...]
+    resumed: bool
+
+
+def do_station(job: Job) -> Done:
+    """Return the finished station, from disk if an earlier run did the same."""
+    key, note = _key(job), job.shard.with_suffix(".json")
+    if earlier := _earlier(job, key, note):
+        return earlier
+    job.shard.unlink(missing_ok=True)
+    rejected = _make_shard(job)
+    with written_whole(note) as part:
+        part.write_text(json.dumps({"key": key, "rejected": rejected}), encoding="utf-8")
+    return Done(job.station, job.shard if job.shard.exists() else None, rejected, resumed=False)
+
+
+def _make_shard(job: Job) -> tuple[Rejection, ...]:
+    """Write the shard if anything usable is left; return what was left out."""
+    source = ", ".join(path.name for path in _files(job))
+    try:
+        stream, unread = _read(job)
+        clean, unfit = process_station(stream, job.processing)
+        rejected = (*unread, *(one._replace(source=one.source or source) for one in unfit))
+        if not clean:
+            return rejected
+        grid = job.spectra
+        periods = np.geomspace(grid.shortest, grid.longest, grid.count)
+        dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
+    except PerError as error:
+        reasons = getattr(error, "reasons", None) or (str(error),)
+        return (Rejection("station", job.station, source, None, tuple(reasons)),)
+    dataset.attrs["simulated"] = str(job.simulated).lower()
+    write_spectra(dataset, job.shard)
+    return rejected
+
+
+def _read(job: Job) -> tuple["Stream", tuple[Rejection, ...]]:
+    if isinstance(job.source, Columns):
+        described = job.source.model_dump()
+        return read_columns(described.pop("file"), **described), ()
+    return read_station(job.source, job.inventory)
+
+
+def _files(job: Job) -> tuple[Path, ...]:
+    return (job.source.file,) if isinstance(job.source, Columns) else job.source
+
+
+def _key(job: Job) -> str:
+    """Return the hash of everything the shard depends on."""
+    parts = [version("per_obspy"), job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
+    parts += [f"{path.name} {file_hash(path)}" for path in _files(job)]
+    parts += [job.source.model_dump_json()] if isinstance(job.source, Columns) else [_metadata_text(job.inventory)]
+    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+
+
+def _metadata_text(inventory: "Inventory | None") -> str:
+    if inventory is None:
+        return ""
+    channels = [channel for network in inventory for station in network for channel in station]
+    return "\n".join(f"{channel!r} {channel.response!r}" for channel in channels)
+
+
+def _earlier(job: Job, key: str, note: Path) -> Done | None:
+    """Return the station as an earlier run left it, if it was made from the same."""
+    try:
+        known = json.loads(note.read_text(encoding="utf-8"))
+        if known["key"] != key:
+            return None
+        rejected = tuple(
+            Rejection(kind, name, source, row, tuple(reasons))
+            for kind, name, source, row, reasons in known["rejected"]
+        )
+    except (OSError, ValueError, KeyError):
+        return None
+    return Done(job.station, job.shard if job.shard.exists() else None, rejected, resumed=True)
+
+
+def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
+    """
+    Give every station as it is finished, in parallel processes.
+
+    A worker that dies takes the whole pool with it. What was not finished then is done again, each station in a
+    process of its own, so that only the guilty one is lost, and its loss is a rejection.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        What to do.
+    workers : int
+        Number of processes; a single job is done in this one.
+    """
+    if len(jobs) == 1:
+        yield _caught(jobs[0], partial(do_station, jobs[0]))
+        return
+    unfinished = {job.station: job for job in jobs}
+    with _pool(workers) as pool, suppress(BrokenProcessPool):
+        for done in do_stations_on(pool, jobs):
+            del unfinished[done.station]
+            yield done
+    for job in unfinished.values():
+        try:
+            with _pool(1) as pool:
+                yield from do_stations_on(pool, [job])
+        except BrokenProcessPool:
+            yield _lost(job, "its worker process died")
+
+
+def do_stations_on(executor: Executor, jobs: Sequence[Job]) -> Iterator[Done]:
+    """Give every station as it is finished, on any executor (a cluster's, for example)."""
+    futures = {executor.submit(do_station, job): job for job in jobs}
+    for future in as_completed(futures):
+        yield _caught(futures[future], future.result)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Return fresh processes: a fork of a process that has threads can hang."""
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+
+
+def _caught(job: Job, work: Callable[[], Done]) -> Done:
+    """Return what the work returns; whatever it raises becomes a reason, so that no station stops the others."""
+    try:
+        return work()
+    except BrokenProcessPool:
+        raise
+    except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
+        return _lost(job, f"{type(error).__name__}: {error}")
+
+
+def _lost(job: Job, reason: str) -> Done:
+    source = ", ".join(path.name for path in _files(job))
+    return Done(job.station, None, (Rejection("station", job.station, source, None, (reason,)),), resumed=False)

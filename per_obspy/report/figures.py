@@ -1,0 +1,129 @@
+"""Figures of a run: from one record to one pair at risk, and the region at a glance."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from per_obspy.checks import FloatArray
+from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, STATE_COLOURS, save
+
+
+def draw_walk(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
+    """
+    Draw the way from a record to a pair at risk: motion, PER spectrum, the pair's circles in the state space.
+
+    Parameters
+    ----------
+    station : Dataset
+        From :func:`per_obspy.station_spectra`.
+    pair : Series
+        A row of the risk table that used this station.
+    path : Path
+        PNG file.
+    """
+    figure = Figure(figsize=(13.0, 4.0), layout="constrained")
+    motion, spectrum, circles = figure.subplots(1, 3, width_ratios=(1.15, 1.0, 1.15))
+    _draw_motion(motion, station, float(pair["azimuth_used"]))
+    _draw_spectrum(spectrum, station, pair)
+    _draw_circles(circles, pair)
+    save(figure, path, station.attrs["simulated"] == "true")
+
+
+def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
+    """Return the acceleration along an azimuth (degrees), or that of the only sensor, m/s²."""
+    acceleration: FloatArray = station["acceleration"].to_numpy()
+    if len(acceleration) == 1:
+        return acceleration[0]
+    return acceleration[0] * np.cos(np.radians(azimuth)) + acceleration[1] * np.sin(np.radians(azimuth))
+
+
+def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
+    axes.plot(station["time"], motion_along(station, azimuth), color=MOTION_COLOUR, linewidth=0.5)
+    along = "" if np.isnan(azimuth) else f", along {azimuth:.0f}°"
+    axes.set(xlabel="time (s)", ylabel="ground acceleration (m/s²)")
+    axes.set_title(f"1  record {station['station'].item()}{along}", fontsize=11)
+
+
+def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
+    """Draw the stored spectrum at the damping nearest to the pair's, and the pair's own radii."""
+    name = "per_rotd100" if "per_rotd100" in station else "per"
+    spectrum = station[name].sel(damping=pair["damping_1"], method="nearest")
+    if name == "per":
+        spectrum = spectrum.isel(component=0)
+    usable = station["usable"].to_numpy() == 1
+    axes.loglog(station["period"], spectrum, color="#BBBBBB", linestyle=":")
+    label = "PER, largest over azimuth" if name == "per_rotd100" else "PER"
+    axes.loglog(station["period"][usable], spectrum[usable], color=MOTION_COLOUR, label=label)
+    for i, colour in enumerate(BUILDING_COLOURS, start=1):
+        text = f"building {i}: T = {pair[f'period_{i}']:.2f} s"
+        axes.plot(pair[f"period_{i}"], pair[f"per_{i}"], "o", color=colour, label=text)
+    axes.set(xlabel="natural period (s)", ylabel="pseudo energy radius (m)")
+    axes.set_title("2  PER spectrum", fontsize=11)
+    axes.legend(fontsize=8, loc="lower right")
+
+
+def _draw_circles(axes: Axes, pair: pd.Series) -> None:
+    """Draw the largest energy circle of each building, their centres separated by the gap (the paper's Fig. 4)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    for i, (colour, centre) in enumerate(zip(BUILDING_COLOURS, (0.0, pair["gap"]), strict=True), start=1):
+        radius = pair[f"participation_{i}"] * pair[f"per_{i}"]
+        axes.fill(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, alpha=0.18)
+        axes.plot(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, label=f"building {i}")
+    axes.axvline(0.0, color=BUILDING_COLOURS[0], linewidth=0.8)
+    axes.axvline(pair["gap"], color=BUILDING_COLOURS[1], linewidth=0.8)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="displacement at contact height (m)", ylabel="velocity / frequency (m)")
+    verdict = f"gap {100 * pair['gap']:.0f} cm, needed {100 * pair['demand']:.0f} cm: pounding {pair['state']}"
+    axes.set_title(f"3  pair {pair['pair_id']}: {verdict}", fontsize=11)
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Path) -> None:
+    """
+    Draw the region: where the pairs and the stations are, and how gaps compare with demands.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From :func:`per_obspy.risk_table`.
+    spectra : Dataset
+        From :func:`per_obspy.spectra.storage.region`.
+    title : str
+        Name of the run.
+    path : Path
+        PNG file.
+    """
+    figure = Figure(figsize=(13.0, 5.5), layout="constrained")
+    place, gaps = figure.subplots(1, 2)
+    _draw_map(place, table, spectra)
+    _draw_gaps(gaps, table)
+    figure.suptitle(title)
+    save(figure, path, spectra.attrs.get("simulated") == "true")
+
+
+def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
+    for state in ("no", "possible", "yes"):
+        chosen = table[table["state"] == state]
+        label = f"{len(chosen)} pairs: {state}"
+        axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=STATE_COLOURS[state], label=label)
+    axes.scatter(spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations")
+    axes.set_aspect(1.0 / np.cos(np.radians(float(table["latitude"].mean()))))
+    axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)", title="pounding")
+    axes.ticklabel_format(useOffset=False)
+    axes.legend(fontsize=8)
+
+
+def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
+    for state in ("no", "possible", "yes"):
+        chosen = table[table["state"] == state]
+        axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
+    largest = 100 * float(table["demand"].max())
+    axes.plot([0.0, largest], [0.0, largest], color="black", linewidth=0.8, label="gap = demand")
+    axes.set(xlabel="demand (cm)", ylabel="gap (cm)", title="gap against demand")
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.legend(fontsize=8)

@@ -1,0 +1,24 @@
+"""How every figure looks, and how it is written."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from per_obspy.files import written_whole
+
+#: State of a pair -> colour (Okabe & Ito 2008, told apart by colour-blind readers too).
+STATE_COLOURS = {"yes": "#D55E00", "possible": "#E69F00", "no": "#009E73"}
+
+#: Buildings 1 and 2, and the ground motion.
+BUILDING_COLOURS = ("#0072B2", "#CC79A7")
+MOTION_COLOUR = "#444444"
+
+DOTS_PER_INCH = 130
+
+
+def save(figure: Figure, path: Path, simulated: bool) -> None:
+    """Write a figure as PNG, whole or not at all; simulated motion is said on it."""
+    if simulated:
+        figure.text(0.995, 0.005, "simulated ground motion", ha="right", va="bottom", fontsize=8, color="#AA0000")
+    with written_whole(path) as part:
+        figure.savefig(part, dpi=DOTS_PER_INCH)

@@ -1,0 +1,76 @@
+"""The columns of the risk table in their order; units and meanings stand here or in the schema of the pair table."""
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+
+
+def _both(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
+    first, second = (Column(f"{name}_{i}", "float64", unit, f"building {i}: {meaning}") for i in (1, 2))
+    return first, second
+
+
+#: What the risk table adds to the completed pair table.
+RESULTS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("rank", "int64", "", "1 is the worst: by state, impact velocity, ratio, importance, occupants"),
+        Column("risk_class", "str", "", "by demand ratio; names and thresholds are in the configuration"),
+        Column("state", "str", "", "yes: gap < demand; possible: a derived input decides; no"),
+        Column("demand", "float64", "m", "gap needed at contact height, by the rule in demand_rule"),
+        Column("demand_rule", "str", "", "which estimate is the demand: per_white_noise, per_record or srss"),
+        Column("demand_ratio", "float64", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
+        Column("impact_velocity", "float64", "m/s", "approach velocity of the single hit, larger of both branches"),
+        Column("single_hit_status", "str", "", "ok, no_pounding, no_grazing_state or inconsistent_critical_gap"),
+        *_both("amplification", "1", "PER after a single hit / before, at least 1; empty without a grazing state"),
+        Column("flags", "str", "", "names separated by spaces, each explained in a row flag_..."),
+        Column("station", "str", "", "whose record is used: the nearest usable one"),
+        Column("distance", "float64", "m", "from the station to the middle of the pair, along the great circle"),
+        Column("azimuth_used", "float64", "degrees", "of the ground motion, the same for both buildings"),
+        Column("azimuth_rule", "str", "", "given; worst: of all for this demand; station: its only horizontal"),
+        *_both("per", "m", "pseudo energy radius of the oscillator, to be multiplied by its participation"),
+        *_both("sd", "m", "spectral displacement of the oscillator, to be multiplied by its participation"),
+        Column("correlation", "float64", "1", "of the two responses to white noise, eq. (16)"),
+        Column("correlation_record", "float64", "1", "of the two responses to this record, over all time"),
+        Column("critical_gap_per", "float64", "m", "eq. (15) from PER and eq. (16), at contact height"),
+        Column("critical_gap_record", "float64", "m", "eq. (15) from PER and the record's correlation, at contact height"),
+        Column("critical_gap_sd", "float64", "m", "eq. (15) from SD and eq. (16), at contact height"),
+        Column("srss_gap", "float64", "m", "root of the sum of the squared PER, at contact height"),
+        Column("absolute_gap", "float64", "m", "sum of the PER, at contact height"),
+    )
+}  # fmt: skip
+
+#: The leading columns; the rest of the completed pair table follows them.
+ORDER = (
+    "rank", "pair_id", "risk_class", "state", "gap", "demand", "demand_rule", "demand_ratio", "impact_velocity",
+    "single_hit_status", "amplification_1", "amplification_2", "flags", "station", "distance", "azimuth_used",
+    "azimuth_rule", "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2", "per_1",
+    "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per", "critical_gap_record",
+    "critical_gap_sd", "srss_gap", "absolute_gap", "contact_mass_1", "contact_mass_2", "restitution", "derived",
+)  # fmt: skip
+
+#: Flags of a pair and what each means.
+FLAGS: dict[str, str] = {
+    "touching": "gap 0: the single hit is outside its reliable range",
+    "single_hit_unreliable": "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low",
+    "outside_usable_periods": "a building's period is outside the usable periods of the station's record",
+    "per_far_above_sd": "PER/SD above the configured limit: a gap from PER is far too large",
+    "far_station": "the station is further away than the configured distance for this flag",
+    "one_horizontal": "the station has one horizontal: its azimuth is used whatever the pair's",
+    "derived_inputs": "the row has derived inputs, named in the column derived",
+    "derived_period": "a period was derived: the demand is at least SRSS and the state is never a plain no",
+    "no_demand": "the demand is 0 (the oscillators move as one or not at all): there is no demand ratio",
+    "floor_to_column": "floors do not meet floors: outside the method",
+    "simulated": "the ground motion is simulated",
+}
+
+
+def column_table(names: Iterable[str]) -> pd.DataFrame:
+    """Return unit and meaning of each of these columns, then of every flag, as written to ``risk.columns.csv``."""
+    known = COLUMNS | COMPLETED | RESULTS
+    carried = Column("", "", "", "carried through from the pair table")
+    rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in names]
+    flags = [(f"flag_{name}", "", meaning) for name, meaning in FLAGS.items()]
+    return pd.DataFrame(rows + flags, columns=["name", "unit", "meaning"])

@@ -1,0 +1,223 @@
+"""
+The risk table: pairs of buildings with the records of their stations, one row a pair, worst first.
+
+Pairs go station by station and in blocks, so that memory follows the block and not the inventory.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Building, Screening
+from per_obspy.errors import Rejection
+from per_obspy.inventory.completion import completed_pairs
+from per_obspy.pounding.single_hit import single_hit
+from per_obspy.screening.assignment import nearest_station
+from per_obspy.screening.columns import ORDER
+from per_obspy.screening.demand import (
+    Demand,
+    GapEstimates,
+    demand_ratio,
+    gap_estimates,
+    governing_demand,
+    pounding_state,
+)
+from per_obspy.screening.flags import flag_text, period_is_derived
+from per_obspy.screening.motion import (
+    PairMotion,
+    motion_along_azimuths,
+    motion_along_every_azimuth,
+    motion_of_one_horizontal,
+)
+
+#: Pairs in a block: at 180 azimuths a block of every array stays below 3 MB.
+BLOCK = 2000
+
+
+def risk_table(
+    spectra: xr.Dataset | Sequence[xr.Dataset],
+    pairs: pd.DataFrame,
+    building: Building = Building(),  # noqa: B008 - frozen
+    screening: Screening = Screening(),  # noqa: B008 - frozen
+) -> pd.DataFrame:
+    """
+    Return one row a pair: ground motion, demand, whether it pounds, and how hard; worst first.
+
+    Parameters
+    ----------
+    spectra : Dataset or sequence of Dataset
+        Stations, from :func:`per_obspy.station_spectra`.
+    pairs : DataFrame
+        From :func:`per_obspy.read_pairs`.
+    building : Building
+        What is assumed where the inventory is silent.
+    screening : Screening
+        Distances, and thresholds of flags and classes.
+
+    Returns
+    -------
+    DataFrame
+        Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair table; ``attrs["rejected"]`` holds a
+        :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
+
+    Raises
+    ------
+    ValueError
+        If no station has coordinates.
+    """
+    stations = [spectra] if isinstance(spectra, xr.Dataset) else list(spectra)
+    located = [station for station in stations if np.isfinite(station["latitude"].item())]
+    if not located:
+        raise ValueError(f"spectra must hold a station with coordinates, got {len(stations)} without")
+    complete = completed_pairs(pairs, building)
+    assigned, rejected = _assigned(complete, located, screening)
+    blocks = [_rows(located[index], block, screening) for index, block in _blocks(assigned)]
+    table = pd.concat(blocks, ignore_index=True) if blocks else assigned
+    table = _ranked(table)
+    table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
+    return table
+
+
+def _assigned(
+    pairs: pd.DataFrame, stations: list[xr.Dataset], screening: Screening
+) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """Return the pairs with the index of their station and its distance, and those with none in reach."""
+    index, distance = nearest_station(
+        pairs["longitude"].to_numpy(),
+        pairs["latitude"].to_numpy(),
+        np.array([station["longitude"].item() for station in stations]),
+        np.array([station["latitude"].item() for station in stations]),
+    )
+    names = np.array([station["station"].item() for station in stations], dtype=object)
+    placed = pairs.assign(station=names[index], station_index=index, distance=distance)
+    reach = screening.largest_distance
+    far = placed[distance > reach]
+    rejected = tuple(
+        Rejection("pair", str(name), "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
+        for name, station, metres in zip(far["pair_id"], far["station"], far["distance"], strict=True)
+    )
+    return placed[distance <= reach], rejected
+
+
+def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
+    """Give blocks of pairs that share a station and know, or do not know, their azimuth."""
+    for (index, _), group in pairs.groupby(["station_index", pairs["azimuth"].isna()]):
+        for start in range(0, len(group), BLOCK):
+            yield int(index), group.iloc[start : start + BLOCK]
+
+
+def _rows(station: xr.Dataset, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return the finished rows of one block, not ranked yet."""
+    motion, rule = _motion(station, pairs)
+    judged = _judged(motion, pairs)
+    hit = _hits(judged, pairs)
+    table = pairs.assign(azimuth_rule=rule, **judged.columns, **hit)
+    table["demand_ratio"] = demand_ratio(table["gap"].to_numpy(), table["demand"].to_numpy())
+    table["state"] = pounding_state(table["gap"].to_numpy(), table["demand"].to_numpy(), period_is_derived(table))
+    table["risk_class"] = _risk_class(table["demand_ratio"].to_numpy(), screening.classes)
+    table["flags"] = flag_text(table, station, screening)
+    return table
+
+
+def _motion(station: xr.Dataset, pairs: pd.DataFrame) -> tuple[PairMotion, str]:
+    """Return the motion of a block and how its azimuth was found."""
+    if station.sizes["horizontal"] == 1:
+        return motion_of_one_horizontal(station, pairs), "station"
+    if pairs["azimuth"].isna().any():
+        return motion_along_every_azimuth(station, pairs), "worst"
+    return motion_along_azimuths(station, pairs), "given"
+
+
+class _Judged(NamedTuple):
+    """Columns at each pair's governing azimuth, and the contact-level radii there."""
+
+    columns: dict[str, NDArray[np.generic]]
+    per: tuple[FloatArray, FloatArray]
+
+
+def _judged(motion: PairMotion, pairs: pd.DataFrame) -> _Judged:
+    """Return all estimates at the azimuth where the pair's demand is largest."""
+    participation = [pairs[f"participation_{i}"].to_numpy(np.float64)[:, None] for i in (1, 2)]
+    per = (participation[0] * motion.per[0], participation[1] * motion.per[1])
+    sd = (participation[0] * motion.sd[0], participation[1] * motion.sd[1])
+    period = tuple(pairs[f"period_{i}"].to_numpy(np.float64)[:, None] for i in (1, 2))
+    damping = tuple(pairs[f"damping_{i}"].to_numpy(np.float64)[:, None] for i in (1, 2))
+    estimates = gap_estimates(per, sd, period, damping, motion.correlation)
+    demand = governing_demand(estimates, period_is_derived(pairs)[:, None])
+    worst = np.argmax(demand.demand, axis=1)
+
+    def at_worst(values: NDArray[np.generic]) -> NDArray[np.generic]:
+        return np.take_along_axis(values, worst[:, None], axis=1)[:, 0]
+
+    columns = _columns(motion, estimates, demand)
+    return _Judged({name: at_worst(values) for name, values in columns.items()}, (at_worst(per[0]), at_worst(per[1])))
+
+
+def _columns(motion: PairMotion, estimates: GapEstimates, demand: Demand) -> dict[str, NDArray[np.generic]]:
+    return {
+        "azimuth_used": motion.azimuth,
+        "per_1": motion.per[0],
+        "per_2": motion.per[1],
+        "sd_1": motion.sd[0],
+        "sd_2": motion.sd[1],
+        "correlation": estimates.correlation,
+        "correlation_record": motion.correlation,
+        "critical_gap_per": estimates.per,
+        "critical_gap_record": estimates.record,
+        "critical_gap_sd": estimates.sd,
+        "srss_gap": estimates.srss,
+        "absolute_gap": estimates.absolute,
+        "demand": demand.demand,
+        "demand_rule": demand.rule,
+    }
+
+
+def _hits(judged: _Judged, pairs: pd.DataFrame) -> dict[str, NDArray[np.generic]]:
+    """Return the single hit of every pair, its critical gap being the demand."""
+    hit = single_hit(
+        *judged.per,
+        *(pairs[f"period_{i}"].to_numpy(np.float64) for i in (1, 2)),
+        *(pairs[f"contact_mass_{i}"].to_numpy(np.float64) for i in (1, 2)),
+        pairs["restitution"].to_numpy(np.float64),
+        judged.columns["demand"],
+        pairs["gap"].to_numpy(np.float64),
+    )
+    return {
+        "single_hit_status": hit.status,
+        "amplification_1": hit.amplification_1,
+        "amplification_2": hit.amplification_2,
+        "impact_velocity": hit.impact_velocity,
+    }
+
+
+def _risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
+    """Return the first class whose threshold the ratio does not exceed; the last where there is no ratio."""
+    names = np.array(list(classes), dtype=object)
+    index = np.searchsorted(np.array(list(classes.values())), np.nan_to_num(ratio, nan=np.inf), side="left")
+    return names[np.minimum(index, names.size - 1)]
+
+
+def _ranked(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table in the order of its columns, worst pair first; ties by importance, occupants, name."""
+    order = {
+        "state": table["state"].map({"yes": 0, "possible": 1, "no": 2}),
+        "velocity": -table["impact_velocity"].fillna(0.0),
+        "ratio": table["demand_ratio"].fillna(np.inf),
+        "importance": -_largest(table, "importance"),
+        "occupants": -_largest(table, "occupants"),
+        "pair_id": table["pair_id"],
+    }
+    ranked = table.loc[pd.DataFrame(order).sort_values(list(order), kind="stable").index].reset_index(drop=True)
+    ranked["rank"] = np.arange(1, len(ranked) + 1)
+    others = [name for name in ranked if name not in ORDER and name != "station_index"]
+    return ranked[[*ORDER, *others]]
+
+
+def _largest(table: pd.DataFrame, name: str) -> pd.Series:
+    """Return the larger value of the two buildings, 0 where the pair table does not know it."""
+    return table.reindex(columns=[f"{name}_1", f"{name}_2"]).max(axis=1).fillna(0.0)

@@ -1,0 +1,100 @@
+"""
+Spectra on disk: one netCDF shard a station, and one file for the region.
+
+A shard holds everything of a station, its processed motion included. ``spectra.nc`` of a region holds the spectra of
+all stations along the dimension ``station`` without the motion.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import xarray as xr
+
+from per_obspy.errors import CatalogError
+from per_obspy.files import written_whole
+
+#: What a region's file leaves in the shards: the motion, sample by sample.
+MOTION = ("acceleration", "horizontal_azimuth", "sampling_interval")
+
+
+def write_spectra(dataset: xr.Dataset, path: Path) -> None:
+    """
+    Write a Dataset of spectra as compressed netCDF-4; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        From :func:`per_obspy.station_spectra` or :func:`region`.
+    path : Path
+        Where to; folders are made.
+    """
+    encoding = {name: {"_FillValue": None} for name in dataset.coords}
+    for name, variable in dataset.data_vars.items():
+        if variable.dtype.kind == "f":
+            encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}
+    with written_whole(path) as part:
+        dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
+
+
+def read_spectra(path: Path) -> xr.Dataset:
+    """
+    Read a Dataset that :func:`write_spectra` wrote, identical to what was written.
+
+    Raises
+    ------
+    CatalogError
+        If the file is missing, damaged or of another kind.
+    """
+    try:
+        dataset = xr.load_dataset(path, engine="netcdf4", decode_times=False, decode_timedelta=False)
+    except (OSError, ValueError) as error:
+        raise CatalogError(str(path), f"cannot be read as netCDF: {error}") from error
+    if "per" not in dataset:
+        raise CatalogError(str(path), f"has no variable 'per', only {sorted(map(str, dataset.variables))}")
+    return dataset
+
+
+def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
+    """
+    Return the spectra of several stations along the dimension ``station``, sorted by name, without the motion.
+
+    Parameters
+    ----------
+    stations : iterable of Dataset
+        From :func:`per_obspy.station_spectra`, on the same periods and dampings.
+
+    Returns
+    -------
+    Dataset
+        Components that a station lacks are missing values.
+
+    Raises
+    ------
+    ValueError
+        If the stations' periods, dampings or azimuths differ.
+    """
+    spectra = sorted((_without_motion(station) for station in stations), key=lambda one: str(one["station"].item()))
+    joined = xr.concat(
+        spectra,
+        dim="station",
+        join="outer",
+        data_vars="all",
+        coords="different",
+        compat="equals",
+        fill_value={"channel": "", "processing": ""},
+        combine_attrs="drop_conflicts",
+    )
+    for axis in ("period", "damping", "azimuth"):
+        if axis in joined.sizes and joined.sizes[axis] != max(one.sizes.get(axis, 0) for one in spectra):
+            raise ValueError(f"{axis} differs between the stations: the spectra are not on one grid")
+    return joined.assign_attrs(title="Pseudo energy radius spectra of a region")
+
+
+def _without_motion(station: xr.Dataset) -> xr.Dataset:
+    spectra = station.drop_vars(MOTION).drop_dims(("time", "horizontal"), errors="ignore")
+    horizontals = (
+        (),
+        int(station.attrs["horizontals"]),
+        {"units": "1", "long_name": "number of horizontal components"},
+    )
+    return spectra.assign(horizontals=horizontals).drop_attrs(deep=False).assign_attrs(station.attrs)
