@@ -8,3 +8,4 @@ from .inventory.periods import asce7_period as asce7_period, ec8_period as ec8_p
 from .inventory.reading import read_pairs as read_pairs
 from .inventory.shear_building import equivalent_sdof as equivalent_sdof, shear_building as shear_building
 from .pounding.single_hit import single_hit as single_hit
+from .spectra.elastic import per_spectrum as per_spectrum, response_spectra as response_spectra

@@ -23,8 +23,8 @@ def unit_responses(phase, damping):
     """
     Return ``H, H', I1, I2`` at a phase: unit impulse response, its derivative, and its first and second integral.
 
-    ``H'' + 2 xi H' + H = 0`` with ``H(0) = 0``, ``H'(0) = 1``; integrating it once and twice gives ``H' = 1 - 2 xi H - I1``
-    and ``H = phase - 2 xi I1 - I2``.
+    ``H'' + 2 xi H' + H = 0`` with ``H(0) = 0``, ``H'(0) = 1``; integrating it once and twice gives
+    ``H' = 1 - 2 xi H - I1`` and ``H = phase - 2 xi I1 - I2``.
     """
     if phase < SERIES_PHASE:
         once, twice = _integral_series(phase, damping)

@@ -1,0 +1,298 @@
+"""Response spectra of linear oscillators, exact for the record that is linear between its samples."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import checks
+from ..checks import FloatArray
+from ..kernels import blocks, radius, response
+from .blocks import (
+    Ground,
+    Oscillators,
+    choose,
+    over_blocks,
+    prepare_ground,
+    prepare_oscillators,
+    raise_between,
+    raise_to_samples,
+    stretches,
+)
+
+
+class ResponseSpectra(NamedTuple):
+    """
+    Largest responses of linear oscillators, each (n_periods,) or (n_damping, n_periods).
+
+    Attributes
+    ----------
+    per : ndarray
+        Pseudo energy radius, the largest ``sqrt(u² + (v / omega)²)``, m.
+    sd : ndarray
+        Largest displacement relative to the ground, m.
+    sv : ndarray
+        Largest velocity relative to the ground, m/s.
+    sa : ndarray
+        Largest absolute acceleration, m/s².
+    psv : ndarray
+        Pseudo velocity ``omega * sd``, m/s.
+    psa : ndarray
+        Pseudo acceleration ``omega² * sd``, m/s².
+    """
+
+    per: FloatArray
+    sd: FloatArray
+    sv: FloatArray
+    sa: FloatArray
+    psv: FloatArray
+    psa: FloatArray
+
+
+def per_spectrum(acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05) -> FloatArray:
+    """
+    Pseudo energy radius spectrum of one component of ground acceleration.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², linear between samples; the structure is at rest at the first sample, and a last
+        sample that is not zero is followed by a ramp of one ``dt`` to zero.
+    dt : float
+        Time between samples, s.
+    periods : (n_periods,) array_like
+        Undamped periods ``2 pi / omega``, s.
+    damping : float or (n_damping,) array_like
+        Fraction of critical, at least 0 and below 1.
+
+    Returns
+    -------
+    per : (n_periods,) or (n_damping, n_periods) ndarray
+        Largest radius ``sqrt(u² + (v / omega)²)``, m, between samples as well as at them.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape.
+
+    Notes
+    -----
+    ``u`` and ``v`` are displacement and velocity relative to the ground (Valles-Mattox & Reinhorn 1996, eq. (11) and
+    (12)). In the free vibration after the record the radius never grows, so that none is added. Bounds of the second
+    derivative of ``r²`` tell in which steps a maximum between samples can lie; there it is found from the roots of
+    ``v`` and of ``2 xi omega v + a``.
+
+    References
+    ----------
+    Nigam, N. C. & Jennings, P. C. (1969), Calculation of response spectra from strong-motion earthquake records,
+    BSSA 59(2), 909-922.
+
+    Examples
+    --------
+    A constant acceleration of an undamped oscillator: the static displacement, doubled.
+
+    >>> per_spectrum([9.81] * 400, 0.005, [1.0], damping=0.0).round(6)
+    array([0.49698])
+    """
+    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
+    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=True).reshape(shape)
+
+
+def response_spectra(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+) -> ResponseSpectra:
+    """
+    Response spectra of one component of ground acceleration: PER, SD, SV, SA, PSV and PSA.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods : (n_periods,) array_like
+        Undamped periods, s.
+    damping : float or (n_damping,) array_like
+        Fraction of critical, at least 0 and below 1.
+
+    Returns
+    -------
+    ResponseSpectra
+        Six arrays (n_periods,) or (n_damping, n_periods): m, m, m/s, m/s², m/s, m/s². Between samples as well as at
+        them; SD, SV and SA include the free vibration after the record.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape.
+
+    Examples
+    --------
+    >>> spectra = response_spectra([9.81] * 400, 0.005, [1.0], damping=0.0)
+    >>> spectra.sa.round(6)
+    array([19.62])
+    """
+    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
+    oscillators = prepare_oscillators(dt, *grid)
+    return _spectra(_responses(prepare_ground(record), oscillators, exact=True), oscillators, shape)
+
+
+def sampled_per_spectrum(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+) -> FloatArray:
+    """Return what `per_spectrum` would if only the samples were looked at, for comparison with other programs, m."""
+    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
+    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=False).reshape(shape)
+
+
+def sampled_response_spectra(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+) -> ResponseSpectra:
+    """Return what `response_spectra` would if only the samples were looked at, for comparison with official tables."""
+    record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
+    oscillators = prepare_oscillators(dt, *grid)
+    return _spectra(_responses(prepare_ground(record), oscillators, exact=False), oscillators, shape)
+
+
+class OscillatorMaxima(NamedTuple):
+    """Largest radius and largest displacement of each oscillator, (n,), m."""
+
+    per: FloatArray
+    sd: FloatArray
+
+
+def oscillator_maxima(acceleration: ArrayLike, dt: float, periods: ArrayLike, dampings: ArrayLike) -> OscillatorMaxima:
+    """
+    Largest radius and displacement of many oscillators, each with its own period and damping.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods, dampings : array_like
+        Undamped periods, s, and fractions of critical, broadcast to the shape (n,).
+
+    Returns
+    -------
+    OscillatorMaxima
+        Two arrays (n,), m, exact between samples, with the free vibration after the record.
+    """
+    record = checks.record("acceleration", acceleration)
+    oscillators = _paired(dt, periods, dampings, None)
+    return OscillatorMaxima(*_responses(prepare_ground(record), oscillators, exact=True)[:2])
+
+
+def azimuth_maxima(
+    north: ArrayLike, east: ArrayLike, dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike
+) -> OscillatorMaxima:
+    """
+    Largest radius and displacement of many oscillators, each with its own period, damping and azimuth.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) array_like
+        Components of the ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods, dampings, azimuths : array_like
+        Undamped periods, s, fractions of critical, and degrees clockwise from north, broadcast to the shape (n,).
+
+    Returns
+    -------
+    OscillatorMaxima
+        Two arrays (n,), m, exact between samples, with the free vibration after the record.
+    """
+    components = checks.record("north", north), checks.record("east", east)
+    if components[0].size != components[1].size:
+        raise ValueError(f"north and east must be equally long, got {components[0].size} and {components[1].size}")
+    oscillators = _paired(dt, periods, dampings, azimuths)
+    return OscillatorMaxima(*_responses(prepare_ground(*components), oscillators, exact=True)[:2])
+
+
+def _arguments(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike
+) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray], tuple[int, ...]]:
+    """Return record, dt, the grid as paired periods and dampings, and the shape of the result."""
+    record = checks.record("acceleration", acceleration)
+    dt = checks.number("dt", dt, checks.positive)
+    row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
+    dampings = checks.fraction_of_critical("damping", damping)
+    if dampings.ndim > 1:
+        raise ValueError(f"damping must be a number or one row of numbers, got the shape {dampings.shape}")
+    grid = np.broadcast_arrays(row, np.atleast_1d(dampings)[:, np.newaxis])
+    return record, dt, (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
+
+
+def row_of(name: str, values: FloatArray) -> FloatArray:
+    """Return one row of at least one value."""
+    if values.ndim != 1 or values.size == 0:
+        raise ValueError(f"{name} must be one row of at least one value, got the shape {values.shape}")
+    return values
+
+
+def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike | None) -> Oscillators:
+    dt = checks.number("dt", dt, checks.positive)
+    period, damping, azimuth = np.broadcast_arrays(
+        checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))),
+        checks.fraction_of_critical("dampings", dampings),
+        checks.finite("azimuths", 0.0 if azimuths is None else azimuths),
+    )
+    row_of("periods", period)
+    return prepare_oscillators(dt, period, damping, None if azimuths is None else azimuth)
+
+
+def _radius_block(ground: Ground, block: Oscillators, exact: bool) -> FloatArray:
+    """Return the largest squared radii of one block, (1, lanes), in units of the scaled acceleration / omega²."""
+    packed, state = np.empty((radius.ROWS, blocks.LANES)), np.empty((2, blocks.LANES))
+    kept, largest = np.empty((blocks.TILES, 3, blocks.LANES)), np.zeros((1, blocks.LANES))
+    radius.pack(block.phases, block.dampings, packed)
+    radius.start_at_rest(ground.north[0], packed, state)
+    for stretch in stretches(ground):
+        radius.run_tiles(stretch.north, packed, state, kept)
+        if exact:
+            chosen = choose(stretch, block, kept, largest)
+            states = np.empty(chosen.shape)
+            radius.states_before(stretch.north, packed, kept, chosen, states)
+            raise_between(stretch, block, kept, states, chosen, largest)
+        else:
+            raise_to_samples(stretch, kept, largest)
+    return largest
+
+
+def _response_block(ground: Ground, block: Oscillators, exact: bool) -> FloatArray:
+    """Return the largest squared radii, displacements, velocities and accelerations of one block, (4, lanes)."""
+    packed = np.empty((response.ROWS, blocks.LANES))
+    kept, largest = np.empty((blocks.TILES, 6, blocks.LANES)), np.zeros((4, blocks.LANES))
+    response.pack_response(block.weights, block.phases, block.dampings, packed)
+    for stretch in stretches(ground):
+        response.run_response_tiles(stretch.north, stretch.east, packed, kept)
+        if exact:
+            chosen = choose(stretch, block, kept, largest)
+            states = np.ascontiguousarray(kept[chosen[:, 0], :2, chosen[:, 1]])
+            raise_between(stretch, block, kept, states, chosen, largest)
+        else:
+            raise_to_samples(stretch, kept, largest)
+    response.free_vibration(packed, block.dampings, largest)
+    return largest
+
+
+def _radii(ground: Ground, oscillators: Oscillators, exact: bool) -> FloatArray:
+    """Return the largest radius of each oscillator, m."""
+    squares = over_blocks(lambda block: _radius_block(ground, block, exact), oscillators, ground)
+    return np.asarray(np.sqrt(squares[0]) / oscillators.omegas**2 * ground.scale)
+
+
+def _responses(ground: Ground, oscillators: Oscillators, exact: bool) -> FloatArray:
+    """Return radius, displacement, velocity / omega and acceleration / omega² of each oscillator, (4, n), m."""
+    largest = over_blocks(lambda block: _response_block(ground, block, exact), oscillators, ground)
+    largest[0] = np.sqrt(largest[0])
+    return np.asarray(largest / oscillators.omegas**2 * ground.scale)
+
+
+def _spectra(lengths: FloatArray, oscillators: Oscillators, shape: tuple[int, ...]) -> ResponseSpectra:
+    omegas = oscillators.omegas
+    per, sd, sv, sa = lengths
+    spectra = per, sd, sv * omegas, sa * omegas**2, sd * omegas, sd * omegas**2
+    return ResponseSpectra(*(values.reshape(shape) for values in spectra))
