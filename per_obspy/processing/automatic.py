@@ -6,7 +6,7 @@ from obspy import Stream, Trace
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.baseline import mean_removed, trend_removed
+from per_obspy.processing.baseline import detrended, mean_removed, trend_removed
 from per_obspy.processing.corners import (
     Corner,
     clean_corner,
@@ -17,8 +17,15 @@ from per_obspy.processing.corners import (
 )
 from per_obspy.processing.filtering import tapered
 from per_obspy.processing.findings import Finding, below, judged
-from per_obspy.processing.noise import NoiseSpectra, clear_band, weakest_ratio
+from per_obspy.processing.noise import NoiseSpectra, clear_band, significant_samples, weakest_ratio
 from per_obspy.processing.provenance import noted, remembered
+from per_obspy.processing.velocity_baseline import (
+    LATEST_START,
+    boore_segments,
+    crossing_time,
+    displacement_polynomial,
+    velocity_residual,
+)
 
 
 def corners_noted(stream: Stream, settings: Processing, magnitude: float | None) -> Stream:
@@ -49,12 +56,40 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     lowest, lowpass = _limits(checked[0], spectra, settings, magnitude)
     if settings.highpass is not None:
         return _noted(tapered(checked, settings.taper), Corner(settings.highpass, "configuration"), lowpass)
-    candidate = tapered(checked, settings.taper)
-    highpass = clean_corner(candidate[0], lowest, settings.highpass_range[1], settings.drift, settings.order)
-    if highpass is None:
-        reason = f"displacement still drifts with the corner at {settings.highpass_range[1]:g} Hz"
-        raise RecordRejected(candidate[0].id, reason)
-    return _noted(candidate, highpass, lowpass)
+    return _noted(*_clean_baseline(checked, lowest, settings), lowpass)
+
+
+def _clean_baseline(stream: Stream, lowest: Corner, settings: Processing) -> tuple[Stream, Corner]:
+    """Return the record with the plain baseline if that comes clean at a low corner, else with the one that does best."""
+    found = _cleaned(stream, "mean and line", lowest, settings)
+    if found is not None and found[1].frequency <= settings.drifting:
+        return found
+    others = (_cleaned(other, name, lowest, settings) for name, other in _other_baselines(stream))
+    clean = [one for one in (found, *others) if one is not None]
+    if not clean:
+        reason = f"displacement drifts with every baseline and the corner at {settings.highpass_range[1]:g} Hz"
+        raise RecordRejected(stream[0].id, reason)
+    return min(clean, key=lambda one: one[1].frequency)
+
+
+def _cleaned(stream: Stream, baseline: str, lowest: Corner, settings: Processing) -> tuple[Stream, Corner] | None:
+    """Return the tapered record and the corner that cleans its displacement, or None where none does."""
+    candidate = tapered(stream, settings.taper)
+    remembered(candidate[0], baseline=baseline)
+    corner = clean_corner(candidate[0], lowest, settings.highpass_range[1], settings.drift, settings.order)
+    return None if corner is None else (candidate, corner)
+
+
+def _other_baselines(stream: Stream) -> Iterator[tuple[str, Stream]]:
+    """Give the record with each baseline that may shift during the shaking, where the record leaves room for it."""
+    trace = stream[0]
+    dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
+    end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
+    yield "displacement polynomial", detrended(stream, displacement_polynomial)
+    if 0 < onset < end <= LATEST_START * (trace.stats.npts - 1) * dt:
+        second = crossing_time(trace.data, dt, onset, end)
+        yield "two segments", detrended(stream, boore_segments, first=onset, second=second)
+        yield "velocity residual", detrended(stream, velocity_residual, onset=onset, end=end)
 
 
 def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Iterator[Finding]:

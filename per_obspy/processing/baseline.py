@@ -1,9 +1,12 @@
 """Baselines that the earthquake did not make: means and polynomial trends."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.polynomial import Polynomial
 from obspy import Stream
 
+from per_obspy.checks import FloatArray
 from per_obspy.processing.provenance import noted
 
 
@@ -55,4 +58,28 @@ def trend_removed(stream: Stream, order: int = 1) -> Stream:
         place = np.linspace(-1, 1, trace.stats.npts)
         trace.data = trace.data - Polynomial.fit(place, trace.data, order, domain=[-1, 1])(place)
         noted(trace, f"polynomial trend of order {order} removed", trend_order=order)
+    return out
+
+
+def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:
+    """
+    Return a copy without the baseline that a function of `velocity_baseline` takes out.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+    removed : callable
+        From samples, m/s2, and options to samples.
+    **options : float
+        What the function needs, SI.
+
+    Returns
+    -------
+    obspy Stream
+    """
+    out = stream.copy()
+    told = ", ".join(f"{name} {value:g}" for name, value in options.items())
+    for trace in out:
+        trace.data = removed(trace.data, trace.stats.delta, **options)
+        noted(trace, f"baseline by {removed.__name__} removed ({told})")
     return out
