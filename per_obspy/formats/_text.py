@@ -15,6 +15,9 @@ WaveformFile = str | Path | BinaryIO
 #: what a decimal number is made of; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
+#: a decimal number in a regular expression
+DECIMAL = r"(-?(?:\d+\.?\d*|\.\d+))"
+
 
 class Text(NamedTuple):
     """A file as lines without their ends; line numbers in the code count from 0, in messages from 1."""
@@ -124,6 +127,12 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
 def block_lines(samples: int, per_line: int) -> int:
     """Return how many lines a block takes."""
     return -(-samples // per_line)
+
+
+def no_more(text: Text, line: int, samples: int) -> None:
+    """Refuse what follows the last sample."""
+    if line < len(text.lines):
+        refuse(text, line, "samples", f"more lines than the {samples} samples that the header promises take")
 
 
 def free_block(text: Text, start: int, stop: int | None, samples: int | None) -> FloatArray:

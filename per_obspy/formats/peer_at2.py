@@ -9,7 +9,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core.trace import Stats
 
 from ._text import Text, WaveformFile, count, free_block, head_lines, interval, line_at, read_text, refuse
-from .vocabulary import STANDARD_GRAVITY, orientation, trace, utc
+from .vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
 
 _QUANTITY = re.compile(r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b")
 _NUMBER = r"([-+\d.Ee*]+)"
@@ -62,14 +62,13 @@ def _size(text: Text) -> tuple[int, float]:
 
 
 def _title(text: Text) -> dict[str, Any]:
-    """Event, date, station and orientation of the second line; strong-motion records begin in 1933."""
+    """Event, date, station and orientation of the second line."""
     title = _TITLE.fullmatch(text.lines[1].strip())
     if title is None:
         name = text.lines[1].split(",")[0].strip()
         return {"station": _code(name), "station_name": name}
     event, month, day, year, station, component = title.groups()
-    century = 0 if len(year) == 4 else 2000 if int(year) < 33 else 1900
-    start = utc(text, 1, "date", (century + int(year), int(month), int(day)))
+    start = utc(text, 1, "date", (full_year(year), int(month), int(day)))
     named = {"station": _code(station), "station_name": station.strip(), "event": {"name": event or None}}
     return named | {"starttime": start} | orientation(component)
 

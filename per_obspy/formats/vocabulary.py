@@ -12,6 +12,7 @@ units                          ``"m/s2"``, ``"m/s"``, ``"m"``, or ``"counts"`` w
 quantity                       ``"acceleration"``, ``"velocity"`` or ``"displacement"``
 processing_level               ``"raw"`` or ``"processed"``
 coordinates                    latitude, longitude (degrees), elevation (m)
+sensor_location                where in the structure or the ground, as the header has it
 sensor_azimuth, sensor_dip     degrees clockwise from north (horizontals only); degrees down from horizontal (0; up
                                is -90)
 corners                        highpass, lowpass: corners of the filter that was applied, Hz
@@ -48,10 +49,10 @@ VERTICAL_DIPS = {
 
 #: words for the points of the compass -> degrees clockwise from north
 COMPASS_AZIMUTHS = {
-    **dict.fromkeys(("N", "NS", "N-S", "NORTH", "N00E"), 0.0),
-    **dict.fromkeys(("E", "EW", "E-W", "EAST", "N90E"), 90.0),
-    **dict.fromkeys(("S", "SN", "SOUTH"), 180.0),
-    **dict.fromkeys(("W", "WE", "WEST"), 270.0),
+    **dict.fromkeys(("N", "NS", "N-S", "SN", "NORTH"), 0.0),
+    **dict.fromkeys(("E", "EW", "E-W", "WE", "EAST"), 90.0),
+    **dict.fromkeys(("S", "SOUTH"), 180.0),
+    **dict.fromkeys(("W", "WEST"), 270.0),
 }
 
 _QUADRANT = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])")
@@ -104,6 +105,28 @@ def channel_code(sampling_rate: float, orientation: Mapping[str, float]) -> str:
         if abs((azimuth - axis + 180) % 360 - 180) <= 5:
             return f"{band}N{letter}"
     return f"{band}N{1 if abs(math.cos(math.radians(azimuth))) > math.sqrt(0.5) - 1e-9 else 2}"
+
+
+def full_year(year: str) -> int:
+    """
+    Return a year of which two digits may be given: strong-motion records begin in 1933.
+
+    >>> full_year("52"), full_year("06"), full_year("1985")
+    (1952, 2006, 1985)
+    """
+    if len(year.strip()) > 2:
+        return int(year)
+    return int(year) + (2000 if int(year) < 33 else 1900)
+
+
+def hemisphere(degrees: str, letter: str) -> float:
+    """
+    Return signed degrees.
+
+    >>> hemisphere("117.365", "W")
+    -117.365
+    """
+    return -float(degrees) if letter.upper() in ("S", "W") else float(degrees)
 
 
 def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:

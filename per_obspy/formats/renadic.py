@@ -1,0 +1,19 @@
+"""RENADIC (Universidad de Chile): volume 1 in CSMIP's layout, mostly with unknown coordinates and unset clocks."""
+
+from typing import Any
+
+from obspy import Stream
+
+from . import csmip
+from ._text import WaveformFile, head
+
+
+def is_renadic(file: WaveformFile) -> bool:
+    """Tell whether a file starts like a record of RENADIC."""
+    start = head(file, 1200).upper()
+    return start.startswith(b"UNCORRECTED ACCELEROGRAM DATA") and b"UNITS OF UNCOR" in start and b"RENADIC" in start
+
+
+def read_renadic(file: WaveformFile, **_unused: Any) -> Stream:
+    """Read a record of RENADIC: uncorrected acceleration of all channels, m/s2."""
+    return csmip.read_volume_1(file)
