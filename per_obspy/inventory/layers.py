@@ -1,0 +1,164 @@
+"""Read a layer of building footprints: polygons in degrees, their attributes, and what is no polygon."""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet
+import pyogrio
+import pyproj
+import shapely
+from numpy.typing import NDArray
+
+from ..errors import CatalogError, Rejection
+
+#: Files that GDAL reads for us; GeoParquet is read by pyarrow.
+GDAL_SUFFIXES = (".gpkg", ".geojson", ".json", ".shp", ".fgb")
+PARQUET_SUFFIXES = (".parquet", ".geoparquet")
+
+Geometries = NDArray[np.object_]
+
+
+class Layer(NamedTuple):
+    """
+    Footprints of one layer.
+
+    Attributes
+    ----------
+    polygons : (n_buildings,) ndarray of shapely geometries
+        Valid polygons and multipolygons, two-dimensional, longitude and latitude in degrees (WGS 84).
+    attributes : DataFrame
+        One row a polygon; its index is the number of the feature in the file, from 1.
+    rejected : tuple of Rejection
+        Features whose geometry cannot be used.
+    """
+
+    polygons: Geometries
+    attributes: pd.DataFrame
+    rejected: tuple[Rejection, ...]
+
+
+class _Raw(NamedTuple):
+    geometries: Geometries
+    attributes: pd.DataFrame
+    crs: Any
+
+
+def read_layer(path: str | Path, layer: str | None = None) -> Layer:
+    """
+    Read the footprints of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        GeoPackage, GeoJSON, Shapefile, FlatGeobuf or GeoParquet.
+    layer : str, optional
+        Name of the layer, for files that have several.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read, has no coordinate reference system, or the layer is empty or holds no polygons.
+    """
+    file = Path(path)
+    raw = _read(file, layer)
+    if len(raw.geometries) == 0:
+        raise CatalogError(str(file), "the layer has no features")
+    kinds = shapely.get_type_id(raw.geometries)
+    if set(kinds[kinds >= 0].tolist()) <= {shapely.GeometryType.POINT, shapely.GeometryType.MULTIPOINT}:
+        raise CatalogError(str(file), "the layer holds points, not footprints: a gap is a distance between walls")
+    degrees = _in_degrees(file, shapely.force_2d(raw.geometries), raw.crs)
+    reasons = [_fault(one, original) for one, original in zip(degrees, raw.geometries, strict=True)]
+    good = np.array([reason is None for reason in reasons])
+    rejected = tuple(
+        Rejection("building", f"feature {i + 1}", str(file), i + 1, (reason,))
+        for i, reason in enumerate(reasons)
+        if reason
+    )
+    attributes = raw.attributes.set_index(pd.RangeIndex(1, len(good) + 1))
+    return Layer(degrees[good], attributes[good], rejected)
+
+
+def _read(file: Path, layer: str | None) -> _Raw:
+    suffix = file.suffix.lower()
+    if suffix == ".csv":
+        raise CatalogError(
+            str(file), "a table has no walls, and a gap is a distance between walls: footprints are needed"
+        )
+    if suffix not in (*GDAL_SUFFIXES, *PARQUET_SUFFIXES):
+        expected = ", ".join((*GDAL_SUFFIXES, *PARQUET_SUFFIXES))
+        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
+    if not file.is_file():
+        raise CatalogError(str(file), "no such file")
+    return _read_gdal(file, layer) if suffix in GDAL_SUFFIXES else _read_geoparquet(file)
+
+
+def _read_gdal(file: Path, layer: str | None) -> _Raw:
+    try:
+        name = _layer_name(file, layer)
+        meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, UnicodeDecodeError) as error:
+        raise CatalogError(str(file), f"cannot be read: {error}") from error
+    attributes = pd.DataFrame(dict(zip(meta["fields"], fields, strict=True)), index=range(len(geometries)))
+    return _Raw(shapely.from_wkb(geometries), attributes, meta["crs"])
+
+
+def _layer_name(file: Path, layer: str | None) -> str:
+    """Return the layer asked for, or the only one with geometries."""
+    kinds = {str(name): kind for name, kind in pyogrio.list_layers(file)}
+    spatial = [name for name, kind in kinds.items() if kind is not None]
+    if layer is not None:
+        if layer not in kinds:
+            raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")
+        return layer
+    if not spatial:
+        raise CatalogError(str(file), f"no layer has geometries (layers found: {', '.join(kinds) or 'none'})")
+    if len(spatial) > 1:
+        raise CatalogError(str(file), f"several layers, name one: {', '.join(spatial)}")
+    return spatial[0]
+
+
+def _read_geoparquet(file: Path) -> _Raw:
+    try:
+        table = pa.parquet.read_table(file)
+    except pa.ArrowInvalid as error:
+        raise CatalogError(str(file), f"not a Parquet table: {error}") from error
+    described = (table.schema.metadata or {}).get(b"geo")
+    if described is None:
+        raise CatalogError(str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints")
+    geo = json.loads(described)
+    name = geo["primary_column"]
+    column = geo["columns"][name]
+    if column.get("encoding") != "WKB":
+        raise CatalogError(str(file), f"geometries are encoded as {column.get('encoding')!r}, expected WKB")
+    geometries = shapely.from_wkb(table[name].to_numpy())
+    # a missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
+    return _Raw(geometries, table.drop_columns([name]).to_pandas(), column.get("crs", "OGC:CRS84"))
+
+
+def _in_degrees(file: Path, geometries: Geometries, crs: Any) -> Geometries:
+    if crs is None:
+        raise CatalogError(str(file), "no coordinate reference system (a Shapefile needs its .prj)")
+    try:
+        transformer = pyproj.Transformer.from_crs(pyproj.CRS.from_user_input(crs), "OGC:CRS84", always_xy=True)
+    except pyproj.exceptions.CRSError as error:
+        raise CatalogError(str(file), f"unknown coordinate reference system {str(crs)!r:.60}") from error
+    return np.asarray(shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T))))
+
+
+def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None) -> str | None:
+    """Return why a geometry is no footprint, or None."""
+    if degrees is None or original is None:
+        return "no geometry"
+    if degrees.is_empty:
+        return "the geometry is empty"
+    if degrees.geom_type not in ("Polygon", "MultiPolygon"):
+        return f"the geometry is a {degrees.geom_type}, not a polygon"
+    bounds = np.array(degrees.bounds)
+    if not (np.isfinite(bounds).all() and (np.abs(bounds) <= [180, 90, 180, 90]).all()):
+        place = ", ".join(f"{value:g}" for value in original.bounds[:2])
+        return f"coordinates {place} lie outside the layer's coordinate reference system"
+    return None if degrees.is_valid else f"the polygon is invalid: {shapely.is_valid_reason(original)}"
