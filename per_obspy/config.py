@@ -89,8 +89,8 @@ class Checks(Section):
     levels: Check = Check(threshold=16, level="reject")  # different values a sample takes, at least
     clipped_run: Check = Check(threshold=5, level="reject")  # equal samples at an extreme, fewer than
     counter_use: Check = Check(threshold=0.8, level="warn")  # peak over full scale of a 24-bit counter, at most
-    dropout: Check = Check(threshold=0.3, level="reject")  # s without change during the shaking, less than
-    spike: Check = Check(threshold=15.0, level="reject")  # jump of one sample over others within 0.5 s, at most
+    dropout: Check = Check(threshold=0.5, level="reject")  # s without change during the shaking, less than
+    spike: Check = Check(threshold=6.0, level="reject")  # jump of one sample over others within 0.5 s, at most
     zero_crossings: Check = Check(threshold=0.1, level="reject")  # a second, at least
     outlier: Check = Check(threshold=5.0, level="reject")  # peak over the largest peak of two sisters, at most
     late_trigger: Check = Check(threshold=0.1, level="warn")  # motion of the first second over the peak, at most

@@ -17,7 +17,7 @@ from per_obspy.processing.corners import (
 )
 from per_obspy.processing.filtering import tapered
 from per_obspy.processing.findings import Finding, below, judged
-from per_obspy.processing.noise import NoiseSpectra, clear_band, significant_samples, weakest_ratio
+from per_obspy.processing.noise import NoiseSpectra, clear_band, significant_samples, sustained_ratio, weakest_ratio
 from per_obspy.processing.provenance import noted, remembered
 from per_obspy.processing.velocity_baseline import (
     LATEST_START,
@@ -60,7 +60,7 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
 
 
 def _clean_baseline(stream: Stream, lowest: Corner, settings: Processing) -> tuple[Stream, Corner]:
-    """Return the record with the plain baseline if that comes clean at a low corner, else with the one that does best."""
+    """Return the record with the plain baseline if that comes clean at a low corner, else with the best one."""
     found = _cleaned(stream, "mean and line", lowest, settings)
     if found is not None and found[1].frequency <= settings.drifting:
         return found
@@ -96,9 +96,8 @@ def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Itera
     checks = settings.checks
     if spectra is None:
         return
-    yield from below(
-        "signal_to_noise", checks.signal_to_noise, float(spectra.ratio.max()), "largest signal-to-noise ratio"
-    )
+    best = sustained_ratio(spectra)
+    yield from below("signal_to_noise", checks.signal_to_noise, best, "signal-to-noise ratio of the best octave")
     low, high = settings.required_band
     ratio = weakest_ratio(spectra, settings.required_band)
     yield from below("clear_band", checks.clear_band, ratio, f"signal-to-noise ratio in {low:g}-{high:g} Hz")
@@ -115,8 +114,9 @@ def _limits(
         fallback = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
         lowest, lowpass = max(fallback, shortest), highest
     else:
-        remembered(trace, clear_from=band[0], clear_to=band[1], signal_to_noise=float(spectra.ratio.max()))
+        remembered(trace, clear_from=band[0], clear_to=band[1], signal_to_noise=sustained_ratio(spectra))
         lowest, lowpass = max(Corner(band[0], "noise"), shortest), min(Corner(band[1], "noise"), highest)
+    remembered(trace, lowest_highpass=lowest.frequency, lowest_highpass_source=lowest.reason)
     if settings.lowpass is not None:
         lowpass = min(Corner(settings.lowpass, "configuration"), highest_corner(trace, settings.lowpass))
     return lowest, lowpass

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import rfft
+from scipy.ndimage import minimum_filter1d
 from scipy.signal.windows import tukey
 
 from per_obspy.checks import FloatArray
@@ -116,3 +117,9 @@ def weakest_ratio(spectra: NoiseSpectra, band: tuple[float, float]) -> float:
     """Return the smallest signal to noise inside a band, Hz; dimensionless."""
     inside = (spectra.frequencies >= band[0]) & (spectra.frequencies <= band[1])
     return float(spectra.ratio[inside].min()) if inside.any() else float("inf")
+
+
+def sustained_ratio(spectra: NoiseSpectra) -> float:
+    """Return the largest signal to noise that holds over an octave, dimensionless: single lines may stand out."""
+    octave = round(CENTRES_A_DECADE * np.log10(2.0))
+    return float(minimum_filter1d(spectra.ratio, octave, mode="constant", cval=0.0).max())

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from obspy import Stream, Trace
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import detrend
@@ -17,6 +18,7 @@ NEIGHBOURS = 2  # samples on each side that belong to a spike
 VICINITY = 0.5  # s
 SMALLEST_SPIKE = 0.05  # of the peak
 QUIET, ENVELOPE = 0.05, 5.0  # of the peak; s
+MOVING = 0.2  # of the largest root mean square
 
 
 def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
@@ -60,15 +62,18 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     yield from above("second_event", checks.second_event, later_event(samples, dt), "another event, over the peak:")
 
 
-def runs(same: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> FloatArray:
-    """Return the lengths of the runs of true values."""
+def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the runs of true values begin and where the first value after each is."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
-    return np.asarray(edges[1::2] - edges[::2], dtype=np.float64)
+    return edges[::2], edges[1::2]
 
 
 def longest_extreme_run(samples: FloatArray) -> int:
     """
     Return the longest run of equal samples at the largest or the smallest value: a signal pinned at the rails.
+
+    Coarse recorders stand still at every turn of the motion: a run that is not twice the longest one between the
+    extremes counts as 1.
 
     Parameters
     ----------
@@ -85,16 +90,31 @@ def longest_extreme_run(samples: FloatArray) -> int:
     3
     """
     close = 1e-6 * np.ptp(samples)
-    return max(int(runs(np.abs(samples - extreme) <= close).max()) for extreme in (samples.max(), samples.min()))
+    low, high = samples <= samples.min() + close, samples >= samples.max() - close
+    pinned = max(int(np.subtract(*runs(at)[::-1]).max()) for at in (low, high))
+    between = np.concatenate(([False], (np.diff(samples) == 0) & ~(low | high)[1:] & _shaking(samples)[1:]))
+    starts, stops = runs(between)
+    longest = int((stops - starts).max()) + 1 if starts.size else 1
+    return pinned if pinned >= 2 * longest else 1
+
+
+def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
+    """Tell which samples lie between 5 and 95 % of the squared motion."""
+    energy = np.cumsum((samples - samples.mean()) ** 2)
+    return np.asarray((energy >= (1 - SIGNIFICANT) * energy[-1]) & (energy <= SIGNIFICANT * energy[-1]))
 
 
 def longest_standstill(samples: FloatArray, dt: float) -> float:
     """
-    Return how long a record stands still while its neighbours move, s: between 5 and 95 % of its squared motion.
+    Return how long a record stands still while the ground moves, s.
+
+    The ground moves where, at both ends of the standstill, the root mean square over 2 s exceeds a fifth of its
+    largest value: coarse recorders may stand still before and after.
 
     Parameters
     ----------
     samples : (n_samples,) ndarray
+        Raw.
     dt : float
         Sampling interval, s.
 
@@ -102,10 +122,11 @@ def longest_standstill(samples: FloatArray, dt: float) -> float:
     -------
     float
     """
-    energy = np.cumsum(detrend(samples) ** 2)
-    first, last = np.searchsorted(energy, [(1 - SIGNIFICANT) * energy[-1], SIGNIFICANT * energy[-1]])
-    same = np.diff(samples[first : last + 1]) == 0
-    return float(runs(same).max() * dt) if same.any() else 0.0
+    squares = (samples - samples.mean()) ** 2
+    envelope = np.sqrt(np.maximum(uniform_filter1d(squares, max(round(2.0 / dt), 1)), 0))
+    starts, stops = runs(np.diff(samples) == 0)
+    moving = np.minimum(envelope[starts], envelope[stops]) > MOVING * envelope.max()
+    return float((stops - starts)[moving].max() * dt) if moving.any() else 0.0
 
 
 def largest_spike(samples: FloatArray, dt: float) -> float:
