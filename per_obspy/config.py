@@ -98,6 +98,7 @@ class Checks(Section):
     second_event: Check = Check(threshold=0.3, level="warn")  # later peak after quiet over the peak, at most
     signal_to_noise: Check = Check(threshold=2.0, level="reject")  # somewhere at least
     clear_band: Check = Check(threshold=2.0, level="warn")  # signal to noise over ``required_band``, at least
+    bandwidth: Check = Check(threshold=4.0, level="reject")  # low-pass over high-pass corner, at least
     final_velocity: Check = Check(threshold=0.1, level="reject")  # over its peak, at most
     final_displacement: Check = Check(threshold=0.2, level="reject")  # over its peak, at most
 

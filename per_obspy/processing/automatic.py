@@ -17,7 +17,14 @@ from per_obspy.processing.corners import (
 )
 from per_obspy.processing.filtering import tapered
 from per_obspy.processing.findings import Finding, below, judged
-from per_obspy.processing.noise import NoiseSpectra, clear_band, significant_samples, sustained_ratio, weakest_ratio
+from per_obspy.processing.noise import (
+    NoiseSpectra,
+    clear_band,
+    significant_samples,
+    sustained_ratio,
+    weakest_ratio,
+    within,
+)
 from per_obspy.processing.provenance import noted, remembered
 from per_obspy.processing.velocity_baseline import (
     LATEST_START,
@@ -51,12 +58,25 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
         If the signal never clears the noise, or no corner cleans the displacement.
     """
     level = trend_removed(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
+    outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)
+    if spectra is not None:
+        spectra = within(spectra, *(corner.frequency for corner in outer))
     checked = judged(level[0], _noise_findings(spectra, settings))
-    lowest, lowpass = _limits(checked[0], spectra, settings, magnitude)
+    lowest, lowpass = _limits(checked[0], spectra, outer, settings, magnitude)
     if settings.highpass is not None:
-        return _noted(tapered(checked, settings.taper), Corner(settings.highpass, "configuration"), lowpass)
-    return _noted(*_clean_baseline(checked, lowest, settings), lowpass)
+        ready, highpass = tapered(checked, settings.taper), Corner(settings.highpass, "configuration")
+    else:
+        ready, highpass = _clean_baseline(checked, lowest, settings)
+    width = lowpass.frequency / highpass.frequency
+    wide = judged(ready[0], below("bandwidth", settings.checks.bandwidth, width, "low-pass over high-pass corner:"))
+    return _noted(wide, highpass, lowpass)
+
+
+def _outer_corners(trace: Trace, settings: Processing) -> tuple[Corner, Corner]:
+    """Return the corners that the length of the record and its sampling allow."""
+    low = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
+    return low, highest_corner(trace, settings.highest_lowpass)
 
 
 def _clean_baseline(stream: Stream, lowest: Corner, settings: Processing) -> tuple[Stream, Corner]:
@@ -104,18 +124,22 @@ def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Itera
 
 
 def _limits(
-    trace: Trace, spectra: NoiseSpectra | None, settings: Processing, magnitude: float | None
+    trace: Trace,
+    spectra: NoiseSpectra | None,
+    outer: tuple[Corner, Corner],
+    settings: Processing,
+    magnitude: float | None,
 ) -> tuple[Corner, Corner]:
     """Return the lowest high-pass and the highest low-pass corner that the record allows, noting its noise."""
-    highest = highest_corner(trace, settings.highest_lowpass)
-    shortest = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
+    lowest, lowpass = outer
     band = clear_band(spectra, settings.checks.signal_to_noise.threshold) if spectra else None
     if spectra is None or band is None:
         fallback = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
-        lowest, lowpass = max(fallback, shortest), highest
+        lowest = max(fallback, lowest)
     else:
         remembered(trace, clear_from=band[0], clear_to=band[1], signal_to_noise=sustained_ratio(spectra))
-        lowest, lowpass = max(Corner(band[0], "noise"), shortest), min(Corner(band[1], "noise"), highest)
+        lowest = Corner(band[0], "noise") if band[0] > spectra.frequencies[0] else lowest
+        lowpass = Corner(band[1], "noise") if band[1] < spectra.frequencies[-1] else lowpass
     remembered(trace, lowest_highpass=lowest.frequency, lowest_highpass_source=lowest.reason)
     if settings.lowpass is not None:
         lowpass = min(Corner(settings.lowpass, "configuration"), highest_corner(trace, settings.lowpass))

@@ -52,7 +52,7 @@ def process_instrument(
         pair, settings.onset_margin, settings.shortest_noise, settings.pick_tolerance, source, settings.pre_event
     )
     outliers = outlier_findings(windowed, settings.checks)
-    magnitude = source.magnitude if source else None
+    magnitude = source.magnitude if source else _told_magnitude(windowed)
     ready, undecided = _in_turn(
         windowed,
         (
@@ -64,6 +64,12 @@ def process_instrument(
     verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
     done, restless = _in_turn(horizontals + verticals, _after(settings))
     return done, (*unfit, *unpaired, *undecided, *restless)
+
+
+def _told_magnitude(stream: Stream) -> float | None:
+    """Return the magnitude that a header tells, if one does."""
+    told = (trace.stats.get("event", {}).get("magnitude") for trace in stream)
+    return next((float(magnitude) for magnitude in told if magnitude), None)
 
 
 def _in_turn(stream: Stream, steps: Iterable[Step]) -> tuple[Stream, tuple[Rejection, ...]]:

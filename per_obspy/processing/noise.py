@@ -89,6 +89,12 @@ def _centres(dt: float) -> tuple[float, ...]:
     return tuple(np.geomspace(lowest, nyquist, count).tolist())
 
 
+def within(spectra: NoiseSpectra, low: float, high: float) -> NoiseSpectra:
+    """Return the spectra between two frequencies, Hz."""
+    inside = (spectra.frequencies >= low) & (spectra.frequencies <= high)
+    return NoiseSpectra(*(values[inside] for values in spectra))
+
+
 def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] | None:
     """
     Return the widest band (in octaves) in which signal exceeds noise by the threshold.
@@ -115,11 +121,10 @@ def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] |
 
 def weakest_ratio(spectra: NoiseSpectra, band: tuple[float, float]) -> float:
     """Return the smallest signal to noise inside a band, Hz; dimensionless."""
-    inside = (spectra.frequencies >= band[0]) & (spectra.frequencies <= band[1])
-    return float(spectra.ratio[inside].min()) if inside.any() else float("inf")
+    return float(within(spectra, *band).ratio.min(initial=np.inf))
 
 
 def sustained_ratio(spectra: NoiseSpectra) -> float:
     """Return the largest signal to noise that holds over an octave, dimensionless: single lines may stand out."""
     octave = round(CENTRES_A_DECADE * np.log10(2.0))
-    return float(minimum_filter1d(spectra.ratio, octave, mode="constant", cval=0.0).max())
+    return float(minimum_filter1d(spectra.ratio, octave, mode="constant", cval=0.0).max(initial=0.0))
