@@ -4,8 +4,11 @@ from .pounding.gap import absolute_gap as absolute_gap, critical_gap as critical
 from .pounding.impact import post_impact_velocities as post_impact_velocities, transfer_energies as transfer_energies
 from .pounding.structure import Structure as Structure
 from .processing.chain import process as process
+from .inventory.footprints import pairs_from_footprints as pairs_from_footprints
 from .inventory.periods import asce7_period as asce7_period, ec8_period as ec8_period
 from .inventory.reading import read_pairs as read_pairs
 from .inventory.shear_building import equivalent_sdof as equivalent_sdof, shear_building as shear_building
 from .pounding.single_hit import single_hit as single_hit
 from .spectra.elastic import per_spectrum as per_spectrum, response_spectra as response_spectra
+from .spectra.station import station_spectra as station_spectra
+from .screening.risk import risk_table as risk_table

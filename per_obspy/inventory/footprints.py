@@ -14,7 +14,7 @@ from .contact import floor_offset
 from .importers import imported
 from .layers import Geometries, Layer, read_layer
 from .neighbours import Neighbours, neighbours
-from .schema import POSITIONS
+from .schema import COLUMNS, POSITIONS
 
 #: Share of the smaller footprint that may be covered by both: digitised party walls cross by centimetres.
 OVERLAP = 0.02
@@ -65,6 +65,7 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
     if not pairs.empty:
         pairs = checked_pairs(pairs, source)
         rejected += tuple(one._replace(row=None) for one in pairs.attrs["rejected"])
+        pairs = _with_floors(pairs)
     pairs.attrs["rejected"] = rejected
     return pairs
 
@@ -129,23 +130,26 @@ def _in_metres(polygons: Geometries, source: str) -> tuple[Geometries, tuple[flo
 
 
 def _with_heights(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with heights from storeys of a given height, the contact height and the floor offset."""
-    known = {}
+    """Return the table with heights from storeys of a given height, where a height is missing."""
     for i in (1, 2):
-        for name in ("height", "storeys", "storey_height"):
-            values = pd.to_numeric(table.get(f"{name}_{i}", pd.Series(np.nan, table.index)), errors="coerce")
-            known[f"{name}_{i}"] = values.where(values > 0.0).to_numpy(dtype=np.float64)
-        product = known[f"storeys_{i}"] * known[f"storey_height_{i}"]
-        if f"height_{i}" not in table:
-            table[f"height_{i}"] = np.nan
-        silent = table[f"height_{i}"].isna().to_numpy()
-        table[f"height_{i}"] = table[f"height_{i}"].mask(silent, product)
-        known[f"height_{i}"] = np.where(silent, product, known[f"height_{i}"])
-    table["contact_height"] = np.minimum(known["height_1"], known["height_2"])
-    full = ~np.isnan([known[f"{name}_{i}"] for name in ("height", "storeys") for i in (1, 2)]).any(axis=0)
-    sizes = [np.where(full, known[name], 1.0) for name in ("height_1", "storeys_1", "height_2", "storeys_2")]
-    table["floor_offset"] = np.where(full, floor_offset(*sizes), np.nan)
-    return table.drop(columns=[name for name in ("storey_height_1", "storey_height_2") if name in table])
+        if f"storey_height_{i}" in table:
+            unknown = pd.Series(np.nan, index=table.index)
+            storeys = pd.to_numeric(table.get(f"storeys_{i}", unknown), errors="coerce")
+            product = storeys * pd.to_numeric(table[f"storey_height_{i}"], errors="coerce")
+            table[f"height_{i}"] = table.get(f"height_{i}", unknown).fillna(product)
+            table = table.drop(columns=f"storey_height_{i}")
+    return table
+
+
+def _with_floors(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return checked pairs with contact height and floor offset where heights and storeys of both are known."""
+    names = ("height_1", "storeys_1", "height_2", "storeys_2")
+    known = [pairs[name].to_numpy() if name in pairs else np.full(len(pairs), np.nan) for name in names]
+    full = ~np.isnan(known).any(axis=0)
+    offset = np.where(full, floor_offset(*np.where(full, known, 1.0)), np.nan)
+    pairs = pairs.assign(contact_height=np.minimum(known[0], known[2]), floor_offset=offset)
+    ours = [name for name in COLUMNS if name in pairs]
+    return pairs[[*ours, *pairs.columns.difference(ours, sort=False)]]
 
 
 def _without_overlaps(table: pd.DataFrame, source: str) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:

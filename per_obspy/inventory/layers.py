@@ -21,6 +21,8 @@ PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 
 Geometries = NDArray[np.object_]
 
+_POLYGONAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
+
 
 class Layer(NamedTuple):
     """
@@ -71,12 +73,10 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     if set(kinds[kinds >= 0].tolist()) <= {shapely.GeometryType.POINT, shapely.GeometryType.MULTIPOINT}:
         raise CatalogError(str(file), "the layer holds points, not footprints: a gap is a distance between walls")
     degrees = _in_degrees(file, shapely.force_2d(raw.geometries), raw.crs)
-    reasons = [_fault(one, original) for one, original in zip(degrees, raw.geometries, strict=True)]
-    good = np.array([reason is None for reason in reasons])
+    good = _are_footprints(degrees)
     rejected = tuple(
-        Rejection("building", f"feature {i + 1}", str(file), i + 1, (reason,))
-        for i, reason in enumerate(reasons)
-        if reason
+        Rejection("building", f"feature {i + 1}", str(file), i + 1, (_fault(degrees[i], raw.geometries[i]),))
+        for i in np.flatnonzero(~good).tolist()
     )
     attributes = raw.attributes.set_index(pd.RangeIndex(1, len(good) + 1))
     return Layer(degrees[good], attributes[good], rejected)
@@ -149,16 +149,25 @@ def _in_degrees(file: Path, geometries: Geometries, crs: Any) -> Geometries:
     return np.asarray(shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T))))
 
 
-def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None) -> str | None:
-    """Return why a geometry is no footprint, or None."""
+def _are_footprints(degrees: Geometries) -> NDArray[np.bool_]:
+    polygonal = np.isin(shapely.get_type_id(degrees), _POLYGONAL) & ~shapely.is_empty(degrees)
+    return np.asarray(polygonal & _on_earth(degrees) & shapely.is_valid(degrees))
+
+
+def _on_earth(degrees: Geometries | shapely.Geometry) -> NDArray[np.bool_]:
+    """Return where coordinates are degrees; a projection gives infinity far outside its range."""
+    return np.asarray((np.abs(shapely.bounds(degrees)) <= [180.0, 90.0, 180.0, 90.0]).all(axis=-1))
+
+
+def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None) -> str:
+    """Return why a geometry is no footprint."""
     if degrees is None or original is None:
         return "no geometry"
     if degrees.is_empty:
         return "the geometry is empty"
-    if degrees.geom_type not in ("Polygon", "MultiPolygon"):
+    if shapely.get_type_id(degrees) not in _POLYGONAL:
         return f"the geometry is a {degrees.geom_type}, not a polygon"
-    bounds = np.array(degrees.bounds)
-    if not (np.isfinite(bounds).all() and (np.abs(bounds) <= [180, 90, 180, 90]).all()):
+    if not _on_earth(degrees):
         place = ", ".join(f"{value:g}" for value in original.bounds[:2])
         return f"coordinates {place} lie outside the layer's coordinate reference system"
-    return None if degrees.is_valid else f"the polygon is invalid: {shapely.is_valid_reason(original)}"
+    return f"the polygon is invalid: {shapely.is_valid_reason(original)}"

@@ -87,7 +87,8 @@ def neighbours(polygons: Geometries, distance: float) -> Neighbours:
     facing, axis = _facing(polygons, first, second, gap)
     axis = np.where(facing[:, None] > 0.0, axis, _connection(polygons[first], polygons[second], gap))
     azimuth = np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
-    overlap = shapely.area(shapely.intersection(polygons[first], polygons[second]))
+    overlap, met = np.zeros(gap.size), gap == 0.0
+    overlap[met] = shapely.area(shapely.intersection(polygons[first[met]], polygons[second[met]]))
     return Neighbours(first, second, gap, overlap, facing, azimuth, _inside(first, second, azimuth))
 
 
