@@ -1,6 +1,7 @@
 """The lowest high-pass corner whose displacement does not wander."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
@@ -52,7 +53,7 @@ def displacement_drift(acceleration: FloatArray, dt: float, lowest: float, order
     angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
     padded = np.pad(acceleration, (side, length - acceleration.size - side))
     spectrum = -rfft(padded)[: frequencies.size] / (angular**2 * thin)
-    basis, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, count), POLYNOMIAL_ORDER + 1))
+    basis = _polynomial_basis(count)
 
     def drift(highpass: float) -> float:
         displacement = irfft(spectrum * butterworth_amplitude(frequencies, highpass, np.inf, order), points)
@@ -61,6 +62,12 @@ def displacement_drift(acceleration: FloatArray, dt: float, lowest: float, order
         return float(np.abs(basis @ (basis.T @ record)).max() / largest) if largest > 0 else 0.0
 
     return drift
+
+
+@lru_cache(maxsize=4)
+def _polynomial_basis(count: int) -> FloatArray:
+    """Return orthonormal polynomials over evenly spaced points, (count, order + 1); components share it."""
+    return np.linalg.qr(np.vander(np.linspace(-1, 1, count), POLYNOMIAL_ORDER + 1))[0]
 
 
 def clean_highpass(

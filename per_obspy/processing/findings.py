@@ -45,7 +45,7 @@ def above(check: str, setting: Check, figure: float, meaning: str) -> list[Findi
 
 def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     """
-    Return a copy of a trace that knows its warnings and notes; raise with every reason if one of them rejects.
+    Return a trace that knows its warnings and notes (a copy if there are any); raise if one finding rejects.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     reject, warn, note = ([one.reason for one in found if one.level == level] for level in ("reject", "warn", "note"))
     if reject:
         raise RecordRejected(trace.id, *reject, *_earlier(trace, "warnings"), *warn)
-    out = trace.copy()
+    out = trace.copy() if warn or note else trace
     for name, reasons in (("warnings", warn), ("notes", note)):
         if reasons:
             remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})

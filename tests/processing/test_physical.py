@@ -36,7 +36,7 @@ def counts(samples, **stats):
 def test_a_flat_accelerometer_is_divided_by_its_gain():
     acceleration, _ = motion()
     out = in_acceleration(counts(GAIN * acceleration + 500.0, response=response()))[0]
-    # the pre-filter starts at 45 Hz, far above the pulse: what is left is rounding of the transform
+    # the pre-filter starts at 40 Hz, far above the pulse: what is left is rounding of the transform
     assert_allclose(out.data, acceleration - acceleration.mean(), atol=1e-9)
     assert (out.stats.units, out.stats.quantity, out.stats.per_obspy.conversion) == ("m/s2", "acceleration", "response")
     assert "response" not in out.stats
