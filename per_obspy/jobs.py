@@ -24,7 +24,8 @@ from per_obspy.errors import PerError, Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.processing.chain import process_station
 from per_obspy.records.columns import read_columns
-from per_obspy.records.folder import read_station
+from per_obspy.records.metadata import metadata_text
+from per_obspy.records.folder import read_event, read_station
 from per_obspy.spectra.station import station_spectra
 from per_obspy.spectra.storage import write_spectra
 
@@ -44,6 +45,8 @@ class Job(NamedTuple):
         Its waveform files, or the description of a plain table.
     inventory : Inventory or None
         Its metadata.
+    event : Path or None
+        QuakeML file.
     processing, spectra : Processing, Spectra
         Settings.
     shard : Path
@@ -55,6 +58,7 @@ class Job(NamedTuple):
     station: str
     source: tuple[Path, ...] | Columns
     inventory: "Inventory | None"
+    event: Path | None
     processing: Processing
     spectra: Spectra
     shard: Path
@@ -100,7 +104,8 @@ def _make_shard(job: Job) -> tuple[Rejection, ...]:
     source = ", ".join(path.name for path in _files(job))
     try:
         stream, unread = _read(job)
-        clean, unfit = process_station(stream, job.processing)
+        event = read_event(job.event) if job.event else None
+        clean, unfit = process_station(stream, job.processing, event)
         rejected = (*unread, *(one._replace(source=one.source or source) for one in unfit))
         if not clean:
             return rejected
@@ -129,16 +134,10 @@ def _files(job: Job) -> tuple[Path, ...]:
 def _key(job: Job) -> str:
     """Return the hash of everything the shard depends on."""
     parts = [version("per_obspy"), job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
-    parts += [f"{path.name} {file_hash(path)}" for path in _files(job)]
-    parts += [job.source.model_dump_json()] if isinstance(job.source, Columns) else [_metadata_text(job.inventory)]
+    parts += [f"{path.name} {file_hash(path)}" for path in (*_files(job), *([job.event] if job.event else []))]
+    parts += [job.source.model_dump_json()] if isinstance(job.source, Columns) else []
+    parts += [metadata_text(job.inventory)] if job.inventory else []
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
-
-
-def _metadata_text(inventory: "Inventory | None") -> str:
-    if inventory is None:
-        return ""
-    channels = [channel for network in inventory for station in network for channel in station]
-    return "\n".join(f"{channel!r} {channel.response!r}" for channel in channels)
 
 
 def _earlier(job: Job, key: str, note: Path) -> Done | None:
@@ -148,8 +147,7 @@ def _earlier(job: Job, key: str, note: Path) -> Done | None:
         if known["key"] != key:
             return None
         rejected = tuple(
-            Rejection(kind, name, source, row, tuple(reasons))
-            for kind, name, source, row, reasons in known["rejected"]
+            Rejection(kind, name, source, row, tuple(reasons)) for kind, name, source, row, reasons in known["rejected"]
         )
     except (OSError, ValueError, KeyError):
         return None

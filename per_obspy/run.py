@@ -30,7 +30,7 @@ from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import read_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs import Done, Job, do_stations, do_stations_on
-from per_obspy.records.folder import find_stations
+from per_obspy.records.folder import find_stations, read_event
 from per_obspy.records.simulated import simulate, write_simulation
 from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.tables import write_rejected, write_risk
@@ -151,8 +151,11 @@ def _work(
 def _jobs(settings: Run, folder: Path, progress: Progress) -> tuple[list[Job], list[Rejection]]:
     """Return one job a station, and the files that are no records."""
     shards = folder / "stations"
-    common = {"processing": settings.processing, "spectra": settings.spectra}
+    common = {"processing": settings.processing, "spectra": settings.spectra, "event": None}
     records = settings.records or _simulated_records(settings, folder, progress)
+    if records.event:
+        read_event(records.event)  # a wrong file stops the run here, not every station
+        common["event"] = records.event
     jobs, rejected = [], []
     for table in records.columns:
         name = f"{table.network}.{table.station}"
@@ -184,7 +187,7 @@ def _simulated_records(settings: Run, folder: Path, progress: Progress) -> Recor
         with written_whole(mark) as part:
             part.write_text(json.dumps({"key": key}), encoding="utf-8")
         progress("simulating records", 1, 1)
-    return Records(folder=target)
+    return Records(folder=target, event=target / "event.xml")
 
 
 def _stations(jobs: Sequence[Job], workers: int, executor: Executor | None, progress: Progress) -> list[Done]:
@@ -205,7 +208,7 @@ def _pairs(settings: Run, folder: Path, stations: Sequence[xr.Dataset]) -> pd.Da
     longitudes = np.array([station["longitude"].item() for station in stations])
     latitudes = np.array([station["latitude"].item() for station in stations])
     with written_whole(folder / "pairs.csv") as part:
-        simulated_pairs(longitudes, latitudes, wanted).to_csv(part, index=False)
+        simulated_pairs(longitudes, latitudes, **wanted.model_dump()).to_csv(part, index=False)
     return read_pairs(folder / "pairs.csv")
 
 
@@ -241,14 +244,23 @@ def _counts(done: Sequence[Done], table: pd.DataFrame | None, rejected: Sequence
         "stations_resumed": sum(one.resumed for one in done),
         "pairs": len(states),
         **{state: states.count(state) for state in ("yes", "possible", "no")},
-        **{f"rejected_{kind}": sum(one.kind == kind for one in rejected) for kind in ("file", "record", "station", "pair")},
+        **{
+            f"rejected_{kind}": sum(one.kind == kind for one in rejected)
+            for kind in ("file", "record", "station", "pair")
+        },
     }
 
 
 def _input_hashes(settings: Run, configuration: Path) -> dict[str, str]:
     """Return the hash of every input file by its path relative to the configuration."""
     records = settings.records or Records()
-    given = [records.folder, records.stationxml, records.event, settings.simulation, settings.pairs and settings.pairs.file]
+    given = [
+        records.folder,
+        records.stationxml,
+        records.event,
+        settings.simulation,
+        settings.pairs and settings.pairs.file,
+    ]
     given += [table.file for table in records.columns]
     files = [path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])]
     return {os.path.relpath(path, configuration.parent): file_hash(path) for path in files if path.is_file()}
@@ -281,7 +293,11 @@ def _held(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise CatalogError(str(folder), f"cannot be used as output folder: {error.strerror}") from error
     try:
-        said = {"process": os.getpid(), "host": platform.node(), "since": datetime.now(UTC).isoformat(timespec="seconds")}
+        said = {
+            "process": os.getpid(),
+            "host": platform.node(),
+            "since": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
         holder.write_text(json.dumps(said), encoding="utf-8")
         yield
     finally:

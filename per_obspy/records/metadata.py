@@ -1,11 +1,12 @@
 """What StationXML knows about a trace, merged by epoch: coordinates, orientation, response."""
 
 from collections.abc import Iterator
+from io import BytesIO
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from obspy import Inventory, Trace
+from obspy import Inventory, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Channel, Response, Station
 
@@ -159,3 +160,10 @@ def _station_coordinates(trace: Trace, inventory: Inventory | None) -> AttribDic
         place = f"{trace.stats.network}.{trace.stats.station}"
         raise RecordRejected(trace.id, f"coordinates are in neither its header nor StationXML (station {place})")
     return _place(station)
+
+
+def metadata_text(inventory: Inventory) -> bytes:
+    """Return the metadata as StationXML that is the same whenever and wherever it is written."""
+    text = BytesIO()
+    Inventory(networks=inventory.networks, source="", created=UTCDateTime(0)).write(text, format="STATIONXML")
+    return text.getvalue()

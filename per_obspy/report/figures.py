@@ -77,7 +77,7 @@ def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     axes.axvline(pair["gap"], color=BUILDING_COLOURS[1], linewidth=0.8)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="displacement at contact height (m)", ylabel="velocity / frequency (m)")
-    verdict = f"gap {100 * pair['gap']:.0f} cm, needed {100 * pair['demand']:.0f} cm: pounding {pair['state']}"
+    verdict = f"gap {100 * pair['gap']:.0f} cm, needed {100 * pair['demand']:.0f} cm"
     axes.set_title(f"3  pair {pair['pair_id']}: {verdict}", fontsize=11)
     axes.legend(fontsize=8, loc="upper right")
 
@@ -113,6 +113,7 @@ def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     axes.scatter(spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations")
     axes.set_aspect(1.0 / np.cos(np.radians(float(table["latitude"].mean()))))
     axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)", title="pounding")
+    axes.locator_params(nbins=6)
     axes.ticklabel_format(useOffset=False)
     axes.legend(fontsize=8)
 

@@ -90,16 +90,12 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
 
     Derived periods make equal buildings seem to move as one (a correlation of 1 and no demand), which nobody knows.
     """
-    candidates = np.stack(
-        [estimates.per, estimates.record, np.where(period_derived, estimates.srss, -np.inf)], axis=0
-    )
+    candidates = np.stack([estimates.per, estimates.record, np.where(period_derived, estimates.srss, -np.inf)], axis=0)
     best = np.argmax(candidates, axis=0)
     return Demand(np.take_along_axis(candidates, best[None], axis=0)[0], RULES[best])
 
 
-def pounding_state(
-    gap: FloatArray, demand: FloatArray, derived_decides: NDArray[np.bool_]
-) -> NDArray[np.object_]:
+def pounding_state(gap: FloatArray, demand: FloatArray, derived_decides: NDArray[np.bool_]) -> NDArray[np.object_]:
     """
     Return yes, possible or no for each pair.
 

@@ -81,9 +81,7 @@ def _along(north: FloatArray, east: FloatArray, dt: float, pairs: pd.DataFrame, 
 
 def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
     """Return period and damping of buildings 1 and of buildings 2."""
-    return [
-        (pairs[f"period_{i}"].to_numpy(np.float64), pairs[f"damping_{i}"].to_numpy(np.float64)) for i in (1, 2)
-    ]
+    return [(pairs[f"period_{i}"].to_numpy(np.float64), pairs[f"damping_{i}"].to_numpy(np.float64)) for i in (1, 2)]
 
 
 def _correlation(

@@ -35,6 +35,9 @@ from per_obspy.screening.motion import (
     motion_of_one_horizontal,
 )
 
+#: Defaults of the configuration.
+BUILDING, SCREENING = Building(), Screening()
+
 #: Pairs in a block: at 180 azimuths a block of every array stays below 3 MB.
 BLOCK = 2000
 
@@ -42,8 +45,8 @@ BLOCK = 2000
 def risk_table(
     spectra: xr.Dataset | Sequence[xr.Dataset],
     pairs: pd.DataFrame,
-    building: Building = Building(),  # noqa: B008 - frozen
-    screening: Screening = Screening(),  # noqa: B008 - frozen
+    building: Building = BUILDING,
+    screening: Screening = SCREENING,
 ) -> pd.DataFrame:
     """
     Return one row a pair: ground motion, demand, whether it pounds, and how hard; worst first.
@@ -77,8 +80,7 @@ def risk_table(
     complete = completed_pairs(pairs, building)
     assigned, rejected = _assigned(complete, located, screening)
     blocks = [_rows(located[index], block, screening) for index, block in _blocks(assigned)]
-    table = pd.concat(blocks, ignore_index=True) if blocks else assigned
-    table = _ranked(table)
+    table = _ranked(pd.concat(blocks, ignore_index=True)) if blocks else assigned.reindex(columns=[*ORDER])
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
     return table
 
@@ -98,8 +100,8 @@ def _assigned(
     reach = screening.largest_distance
     far = placed[distance > reach]
     rejected = tuple(
-        Rejection("pair", str(name), "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
-        for name, station, metres in zip(far["pair_id"], far["station"], far["distance"], strict=True)
+        Rejection("pair", name, "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
+        for name, station, metres in far[["pair_id", "station", "distance"]].itertuples(index=False)
     )
     return placed[distance <= reach], rejected
 

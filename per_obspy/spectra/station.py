@@ -25,7 +25,7 @@ from per_obspy.spectra.horizontals import north_and_east
 #: Every degree, for the percentiles over azimuth.
 EVERY_AZIMUTH = np.arange(180.0)
 
-_RADIUS = {"units": "m", "coverage_content_type": "modelResult"}
+_RADIUS = {"units": "m"}
 
 
 def station_spectra(
@@ -52,8 +52,8 @@ def station_spectra(
     Returns
     -------
     Dataset
-        Dimensions ``component`` (horizontal_1, horizontal_2, vertical: those there are), ``azimuth``, ``damping``,
-        ``period``, ``horizontal`` and ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one
+        Dimensions ``component`` (their names, horizontal_1, horizontal_2, vertical, as far as there are, stand in
+        ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one
         horizontal there are no spectra by azimuth: the station serves its own azimuth only.
 
     Raises
@@ -74,6 +74,8 @@ def station_spectra(
             _usable(horizontals, grid),
         ]
     )
+    for variable in dataset.data_vars.values():
+        variable.attrs["coverage_content_type"] = _content_type(variable)
     return dataset.assign_attrs(_attributes(horizontals))
 
 
@@ -140,7 +142,7 @@ def _component_spectra(traces: dict[str, Trace], periods: FloatArray, dampings: 
             ),
         },
         coords={
-            "component": ("component", list(traces), {"long_name": "component"}),
+            "component_name": ("component", list(traces), {"long_name": "horizontal_1, horizontal_2, vertical"}),
             "damping": ("damping", dampings, {"units": "1", "long_name": "damping ratio, fraction of critical"}),
             "period": ("period", periods, {"units": "s", "long_name": "natural period"}),
         },
@@ -204,7 +206,13 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
             "time": (
                 "time",
                 np.arange(motion.shape[1]) * trace.stats.delta,
-                {"units": "s", "long_name": f"time since {start}"},
+                {
+                    "units": f"seconds since {start}",
+                    "standard_name": "time",
+                    "long_name": "time",
+                    "calendar": "standard",
+                    "units_metadata": "leap_seconds: none",
+                },
             ),
             **_place(trace),
         },
@@ -217,7 +225,7 @@ def _place(trace: Trace) -> dict[str, Any]:
     described = {
         "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
         "longitude": {"units": "degrees_east", "standard_name": "longitude", "long_name": "longitude"},
-        "elevation": {"units": "m", "long_name": "elevation above sea level", "positive": "up"},
+        "elevation": {"units": "m", "standard_name": "surface_altitude", "long_name": "elevation", "positive": "up"},
     }
     station = f"{trace.stats.network}.{trace.stats.station}"
     names: dict[str, Any] = {"station": ((), station, {"cf_role": "timeseries_id", "long_name": "station"})}
@@ -240,22 +248,39 @@ def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
     )
 
 
+def _content_type(variable: xr.DataArray) -> str:
+    """Return the kind of content in the words of ISO 19115-1, which ACDD asks for."""
+    if "flag_values" in variable.attrs:
+        return "qualityInformation"
+    return "modelResult" if variable.dtype == np.float32 else "auxiliaryInformation"
+
+
 def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
     """Return the attributes of CF 1.11 and ACDD 1.3 that are true of one station."""
     first = horizontals[0].stats
-    station = f"{first.network}.{first.station}"
+    station, software = f"{first.network}.{first.station}", f"per_obspy {version('per_obspy')}"
+    known = first.get("coordinates", {})
+    place = {
+        f"geospatial_{name[:3]}_{end}": known[name]
+        for name in ("latitude", "longitude")
+        for end in ("min", "max")
+        if name in known
+    }
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": f"Pseudo energy radius spectra of station {station}",
         "summary": "Pseudo energy radius and response spectra of strong-motion records, exact between samples.",
         "keywords": "earthquake, strong motion, response spectrum, pseudo energy radius, structural pounding",
         "references": "Valles-Mattox and Reinhorn, An energy approach to pounding of structures, 11WCEE, 1996",
-        "source": f"per_obspy {version('per_obspy')}",
+        "id": station,
+        "source": software,
+        "history": f"computed from processed acceleration by {software}",
+        "processing_level": "spectra of processed records",
         "standard_name_vocabulary": "CF Standard Name Table v93",
         "cdm_data_type": "Station",
-        "horizontals": len(horizontals),
-        "simulated": str(bool(first.get("simulated", False))).lower(),
         "time_coverage_start": str(first.starttime),
         "time_coverage_end": str(first.endtime),
-        "history": f"computed from processed acceleration by per_obspy {version('per_obspy')}",
+        "horizontals": len(horizontals),
+        "simulated": "false",
+        **place,
     }

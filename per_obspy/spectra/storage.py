@@ -73,13 +73,14 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     ValueError
         If the stations' periods, dampings or azimuths differ.
     """
-    spectra = sorted((_without_motion(station) for station in stations), key=lambda one: str(one["station"].item()))
+    ordered = sorted(stations, key=lambda one: str(one["station"].item()))
+    spectra = [_without_motion(station) for station in ordered]
     joined = xr.concat(
         spectra,
         dim="station",
         join="outer",
         data_vars="all",
-        coords="different",
+        coords="all",
         compat="equals",
         fill_value={"channel": "", "processing": ""},
         combine_attrs="drop_conflicts",
@@ -87,14 +88,35 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     for axis in ("period", "damping", "azimuth"):
         if axis in joined.sizes and joined.sizes[axis] != max(one.sizes.get(axis, 0) for one in spectra):
             raise ValueError(f"{axis} differs between the stations: the spectra are not on one grid")
-    return joined.assign_attrs(title="Pseudo energy radius spectra of a region")
+    named = _unlabelled(joined).assign_attrs(title="Pseudo energy radius spectra of a region", id="region")
+    return named.assign_attrs(_box(named))
 
 
 def _without_motion(station: xr.Dataset) -> xr.Dataset:
-    spectra = station.drop_vars(MOTION).drop_dims(("time", "horizontal"), errors="ignore")
+    """Return the spectra with what has to be told apart by station as variables."""
+    spectra = station.drop_vars([*MOTION, "time"]).rename(station="station_name").drop_encoding()
+    spectra = spectra.assign_coords(component=spectra["component_name"].values).drop_vars("component_name")
     horizontals = (
         (),
         int(station.attrs["horizontals"]),
         {"units": "1", "long_name": "number of horizontal components"},
     )
-    return spectra.assign(horizontals=horizontals).drop_attrs(deep=False).assign_attrs(station.attrs)
+    return spectra.assign(horizontals=horizontals)
+
+
+def _unlabelled(joined: xr.Dataset) -> xr.Dataset:
+    """Return the components' names as CF wants them: text beside the dimension, which has no coordinate."""
+    names = ("component", joined["component"].values, {"long_name": "horizontal_1, horizontal_2, vertical"})
+    return joined.drop_vars("component").assign_coords(component_name=names)
+
+
+def _box(region: xr.Dataset) -> dict[str, float]:
+    """Return the smallest box of coordinates in the words of ACDD, if any station knows where it is."""
+    known = region[["latitude", "longitude"]].dropna("station")
+    if not known.sizes["station"]:
+        return {}
+    return {
+        f"geospatial_{name[:3]}_{end}": float(getattr(known[name], end)())
+        for name in ("latitude", "longitude")
+        for end in ("min", "max")
+    }

@@ -1,0 +1,159 @@
+"""The command line as a user meets it: help, exit codes, one line for what is wrong, no traceback."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pytest
+
+from per_obspy import cli
+
+HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap"
+ROW = "a,0.3,0.0,10,0.3001,0.0,12,0.05"
+
+
+def _call(monkeypatch, capsys, *arguments):
+    """Return exit code, output and errors of ``per-obspy`` with these arguments."""
+    monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    out, err = capsys.readouterr()
+    return stop.value.code or 0, out, err
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """A folder of simulated records, made by the command."""
+    folder = tmp_path_factory.mktemp("records")
+    (folder / "scenario.toml").write_text("[scenario]\nstations = 2\ndt = 0.02\n")
+    command = [sys.executable, "-m", "per_obspy", "simulate", str(folder / "scenario.toml"), "-o", str(folder / "made")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "6 simulated records" in done.stdout
+    return folder / "made"
+
+
+@pytest.fixture
+def configuration(records, tmp_path):
+    """A run of those records on one pair of buildings."""
+    (tmp_path / "pairs.csv").write_text(f"{HEADER}\n{ROW}\n")
+    file = tmp_path / "run.toml"
+    file.write_text(
+        f'name = "one pair"\noutput = "out"\nworkers = 1\n[records]\nfolder = "{records}"\n'
+        '[pairs]\nfile = "pairs.csv"\n[screening]\nlargest_distance = 1e5\n[spectra]\ncount = 5\n'
+    )
+    return file
+
+
+def test_help_answers_at_once():
+    start = time.perf_counter()
+    done = subprocess.run([sys.executable, "-m", "per_obspy", "--help"], capture_output=True, text=True, check=True)
+    assert "run" in done.stdout
+    assert time.perf_counter() - start < 5.0  # 0.4 s measured; an import of obspy or numba alone takes longer
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys, per_obspy.cli; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numba", "pandas", "xarray", "obspy", "matplotlib", "numpy"} & set(loaded)
+
+
+def test_a_run_prints_the_worst_pairs_and_where_everything_is(monkeypatch, capsys, configuration):
+    code, out, err = _call(monkeypatch, capsys, "run", configuration)
+    assert code == 0
+    assert "1 pairs" in out
+    assert "The 1 worst pairs" in out
+    assert "risk.csv" in out
+    assert "stations: 2 of 2" in err  # plain lines, because nobody watches
+
+
+def test_json_is_for_machines(monkeypatch, capsys, configuration):
+    code, out, _ = _call(monkeypatch, capsys, "run", configuration, "--json")
+    assert code == 0
+    assert json.loads(out)["counts"]["pairs"] == 1
+
+
+BAD_TABLES = {
+    "missing column": (f"{HEADER.replace(',gap', '')}\n{ROW[:-5]}\n".encode(), "gap"),
+    "empty table": (f"{HEADER}\n".encode(), "pairs.csv"),
+    "empty file": (b"", "pairs.csv"),
+    "wrong encoding": (f"{HEADER},owner\n{ROW},Peña\n".encode("latin-1"), "pairs.csv"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_TABLES)
+def test_a_wrong_pair_table_stops_with_one_line(monkeypatch, capsys, configuration, fault):
+    content, named = BAD_TABLES[fault]
+    (configuration.parent / "pairs.csv").write_bytes(content)
+    code, _, err = _call(monkeypatch, capsys, "run", configuration)
+    assert code == 2
+    last = err.strip().splitlines()[-1]
+    assert "pairs.csv" in last
+    assert named in last
+    assert "Traceback" not in err
+
+
+BAD_ROWS = {
+    "negative gap": (ROW.replace("0.05", "-0.05"), "gap", "-0.05"),
+    "gap in millimetres": (ROW.replace("0.05", "50"), "gap", "50"),
+    "28 m floor": (ROW.replace(",10,", ",28,"), "height", "28"),
+    "height of 0": (ROW.replace(",10,", ",0,"), "height_1", "0"),
+    "duplicate pair_id": (ROW, "pair_id", "a"),
+    "latitude out of range": (ROW.replace("0.3,0.0,", "0.3,95.0,", 1), "latitude_1", "95"),
+    "unknown system": (ROW, "system_1", "paper"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_ROWS)
+def test_a_wrong_row_is_rejected_by_name_and_the_rest_goes_on(monkeypatch, capsys, configuration, fault):
+    row, column, value = BAD_ROWS[fault]
+    system = "paper" if fault == "unknown system" else ""
+    storeys = "1" if fault == "28 m floor" else ""
+    name = "a" if fault == "duplicate pair_id" else "b"
+    bad = f"{name}{row[1:]},{system},{storeys}"
+    (configuration.parent / "pairs.csv").write_text(f"{HEADER},system_1,storeys_1\n{ROW},,\n{bad}\n")
+    code, _, err = _call(monkeypatch, capsys, "run", configuration)
+    rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
+    pairs = rejected[rejected["kind"] == "pair"]
+    assert "Traceback" not in err
+    assert pairs["reasons"].str.contains(column).all()
+    assert pairs["reasons"].str.contains(value, regex=False).all()
+    assert pairs["row"].tolist()[-1:] == [3]
+    assert code == 0
+    assert len(pairs) == 1
+
+
+def test_wrong_folders_stop_with_one_line(monkeypatch, capsys, configuration, tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "texts").mkdir()
+    (tmp_path / "texts" / "readme.txt").write_text("hello")
+    text = configuration.read_text()
+    before = text[text.index("[records]") : text.index("[pairs]")]
+    for folder in ("absent", "empty", "texts"):
+        configuration.write_text(text.replace(before, f'[records]\nfolder = "{folder}"\n'))
+        code, _, err = _call(monkeypatch, capsys, "run", configuration)
+        assert code == 2
+        assert folder in err.strip().splitlines()[-1]
+        assert "Traceback" not in err
+
+
+def test_a_wrong_key_is_named(monkeypatch, capsys, configuration):
+    configuration.write_text(configuration.read_text() + "\n[processing]\nhighpas = 0.1\n")
+    code, _, err = _call(monkeypatch, capsys, "run", configuration)
+    assert code == 2
+    assert "run.toml: processing.highpas: unknown key (got 0.1)" in err
+
+
+def test_nothing_in_reach_exits_with_3(monkeypatch, capsys, configuration):
+    far = ROW.replace("0.3,", "90.3,").replace("0.3001,", "90.3001,")
+    (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{far}\n")
+    code, _, err = _call(monkeypatch, capsys, "run", configuration)
+    assert code == 3
+    assert "rejected.csv" in err
+    rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
+    assert rejected[rejected["kind"] == "pair"]["reasons"].str.contains("m away").all()
+
+
+def test_no_such_command_exits_with_2(monkeypatch, capsys):
+    assert _call(monkeypatch, capsys, "fly")[0] == 2
