@@ -16,17 +16,19 @@ _UNKNOWN = (-999.0, 0.0)
 
 _SITE = re.compile(rf"STATION (?:NO|ID)\.\s*(\S*?)\s+{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
 _MODEL = re.compile(r"[NS][,\s]\s*[\d.]+\s*[EW]\s+(\S.*?)\s*S/N\s*(\w*)")
-_CHANNELS = re.compile(r"CHNS OF\s*(\d+)")
+_CHANNELS = re.compile(r"\(\s*(\d{1,3})\s*CHNS OF\s*(\d{1,3})")
 _CONSTANTS = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC,\s*DAMPING\s*=\s*{DECIMAL}")
 _SENSITIVITY = re.compile(rf"SENSITIVITY\s*=\s*{DECIMAL}\s*V(?:DC)?/G")
-_CHANNEL = re.compile(r"CHAN\s*(\d+):\s*(.*?)\s*(?:\(STA CHN:\s*(\d+)\)\s*)?(?:LOCATION:\s*(.*))?")
+_CHANNEL = re.compile(r"CHAN\s*(\d{1,3}):\s*(.*?)\s*(?:\(STA CHN:\s*(\d{1,3})\)\s*)?(?:LOCATION:\s*(.*))?")
 _SEED = re.compile(r"[^.]*\.([A-Z0-9]{1,2})\.([A-Z0-9]{1,5})\.\S\S\.H")
 _AGENCIES = re.compile(r"\b(CGS|CDMG|CSMIP)\b")
 
-_CLOCK = rf"(\d+)/\s*(\d+)/\s*(\d+),?\s+(\d+):\s*(\d+):\s*{DECIMAL}\s*([A-Z]+)"
+_CLOCK = rf"(\d{{1,2}})/\s*(\d{{1,2}})/\s*(\d{{1,4}}),?\s+(\d{{1,2}}):\s*(\d{{1,2}}):\s*{DECIMAL}\s*([A-Z]+)"
 _START = re.compile(rf"(?:START|TRIGGER) TIME:\s*{_CLOCK}")
 _ORIGIN = re.compile(rf"ORIGIN[^:]*:\s*{_CLOCK}")
-_RECORDED = re.compile(rf"\b([A-Z]{{3}})[A-Z]*\s+(\d+),\s+(\d{{4}})\s+(\d+):(\d+)(?::{DECIMAL})?\s+([A-Z]+)")
+_RECORDED = re.compile(
+    rf"\b([A-Z]{{3}})[A-Z]*\s+(\d{{1,2}}),\s+(\d{{4}})\s+(\d{{1,2}}):(\d{{1,2}})(?::{DECIMAL})?\s+([A-Z]+)"
+)
 _MONTHS = ("JAN", "FEB", "MAR", "APR", "MAY", "JUN", "JUL", "AUG", "SEP", "OCT", "NOV", "DEC")
 #: hours ahead of UTC
 _ZONES = {"UTC": 0, "GMT": 0, "UT": 0, "PST": -8, "PDT": -7, "MST": -7, "MDT": -6, "AKST": -9, "AKDT": -8, "HST": -10}
@@ -68,11 +70,23 @@ def read_header(text: Text, first: int, text_lines: int, reals: int) -> Header:
     line_at(text, numbers, "header numbers")
     words = _station(lines) | _instrument(lines) | orientation(channel[2]) | {"sensor_location": channel[4] or None}
     words |= {"starttime": _start(text, first, lines), "event": _event(text, first, lines)}
-    total = _CHANNELS.search(lines[4])
-    if total and int(total[1]) > 3:
-        words["location"] = f"{int(channel[3] or channel[1]):02d}"
+    words["location"] = _location(lines[4], int(channel[1]), int(channel[3] or channel[1]))
     values = fixed_block(text, numbers, reals, 10, 8)
     return Header(words, int(channel[1]), values, numbers + block_lines(reals, 8))
+
+
+def _location(site: str, channel: int, station_channel: int) -> str | None:
+    """
+    Return a location code that tells instruments of one station apart and keeps the components of each together.
+
+    A recorder of three channels is named by its first one; a recorder that serves sensors all over a structure gives
+    each its own number.
+    """
+    channels = _CHANNELS.search(site)
+    recorder, station = (int(channels[1]), int(channels[2])) if channels else (0, 0)
+    if station <= 4 and recorder == station:
+        return None
+    return f"{station_channel - channel + 1 if recorder <= 3 else station_channel:02d}"
 
 
 def known(value: float, factor: float = 1.0) -> float | None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..checks import FloatArray
-from ._text import Text, block_lines, fixed_block, refuse
+from ._text import Text, block_lines, fixed_block, interval, refuse
 
 _WIDTH, _PAIRS_PER_LINE = 7, 5
 
@@ -26,10 +26,11 @@ def read_pairs(text: Text, line: int, samples: int) -> tuple[FloatArray, float]:
     pairs = fixed_block(text, line, 2 * samples, _WIDTH, 2 * _PAIRS_PER_LINE).reshape(-1, 2)
     times = pairs[:, 0]
     dt = float(times[-1] - times[0]) / max(samples - 1, 1)
+    dt = interval(text, line, "mean interval", dt)
     steps = np.diff(times)
     drift = np.abs(times - times[0] - dt * np.arange(samples))[1:]
     wrong = (steps <= 0) | (drift > _DRIFT * dt * samples + dt)
-    if dt <= 0 or wrong.any():
+    if wrong.any():
         index = int(np.argmax(wrong)) + 1
         place = line + index // _PAIRS_PER_LINE
         refuse(text, place, f"time {index + 1}", f"{times[index]:g} s breaks the mean interval of {dt:g} s")

@@ -15,6 +15,8 @@ WaveformFile = str | Path | BinaryIO
 #: what a decimal number is made of; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
+_LONGEST_LINE = 10_000  # characters; a format that promises more is damaged
+
 #: a decimal number in a regular expression
 DECIMAL = r"(-?(?:\d+\.?\d*|\.\d+))"
 
@@ -87,11 +89,11 @@ def count(text: Text, line: int, field: str, value: str) -> int:
     return int(result)
 
 
-def interval(text: Text, line: int, field: str, value: str) -> float:
-    """Return a sampling interval, s, or a sampling rate, Hz: positive."""
-    result = number(text, line, field, value)
-    if result <= 0:
-        refuse(text, line, field, f"must be positive, got {value.strip()!r}")
+def interval(text: Text, line: int, field: str, value: str | float) -> float:
+    """Return a sampling interval, s, or a sampling rate, Hz: from 1e-5 to 1e5."""
+    result = number(text, line, field, value) if isinstance(value, str) else float(value)
+    if not 1e-5 <= result <= 1e5:
+        refuse(text, line, field, f"must be positive and plausible, got {str(value).strip()!r}")
     return result
 
 
@@ -110,8 +112,10 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
     width, per_line : int
         Characters of a number, numbers of a full line.
     """
-    rows = _rows(text, start, block_lines(samples, per_line), samples)
     full = width * per_line
+    if full > _LONGEST_LINE:
+        refuse(text, start - 1, "format", f"{per_line} numbers of {width} characters a line")
+    rows = _rows(text, start, block_lines(samples, per_line), samples)
     lengths = np.fromiter(map(len, rows), dtype=np.intp, count=len(rows))
     if lengths.max() > full:
         line = int(np.argmax(lengths > full))
@@ -162,9 +166,10 @@ def _rows(text: Text, start: int, lines: int, samples: int) -> list[str]:
 
 def _floats(fields: NDArray[np.bytes_]) -> FloatArray | None:
     try:
-        return fields.astype(np.float64)
+        values = fields.astype(np.float64)
     except ValueError:
         return None
+    return values if np.isfinite(values).all() else None
 
 
 def _refuse_fixed(text: Text, start: int, rows: list[str], samples: int, width: int, per_line: int) -> NoReturn:

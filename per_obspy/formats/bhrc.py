@@ -13,6 +13,7 @@ from ._text import (
     count,
     fixed_block,
     head,
+    interval,
     line_at,
     number,
     read_text,
@@ -27,7 +28,7 @@ _STATION = re.compile(rf"(.*?)\s+Station\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW
 _AZIMUTH = re.compile(r"\b([LT])\s*(\d{1,3})\b")
 _EPICENTRE = re.compile(rf"Epicenter\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+FD\s*{DECIMAL})?")
 _MAGNITUDE = re.compile(rf"\b(Mw|Ms|mb|ML|M)\s*{DECIMAL}")
-_TIME = re.compile(rf"Origin Time\s*:\s*(\d{{4}})/(\d+)/(\d+)\s+(\d+):(\d+):{DECIMAL}")
+_TIME = re.compile(rf"Origin Time\s*:\s*(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})\s+(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _POINTS = re.compile(rf"NO\. OF POINTS\s*=\s*(\S+)\s+DURATION\s*=\s*{DECIMAL}")
 _SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECIMAL}")
 
@@ -75,7 +76,7 @@ def _size(text: Text, first: int) -> tuple[int, float]:
     rate = number(text, first + _RATE_LINE, "sampling rate", text.lines[first + _RATE_LINE][:_WIDTH])
     if rate <= 0 or abs(samples / rate - float(points[2])) > 0.01 * float(points[2]):
         refuse(text, first + _RATE_LINE, "sampling rate", f"{rate:g} Hz, but {samples} samples last {points[2]} s")
-    return samples, 1 / rate
+    return samples, 1 / interval(text, first + _RATE_LINE, "sampling rate", rate)
 
 
 def _station(lines: list[str]) -> dict[str, Any]:

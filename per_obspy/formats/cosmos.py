@@ -14,7 +14,7 @@ _TITLE = re.compile(
 )
 _FORMAT = re.compile(r"Format\s*=\s*\(\s*(\d+)([IFE])(\d+)(?:\.\d+)?\s*\)")
 _HEADER_NUMBERS = re.compile(r"\s*100 (Integer|Real)-header values follow on\s+(\d+) lines")
-_COMMENTS = re.compile(r"\s*(\d+) Comment line\(s\) follow")
+_COMMENTS = re.compile(r"\s*(\d{1,4}) Comment line\(s\) follow")
 _SAMPLES = re.compile(rf"\s*(\d+)\s+.*?\bapprox\s+{DECIMAL}\s*secs?,\s*units=\s*([^(,]*?)\s*\(")
 _CODE = re.compile(r"Code:\s*(\w+)-(\S+)\s*(.*)")
 _SCNL = re.compile(r"\|<SCNL>(\w+)\.(\w+)\.(\w+)\.(\S+)")
@@ -135,7 +135,7 @@ def _interval(text: Text, header: _Header, samples: int) -> float:
     dt = recorder if milliseconds is None else milliseconds / 1000
     announced = _SAMPLES.match(text.lines[header.next_line])
     seconds = float(announced[2]) if announced else 0.0
-    if dt is None or dt <= 0 or abs(samples * dt - seconds) > 1 + 0.05 * seconds:
+    if dt is None or not 1e-5 <= dt <= 1e5 or abs(samples * dt - seconds) > 1 + 0.05 * seconds:
         refuse(text, header.next_line, "interval", f"{dt} s in the header, but {samples} samples last {seconds:g} s")
     return dt
 

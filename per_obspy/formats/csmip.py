@@ -69,7 +69,7 @@ def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
     if promised is None:
         refuse(text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none")
     samples = count(text, first + 10, "number of points", promised[1])
-    if is_title(text.lines[header.next_line]):
+    if is_title(line_at(text, header.next_line, "samples")):
         values, dt, line = titled_block(text, header.next_line, "", 8, 9)
         if len(values) != samples:
             refuse(text, header.next_line, "number of points", f"{len(values)}, but {samples} on line {first + 11}")

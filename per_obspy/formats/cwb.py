@@ -12,7 +12,7 @@ from .vocabulary import GAL, coordinates, orientation, trace, utc
 
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s+(\w)\(\+\);?\s*(\w)\(\+\);?\s*(\w)\(\+\)")
-_TIME = re.compile(rf"(\d{{4}})/(\d+)/(\d+)-(\d+):(\d+):{DECIMAL}")
+_TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})-(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _EXTREMES = re.compile(rf"{DECIMAL}~\s*{DECIMAL}")
 _HOURS_AHEAD = 8.0
 

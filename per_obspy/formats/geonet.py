@@ -6,13 +6,25 @@ from typing import Any
 from obspy import Stream, Trace
 
 from ..checks import FloatArray
-from ._text import DECIMAL, Text, WaveformFile, block_lines, count, fixed_block, head_lines, line_at, read_text, refuse
+from ._text import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    block_lines,
+    count,
+    fixed_block,
+    head_lines,
+    interval,
+    line_at,
+    read_text,
+    refuse,
+)
 from .vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
 _WIDTH, _PER_LINE = 8, 10
 _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w+)\b")
-_ANGLE = r"(\d+)\s+(\d+)\s+(\d+)([NSEW])"
+_ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
 _SITE = re.compile(rf"Site (\S+)\s+{_ANGLE}\s+{_ANGLE}")
 _EPICENTRE = re.compile(rf"Epicentre\s+{_ANGLE}\s+{_ANGLE}.*?(?:Depth\s*{DECIMAL}\s*km)?(?:\s+M\w?\s*{DECIMAL})?\s*")
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")
@@ -49,9 +61,7 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     numbers = first + _TEXT_LINES
     integers = fixed_block(text, numbers, 10 * _INTEGER_LINES, _WIDTH, _PER_LINE)
     reals = fixed_block(text, numbers + _INTEGER_LINES, 60, _WIDTH, _PER_LINE)
-    dt = float(reals[25])
-    if dt <= 0:
-        refuse(text, numbers + _INTEGER_LINES + 2, "interval", f"must be positive, got {dt:g}")
+    dt = interval(text, numbers + _INTEGER_LINES + 2, "interval", float(reals[25]))
     values, line = _samples(text, first, integers)
     words = _station(text, first) | _source(lines) | orientation(lines[12].removeprefix("Component").split("  ")[0])
     words |= {"starttime": _start(text, numbers, integers), "units": "m/s2", "quantity": "acceleration"}

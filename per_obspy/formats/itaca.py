@@ -11,7 +11,7 @@ from .vocabulary import orientation, trace, utc
 
 _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5
-_TIME = re.compile(rf"(\d+)-(\d+)-(\d+) (\d+):(\d+):{DECIMAL}")
+_TIME = re.compile(rf"(\d{{4}})-(\d{{1,2}})-(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _STATION = re.compile(r"(\S+) / (.*)")
 _CORNERS = re.compile(rf"{DECIMAL}\s*-\s*{DECIMAL}")
 

@@ -13,8 +13,8 @@ from .vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
 _PLACE = re.compile(rf"{DECIMAL}\s*([NS])\s*-\s*{DECIMAL}\s*([EW])")
-_EVENT_TIME = re.compile(rf"(\d{{4}})/(\d+)/(\d+) (\d+):(\d+):{DECIMAL}")
-_RECORD_TIME = re.compile(rf"(\d+)/(\d+)/(\d{{4}}) (\d+):(\d+):{DECIMAL}")
+_EVENT_TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
+_RECORD_TIME = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _PEAKS = re.compile(rf"\(([NEU]-[SWD])\)\s*{DECIMAL}")
 
 

@@ -14,6 +14,7 @@ from ._text import (
     count,
     fixed_block,
     head_lines,
+    interval,
     line_at,
     no_more,
     read_text,
@@ -48,15 +49,14 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     comments = 0 if integers[15] == _NO_INTEGER else int(integers[15])
     first = _TEXT_LINES + 16 + max(comments, 0)
     samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:g}")
-    if not 0 < reals[1] < _NO_REAL:
-        refuse(text, _TEXT_LINES + 6, "sampling rate", f"must be positive, got {reals[1]:g}")
+    rate = interval(text, _TEXT_LINES + 6, "sampling rate", float(reals[1]))
     values = 0.01 * fixed_block(text, first, samples, 10, 8)
     no_more(text, first + block_lines(samples, 8), samples)
     quantity, unit = _QUANTITIES.get(title[1], ("acceleration", "m/s2"))
     level = "raw" if title[1].startswith("UNCORRECTED") else "processed"
     words = {"quantity": quantity, "units": unit, "processing_level": level, "starttime": _start(text, integers)}
     words |= _station(text, integers, reals) | _numbers(reals) | _direction(integers)
-    return Stream([trace(values, 1 / float(reals[1]), words)])
+    return Stream([trace(values, 1 / rate, words)])
 
 
 def _real(reals: FloatArray, index: int) -> float | None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from ._fields import Field, Fields, field, number_field, word_field
+from ._fields import Field, Fields, count_field, field, number_field, word_field
 from ._text import DECIMAL, Text, WaveformFile, count, fixed_block, head, interval, no_more, number, read_text, refuse
 from .vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 
@@ -16,7 +16,7 @@ _RULE = "---------+"
 _DATE = re.compile(r"(\d{4})/(\d\d?)/(\d\d?)|(\d\d?) DE (\w+) DEL? (\d{4})")
 _MONTHS = ("ENERO", "FEBRERO", "MARZO", "ABRIL", "MAYO", "JUNIO", "JULIO", "AGOSTO", "SEPTIEMBRE", "OCTUBRE",
            "NOVIEMBRE", "DICIEMBRE")  # fmt: skip
-_CLOCK = re.compile(rf"(\d+):(\d+):{DECIMAL}")
+_CLOCK = re.compile(rf"(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _LATITUDE = re.compile(rf"{DECIMAL}\s*LAT\.?\s*([NS])")
 _LONGITUDE = re.compile(rf"{DECIMAL}\s*LONG\.?\s*([EWO])")
 _HALF_DAY = 43200.0  # s
@@ -34,7 +34,7 @@ def read_unam(file: WaveformFile, **_unused: Any) -> Stream:
     first = _first_sample(text)
     fields = _fields(text, first)
     _gal(text, fields)
-    channels = int(count(text, *_named(field(text, fields, "NUMERO DE CANALES"), "NUMERO DE CANALES")))
+    channels = count_field(text, fields, "NUMERO DE CANALES")
     sizes = [count(text, *found) for found in _values(text, fields, "NUM. TOTAL DE MUESTRAS, C1-C6", channels)]
     steps = [interval(text, *found) for found in _values(text, fields, "INTERVALO DE MUESTREO, C1-C6 (s)", channels)]
     if len(set(sizes)) > 1 or len(set(steps)) > 1:
@@ -85,10 +85,6 @@ def _lines(text: Text, stop: int) -> list[tuple[str, Field]]:
             name = re.sub(r"\s+", " ", content[:39].strip()).replace("[", "(").replace("]", ")")
             named.append((name.replace(". (", ".(").replace("C6, (", "C6 ("), Field(line, content[40:].strip())))
     return named
-
-
-def _named(found: Field, name: str) -> tuple[int, str, str]:
-    return found.line, name, found.value
 
 
 def _values(text: Text, fields: Fields, name: str, channels: int) -> list[tuple[int, str, str]]:

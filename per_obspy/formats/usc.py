@@ -12,10 +12,10 @@ from .vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orient
 
 _VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
 _VOLUME_1_LINES, _VOLUME_2_LINES = 27, 45
-_ANGLE = r"(\d+)\s+(\d+)\s+(\d+)([NSEW])"
+_ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
 _STATION = re.compile(rf"STATION USC#\s*(\S+)\s+{_ANGLE},\s*{_ANGLE}")
 _EPICENTRE = re.compile(rf"EPICENTER\s*-\s*{_ANGLE},\s*{_ANGLE}")
-_DATE = re.compile(r"([A-Z]{3})\S* (\d+), (\d{4})\s*-\s*(\d\d)(\d\d) GMT")
+_DATE = re.compile(r"([A-Z]{3})\S* (\d{1,2}), (\d{4})\s*-\s*(\d\d)(\d\d) GMT")
 _MONTHS = ("JAN", "FEB", "MAR", "APR", "MAY", "JUN", "JUL", "AUG", "SEP", "OCT", "NOV", "DEC")
 _SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECIMAL}")
 _POINTS = re.compile(r"NO\. OF POINTS\s*=\s*(\S+)")

@@ -4,10 +4,9 @@ The words that every format plugin puts into ``trace.stats``, and the few conver
 ============================== ================================================================================
 word                           meaning
 ============================== ================================================================================
-network, station, location     codes of the header; location is the channel number where a station has more than
-                               one instrument
+network, station, location     codes of the header; location tells instruments of one station apart
 channel                        SEED code from sampling rate and orientation, instrument code N (accelerometer)
-starttime, delta               UTC; s. A header with a date but no time gives midnight
+starttime, delta               UTC; s. Unknown: 1970-01-01, ObsPy's default; a date without a time gives midnight
 units                          ``"m/s2"``, ``"m/s"``, ``"m"``, or ``"counts"`` with the gain in ``calib`` (m/s2 a count)
 quantity                       ``"acceleration"``, ``"velocity"`` or ``"displacement"``
 processing_level               ``"raw"`` or ``"processed"``
@@ -163,6 +162,8 @@ def utc(
 ) -> UTCDateTime:
     """Return a time in UTC from year, month, day and hour, minute, second of a clock that many hours ahead of UTC."""
     hour, minute, second = (*clock, 0.0, 0.0, 0.0)[:3]
+    if not 1900 <= date[0] < 2100:
+        refuse(text, line, field, f"{date[0]} is not a year of a record")
     try:
         year, month, day = date
         moment = datetime(year, month, day, tzinfo=UTC) + timedelta(

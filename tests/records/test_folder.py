@@ -236,3 +236,13 @@ def test_knet_counts_keep_their_gain(real_data: Path):
             # the header has the peak about the mean, to 0.001 gal
             peak = np.abs(trace.data - trace.data.mean()).max()
             assert peak * trace.stats.calib == pytest.approx(trace.stats.header_peak * trace.stats.calib, abs=2e-5)
+
+
+@pytest.mark.real_data
+def test_a_cut_knet_file_is_a_reason(real_data: Path, tmp_path: Path):
+    lines = (real_data / "records" / "aomori2018_knet" / "AOM0011801241951.NS").read_text().splitlines()
+    (tmp_path / "AOM0011801241951.NS").write_text("\n".join(lines[:500]))
+    contents = find_stations(tmp_path)
+    stream, rejected = read_station(contents.stations["BO.AOM001"], None)
+    assert not stream
+    assert rejected[0].reasons == ("the header promises 102 s, the file holds 38.64 s",)

@@ -1,0 +1,202 @@
+"""What every format plugin owes: the right numbers, the right words, and a clear refusal of anything damaged."""
+
+import io
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import obspy
+import pytest
+from format_samples import SAMPLES, Sample
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from obspy import Stream, UTCDateTime
+
+from per_obspy.errors import RecordRejected
+from per_obspy.formats._text import Text, fixed_block
+
+WORDS = {"units", "quantity", "processing_level"}
+BOUNDARIES = {"csmip_v1", "geonet_v1a", "geonet_v2a", "bhrc", "cosmos_v0c", "cosmos_v2c"}  # several channels a file
+
+
+def plugins() -> dict[str, dict[str, EntryPoint]]:
+    """Return our formats: name -> isFormat, readFormat."""
+    ours = [point for point in entry_points(group="obspy.plugin.waveform") if point.value.startswith("per_obspy.")]
+    return {
+        point.name: {part.name: part.load() for part in entry_points(group=f"obspy.plugin.waveform.{point.name}")}
+        for point in ours
+    }
+
+
+PLUGINS = plugins()
+both = pytest.mark.parametrize("sample", SAMPLES.values(), ids=SAMPLES)
+
+
+def read(sample: Sample, text: str) -> Stream:
+    return PLUGINS[sample.name]["readFormat"](io.BytesIO(text.encode("latin-1")))
+
+
+@both
+def test_obspy_reads_path_and_open_file(sample: Sample, tmp_path: Path):
+    path = tmp_path / "record"
+    path.write_text(sample.text)
+    for stream in (obspy.read(str(path)), obspy.read(io.BytesIO(sample.text.encode()))):
+        assert {trace.stats._format for trace in stream} == {sample.name}
+        assert tuple(trace.id for trace in stream) == sample.ids
+
+
+@both
+def test_samples_interval_and_direction(sample: Sample):
+    stream = read(sample, sample.text)
+    assert [trace.id for trace in stream] == list(sample.ids)
+    for trace, values, azimuth, dip in zip(stream, sample.values, sample.azimuths, sample.dips, strict=True):
+        # written exactly; a product of a few rounded factors
+        assert_allclose(trace.data, values, rtol=1e-14)
+        assert trace.data.dtype == np.float64
+        assert trace.stats.delta == pytest.approx(sample.dt, rel=1e-12)
+        assert trace.stats.get("sensor_azimuth") == azimuth
+        assert trace.stats.get("sensor_dip") == dip
+
+
+@both
+def test_words_of_the_vocabulary(sample: Sample):
+    for trace in read(sample, sample.text):
+        assert trace.stats.units == sample.units
+        assert trace.stats.quantity == "acceleration"
+        assert trace.stats.processing_level == sample.level
+        assert trace.stats.starttime == UTCDateTime(sample.start or 0)
+        if sample.coordinates is None:
+            assert "coordinates" not in trace.stats
+        else:
+            place = (trace.stats.coordinates.latitude, trace.stats.coordinates.longitude)
+            # degrees, minutes and seconds are added in floating point
+            assert place == pytest.approx(sample.coordinates, abs=1e-9)
+
+
+@both
+def test_predicates_claim_their_own_format_only(sample: Sample):
+    start = sample.text.encode("latin-1")
+    claims = [name for name, plugin in PLUGINS.items() if plugin["isFormat"](io.BytesIO(start))]
+    assert claims == [sample.name]
+
+
+@both
+@pytest.mark.parametrize("ending", ["\r\n", "\r\r\n", "\r"])
+def test_line_ends_and_padding_change_nothing(sample: Sample, ending: str):
+    stream = read(sample, sample.text.replace("\n", ending) + ending + "\x1a")
+    for trace, again in zip(read(sample, sample.text), stream, strict=True):
+        assert_array_equal(trace.data, again.data)
+        assert trace.stats == again.stats
+
+
+@both
+def test_latin_1_text_is_no_obstacle(sample: Sample):
+    changed = sample.text
+    for name in ("Some", "SOME", "Town", "Aquila", "Willow", "free"):
+        changed = changed.replace(name, "S\xe4\xf1o")
+    assert len(read(sample, changed)) == len(sample.ids)
+
+
+@both
+def test_every_cut_is_refused(sample: Sample, request: pytest.FixtureRequest):
+    """A file cut anywhere is refused, unless the cut falls between whole channels, which nothing in the file tells."""
+    text = sample.text.rstrip()
+    whole = [trace.data for trace in read(sample, text)]
+    for stop in range(0, len(text) - 1, 7):
+        try:
+            stream = read(sample, text[:stop])
+        except RecordRejected:
+            continue
+        for trace, values in zip(stream, whole, strict=False):
+            # the last digits of the last sample may be missing: a cut file of free numbers cannot show that
+            assert_array_equal(trace.data[:-1], values[:-1])
+            assert len(trace) == len(values)
+        assert len(stream) == len(whole) or request.node.callspec.id in BOUNDARIES
+
+
+@both
+def test_lines_that_are_left_out_or_doubled_are_refused(sample: Sample):
+    lines = sample.text.rstrip().split("\n")
+    last = len(lines) - 2 if lines[-1].startswith(("/&", "End")) else len(lines) - 1
+    for changed in (lines[:last] + lines[last + 1 :], [*lines[:last], lines[last - 1], *lines[last:]]):
+        with pytest.raises(RecordRejected, match=r"line \d+"):
+            read(sample, "\n".join(changed))
+
+
+@both
+@pytest.mark.parametrize("garbage", ["*****", "  nan", "  inf", " 1_00", "1E999", "0x1F ", "x.yz1"])
+def test_samples_that_are_no_numbers_are_refused(sample: Sample, garbage: str):
+    lines = sample.text.rstrip().split("\n")
+    last = len(lines) - 2 if lines[-1].startswith(("/&", "End")) else len(lines) - 1
+    lines[last] = (lines[last][:-5] if len(lines[last]) > 9 else "") + garbage
+    with pytest.raises(RecordRejected, match=rf"line {last + 1}, "):
+        read(sample, "\n".join(lines))
+
+
+@both
+def test_overlong_lines_are_refused(sample: Sample):
+    lines = sample.text.rstrip().split("\n")
+    last = len(lines) - 2 if lines[-1].startswith(("/&", "End")) else len(lines) - 1
+    lines[last - 1] += " 1.000000 2.00000"
+    with pytest.raises(RecordRejected, match=r"line \d+, "):
+        read(sample, "\n".join(lines))
+
+
+def refuses_or_reads(name: str, content: bytes) -> None:
+    """Anything may be refused, but only as a RecordRejected; what is read is finite."""
+    assert PLUGINS[name]["isFormat"](io.BytesIO(content)) in (True, False)
+    try:
+        stream = PLUGINS[name]["readFormat"](io.BytesIO(content))
+    except RecordRejected:
+        return
+    for trace in stream:
+        assert np.isfinite(trace.data).all()
+        assert np.isfinite(trace.stats.delta)
+        assert trace.stats.delta > 0
+
+
+@pytest.mark.parametrize("name", sorted(PLUGINS))
+@given(content=st.binary(max_size=300))
+@settings(max_examples=30, deadline=None)
+def test_any_bytes(name: str, content: bytes):
+    refuses_or_reads(name, content)
+
+
+@both
+@given(data=st.data())
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_damaged_files(sample: Sample, data: st.DataObject):
+    """Overwrite, remove or repeat pieces anywhere: every reader survives."""
+    content = bytearray(sample.text.encode("latin-1"))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, max(len(content) - 1, 0)))
+        size = data.draw(st.integers(0, 12))
+        piece = st.one_of(
+            st.binary(max_size=12), st.sampled_from([b"-999", b"9" * 12, b"0", b" ", b"\n", b"-", b"1E30"])
+        )
+        content[place : place + size] = data.draw(piece)
+    refuses_or_reads(sample.name, bytes(content))
+
+
+def obspy_test_files() -> list[Path]:
+    return sorted(path for path in Path(obspy.__file__).parent.glob("**/tests/data/**/*") if path.is_file())
+
+
+def test_no_test_file_of_obspy_is_claimed():
+    files = obspy_test_files()
+    if not files:
+        pytest.skip("this ObsPy is installed without its test files")
+    claimed = [(path.name, name) for path in files for name, plugin in PLUGINS.items() if plugin["isFormat"](str(path))]
+    assert claimed == []
+
+
+def test_samples_are_read_at_20_megabytes_a_second():
+    """One block of fixed width; a quarter of the demand leaves room for a busy machine."""
+    rows = ["".join(f"{value:15.7E}" for value in row) for row in np.random.default_rng(1).normal(size=(40_000, 5))]
+    began = perf_counter()
+    values = fixed_block(Text("memory", rows), 0, 200_000, 15, 5)
+    rate = 3.0 / (perf_counter() - began)
+    assert len(values) == 200_000
+    assert rate > 5
