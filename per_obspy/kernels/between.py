@@ -184,6 +184,26 @@ def slacks(rates, damping, phase):
 
 
 @kernel
+def may_exceed(u, z, start, end, damping, phase, largest):
+    """
+    Tell whether a step may hold a new largest value.
+
+    The particular solution moves on a line, and around it the radius of the free vibration never grows.
+    """
+    rate = (end - start) / phase
+    lean = 2.0 * damping * rate
+    swing = math.hypot(u + start - lean, z + rate)
+    still = max(abs(lean - start), abs(lean - end))
+    felt = max(abs(start), abs(end)) + math.sqrt(1.0 + 4.0 * damping * damping) * swing
+    return (
+        math.hypot(still, rate) + swing > math.sqrt(largest[0])
+        or still + swing > largest[1]
+        or abs(rate) + swing > largest[2]
+        or felt > largest[3]
+    )
+
+
+@kernel
 def may_vanish(at_start, at_end, variation):
     """Tell whether a function can have a root within a step over which it varies by no more than this."""
     return at_start * at_end <= 0.0 or abs(at_start) + abs(at_end) <= variation
@@ -197,6 +217,8 @@ def find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantiti
     A point is wanted if the bound of its quantity exceeds the largest value and its condition may vanish in the step;
     those of the displacement are also the radius's.
     """
+    if phase > LONGEST_SPAN and not may_exceed(u, z, start, end, damping, phase, largest):
+        return False
     twice, jump = 2.0 * damping, abs(end - start)
     rates = rate_bounds(radius, max(abs(start), abs(end)), jump, damping, phase)
     slack = slacks(rates, damping, phase)

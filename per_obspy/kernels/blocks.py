@@ -51,11 +51,11 @@ def _thresholds(peaks, jumps, phases, dampings, weights, largest, threshold):
 
 
 @kernel
-def select(kept, peaks, jumps, phases, dampings, weights, largest, chosen):
+def select(kept, peaks, jumps, phases, dampings, weights, lanes, largest, chosen):
     """
     Raise the largest values to those of the tiles and list as (tile, lane) where more may lie between samples.
 
-    ``kept`` (tile, row, lane) holds the values from row 2 on. Returns how many were listed.
+    ``kept`` (tile, row, lane) holds the values from row 2 on; only the first ``lanes`` count. Returns how many there are.
     """
     tiles, quantities = peaks.shape[1], largest.shape[0]
     for tile in range(tiles):
@@ -66,7 +66,7 @@ def select(kept, peaks, jumps, phases, dampings, weights, largest, chosen):
     _thresholds(peaks, jumps, phases, dampings, weights, largest, threshold)
     count = 0
     for tile in range(tiles):
-        for lane in range(LANES):
+        for lane in range(lanes):
             beyond = kept[tile, 2, lane] > threshold[0, lane]
             for row in range(1, quantities):
                 beyond |= kept[tile, 2 + row, lane] > threshold[row, lane]
@@ -80,7 +80,7 @@ def select(kept, peaks, jumps, phases, dampings, weights, largest, chosen):
 def repeat(north, east, peaks, jumps, phases, dampings, weights, kept, states, chosen, largest):
     """Raise the largest values by what lies between the samples of the chosen (tile, lane), from the states before."""
     quantities = largest.shape[0]
-    work, wanted, here = workspace(), np.empty(4, np.bool_), np.zeros(4)
+    work, wanted, here = workspace(), np.empty(4, np.bool_), np.full(4, np.inf)
     for number in range(chosen.shape[0]):
         tile, lane = chosen[number]
         phase, damping = phases[lane], dampings[lane]

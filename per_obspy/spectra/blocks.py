@@ -36,12 +36,13 @@ class Ground(NamedTuple):
 
 
 class Oscillators(NamedTuple):
-    """Phase of one step, damping, weights of north and east (2, n), and omega in rad/s."""
+    """Phase of one step, damping, weights of north and east (2, n), omega in rad/s; the first ``count`` are wanted."""
 
     phases: FloatArray
     dampings: FloatArray
     weights: FloatArray
     omegas: FloatArray
+    count: int
 
 
 def prepare_ground(north: FloatArray, east: FloatArray | None = None) -> Ground:
@@ -69,7 +70,7 @@ def prepare_oscillators(
     """Return paired oscillators (n,) that feel the first component, or their own azimuths (degrees) of two."""
     omegas = 2.0 * np.pi / periods
     angles = np.zeros(periods.size) if azimuths is None else np.radians(azimuths)
-    return Oscillators(omegas * dt, dampings.copy(), np.stack([np.cos(angles), np.sin(angles)]), omegas)
+    return Oscillators(omegas * dt, dampings.copy(), np.stack([np.cos(angles), np.sin(angles)]), omegas, periods.size)
 
 
 def stretches(ground: Ground) -> Iterator[Ground]:
@@ -85,7 +86,7 @@ def choose(stretch: Ground, block: Oscillators, kept: FloatArray, largest: Float
     """Raise the largest values to the samples of a stretch; return (tile, lane) where more may lie in between."""
     tiles = stretch.peaks.shape[1]
     chosen = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.select(kept, stretch.peaks, stretch.jumps, *block[:3], largest, chosen)
+    count = blocks.select(kept, stretch.peaks, stretch.jumps, *block[:3], block.count, largest, chosen)
     return chosen[:count]
 
 
@@ -108,16 +109,18 @@ def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> 
 
 def over_blocks(work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, ground: Ground) -> FloatArray:
     """Return the rows that the work gives for each block of oscillators, (rows, n); in threads where that pays."""
-    count = oscillators.phases.size
-    padded = np.minimum(np.arange(-(-count // blocks.LANES) * blocks.LANES), count - 1)
-    parts = [
-        Oscillators(*(np.ascontiguousarray(values[..., lanes]) for values in oscillators))
-        for lanes in padded.reshape(-1, blocks.LANES)
-    ]
+    parts = [_block(oscillators, first) for first in range(0, oscillators.count, blocks.LANES)]
     threads = min(len(parts), len(os.sched_getaffinity(0)))
-    if threads == 1 or padded.size * ground.north.size < STEPS_WORTH_THREADS:
+    if threads == 1 or oscillators.count * ground.north.size < STEPS_WORTH_THREADS:
         rows = [work(part) for part in parts]
     else:
         with ThreadPoolExecutor(threads) as pool:
             rows = list(pool.map(work, parts))
-    return np.concatenate(rows, axis=1)[:, :count]
+    return np.concatenate(rows, axis=1)[:, : oscillators.count]
+
+
+def _block(oscillators: Oscillators, first: int) -> Oscillators:
+    """Return one block, filled up with copies of the last oscillator."""
+    count = min(blocks.LANES, oscillators.count - first)
+    lanes = first + np.minimum(np.arange(blocks.LANES), count - 1)
+    return Oscillators(*(np.ascontiguousarray(values[..., lanes]) for values in oscillators[:4]), count)

@@ -219,7 +219,7 @@ def _arguments(
     dt = checks.number("dt", dt, checks.positive)
     row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
     dampings = checks.fraction_of_critical("damping", damping)
-    if dampings.ndim > 1:
+    if dampings.ndim > 1 or dampings.size == 0:
         raise ValueError(f"damping must be a number or one row of numbers, got the shape {dampings.shape}")
     grid = np.broadcast_arrays(row, np.atleast_1d(dampings)[:, np.newaxis])
     return record, dt, (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
