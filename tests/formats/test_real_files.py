@@ -11,11 +11,11 @@ import pytest
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.csmip import read_spectra
+from per_obspy.spectra.elastic import response_spectra
 
 pytestmark = pytest.mark.real_data
 
 FOLDER = Path(os.environ.get("PER_OBSPY_DATA", Path(__file__).parents[3] / "shared" / "data"))
-G = 9.80665
 
 #: files whose interval in peaks.csv is the recorder's (real number 34), not the series' (real number 62): the header's
 #: time of the peak and the length of the record fit only the latter
@@ -108,19 +108,19 @@ def v2_and_v3() -> list[str]:
 
 @pytest.mark.parametrize("name", v2_and_v3())
 def test_official_spectra_fit_the_corrected_record_beside_them(real_data: Path, name: str):
+    """Reader, units and interval of volume 2 and volume 3 are right if our spectra of one give the other."""
     path = real_data / "spectra_v3" / name
     stream = obspy.read(str(path.with_suffix(path.suffix.replace("3", "2"))))
     spectra = read_spectra(path)
     assert len(stream) == len(spectra)
     for trace, official in zip(stream, spectra, strict=True):
-        assert (np.diff(official.periods) > 0).all()
-        assert official.periods[0] == pytest.approx(0.04)
-        omega = 2 * np.pi / official.periods
-        # pseudo velocity is omega SD by definition; three digits are printed, SD also in inches
-        np.testing.assert_allclose(official.psv, omega * official.sd, rtol=0.02)
-        # a very stiff oscillator follows the ground: Sa at 0.04 s is near the peak, at most a resonance above it
-        stiff = official.sa[official.damping == 0.05, 0] / np.abs(trace.data).max()
-        assert ((stiff > 0.95) & (stiff < 3.0)).all()
+        five = int(np.argmin(np.abs(official.damping - 0.05)))
+        ours = response_spectra(trace.data, trace.stats.delta, official.periods, 0.05)
+        for kind in ("sd", "sv", "sa"):
+            error = np.abs(getattr(ours, kind) / getattr(official, kind)[five] - 1)
+            # three digits are printed (up to 0.5 %), the agency's maxima are at samples (up to a few per cent at 0.04 s)
+            assert np.median(error) < 0.015
+            assert np.percentile(error, 95) < 0.06
 
 
 @pytest.mark.parametrize("start", ["", "Response and Fourier amplitude spectra"])
