@@ -12,3 +12,4 @@ from .pounding.single_hit import single_hit as single_hit
 from .spectra.elastic import per_spectrum as per_spectrum, response_spectra as response_spectra
 from .spectra.station import station_spectra as station_spectra
 from .screening.risk import risk_table as risk_table
+from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum, rotd as rotd
