@@ -9,6 +9,7 @@ from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.processing.provenance import rejection, remembered
+from per_obspy.processing.splicing import spliced
 
 PREFERENCE = ("HN", "BN", "HH", "BH")  # accelerometers before velocity sensors, fast before slow
 STEEPEST_HORIZONTAL = 45.0  # degrees of dip
@@ -84,12 +85,15 @@ def _joined(name: str, pieces: Stream) -> Stream:
         reasons = ["no samples"]
     if reasons:
         raise RecordRejected(name, *reasons)
-    copies.merge(method=0)  # samples that overlap and disagree are masked
-    reasons = _holes(copies[0])
+    whole = copies.copy().merge(method=0)  # samples that overlap and disagree are masked
+    reasons = _holes(whole[0])
     if reasons:
-        raise RecordRejected(name, *reasons)
-    copies[0].data = np.ascontiguousarray(np.ma.getdata(copies[0].data))
-    return copies
+        joined = None if any(seconds > 0 for *_, seconds, _ in copies.get_gaps()) else spliced(copies)
+        if joined is None or len(copies) == 1:
+            raise RecordRejected(name, *reasons)
+        whole = Stream([joined])
+    whole[0].data = np.ascontiguousarray(np.ma.getdata(whole[0].data))
+    return whole
 
 
 def _in_float64(trace: Trace) -> Trace:
