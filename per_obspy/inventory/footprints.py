@@ -9,7 +9,7 @@ import shapely
 
 from .. import checks
 from ..errors import CatalogError, Rejection
-from .checking import checked_pairs
+from .checking import Rejections, checked_pairs
 from .contact import floor_offset
 from .importers import imported
 from .layers import Geometries, Layer, read_layer
@@ -66,7 +66,7 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
         pairs = checked_pairs(pairs, source)
         rejected += tuple(one._replace(row=None) for one in pairs.attrs["rejected"])
         pairs = _with_floors(pairs)
-    pairs.attrs["rejected"] = rejected
+    pairs.attrs["rejected"] = Rejections(rejected)
     return pairs
 
 

@@ -12,7 +12,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from ..errors import CatalogError, Rejection
-from .checking import checked_pairs
+from .checking import Rejections, checked_pairs
 from .schema import COLUMNS
 
 #: A table as read, the line of each of its rows, and lines that are no rows with their reasons.
@@ -49,7 +49,7 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     table, lines, broken = _READERS[file.suffix.lower()](file)
     pairs = checked_pairs(table, str(file), lines)
     rejected = (*pairs.attrs["rejected"], *broken)
-    pairs.attrs["rejected"] = tuple(sorted(rejected, key=lambda rejection: rejection.row or 0))
+    pairs.attrs["rejected"] = Rejections(sorted(rejected, key=lambda rejection: rejection.row or 0))
     return pairs
 
 

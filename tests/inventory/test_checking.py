@@ -154,3 +154,9 @@ def test_every_column_has_a_unit_and_a_meaning():
         assert column.meaning
         assert bool(column.unit) == (column.dtype == "float64")
         assert column.low <= column.high
+
+
+def test_rejections_are_shared_by_every_copy_of_the_table():
+    # would catch a plain tuple, which pandas copies element by element in every operation
+    pairs = checked_pairs(pd.DataFrame([_row(), _row(pair_id="b", gap=-1.0)]), "pairs.csv")
+    assert pairs.assign(more=1).copy().attrs["rejected"] is pairs.attrs["rejected"]
