@@ -54,6 +54,7 @@ COMPASS_AZIMUTHS = {
     **dict.fromkeys(("W", "WEST"), 270.0),
 }
 
+_CODES = ("network", "station", "location", "channel")
 _QUADRANT = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])")
 _QUADRANT_AZIMUTHS = {"NE": (0.0, 1.0), "NW": (360.0, -1.0), "SE": (180.0, -1.0), "SW": (180.0, 1.0)}
 
@@ -132,11 +133,13 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
     """
     Return a trace with the words of the vocabulary; words that are None are left out, and so are empty groups.
 
-    The channel code is made from rate and orientation where the header has none.
+    The channel code is made from rate and orientation where the header has none. Codes keep letters, digits, ``_`` and
+    ``-`` only, so that they can name a file.
     """
     known = {name: _group(value) for name, value in words.items()}
     known = {name: value for name, value in known.items() if value is not None and value != AttribDict()}
     known.setdefault("channel", channel_code(1 / dt, known))
+    known |= {name: re.sub(r"[^A-Za-z0-9_-]", "", known[name]) for name in _CODES if name in known}
     return Trace(data=samples, header={"delta": dt, **known})
 
 

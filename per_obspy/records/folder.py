@@ -13,6 +13,7 @@ from obspy import Inventory, Stream
 from obspy.core.event import Event
 
 from ..errors import CatalogError, PerError, RecordRejected, Rejection
+from .archives import is_archive, members, open_file
 from .metadata import with_metadata
 
 _MARKS = {b"<FDSNStationXML": "inventory", b"quakeml": "event"}
@@ -25,7 +26,8 @@ class FolderContents(NamedTuple):
     Attributes
     ----------
     stations : dict
-        ``"NET.STA"`` -> the files that hold records of the station, sorted.
+        ``"NET.STA"`` -> the files that hold records of the station, sorted; files in an archive as if it were a
+        folder.
     inventory : Inventory or None
         All StationXML, merged; None if there is none.
     rejected : tuple of Rejection
@@ -44,7 +46,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     Parameters
     ----------
     folder : str or Path
-        Any mixture of waveform files; StationXML among them is used, QuakeML is passed over.
+        Any mixture of waveform files, in archives too; StationXML among them is used, QuakeML is passed over.
     stationxml : str or Path, optional
         A StationXML file, or a folder of them, in addition.
 
@@ -53,10 +55,9 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     CatalogError
         If the folder is missing, empty or without any record, or the named StationXML cannot be read.
     """
-    files = _files(Path(folder))
+    files, rejected = _files(Path(folder))
     kinds = {path: _kind(path) for path in files}
     stations: dict[str, list[Path]] = defaultdict(list)
-    rejected = []
     for path in (path for path in files if kinds[path] == "record"):
         try:
             for station in sorted(
@@ -137,27 +138,34 @@ def read_event(path: str | Path) -> Event:
     return events[0]
 
 
-def _files(folder: Path) -> list[Path]:
+def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
+    """Return all files, those in archives included, and the archives that cannot be read."""
     if not folder.is_dir():
         raise CatalogError(str(folder), "is not a folder" if folder.exists() else "no such folder")
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    if not files:
+    files, rejected = [], []
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        try:
+            files += members(path) if is_archive(path) else [path]
+        except RecordRejected as rejection:
+            rejected.append(_rejected_file(path, rejection))
+    if not files and not rejected:
         raise CatalogError(str(folder), "the folder is empty")
-    return files
+    return files, rejected
 
 
 def _kind(path: Path) -> str:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             start = file.read(1000)
-    except OSError:
+    except RecordRejected:
         return "record"  # reading it says why it cannot be read
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
 def _read(path: Path, *, headonly: bool) -> Stream:
-    if not path.stat().st_size:
-        raise RecordRejected(str(path), "the file is empty")
+    with open_file(path) as file:
+        if not file.read(1):
+            raise RecordRejected(str(path), "the file is empty")
     return _foreign(obspy.read, path, headonly=headonly)
 
 
@@ -178,7 +186,10 @@ def _named_inventories(stationxml: Path) -> list[Inventory]:
 def _foreign(reader: Callable[..., Any], path: Path, **options: bool) -> Any:
     """Call a reader of ObsPy: the one place where its errors, which have no common class, become a rejection."""
     try:
-        return reader(glob.escape(str(path)), **options)
+        if path.is_file():
+            return reader(glob.escape(str(path)), **options)
+        with open_file(path) as file:
+            return reader(file, **options)
     except PerError:
         raise
     except Exception as error:  # ObsPy's readers raise bare Exception, and whatever the libraries below them gave

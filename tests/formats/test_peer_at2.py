@@ -77,7 +77,7 @@ def test_obspy_detects_path_and_open_file(tmp_path: Path):
         ("NPTS=      7", "NPTS=      6", "line 6, samples: the header promises 6, the file holds 7"),
         ("NPTS=      7", "NPTS=     -7", "line 4, NPTS: must be a positive whole number, got '-7'"),
         ("NPTS=      7", "NPTS=    ***", "line 4, NPTS: '\\*\\*\\*' is not a number"),
-        (".0100 SEC", "0 SEC", "line 4, DT: must be positive, got '0'"),
+        (".0100 SEC", "0 SEC", "line 4, DT: must be positive and plausible, got '0'"),
         (".2500000E-03", "************", "line 5, samples: '\\*+' is not a number"),
         (".2500000E-03", "NaN", "line 5, samples: 'NaN' is not a number"),
         ("7/21/1952", "7/41/1952", r"line 2, date: \(1952, 7, 41\)"),

@@ -1,0 +1,105 @@
+"""Archives of records."""
+
+import io
+import tarfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from obspy import Stream, Trace
+
+from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.records.archives import members, open_file
+from per_obspy.records.folder import find_stations, read_station
+
+AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
+Some Event, 7/21/1952, Some School, 21
+ACCELERATION TIME SERIES IN UNITS OF G
+NPTS=      3, DT=   .0100 SEC,
+  .1E+00 .2E+00 -.3E+00
+"""
+
+
+def mseed(station: str) -> bytes:
+    file = io.BytesIO()
+    header = {"network": "CI", "station": station, "channel": "HNN", "delta": 0.01}
+    Stream([Trace(np.arange(300, dtype=np.int32), header)]).write(file, format="MSEED")
+    return file.getvalue()
+
+
+CONTENT = {"deep/one.mseed": mseed("ONE"), "two.mseed": mseed("TWO"), "three.AT2": AT2, "readme.txt": b"words"}
+
+
+def pack(path: Path) -> Path:
+    if path.suffix == ".zip":
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in CONTENT.items():
+                archive.writestr(name, content)
+        return path
+    mode = {".tar": "w", ".gz": "w:gz", ".tgz": "w:gz", ".bz2": "w:bz2", ".xz": "w:xz"}[path.suffix]
+    with tarfile.open(path, mode) as archive:  # type: ignore[call-overload] # the mode is one of the documented
+        for name, content in CONTENT.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    return path
+
+
+every = pytest.mark.parametrize("name", ["a.zip", "a.tar", "a.tar.gz", "a.tgz", "a.tar.bz2", "a.tar.xz", "A.ZIP.zip"])
+
+
+@every
+def test_an_archive_is_a_folder(tmp_path: Path, name: str):
+    archive = pack(tmp_path / name)
+    contents = find_stations(tmp_path)
+    assert contents.stations["CI.ONE"] == (archive / "deep" / "one.mseed",)
+    assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
+    assert [rejection.name for rejection in contents.rejected] == ["readme.txt"]
+    assert open_file(archive / "three.AT2").read() == AT2
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # nothing is unpacked on disk
+
+
+@every
+def test_records_in_archives_are_the_same_as_beside_them(tmp_path: Path, name: str):
+    archive = pack(tmp_path / name)
+    (tmp_path / "three.AT2").write_bytes(AT2)
+    paths = [archive / "three.AT2", tmp_path / "three.AT2"]
+    for path in paths:
+        stream, rejected = read_station([path], None)
+        # the AT2 format has no coordinates, which the reason says: it was read
+        assert not stream
+        assert "coordinates" in rejected[0].reasons[0]
+        assert rejected[0].source == str(path)
+
+
+@every
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
+def test_a_damaged_archive_is_a_rejection(tmp_path: Path, name: str, part: float):
+    archive = pack(tmp_path / name)
+    content = archive.read_bytes()
+    archive.write_bytes(content[: int(part * len(content))])
+    (tmp_path / "three.AT2").write_bytes(AT2)
+    contents = find_stations(tmp_path)
+    assert next(iter(contents.stations)) == ".SOMESCHOOL"
+    assert contents.rejected
+
+
+def test_a_folder_of_damaged_archives_is_refused(tmp_path: Path):
+    (tmp_path / "a.zip").write_bytes(b"no archive")
+    with pytest.raises(CatalogError, match=r"a\.zip: the archive is damaged"):
+        find_stations(tmp_path)
+
+
+def test_missing_members_and_damaged_members_are_refused(tmp_path: Path):
+    archive = pack(tmp_path / "a.zip")
+    with pytest.raises(RecordRejected, match="cannot be read"):
+        open_file(archive / "none.AT2")
+    content = bytearray(archive.read_bytes())
+    place = content.index(b"NPTS")
+    content[place : place + 4] = b"MPTS"
+    archive.write_bytes(content)
+    assert_array_equal(len(members(archive)), len(CONTENT))
+    with pytest.raises(RecordRejected, match="Bad CRC-32"):
+        open_file(archive / "three.AT2")
