@@ -116,6 +116,8 @@ class Processing(Section):
     overlap: float = Field(0.8, gt=0, le=1, description="part of the longer horizontal that both must cover")
     onset_margin: float = Field(0.5, ge=0, description="s before the first wave where the noise ends")
     shortest_noise: float = Field(2.0, gt=0, description="s of noise that tell something; fewer count as none")
+    longest_noise: float = Field(120.0, gt=0, description="s before the first wave that are kept")
+    longest_signal: float = Field(600.0, gt=0, description="s after the first wave that are kept")
     pick_tolerance: float = Field(10.0, gt=0, description="s between a pick and the computed travel time of P")
     smoothing: float = Field(20.0, gt=0, description="b of the Konno-Ohmachi window")
     required_band: tuple[float, float] = Field((0.2, 10.0), description="Hz, where the signal should clear the noise")

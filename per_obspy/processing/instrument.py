@@ -18,7 +18,7 @@ from per_obspy.processing.physical import in_acceleration
 from per_obspy.processing.provenance import noted, remembered
 from per_obspy.processing.quality import outlier_findings, raw_findings
 from per_obspy.processing.usable import usable_periods_noted
-from per_obspy.processing.windows import Source, noise_window_noted
+from per_obspy.processing.windows import Source, noise_window_noted, trimmed
 
 Step = Callable[[Stream], Stream]
 
@@ -48,8 +48,12 @@ def process_instrument(
         return passed_through(pair, settings), rejected
     physical, unfit = _in_turn(instrument, _before(settings))
     pair, unpaired = paired(physical, settings.overlap)
-    windowed = noise_window_noted(
-        pair, settings.onset_margin, settings.shortest_noise, settings.pick_tolerance, source, settings.pre_event
+    windowed = trimmed(
+        noise_window_noted(
+            pair, settings.onset_margin, settings.shortest_noise, settings.pick_tolerance, source, settings.pre_event
+        ),
+        settings.longest_noise,
+        settings.longest_signal,
     )
     outliers = outlier_findings(windowed, settings.checks)
     magnitude = source.magnitude if source else _told_magnitude(windowed)

@@ -135,3 +135,30 @@ def _onset(stream: Stream, tolerance: float, source: Source | None) -> tuple[UTC
     if computed is not None:
         return computed, f"travel time of P, {MODEL}"
     return None, "no clear onset"
+
+
+def trimmed(stream: Stream, before: float = 120.0, after: float = 600.0) -> Stream:
+    """
+    Return a copy without what lies far from the first wave: the hours of a continuous record.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        From `noise_window_noted`; traces without an onset stay whole.
+    before, after : float
+        What is kept before and after the first wave, s.
+
+    Returns
+    -------
+    obspy Stream
+    """
+    out = stream.copy()
+    for trace in out:
+        start, end = trace.stats.starttime, trace.stats.endtime
+        onset = UTCDateTime(trace.stats.per_obspy.get("onset", start))
+        if "onset" in trace.stats.per_obspy and (start < onset - before or end > onset + after):
+            trace.trim(onset - before, onset + after)
+            cut = trace.stats.starttime - start
+            noise = max(float(trace.stats.per_obspy.noise) - cut, 0.0)
+            noted(trace, f"{cut:.2f} s cut before and {end - trace.stats.endtime:.2f} s after", noise=noise)
+    return out

@@ -4,7 +4,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.event import Event, Magnitude, Origin
 
-from per_obspy.processing.windows import Source, noise_window_noted, p_arrival, source_of
+from per_obspy.processing.windows import Source, noise_window_noted, p_arrival, source_of, trimmed
 
 START = UTCDateTime(2020, 1, 1)
 DEGREE = 111.19  # km on the sphere of 6371 km
@@ -84,3 +84,19 @@ def test_noise_shorter_than_the_limit_counts_as_none(earthquake):
 def test_a_given_length_of_noise_is_used(earthquake):
     out = noise_window_noted(Stream([component(earthquake())]), pre_event=7.0)[0].stats.per_obspy
     assert (out.noise, out.onset_source) == (7.0, "configuration")
+
+
+def test_hours_around_the_shaking_are_cut(earthquake):
+    given = noise_window_noted(Stream([component(earthquake())]))
+    out = trimmed(given, before=15.0, after=60.0)[0]
+    onset = UTCDateTime(given[0].stats.per_obspy.onset)
+    assert out.stats.starttime - (onset - 15.0) == pytest.approx(0.0, abs=0.006)  # half a sample
+    assert out.stats.endtime - (onset + 60.0) == pytest.approx(0.0, abs=0.006)
+    assert out.stats.per_obspy.noise == pytest.approx(14.5, abs=0.01)
+    assert given[0].stats.npts == 12000
+
+
+def test_short_records_and_records_without_an_onset_stay_whole(earthquake):
+    for samples in (earthquake(), np.zeros(12000)):
+        given = noise_window_noted(Stream([component(samples)]))
+        assert trimmed(given, before=200.0) == given

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core import AttribDict
+
+from per_obspy.config import Processing
+from per_obspy.processing.chain import process_instruments, process_station
+from per_obspy.processing.instrument import passed_through, process_instrument
+from per_obspy.processing.windows import Source
+
+START = UTCDateTime(2020, 1, 1)
+SETTINGS = Processing()
+
+
+@pytest.fixture(scope="module")
+def record(earthquake):
+    """Return a function that makes one component of a record with a little noise."""
+
+    def make(channel="HNE", seed=1, factor=1.0, onset=20.0, **stats):
+        samples = earthquake(seed, onset=onset) + 1e-4 * np.random.default_rng(seed + 50).normal(size=12000)
+        dip = -90.0 if channel.endswith("Z") else 0.0
+        header = {"network": "XX", "station": "STA", "channel": channel, "sampling_rate": 100.0, "units": "m/s2"}
+        header |= {"starttime": START, "sensor_dip": dip, "per_obspy": AttribDict()} | stats
+        return Trace(factor * samples, header)
+
+    return make
+
+
+def test_horizontals_share_their_corners_and_the_vertical_has_its_own(record):
+    three = Stream([record("HNE", 1), record("HNN", 2), record("HNZ", 3)])
+    out, rejected = process_instrument(three, SETTINGS, None)
+    assert rejected == ()
+    east, north, vertical = (out.select(channel=code)[0].stats.per_obspy for code in ("HNE", "HNN", "HNZ"))
+    assert east.highpass == north.highpass == max(east.own_highpass, north.own_highpass)
+    assert "own_highpass" not in vertical
+    assert {"shared"} < {east.highpass_source, north.highpass_source}
+
+
+def test_noise_is_measured_before_the_wave_of_the_vertical(record):
+    out, _ = process_instrument(Stream([record("HNE"), record("HNZ", 3)]), SETTINGS, None)
+    assert out[0].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
+
+
+def test_an_outlier_is_dropped_with_its_figure(record):
+    out, rejected = process_instrument(
+        Stream([record("HNE"), record("HNN", 2, factor=8.0), record("HNZ", 3)]), SETTINGS, None
+    )
+    assert {trace.stats.channel for trace in out} == {"HNE", "HNZ"}
+    assert "peak over that of" in rejected[0].reasons[0]
+
+
+def test_one_bad_horizontal_does_not_decide_the_corners_of_the_other(record):
+    alone, _ = process_instrument(Stream([record("HNE")]), SETTINGS, None)
+    broken = record("HNN", 2)
+    broken.data = np.random.default_rng(3).normal(size=12000)  # no signal at all
+    both, rejected = process_instrument(Stream([record("HNE"), broken]), SETTINGS, None)
+    assert [row.name for row in rejected] == ["XX.STA..HNN"]
+    assert both[0].stats.per_obspy.highpass == alone[0].stats.per_obspy.highpass
+
+
+@pytest.mark.parametrize(("size", "corner"), [(4.0, 0.3), (6.0, 0.1)])
+def test_without_noise_the_magnitude_decides_from_event_or_header(record, size, corner):
+    source = Source(START, 0.0, 0.0, 1e4, size)
+    late = record(onset=0.5)
+    by_event, _ = process_instrument(Stream([late]), SETTINGS, source)
+    by_header, _ = process_instrument(Stream([record(onset=0.5, event=AttribDict(magnitude=size))]), SETTINGS, None)
+    for out in (by_event, by_header):
+        assert out[0].stats.per_obspy.lowest_highpass == corner
+        assert out[0].stats.per_obspy.highpass >= corner
+
+
+def test_a_second_pass_changes_nothing(record):
+    once, _ = process_instrument(Stream([record()]), SETTINGS, None)
+    twice, _ = process_instrument(once, SETTINGS, None)
+    assert_array_equal(twice[0].data, once[0].data)
+    assert twice[0].stats.per_obspy.longest_period == once[0].stats.per_obspy.longest_period
+
+
+def test_others_motion_that_does_not_rest_is_a_warning(record):
+    drifting = record(processing_level="processed")
+    drifting.data = drifting.data + 0.05
+    kept = passed_through(Stream([drifting]), SETTINGS)[0]
+    assert_array_equal(kept.data, drifting.data)
+    assert "final velocity over its peak" in kept.stats.per_obspy.warnings
+
+
+def test_a_raw_record_goes_before_the_same_record_processed_by_others(record):
+    others = record(processing_level="processed", corners=AttribDict(highpass=0.3, lowpass=25.0))
+    kept, rejected = process_station(Stream([others, record()]), SETTINGS)
+    assert kept[0].stats.per_obspy.highpass < 0.3
+    assert len(rejected) == 1
+    broken = record()
+    broken.data = np.full(12000, np.nan)
+    kept, rejected = process_station(Stream([others, broken]), SETTINGS)
+    assert kept[0].stats.per_obspy.highpass == 0.3
+    assert "not finite" in rejected[0].reasons[0]
+
+
+def test_sensors_of_a_building_stay_apart(record):
+    floors = [record(code, seed, location=floor) for seed, floor in enumerate(("01", "02")) for code in ("HNE", "HNN")]
+    apart, rejected = process_instruments(Stream(floors), SETTINGS)
+    assert [{trace.stats.location for trace in one} for one in apart] == [{"01"}, {"02"}]
+    assert rejected == ()
+
+
+def test_hours_of_quiet_do_not_swallow_the_shaking(record):
+    # mutation: without the cut the taper of a tenth of a long record reaches into the shaking
+    short = record()
+    long = record()
+    quiet = 1e-4 * np.random.default_rng(4).normal(size=60_000)
+    long.data = np.concatenate((quiet, long.data, 1e-4 * np.random.default_rng(5).normal(size=60_000)))
+    settings = Processing(longest_noise=19.0, longest_signal=100.0, highpass=0.1)
+    ours, theirs = (process_instrument(Stream([one]), settings, None)[0][0] for one in (long, short))
+    assert np.abs(ours.data).max() == pytest.approx(np.abs(theirs.data).max(), rel=1e-3)
+    assert ours.stats.npts < 20_000  # 119 s and the pads of 75 s, not 22 minutes
