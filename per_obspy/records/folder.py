@@ -66,7 +66,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
                 stations[station].append(path)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
-    inventories = [] if stationxml is None else _named_inventories(Path(stationxml))
+    inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     for path in (path for path in files if kinds[path] == "inventory"):
         try:
             inventories.append(_read_inventory(path))
@@ -75,7 +75,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     if not stations:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
     found = {station: tuple(paths) for station, paths in sorted(stations.items())}
-    return FolderContents(found, reduce(add, inventories) if inventories else None, tuple(rejected))
+    return FolderContents(found, merged_inventory(inventories), tuple(rejected))
 
 
 def read_station(
@@ -173,7 +173,13 @@ def _read_inventory(path: Path) -> Inventory:
     return _foreign(obspy.read_inventory, path)
 
 
-def _named_inventories(stationxml: Path) -> list[Inventory]:
+def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
+    """Return one inventory of all; None of none."""
+    return reduce(add, inventories) if inventories else None
+
+
+def read_inventories(stationxml: Path) -> list[Inventory]:
+    """Read a StationXML file, or all of a folder; raise ``CatalogError`` if there is none or one cannot be read."""
     paths = sorted(stationxml.rglob("*.xml")) if stationxml.is_dir() else [stationxml]
     if not paths:
         raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
