@@ -1,0 +1,74 @@
+"""First root of a polynomial, found so that no earlier root can be passed."""
+
+import math
+
+from ._jit import kernel
+
+#: A polynomial below this share of its own terms is zero.
+ROUNDING = 1e-15
+#: Where value and slope both vanish, a search goes on by this share of its interval.
+LEAST_ADVANCE = 1e-7
+
+
+@kernel
+def value_and_slope(polynomial, terms, time):
+    """Return the polynomial and its derivative at a time, by Horner's rule."""
+    value = slope = 0.0
+    for n in range(terms - 1, -1, -1):
+        slope = slope * time + value
+        value = value * time + polynomial[n]
+    return value, slope
+
+
+@kernel
+def size_and_curvature(polynomial, terms, end):
+    """Return bounds on [0, end]: of the polynomial without its constant, and of its second derivative."""
+    size = curvature = 0.0
+    power = 1.0  # end**(n - 2)
+    if terms > 1:
+        size = abs(polynomial[1]) * end
+    for n in range(2, terms):
+        term = abs(polynomial[n]) * power
+        size += term * end * end
+        curvature += n * (n - 1) * term
+        power *= end
+    return size, curvature
+
+
+@kernel
+def first_fall(polynomial, terms, sign, start, end, rounding):
+    """
+    Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, or -1 if it does not.
+
+    With K >= |p''| the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends like Newton's.
+    A start at zero that rises is not a fall: the same step, written for c < 0, leaves it by 2 p' / K at least.
+    """
+    size, curvature = size_and_curvature(polynomial, terms, end)
+    if sign * polynomial[0] > size + rounding:
+        return -1.0
+    tolerance = rounding + ROUNDING * (abs(polynomial[0]) + size)
+    time = start
+    while True:
+        value, slope = value_and_slope(polynomial, terms, time)
+        value, closing = sign * value, -sign * slope
+        if value <= tolerance and closing > 0.0:
+            return time
+        step = safe_step(max(value, 0.0), closing, curvature)
+        if value <= tolerance:
+            step = max(step, LEAST_ADVANCE * end)
+            if step == 0.0:  # nothing is left of the interval
+                return -1.0
+        elif time + step == time:
+            return time
+        time += step
+        if not time <= end:
+            return -1.0
+
+
+@kernel
+def safe_step(value, closing, curvature):
+    """Return a step within which a function of this value, closing speed and largest curvature has no root."""
+    root = math.sqrt(closing * closing + 2.0 * curvature * value)
+    if closing > 0.0:
+        return 2.0 * value / (closing + root)
+    return (root - closing) / curvature if curvature > 0.0 else math.inf

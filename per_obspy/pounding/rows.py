@@ -1,0 +1,151 @@
+"""What the histories of pairs and rows have in common: tables for the kernels, and the record's end."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_contact import LOG_COLUMNS, Tally
+from per_obspy.kernels.pounding_motion import LARGEST_PHASE, MOST_TERMS, Row
+from per_obspy.pounding.structure import Structure
+
+
+def structure_table(structures: Sequence[Structure]) -> FloatArray:
+    """
+    Return the kernels' table of structures.
+
+    Parameters
+    ----------
+    structures : sequence of Structure
+        From left to right.
+
+    Returns
+    -------
+    (n_structures, 6) ndarray
+        Half damping rate ``xi omega`` (1/s), squared frequency (rad²/s²), hardening, yield displacement (m),
+        participation, mass (kg).
+    """
+    return np.array(
+        [
+            (s.damping * s.frequency, s.frequency**2, s.hardening, s.yield_displacement, s.participation, s.mass)
+            for s in structures
+        ]
+    )
+
+
+def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> Row:
+    """
+    Return a row of structures at rest; structures without a gap start in contact.
+
+    Parameters
+    ----------
+    table : (n_structures, 6) ndarray
+        As from `structure_table`.
+    gaps : (n_structures - 1,) ndarray
+        In m.
+    restitution : (n_structures - 1,) ndarray
+        Dimensionless.
+
+    Returns
+    -------
+    Row
+        For the kernels.
+    """
+    count = len(table)
+    return Row(
+        structures=table,
+        gaps=gaps,
+        restitution=restitution,
+        state=np.zeros((count, 3)),
+        phase=np.zeros(count, np.int64),
+        stuck=gaps <= 0.0,
+        lingering=np.zeros(count - 1, np.bool_),
+        order=np.zeros(count - 1, np.int64),
+        unloading=np.zeros(count, np.int64),
+        curve=np.zeros((count, MOST_TERMS)),
+        guard=np.zeros(MOST_TERMS),
+    )
+
+
+def new_tally(count: int, capacity: int) -> Tally:
+    """
+    Return a tally for a number of structures, with room for a number of impacts in its log.
+
+    Parameters
+    ----------
+    count : int
+        Structures.
+    capacity : int
+        Impacts.
+
+    Returns
+    -------
+    Tally
+        All zero.
+    """
+    return Tally(
+        peaks=np.zeros((count, 3)),
+        approach=np.zeros(1),
+        counts=np.zeros(2, np.int64),
+        transfer=np.zeros(count),
+        log=np.zeros((capacity, LOG_COLUMNS)),
+    )
+
+
+def refinement(largest_frequency: float, dt: float) -> int:
+    """
+    Return into how many equal segments each sampling interval is cut, so that Taylor series are short.
+
+    Parameters
+    ----------
+    largest_frequency : float
+        Undamped circular frequency, rad/s.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    int
+        A power of two; 1 where the shortest period is above about 9 dt.
+    """
+    return 2 ** max(0, math.ceil(math.log2(largest_frequency * dt / LARGEST_PHASE)))
+
+
+def closed_record(acceleration: FloatArray) -> FloatArray:
+    """
+    Return a record that ends at zero: unless it does, one sample of zero is appended (a ramp of length dt).
+
+    Parameters
+    ----------
+    acceleration : (..., n_samples) ndarray
+        In m/s².
+
+    Returns
+    -------
+    (..., n_samples or n_samples + 1) ndarray
+        In m/s².
+    """
+    if not acceleration[..., -1].any():
+        return acceleration
+    return np.concatenate([acceleration, np.zeros((*acceleration.shape[:-1], 1))], axis=-1)
+
+
+def largest_ground_velocity(acceleration: FloatArray, dt: float) -> float:
+    """
+    Return the largest velocity of the ground, as the scale against which speeds are small.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) ndarray
+        In m/s².
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    float
+        In m/s; the ground starts at rest.
+    """
+    steps = 0.5 * dt * (acceleration[1:] + acceleration[:-1])
+    return float(np.abs(np.cumsum(steps)).max(initial=0.0))
