@@ -5,6 +5,7 @@ Only ``run.py`` and ``cli.py`` see a configuration as a whole. Rooms below take 
 configuration are relative to the folder of its file.
 """
 
+import datetime
 import os
 import tomllib
 from pathlib import Path
@@ -92,6 +93,7 @@ class Checks(Section):
     dropout: Check = Check(threshold=0.5, level="reject")  # s without change during the shaking, less than
     spike: Check = Check(threshold=6.0, level="reject")  # jump of one sample over others within 0.5 s, at most
     zero_crossings: Check = Check(threshold=0.1, level="reject")  # a second, at least
+    header_peak: Check = Check(threshold=0.01, level="warn")  # relative, between header and samples, at most
     outlier: Check = Check(threshold=5.0, level="reject")  # peak over the largest peak of two sisters, at most
     late_trigger: Check = Check(threshold=0.1, level="warn")  # motion of the first second over the peak, at most
     cut_off: Check = Check(threshold=0.1, level="warn")  # motion of the last second over the peak, at most
@@ -187,6 +189,12 @@ class Scenario(Section):
     noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
     pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
     dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")
+
+    @field_validator("origin_time")
+    @classmethod
+    def _a_time(cls, origin_time: str) -> str:
+        datetime.datetime.fromisoformat(origin_time)
+        return origin_time
 
 
 class SimulatedPairs(Section):

@@ -106,7 +106,8 @@ def _place(scenario: config.Scenario, number: int) -> Place:
     radius = scenario.city_radius * np.sqrt((0.5 + number / plastic) % 1.0)
     angle = 2.0 * np.pi * ((0.5 + number / plastic**2) % 1.0)
     latitude = scenario.city_latitude + _degrees(radius * np.cos(angle))
-    longitude = scenario.city_longitude + _degrees(radius * np.sin(angle)) / np.cos(np.deg2rad(latitude))
+    east = _degrees(radius * np.sin(angle)) / np.cos(np.deg2rad(latitude))
+    longitude = (scenario.city_longitude + east + 180.0) % 360.0 - 180.0
     from_lake = gps2dist_azimuth(latitude, longitude, scenario.lakebed_latitude, scenario.lakebed_longitude)[0]
     scatter = np.exp(scenario.lakebed_scatter * _random(scenario, number, 0).standard_normal())
     lakebed = scenario.lakebed_frequency * scatter if from_lake < scenario.lakebed_radius else None
@@ -171,7 +172,7 @@ def _spectra(scenario: config.Scenario, place: Place, distance: float, n_samples
         frequency, distance, scenario.shear_velocity, scenario.quality, scenario.quality_exponent
     )
     rock = source * path * stochastic.rock_response(frequency, scenario.kappa)
-    lakebed = (
-        1.0 if place.lakebed is None else stochastic.kanai_tajimi(frequency, place.lakebed, scenario.lakebed_damping)
-    )
-    return np.stack([lakebed * rock, lakebed * rock, scenario.vertical * rock]).astype(np.complex128)
+    horizontal = rock.astype(np.complex128)
+    if place.lakebed is not None:
+        horizontal *= stochastic.kanai_tajimi(frequency, place.lakebed, scenario.lakebed_damping)
+    return np.stack([horizontal, horizontal, scenario.vertical * rock])

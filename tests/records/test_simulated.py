@@ -167,3 +167,17 @@ def test_horizontals_are_correlated_as_configured():
     # about 100 independent samples a record (10 s of 5 Hz noise) and 12 records: 0.03 of scatter; four times that
     assert abs(correlation(0.3) - 0.3) < 0.12
     assert abs(correlation(-0.5) + 0.5) < 0.12
+
+
+def test_a_city_across_the_date_line():
+    # would catch longitudes beyond 180, which StationXML does not know
+    far = simulate(Scenario(stations=8, longitude=-179.8, city_longitude=179.99, lakebed_radius=0.0))
+    longitudes = np.array([station.longitude for station in far.inventory[0]])
+    assert (np.abs(longitudes) <= 180).all()
+    assert (longitudes > 0).any()
+    assert (longitudes < 0).any()
+
+
+def test_a_scenario_at_no_time():
+    with pytest.raises(ValueError, match="origin_time"):
+        Scenario(origin_time="yesterday")
