@@ -8,8 +8,9 @@ from obspy.core.event import Event
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.gathering import instruments, is_horizontal, merged, oriented
+from per_obspy.processing.gathering import instruments, is_horizontal, oriented
 from per_obspy.processing.instrument import process_instrument
+from per_obspy.processing.merging import merged
 from per_obspy.processing.provenance import rejection
 from per_obspy.processing.windows import source_of
 

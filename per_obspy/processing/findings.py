@@ -1,13 +1,13 @@
-"""What checks find: every failed check adds a reason with its figure, and none stops another."""
+"""What checks find: every failed check adds a reason with its figure; none stops another, or another trace."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from obspy import Stream, Trace
 
 from per_obspy.config import Check
-from per_obspy.errors import RecordRejected
-from per_obspy.processing.provenance import remembered
+from per_obspy.errors import RecordRejected, Rejection
+from per_obspy.processing.provenance import rejection, remembered
 
 
 class Finding(NamedTuple):
@@ -76,3 +76,29 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
 def _earlier(trace: Trace, name: str) -> list[str]:
     text = trace.stats.get("per_obspy", {}).get(name)
     return [text] if text else []
+
+
+def surviving(step: Callable[[Stream], Stream], stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
+    """
+    Apply a step trace by trace, so that one bad trace never loses the others.
+
+    Parameters
+    ----------
+    step : callable
+        From Stream to new Stream; raises `RecordRejected`.
+    stream : obspy Stream
+
+    Returns
+    -------
+    kept : obspy Stream
+        What the step returned for the traces that it accepted.
+    lost : tuple of Rejection
+        One row for each of the others.
+    """
+    kept, lost = Stream(), []
+    for trace in stream:
+        try:
+            kept += step(Stream([trace]))
+        except RecordRejected as fault:
+            lost.append(rejection(trace, *fault.reasons))
+    return kept, tuple(lost)

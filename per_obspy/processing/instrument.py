@@ -11,12 +11,12 @@ from per_obspy.errors import Rejection
 from per_obspy.processing.automatic import corners_noted
 from per_obspy.processing.corners import LOWPASS_OF_NYQUIST, corners_shared
 from per_obspy.processing.filtering import filtered, padded
-from per_obspy.processing.findings import judged
-from per_obspy.processing.gathering import is_horizontal, is_processed, paired, surviving
+from per_obspy.processing.findings import judged, surviving
+from per_obspy.processing.gathering import is_horizontal, paired
 from per_obspy.processing.outcome import final_findings
 from per_obspy.processing.physical import in_acceleration
-from per_obspy.processing.provenance import noted, remembered
-from per_obspy.processing.quality import outlier_findings, raw_findings
+from per_obspy.processing.provenance import is_processed, noted, remembered
+from per_obspy.processing.quality import header_findings, outlier_findings, raw_findings
 from per_obspy.processing.usable import usable_periods_noted
 from per_obspy.processing.windows import Source, noise_window_noted, trimmed
 
@@ -48,26 +48,27 @@ def process_instrument(
         return passed_through(pair, settings), rejected
     physical, unfit = _in_turn(instrument, _before(settings))
     pair, unpaired = paired(physical, settings.overlap)
-    windowed = trimmed(
-        noise_window_noted(
-            pair, settings.onset_margin, settings.shortest_noise, settings.pick_tolerance, source, settings.pre_event
-        ),
-        settings.longest_noise,
-        settings.longest_signal,
-    )
-    outliers = outlier_findings(windowed, settings.checks)
-    magnitude = source.magnitude if source else _told_magnitude(windowed)
-    ready, undecided = _in_turn(
-        windowed,
-        (
-            lambda stream: judged(stream[0], outliers.get(stream[0].id, [])),
-            partial(corners_noted, settings=settings, magnitude=magnitude),
-        ),
-    )
+    windowed = _windowed(pair, settings, source)
+    ready, undecided = _in_turn(windowed, _between(windowed, settings, source))
     horizontals = corners_shared(Stream([trace for trace in ready if is_horizontal(trace)]))
     verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
     done, restless = _in_turn(horizontals + verticals, _after(settings))
     return done, (*unfit, *unpaired, *undecided, *restless)
+
+
+def _windowed(stream: Stream, settings: Processing, source: Source | None) -> Stream:
+    margin, shortest, tolerance = settings.onset_margin, settings.shortest_noise, settings.pick_tolerance
+    noted_windows = noise_window_noted(stream, margin, shortest, tolerance, source, settings.pre_event)
+    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal)
+
+
+def _between(stream: Stream, settings: Processing, source: Source | None) -> tuple[Step, ...]:
+    outliers = outlier_findings(stream, settings.checks)
+    magnitude = source.magnitude if source else _told_magnitude(stream)
+    return (
+        lambda one: judged(one[0], outliers.get(one[0].id, [])),
+        partial(corners_noted, settings=settings, magnitude=magnitude),
+    )
 
 
 def _told_magnitude(stream: Stream) -> float | None:
@@ -142,6 +143,7 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
             remembered(trace, **{name: float(told.get(name, guess))}, **source)
     checked = Stream()
     for trace in usable_periods_noted(out, settings.usable):
-        findings = [one._replace(level="warn") for one in final_findings(trace, settings.checks)]
+        found = (*header_findings(trace, settings.checks), *final_findings(trace, settings.checks))
+        findings = [one._replace(level="warn") for one in found]
         checked += judged(trace, findings)
     return checked

@@ -30,12 +30,11 @@ def remembered(trace: Trace, **numbers: Value) -> None:
     trace.stats.setdefault("per_obspy", AttribDict()).update(numbers)
 
 
-def chosen(trace: Trace, name: str, default: Value | None = None) -> Value | None:
-    """Return a number that an earlier step chose for this record, or the default."""
-    value: Value | None = trace.stats.get("per_obspy", {}).get(name, default)
-    return value
-
-
 def rejection(trace: Trace, *reasons: str) -> Rejection:
     """Return the row of ``rejected.csv`` for a trace."""
     return Rejection("record", trace.id, str(trace.stats.get("source", "")), None, reasons)
+
+
+def is_processed(trace: Trace) -> bool:
+    """Tell whether others have processed a trace."""
+    return bool(trace.stats.get("processing_level") == "processed")

@@ -36,30 +36,60 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     ------
     Finding
     """
-    dt = trace.stats.delta
-    yield from below("sampling_rate", checks.sampling_rate, trace.stats.sampling_rate, "sampling rate, Hz:")
-    yield from below("duration", checks.duration, trace.stats.npts * dt, "duration, s:")
     different = np.unique(trace.data).size
+    yield from below("sampling_rate", checks.sampling_rate, trace.stats.sampling_rate, "sampling rate, Hz:")
+    yield from below("duration", checks.duration, trace.stats.npts * trace.stats.delta, "duration, s:")
     yield from below("levels", checks.levels, different, "different values (dead channel):")
-    if different < 3 or trace.stats.npts < 10:
-        return
-    samples = detrend(trace.data)
-    peak = np.abs(samples).max()
+    if different > 2 and trace.stats.npts * trace.stats.delta > 1:
+        yield from _recorder_findings(trace, checks)
+        yield from _shaking_findings(detrend(trace.data), trace.stats.delta, checks)
+        yield from header_findings(trace, checks)
+
+
+def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     run = longest_extreme_run(trace.data)
     if run >= checks.clipped_run.threshold:
         yield Finding("clipped_run", checks.clipped_run.level, f"clipped: {run} equal samples at an extreme")
     if trace.stats.get("units", "counts") == "counts":
         use = float(np.abs(trace.data).max()) / FULL_SCALE
         yield from above("counter_use", checks.counter_use, use, "peak over the full scale of a 24-bit counter:")
-    yield from above("dropout", checks.dropout, longest_standstill(trace.data, dt), "dropout, s without change:")
-    yield from above("spike", checks.spike, largest_spike(samples, dt), "spike or step, over its vicinity:")
+    still = longest_standstill(trace.data, trace.stats.delta)
+    yield from above("dropout", checks.dropout, still, "dropout, s without change:")
+    spike = largest_spike(detrend(trace.data), trace.stats.delta)
+    yield from above("spike", checks.spike, spike, "spike or step, over its vicinity:")
+
+
+def _shaking_findings(samples: FloatArray, dt: float, checks: Checks) -> Iterator[Finding]:
     rate = np.count_nonzero(np.diff(np.signbit(samples))) / (samples.size * dt)
     yield from below("zero_crossings", checks.zero_crossings, rate, "zero crossings a second:")
-    second = round(1 / dt)
+    second, peak = round(1 / dt), np.abs(samples).max()
     first, last = (float(np.sqrt(np.mean(part**2)) / peak) for part in (samples[:second], samples[-second:]))
     yield from above("late_trigger", checks.late_trigger, first, "late trigger: first second over the peak:")
     yield from above("cut_off", checks.cut_off, last, "ends while shaking: last second over the peak:")
     yield from above("second_event", checks.second_event, later_event(samples, dt), "another event, over the peak:")
+
+
+def header_findings(trace: Trace, checks: Checks) -> list[Finding]:
+    """
+    Return a finding if the largest sample, with or without the mean, is not the peak that the header tells.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+        With ``header_peak``, in the unit of the samples, where the header has one.
+    checks : Checks
+        Thresholds and levels.
+
+    Returns
+    -------
+    list of Finding
+    """
+    told = trace.stats.get("header_peak")
+    if not told:
+        return []
+    peaks = np.abs(trace.data).max(), np.abs(trace.data - trace.data.mean()).max()
+    error = min(abs(float(peak) / told - 1) for peak in peaks)
+    return above("header_peak", checks.header_peak, error, f"largest sample off the header's {told:g} by a share of")
 
 
 def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -2,10 +2,14 @@ import numpy as np
 import pytest
 from obspy import Stream, Trace
 
-from per_obspy.config import Check, Checks
-from per_obspy.errors import RecordRejected
-from per_obspy.processing.findings import Finding, above, below, judged
-from per_obspy.processing.quality import later_event, longest_extreme_run, outlier_findings, raw_findings
+from per_obspy.config import Checks
+from per_obspy.processing.quality import (
+    header_findings,
+    later_event,
+    longest_extreme_run,
+    outlier_findings,
+    raw_findings,
+)
 
 RATE, GAIN = 100.0, 2e5
 
@@ -137,18 +141,12 @@ def test_between_two_components_nobody_can_tell():
     assert outlier_findings(instrument(1, 10), Checks()) == {}
 
 
-def test_thresholds_belong_to_the_good_side():
-    setting = Check(threshold=2.0, level="warn")
-    assert (below("x", setting, 2.0, ""), above("x", setting, 2.0, "")) == ([], [])
-    assert below("x", setting, 1.5, "figure")[0].reason == "figure 1.5, needs 2"
-    assert above("x", setting, 2.5, "figure")[0].reason == "figure 2.5, allowed 2"
+@pytest.mark.parametrize(("told", "found"), [(1.0, False), (1.005, False), (1.03, True), (0.9, True)])
+def test_a_header_that_tells_another_peak_is_found(earthquake, told, found):
+    samples = earthquake() - earthquake().mean()
+    trace = Trace(samples + 3.0, {"units": "m/s2", "header_peak": told * np.abs(samples).max()})
+    assert bool(header_findings(trace, Checks())) is found
 
 
-def test_levels_decide_what_a_finding_means():
-    trace = Trace(np.zeros(3), {"channel": "HNE"})
-    kept = judged(trace, [Finding("a", "warn", "one"), Finding("b", "note", "two"), Finding("c", "warn", "three")])[0]
-    assert (kept.stats.per_obspy.warnings, kept.stats.per_obspy.notes) == ("one; three", "two")
-    with pytest.raises(RecordRejected) as caught:
-        judged(kept, [Finding("d", "reject", "four"), Finding("e", "reject", "five"), Finding("f", "warn", "six")])
-    assert caught.value.reasons == ("four", "five", "one; three", "six")
-    assert "per_obspy" not in trace.stats
+def test_a_header_without_a_peak_tells_nothing(earthquake):
+    assert header_findings(Trace(earthquake()), Checks()) == []

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from obspy import Stream, Trace, UTCDateTime, read
 
-from per_obspy.processing.gathering import merged
+from per_obspy.processing.merging import merged
 from per_obspy.processing.splicing import best_overlap, spliced
 
 RATE = 100.0
