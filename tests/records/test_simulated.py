@@ -171,7 +171,7 @@ def test_horizontals_are_correlated_as_configured():
 
 def test_a_city_across_the_date_line():
     # would catch longitudes beyond 180, which StationXML does not know
-    far = simulate(Scenario(stations=8, longitude=-179.8, city_longitude=179.99, lakebed_radius=0.0))
+    far = simulate(Scenario(stations=8, longitude=-179.8, city_longitude=179.99, lakebed_longitude=179.99))
     longitudes = np.array([station.longitude for station in far.inventory[0]])
     assert (np.abs(longitudes) <= 180).all()
     assert (longitudes > 0).any()
