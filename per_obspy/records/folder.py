@@ -16,7 +16,8 @@ from ..errors import CatalogError, PerError, RecordRejected, Rejection
 from .archives import is_archive, members, open_file
 from .metadata import with_metadata
 
-_MARKS = {b"<FDSNStationXML": "inventory", b"quakeml": "event"}
+#: what StationXML, FDSN station text and QuakeML begin with
+_MARKS = {b"<FDSNStationXML": "inventory", b"#Network": "inventory", b"quakeml": "event"}
 
 
 class FolderContents(NamedTuple):
@@ -48,7 +49,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     folder : str or Path
         Any mixture of waveform files, in archives too; StationXML among them is used, QuakeML is passed over.
     stationxml : str or Path, optional
-        A StationXML file, or a folder of them, in addition.
+        A StationXML file, or a folder of them, in addition. FDSN station text does where only coordinates are missing.
 
     Raises
     ------

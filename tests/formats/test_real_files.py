@@ -1,6 +1,7 @@
 """Every real file of the shared folder, one by one: samples, interval and peak."""
 
 import csv
+import io
 import os
 from collections import defaultdict
 from pathlib import Path
@@ -128,3 +129,31 @@ def test_what_is_no_volume_3_is_refused(tmp_path: Path, start: str):
     (tmp_path / "no.v3").write_text(start + "\nnothing else\n")
     with pytest.raises(RecordRejected, match=r"no\.v3: line \d+, "):
         read_spectra(tmp_path / "no.v3")
+
+
+def one_file_of_each_format() -> list[str]:
+    """Return the smallest real file of each folder of peaks.csv."""
+    smallest: dict[str, tuple[int, str]] = {}
+    for name in EXPECTED:
+        size = (FOLDER / "records" / name).stat().st_size
+        smallest[name.split("/")[0]] = min(smallest.get(name.split("/")[0], (size, name)), (size, name))
+    return [name for _, name in smallest.values() if "knet" not in name]
+
+
+@pytest.mark.parametrize("name", one_file_of_each_format())
+def test_damaged_real_files_are_refused_or_read(real_data: Path, name: str):
+    """Overwrite pieces of the header and of the samples: nothing but a RecordRejected may come out."""
+    content = (real_data / "records" / name).read_bytes()
+    reader_name = obspy.read(str(real_data / "records" / name))[0].stats._format
+    random = np.random.default_rng(5)
+    pieces = [b"-999", b"9" * 12, b"0", b" ", b"\n", b"-", b"1E30", b"\xff\xfe", b"*****", b""]
+    for _ in range(12):
+        damaged = bytearray(content)
+        for reach in (2000, len(content)):
+            place = int(random.integers(min(reach, len(content))))
+            damaged[place : place + int(random.integers(20))] = pieces[int(random.integers(len(pieces)))]
+        try:
+            stream = obspy.read(io.BytesIO(bytes(damaged)), format=reader_name)
+        except RecordRejected:
+            continue
+        assert all(np.isfinite(trace.data).all() for trace in stream)

@@ -246,3 +246,28 @@ def test_a_cut_knet_file_is_a_reason(real_data: Path, tmp_path: Path):
     stream, rejected = read_station(contents.stations["BO.AOM001"], None)
     assert not stream
     assert rejected[0].reasons == ("the header promises 102 s, the file holds 38.64 s",)
+
+
+STATION_TEXT = """#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime
+|ANGOL|-37.79|-72.71|100.0|Angol Hospital|1970-01-01T00:00:00|
+"""
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("beside", [True, False])
+def test_station_text_gives_the_coordinates_that_renadic_leaves_out(real_data: Path, tmp_path: Path, beside: bool):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    source = real_data / "records" / "maule2010_renadic" / "angol1002271parte1.v1"
+    (folder / "angol.v1").write_bytes(source.read_bytes())
+    text = (folder if beside else tmp_path) / "stations.txt"
+    text.write_text(STATION_TEXT)
+    contents = find_stations(folder, None if beside else text)
+    assert contents.rejected == ()
+    stream, rejected = read_station(contents.stations[".ANGOL"], contents.inventory, ".ANGOL")
+    assert rejected == ()
+    assert [trace.stats.coordinates.latitude for trace in stream] == [-37.79] * 3
+    assert [trace.stats.get("sensor_azimuth") for trace in stream] == [90, 0, None]
+    stream, rejected = read_station(contents.stations[".ANGOL"], None, ".ANGOL")
+    assert not stream
+    assert "coordinates are in neither its header nor StationXML" in rejected[0].reasons[0]
