@@ -132,7 +132,14 @@ class Processing(Section):
         description="without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)",
     )
     unknown_highpass: float = Field(0.08, gt=0, description="Hz, without noise to measure and without magnitude")
+    permanent_offset: bool = Field(False, description="near a fault: keep it, no high-pass, adaptive baseline")
     checks: Checks = Checks()
+
+    @model_validator(mode="after")
+    def _one_long_period_limit(self) -> Self:
+        if self.permanent_offset and self.highpass is not None:
+            raise ValueError(f"permanent_offset keeps what highpass = {self.highpass:g} Hz removes: give one of them")
+        return self
 
 
 class Spectra(Section):

@@ -73,6 +73,44 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     return _noted(wide, highpass, lowpass)
 
 
+def offset_kept(stream: Stream, settings: Processing) -> Stream:
+    """
+    Return a copy of one record that keeps its permanent displacement: without its velocity residual, not high-passed.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        One trace, m/s2, with ``noise`` (s) in ``stats.per_obspy``.
+    settings : Processing
+        Every number of the chain.
+
+    Returns
+    -------
+    obspy Stream
+        Tapered. ``highpass`` is one cycle in the record: it limits the usable periods, and is not applied.
+
+    Raises
+    ------
+    RecordRejected
+        If the record is not quiet before and after the shaking.
+    """
+    level = mean_removed(stream, float(stream[0].stats.per_obspy.noise))
+    onset, end, quiet = _shaking_times(level[0])
+    if not quiet:
+        raise RecordRejected(level[0].id, f"permanent offset needs quiet ends, shakes from {onset:.1f} to {end:.1f} s")
+    out = tapered(detrended(level, velocity_residual, onset=onset, end=end), settings.taper)
+    remembered(out[0], baseline="velocity residual")
+    lowest = Corner(lowest_highpass(out[0]).frequency, "not applied: permanent offset kept")
+    return _noted(out, lowest, highest_corner(out[0], settings.lowpass or settings.highest_lowpass))
+
+
+def _shaking_times(trace: Trace) -> tuple[float, float, bool]:
+    """Return onset and end, s, of the shaking, and whether there is quiet before and after."""
+    dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
+    end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
+    return onset, end, 0 < onset < end <= LATEST_START * (trace.stats.npts - 1) * dt
+
+
 def _outer_corners(trace: Trace, settings: Processing) -> tuple[Corner, Corner]:
     """Return the corners that the length of the record and its sampling allow."""
     low = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
@@ -102,12 +140,10 @@ def _cleaned(stream: Stream, baseline: str, lowest: Corner, settings: Processing
 
 def _other_baselines(stream: Stream) -> Iterator[tuple[str, Stream]]:
     """Give the record with each baseline that may shift during the shaking, where the record leaves room for it."""
-    trace = stream[0]
-    dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
-    end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
+    onset, end, quiet = _shaking_times(stream[0])
     yield "displacement polynomial", detrended(stream, displacement_polynomial)
-    if 0 < onset < end <= LATEST_START * (trace.stats.npts - 1) * dt:
-        second = crossing_time(trace.data, dt, onset, end)
+    if quiet:
+        second = crossing_time(stream[0].data, stream[0].stats.delta, onset, end)
         yield "two segments", detrended(stream, boore_segments, first=onset, second=second)
         yield "velocity residual", detrended(stream, velocity_residual, onset=onset, end=end)
 

@@ -151,11 +151,6 @@ def filtered(stream: Stream, highpass: float, lowpass: float, order: int = 5) ->
     out = stream.copy()
     for trace in out:
         trace.data = acausal_bandpass(trace.data, trace.stats.sampling_rate, highpass, lowpass, order)
-        noted(
-            trace,
-            f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz",
-            highpass=highpass,
-            lowpass=lowpass,
-            order=order,
-        )
+        applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
+        noted(trace, f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz", order=order, **applied)
     return out

@@ -1,17 +1,17 @@
 """The steps of one instrument in their order: checks, m/s2, noise, baseline, corners, filter, usable periods."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial, reduce
 
-from obspy import Stream
+from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
-from per_obspy.processing.automatic import corners_noted
+from per_obspy.processing.automatic import corners_noted, offset_kept
 from per_obspy.processing.corners import LOWPASS_OF_NYQUIST, corners_shared
 from per_obspy.processing.filtering import filtered, padded
-from per_obspy.processing.findings import judged, surviving
+from per_obspy.processing.findings import Finding, judged, surviving
 from per_obspy.processing.gathering import is_horizontal, paired
 from per_obspy.processing.outcome import final_findings
 from per_obspy.processing.physical import in_acceleration
@@ -65,9 +65,11 @@ def _windowed(stream: Stream, settings: Processing, source: Source | None) -> St
 def _between(stream: Stream, settings: Processing, source: Source | None) -> tuple[Step, ...]:
     outliers = outlier_findings(stream, settings.checks)
     magnitude = source.magnitude if source else _told_magnitude(stream)
+    automatic = partial(corners_noted, settings=settings, magnitude=magnitude)
+    kept = partial(offset_kept, settings=settings)
     return (
         lambda one: judged(one[0], outliers.get(one[0].id, [])),
-        partial(corners_noted, settings=settings, magnitude=magnitude),
+        kept if settings.permanent_offset else automatic,
     )
 
 
@@ -90,9 +92,9 @@ def _before(settings: Processing) -> tuple[Step, ...]:
 
 def _after(settings: Processing) -> tuple[Step, ...]:
     return (
-        partial(_padded_and_filtered, order=settings.order),
+        partial(_low_passed if settings.permanent_offset else _padded_and_filtered, order=settings.order),
         partial(usable_periods_noted, usable=settings.usable),
-        lambda stream: judged(stream[0], final_findings(stream[0], settings.checks)),
+        lambda stream: judged(stream[0], _final_findings(stream[0], settings)),
         _marked,
     )
 
@@ -100,6 +102,17 @@ def _after(settings: Processing) -> tuple[Step, ...]:
 def _padded_and_filtered(stream: Stream, order: int) -> Stream:
     corners = stream[0].stats.per_obspy
     return filtered(padded(stream, corners.highpass, order), corners.highpass, corners.lowpass, order)
+
+
+def _low_passed(stream: Stream, order: int) -> Stream:
+    return filtered(stream, 0.0, stream[0].stats.per_obspy.lowpass, order)
+
+
+def _final_findings(trace: Trace, settings: Processing) -> Iterator[Finding]:
+    """Give what does not come to rest; a permanent offset that was asked for may stay."""
+    for finding in final_findings(trace, settings.checks):
+        if not (settings.permanent_offset and finding.check == "final_displacement"):
+            yield finding
 
 
 def _marked(stream: Stream) -> Stream:

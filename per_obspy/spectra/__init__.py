@@ -1,3 +1,1 @@
-"""
-Arrays to spectra (one component, by azimuth, inelastic), a Stream to a station's Dataset, to netCDF and back.
-"""
+"""Arrays to spectra, a Stream to the Dataset of a station, and to netCDF and back."""

@@ -7,6 +7,7 @@ from obspy.core import AttribDict
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_instruments, process_station
 from per_obspy.processing.instrument import passed_through, process_instrument
+from per_obspy.processing.outcome import integrated
 from per_obspy.processing.windows import Source
 
 START = UTCDateTime(2020, 1, 1)
@@ -114,3 +115,40 @@ def test_hours_of_quiet_do_not_swallow_the_shaking(record):
     ours, theirs = (process_instrument(Stream([one]), settings, None)[0][0] for one in (long, short))
     assert np.abs(ours.data).max() == pytest.approx(np.abs(theirs.data).max(), rel=1e-3)
     assert ours.stats.npts < 20_000  # 119 s and the pads of 75 s, not 22 minutes
+
+
+def offset_record(record, displacement, after=5e-4):
+    """Return a record whose ground moves for good within 4 s of the shaking, with a baseline that shifts as well."""
+    trace = record()
+    time = np.arange(12000) / 100.0
+    velocity = displacement * np.where(np.abs(time - 25) < 2, (1 + np.cos(np.pi * (time - 25) / 2)) / 4, 0.0)
+    trace.data = trace.data + np.gradient(velocity, 0.01) + np.where(time > 45, after, 0.0)
+    return trace
+
+
+@pytest.mark.parametrize("displacement", [0.5, -1.0])
+def test_a_permanent_offset_is_kept_on_request(record, displacement):
+    settings = Processing(permanent_offset=True)
+    plain, offset = (
+        process_instrument(Stream([offset_record(record, size)]), settings, None)[0] for size in (0.0, displacement)
+    )
+    final = [integrated(integrated(out))[0].data[-1] for out in (plain, offset)]
+    # what the baseline leaves without an offset (its own uncertainty) is the same with it: the method is nearly linear
+    assert final[1] - final[0] == pytest.approx(displacement, rel=0.15)
+    filtered, _ = process_instrument(Stream([offset_record(record, displacement)]), SETTINGS, None)
+    assert abs(integrated(integrated(filtered))[0].data[-1]) < 0.05
+    kept = offset[0].stats.per_obspy
+    assert kept.highpass_source.startswith("not applied")
+    assert kept.longest_period == pytest.approx(96.0)
+
+
+def test_an_offset_without_quiet_ends_is_rejected(record):
+    early = record(onset=0.5)
+    out, rejected = process_instrument(Stream([early]), Processing(permanent_offset=True), None)
+    assert not out
+    assert "permanent offset needs quiet ends" in rejected[0].reasons[0]
+
+
+def test_an_offset_and_a_high_pass_exclude_each_other():
+    with pytest.raises(ValueError, match=r"permanent_offset keeps what highpass = 0\.1 Hz removes"):
+        Processing(permanent_offset=True, highpass=0.1)
