@@ -1,19 +1,19 @@
 """A folder of records: every file that ObsPy and its plugins understand, with StationXML beside them or elsewhere."""
 
-import glob
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import reduce
 from operator import add
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import obspy
 from obspy import Inventory, Stream
 from obspy.core.event import Event
 
-from ..errors import CatalogError, PerError, RecordRejected, Rejection
+from ..errors import CatalogError, RecordRejected, Rejection
 from .archives import is_archive, members, open_file
+from .foreign import foreign
 from .metadata import with_metadata
 
 #: what StationXML, FDSN station text and QuakeML begin with
@@ -129,7 +129,7 @@ def read_event(path: str | Path) -> Event:
         If the file cannot be read or does not hold exactly one event with an origin.
     """
     try:
-        events = _foreign(obspy.read_events, Path(path))
+        events = foreign(obspy.read_events, Path(path))
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1:
@@ -167,11 +167,11 @@ def _read(path: Path, *, headonly: bool) -> Stream:
     with open_file(path) as file:
         if not file.read(1):
             raise RecordRejected(str(path), "the file is empty")
-    return _foreign(obspy.read, path, headonly=headonly)
+    return foreign(obspy.read, path, headonly=headonly)
 
 
 def _read_inventory(path: Path) -> Inventory:
-    return _foreign(obspy.read_inventory, path)
+    return foreign(obspy.read_inventory, path)
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
@@ -188,20 +188,6 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
         return [_read_inventory(path) for path in paths]
     except RecordRejected as rejection:
         raise CatalogError(rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}") from rejection
-
-
-def _foreign(reader: Callable[..., Any], path: Path, **options: bool) -> Any:
-    """Call a reader of ObsPy: the one place where its errors, which have no common class, become a rejection."""
-    try:
-        if path.is_file():
-            return reader(glob.escape(str(path)), **options)
-        with open_file(path) as file:
-            return reader(file, **options)
-    except PerError:
-        raise
-    except Exception as error:  # ObsPy's readers raise bare Exception, and whatever the libraries below them gave
-        reason = " ".join(str(error).split())
-        raise RecordRejected(str(path), f"ObsPy cannot read it: {type(error).__name__}: {reason}") from error
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
