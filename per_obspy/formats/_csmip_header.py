@@ -104,9 +104,9 @@ def _station(lines: list[str]) -> dict[str, Any]:
     site = _SITE.match(lines[4].strip())
     number = site[1] if site else ""
     place = (hemisphere(site[2], site[3]), hemisphere(site[4], site[5])) if site else (None, None)
-    name = re.split(r"\s{2,}|\s+S/N", lines[5].strip())[0]
+    name, *owner = re.split(r"\s{2,}|\s+S/N", lines[5].strip())
     seed = _SEED.match(lines[3])
-    network = "CE" if _AGENCIES.search(lines[0] + " " + lines[5]) else ""
+    network = "CE" if _AGENCIES.search(owner[0] if owner else lines[0]) else ""
     return {
         "network": seed[1] if seed else network,
         "station": seed[2] if seed else number or re.sub(r"[^A-Z0-9]", "", name),
