@@ -69,7 +69,7 @@ class Rejection(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``"record"``, ``"pair"``, ``"file"`` or ``"station"``.
+        ``"record"``, ``"pair"``, ``"file"``, ``"station"`` or ``"building"``.
     name : str
         Identifier of the trace, station or pair.
     source : str
