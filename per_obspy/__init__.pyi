@@ -13,3 +13,4 @@ from .spectra.elastic import per_spectrum as per_spectrum, response_spectra as r
 from .spectra.station import station_spectra as station_spectra
 from .screening.risk import risk_table as risk_table
 from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum, rotd as rotd
+from .pounding.relative import relative_displacement as relative_displacement

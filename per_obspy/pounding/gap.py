@@ -45,8 +45,9 @@ def critical_gap(per_1: ArrayLike, per_2: ArrayLike, correlation: ArrayLike) -> 
     per_1, per_2 = _radii(per_1, per_2)
     correlation = checks.between("correlation", correlation, -1.0, 1.0)
     difference = np.abs(per_1 - per_2)
-    gap = np.hypot(difference, np.sqrt(2.0 * (1.0 - correlation)) * np.sqrt(per_1) * np.sqrt(per_2))
-    return np.minimum(np.maximum(gap, difference), per_1 + per_2)
+    gap: FloatArray = np.hypot(difference, np.sqrt(2.0 * (1.0 - correlation)) * np.sqrt(per_1) * np.sqrt(per_2))
+    bounded: FloatArray = np.minimum(np.maximum(gap, difference), per_1 + per_2)
+    return bounded
 
 
 def srss_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
