@@ -134,8 +134,9 @@ def _place(site: Channel | Station) -> AttribDict:
 
 
 def _direction(channel: Channel) -> dict[str, float]:
-    if channel.dip is not None and abs(channel.dip) == 90:
-        return {"sensor_dip": float(channel.dip)}
+    vertical = -90.0 if channel.dip is None and channel.code.endswith("Z") else channel.dip
+    if vertical is not None and abs(vertical) == 90:
+        return {"sensor_dip": float(vertical)}
     if channel.azimuth is None:
         return {}
     dip = {} if channel.dip is None else {"sensor_dip": float(channel.dip)}

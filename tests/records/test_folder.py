@@ -180,7 +180,7 @@ def test_folders_without_records_are_refused(tmp_path: Path):
     (tmp_path / "b.txt").write_text("more words")
     with pytest.raises(CatalogError, match=r"none of its 2 files is a record; a\.txt: ObsPy cannot read it"):
         find_stations(tmp_path)
-    with pytest.raises(CatalogError, match=r"a\.txt: is not a folder"):
+    with pytest.raises(CatalogError, match=r"none of its 1 files is a record; a\.txt"):
         find_stations(tmp_path / "a.txt")
 
 
@@ -271,3 +271,14 @@ def test_station_text_gives_the_coordinates_that_renadic_leaves_out(real_data: P
     stream, rejected = read_station(contents.stations[".ANGOL"], None, ".ANGOL")
     assert not stream
     assert "coordinates are in neither its header nor StationXML" in rejected[0].reasons[0]
+
+
+def test_a_vertical_channel_without_dip_points_up(folder: Path):
+    described = inventory(THREE)
+    for channel in described[0][0]:
+        channel.dip = None
+    described.write(str(folder / "station.xml"), format="STATIONXML")
+    stream, reasons = read_all(folder)
+    assert reasons == ()
+    assert [trace.stats.get("sensor_azimuth") for trace in stream] == [30, 120, None]
+    assert [trace.stats.sensor_dip for trace in stream] == [0, 0, -90]  # SEED: Z is vertical
