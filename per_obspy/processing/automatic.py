@@ -34,6 +34,8 @@ from per_obspy.processing.velocity_baseline import (
     velocity_residual,
 )
 
+FEWEST = 10  # samples of quiet to which a parabola may be fitted
+
 
 def corners_noted(stream: Stream, settings: Processing, magnitude: float | None) -> Stream:
     """
@@ -108,7 +110,7 @@ def _shaking_times(trace: Trace) -> tuple[float, float, bool]:
     """Return onset and end, s, of the shaking, and whether there is quiet before and after."""
     dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
     end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
-    return onset, end, 0 < onset < end <= LATEST_START * (trace.stats.npts - 1) * dt
+    return onset, end, FEWEST * dt <= onset < end <= LATEST_START * (trace.stats.npts - 1) * dt
 
 
 def _outer_corners(trace: Trace, settings: Processing) -> tuple[Corner, Corner]:

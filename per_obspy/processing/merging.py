@@ -11,6 +11,8 @@ from per_obspy.processing.findings import surviving
 from per_obspy.processing.provenance import is_processed
 from per_obspy.processing.splicing import spliced
 
+LARGEST = 1e30  # counts or m/s2; beyond it squares overflow, and no recorder goes there
+
 
 def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     """
@@ -74,8 +76,11 @@ def _differences(pieces: Iterable[Trace]) -> list[tuple[str, str]]:
 
 def _holes(trace: Trace) -> list[str]:
     missing = np.ma.getmaskarray(trace.data)
-    wrong = ~np.isfinite(np.ma.getdata(trace.data)) & ~missing
-    texts = ((missing, "samples are missing (gap or contradicting overlap)"), (wrong, "samples are not finite"))
+    wrong = ~(np.abs(np.ma.getdata(trace.data)) < LARGEST) & ~missing
+    texts = (
+        (missing, "samples are missing (gap or contradicting overlap)"),
+        (wrong, f"samples are not finite or beyond {LARGEST:g}"),
+    )
     times = trace.stats.starttime, trace.stats.delta
     return [
         f"{np.count_nonzero(bad)} of {bad.size} {text}, the first at {times[0] + int(bad.argmax()) * times[1]}"

@@ -10,6 +10,7 @@ from scipy.signal import butter, sosfilt
 from per_obspy.checks import FloatArray
 
 TINY = np.finfo(float).tiny
+FEWEST = 20  # samples up to the peak
 
 
 def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | None:
@@ -31,7 +32,7 @@ def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | N
     dt = trace.stats.delta
     samples = _band_passed(trace.data, dt)
     until = samples[: int(np.abs(samples).argmax()) + 1]
-    if until.size * dt < 0.5:
+    if until.size < max(0.5 / dt, FEWEST):
         return None
     picks = [aic_onset(until), energy_ratio_onset(until, max(round(1.0 / dt), 2)), baer_onset(samples, dt)]
     found = sorted(pick for pick in picks if pick is not None and 0 < pick < samples.size - 1)

@@ -13,6 +13,7 @@ from per_obspy.config import Checks
 from per_obspy.processing.findings import Finding, above, below
 from per_obspy.processing.noise import SIGNIFICANT
 
+FEWEST = 50  # samples of which anything can be said
 FULL_SCALE = 2**23  # of a 24-bit counter
 NEIGHBOURS = 2  # samples on each side that belong to a spike
 VICINITY = 0.5  # s
@@ -40,7 +41,9 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     yield from below("sampling_rate", checks.sampling_rate, trace.stats.sampling_rate, "sampling rate, Hz:")
     yield from below("duration", checks.duration, trace.stats.npts * trace.stats.delta, "duration, s:")
     yield from below("levels", checks.levels, different, "different values (dead channel):")
-    if different > 2 and trace.stats.npts * trace.stats.delta > 1:
+    if different < 3 or trace.stats.npts < FEWEST:
+        yield Finding("levels", "reject", f"{different} different values in {trace.stats.npts} samples are no record")
+    else:
         yield from _recorder_findings(trace, checks)
         yield from _shaking_findings(detrend(trace.data), trace.stats.delta, checks)
         yield from header_findings(trace, checks)
@@ -62,7 +65,7 @@ def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
 def _shaking_findings(samples: FloatArray, dt: float, checks: Checks) -> Iterator[Finding]:
     rate = np.count_nonzero(np.diff(np.signbit(samples))) / (samples.size * dt)
     yield from below("zero_crossings", checks.zero_crossings, rate, "zero crossings a second:")
-    second, peak = round(1 / dt), np.abs(samples).max()
+    second, peak = max(round(1 / dt), 1), np.abs(samples).max()
     first, last = (float(np.sqrt(np.mean(part**2)) / peak) for part in (samples[:second], samples[-second:]))
     yield from above("late_trigger", checks.late_trigger, first, "late trigger: first second over the peak:")
     yield from above("cut_off", checks.cut_off, last, "ends while shaking: last second over the peak:")

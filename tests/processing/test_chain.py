@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from obspy import Inventory, Stream, Trace, UTCDateTime, read, read_inventory
 from obspy.core import AttribDict
 
-from per_obspy.config import Processing
+from per_obspy.config import Checks, Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.chain import process, process_station
 from per_obspy.processing.physical import in_acceleration
@@ -119,6 +121,38 @@ def test_nothing_left_is_an_error_with_every_reason():
 def test_stations_do_not_mix():
     out = process(station() + station(station="STB"))
     assert [one.stats.station for one in out].count("STB") == 3
+
+
+SHAPES = {
+    "silence": lambda t, _: 0 * t,
+    "offset": lambda t, _: 0 * t + 1,
+    "noise": lambda t, rng: rng.normal(size=t.size),
+    "sine": lambda t, _: np.sin(t),
+    "parabola": lambda t, _: t**2,
+    "late noise": lambda t, rng: np.where(2 * t > t[-1], rng.normal(size=t.size), 0),
+    "burst": lambda t, rng: rng.normal(size=t.size) * np.exp(-(((t - t.mean()) / (t[-1] / 9 + 1e-3)) ** 2)),
+    "giants": lambda t, rng: np.where(rng.random(t.size) > 0.99, 1e200, 0),
+}
+LENIENT = Processing(checks=Checks(**{name: check.model_copy(update={"level": "note"}) for name, check in Checks()}))
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    shape=st.sampled_from(sorted(SHAPES)),
+    count=st.sampled_from([1, 2, 9, 49, 50, 51, 150, 600, 5000]),
+    rate=st.sampled_from([1.0, 20.0, 100.0, 500.0]),
+    how=st.sampled_from([Processing(), LENIENT, Processing(permanent_offset=True)]),
+)
+def test_any_record_is_kept_whole_or_named(shape, count, rate, how):
+    # with every check off as well: what is left must still be numbers, never a crash that loses the station
+    samples = SHAPES[shape](np.arange(count) / rate, np.random.default_rng(count))
+    sizes = {"HNE": 1, "HNN": 2, "HNZ": 3}
+    stream = Stream([trace(code, samples * size, sampling_rate=rate) for code, size in sizes.items()])
+    kept, rejected = process_station(stream, how)
+    assert {one.id for one in kept} | {row.name for row in rejected} == {one.id for one in stream}
+    for one in kept:
+        assert np.isfinite(one.data).all()
+        assert 0 < one.stats.per_obspy.shortest_period < one.stats.per_obspy.longest_period
 
 
 def test_inputs_stay_unchanged():

@@ -32,13 +32,14 @@ def test_overlapping_pieces_that_disagree_are_a_reason():
     assert "contradicting overlap" in merged(Stream([trace(), other]))[1][0].reasons[0]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -1e200])
 def test_samples_that_are_not_finite_are_a_reason(bad):
     broken = trace()
     broken.data[7] = bad
     whole, rejected = merged(Stream([broken]))
     assert not whole
-    assert rejected[0].reasons == ("1 of 1000 samples are not finite, the first at 2020-01-01T00:00:00.070000Z",)
+    reason = "1 of 1000 samples are not finite or beyond 1e+30, the first at 2020-01-01T00:00:00.070000Z"
+    assert rejected[0].reasons == (reason,)
 
 
 def test_masked_samples_are_a_reason():

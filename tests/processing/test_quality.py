@@ -150,3 +150,10 @@ def test_a_header_that_tells_another_peak_is_found(earthquake, told, found):
 
 def test_a_header_without_a_peak_tells_nothing(earthquake):
     assert header_findings(Trace(earthquake()), Checks()) == []
+
+
+@pytest.mark.parametrize("samples", [np.arange(49.0), np.repeat([1.0, 2.0], 500)])
+def test_what_is_no_record_is_rejected_at_any_level(samples):
+    lenient = Checks(**{name: check.model_copy(update={"level": "note"}) for name, check in Checks()})
+    found = list(raw_findings(Trace(samples, {"sampling_rate": RATE}), lenient))
+    assert [finding.level for finding in found].count("reject") == 1
