@@ -21,6 +21,7 @@ from .pounding_motion import (
     last_in_contact,
     mass_share,
     restoring,
+    size_of_forces,
 )
 
 # columns of Tally.log, one row an impact
@@ -118,15 +119,6 @@ def free_acceleration(row, i, acceleration):
     stiffness, constant = restoring(row.structures, row.state, row.phase, i)
     damping = 2.0 * row.structures[i, RATE] * row.state[i, V]
     return constant - stiffness * row.state[i, U] - damping - row.structures[i, PARTICIPATION] * acceleration
-
-
-@kernel
-def size_of_forces(row, i, acceleration, slope, duration):
-    """Return the sum of the sizes of the forces on a structure per unit mass, and of their changes in a duration."""
-    stiffness, constant = restoring(row.structures, row.state, row.phase, i)
-    drive = row.structures[i, PARTICIPATION] * (abs(acceleration) + abs(slope) * duration)
-    u, v = abs(row.state[i, U]), abs(row.state[i, V])
-    return abs(constant) + stiffness * (u + v * duration) + 2.0 * row.structures[i, RATE] * v + drive
 
 
 @kernel

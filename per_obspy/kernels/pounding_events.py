@@ -38,7 +38,7 @@ def find_event(row, segment, elapsed):
     kind, place = NOTHING, -1
     for j in range(row.stuck.size):
         if row.stuck[j]:
-            rounding = fill_force(row, j, acceleration, slope, terms)
+            rounding = fill_force(row, j, acceleration, slope, segment.duration, terms)
             row.guard[0] += rounding  # a force that is zero but for rounding does not open the interface
             time, found = first_fall(row.guard, terms, 1.0, 0.0, span, 0.0), RELEASE
         else:

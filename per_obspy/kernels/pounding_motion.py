@@ -166,35 +166,45 @@ def fill_clearance(row, interface, terms):
 
 
 @kernel
+def size_of_forces(row, i, acceleration, slope, duration):
+    """Return the sum of the sizes of the forces on a structure per unit mass, and of their changes in a duration."""
+    stiffness, constant = restoring(row.structures, row.state, row.phase, i)
+    drive = row.structures[i, PARTICIPATION] * (abs(acceleration) + abs(slope) * duration)
+    u, v = abs(row.state[i, U]), abs(row.state[i, V])
+    return abs(constant) + stiffness * (u + v * duration) + 2.0 * row.structures[i, RATE] * v + drive
+
+
+@kernel
 def _add_force(row, i, factor, acceleration, slope, terms):
-    """Add the outer force that structure i's motion needs, times a factor, to the guard; return its size."""
+    """Add the outer force that structure i's motion needs, times a factor, to the guard."""
     guard, curve, structures = row.guard, row.curve[i], row.structures
     factor *= structures[i, MASS]
     damping = 2.0 * structures[i, RATE]
-    ground = structures[i, PARTICIPATION] * acceleration
     stiffness, constant = restoring(structures, row.state, row.phase, i)
     for n in range(terms - 2):
         guard[n] += factor * (
             (n + 2) * (n + 1) * curve[n + 2] + damping * (n + 1) * curve[n + 1] + stiffness * curve[n]
         )
-    guard[0] += factor * (ground - constant)
+    guard[0] += factor * (structures[i, PARTICIPATION] * acceleration - constant)
     guard[1] += factor * structures[i, PARTICIPATION] * slope
-    size = 2.0 * abs(curve[2]) + damping * abs(curve[1]) + stiffness * abs(curve[0]) + abs(constant) + abs(ground)
-    return abs(factor) * size
 
 
 @kernel
-def fill_force(row, interface, acceleration, slope, terms):
+def fill_force(row, interface, acceleration, slope, duration, terms):
     """Fill the guard with a closed interface's force, positive in compression; return its rounding."""
-    first = interface
+    first, last = interface, last_in_contact(row.stuck, interface)
     while first > 0 and row.stuck[first - 1]:
         first -= 1
+    size = 0.0
+    for i in range(first, last + 1):
+        size = max(size, size_of_forces(row, i, acceleration, slope, duration))
     begin, end, factor = first, interface, -1.0
     for i in range(first, interface + 1):
         if row.structures[i, MASS] == math.inf:  # then the force follows from the structures on the other side
-            begin, end, factor = interface + 1, last_in_contact(row.stuck, interface), 1.0
+            begin, end, factor = interface + 1, last, 1.0
     row.guard[:] = 0.0
-    size = 0.0
+    mass = 0.0
     for i in range(begin, end + 1):
-        size += _add_force(row, i, factor, acceleration, slope, terms)
-    return FORCE_ROUNDING * size
+        _add_force(row, i, factor, acceleration, slope, terms)
+        mass += row.structures[i, MASS]
+    return FORCE_ROUNDING * mass * size

@@ -64,7 +64,7 @@ def _add_contact_work(row, work, acceleration, slope, span, terms):
     half = 0.5 * span
     for j in range(row.stuck.size):
         if row.stuck[j]:
-            fill_force(row, j, acceleration, slope, terms)
+            fill_force(row, j, acceleration, slope, span, terms)
             for node in range(NODES.size):
                 time = half * (1.0 + NODES[node])
                 force = value_and_slope(row.guard, terms - 2, time)[0]
