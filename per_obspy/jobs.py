@@ -21,8 +21,9 @@ import numpy as np
 
 from per_obspy.config import Columns, Processing, Spectra
 from per_obspy.errors import PerError, Rejection
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import written_whole
 from per_obspy.processing.chain import process_station
+from per_obspy.records.archives import open_file
 from per_obspy.records.columns import read_columns
 from per_obspy.records.metadata import metadata_text
 from per_obspy.records.folder import read_event, read_station
@@ -124,7 +125,7 @@ def _read(job: Job) -> tuple["Stream", tuple[Rejection, ...]]:
     if isinstance(job.source, Columns):
         described = job.source.model_dump()
         return read_columns(described.pop("file"), **described), ()
-    return read_station(job.source, job.inventory)
+    return read_station(job.source, job.inventory, job.station)
 
 
 def _files(job: Job) -> tuple[Path, ...]:
@@ -134,10 +135,16 @@ def _files(job: Job) -> tuple[Path, ...]:
 def _key(job: Job) -> str:
     """Return the hash of everything the shard depends on."""
     parts = [version("per_obspy"), job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
-    parts += [f"{path.name} {file_hash(path)}" for path in (*_files(job), *([job.event] if job.event else []))]
+    parts += [f"{path.name} {_content_hash(path)}" for path in (*_files(job), *([job.event] if job.event else []))]
     parts += [job.source.model_dump_json()] if isinstance(job.source, Columns) else []
     parts += [metadata_text(job.inventory)] if job.inventory else []
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+
+
+def _content_hash(path: Path) -> str:
+    """Return the hash of a file, or of a member of an archive."""
+    with open_file(path) as file:
+        return hashlib.sha256(file.read()).hexdigest()
 
 
 def _earlier(job: Job, key: str, note: Path) -> Done | None:

@@ -179,7 +179,7 @@ def _simulated_records(settings: Run, folder: Path, progress: Progress) -> Recor
     target = folder / "simulated"
     scenario = load(settings.simulation, Simulation).scenario
     key = _hash({"version": version("per_obspy"), "scenario": scenario.model_dump(mode="json")})
-    mark = target / "scenario.json"
+    mark = folder / "simulated.json"
     if not mark.is_file() or json.loads(mark.read_text(encoding="utf-8"))["key"] != key:
         progress("simulating records", 0, 1)
         shutil.rmtree(target, ignore_errors=True)

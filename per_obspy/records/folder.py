@@ -47,7 +47,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     Parameters
     ----------
     folder : str or Path
-        Any mixture of waveform files, in archives too; StationXML among them is used, QuakeML is passed over.
+        Any mixture of waveform files, in archives too, or a single file; StationXML among them is used, QuakeML is passed over.
     stationxml : str or Path, optional
         A StationXML file, or a folder of them, in addition. FDSN station text does where only coordinates are missing.
 
@@ -140,11 +140,11 @@ def read_event(path: str | Path) -> Event:
 
 
 def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
-    """Return all files, those in archives included, and the archives that cannot be read."""
-    if not folder.is_dir():
-        raise CatalogError(str(folder), "is not a folder" if folder.exists() else "no such folder")
+    """Return all files, those in archives included, and the archives that cannot be read; a file is itself."""
+    if not folder.exists():
+        raise CatalogError(str(folder), "no such folder or file")
     files, rejected = [], []
-    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+    for path in [folder] if folder.is_file() else sorted(path for path in folder.rglob("*") if path.is_file()):
         try:
             files += members(path) if is_archive(path) else [path]
         except RecordRejected as rejection:

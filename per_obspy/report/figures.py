@@ -42,7 +42,11 @@ def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
 
 
 def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
-    axes.plot(station["time"], motion_along(station, azimuth), color=MOTION_COLOUR, linewidth=0.5)
+    motion, time = motion_along(station, azimuth), station["time"].to_numpy()
+    energy = np.cumsum(motion**2)
+    start, end = np.interp([0.001, 0.999], energy / energy[-1], time)
+    axes.plot(time, motion, color=MOTION_COLOUR, linewidth=0.5)
+    axes.set_xlim(start - 5.0, end + 5.0)  # pads and quiet ends are left out
     along = "" if np.isnan(azimuth) else f", along {azimuth:.0f}°"
     axes.set(xlabel="time (s)", ylabel="ground acceleration (m/s²)")
     axes.set_title(f"1  record {station['station'].item()}{along}", fontsize=11)

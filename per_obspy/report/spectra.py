@@ -1,0 +1,83 @@
+"""Figures of one station: its spectra side by side, and the state-space trace of one oscillator."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from per_obspy.report.style import MOTION_COLOUR, save
+from per_obspy.spectra.bilinear import bilinear_response
+
+#: Colours of components, in their order (Okabe & Ito 2008).
+COMPONENT_COLOURS = ("#0072B2", "#D55E00", "#009E73")
+
+
+def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
+    """
+    Draw PER, SD, pseudo-velocity and PER/SD of every component of a station at one damping.
+
+    Parameters
+    ----------
+    station : Dataset
+        From :func:`per_obspy.station_spectra`.
+    damping : float
+        Fraction of critical; the nearest that is stored is drawn.
+    path : Path
+        PNG file.
+    """
+    chosen = station.sel(damping=damping, method="nearest")
+    figure = Figure(figsize=(13.0, 4.2), layout="constrained")
+    radius, velocity, ratio = figure.subplots(1, 3)
+    period = station["period"].to_numpy()
+    usable = np.where(station["usable"] == 1, 1.0, np.nan)
+    for index, name in enumerate(station["channel"].to_numpy()):
+        colour = COMPONENT_COLOURS[index % len(COMPONENT_COLOURS)]
+        per, sd = chosen["per"][index].to_numpy(), chosen["sd"][index].to_numpy()
+        radius.loglog(period, per * usable, color=colour, label=f"{name} PER")
+        radius.loglog(period, sd * usable, color=colour, linestyle="--", label=f"{name} SD")
+        velocity.loglog(period, 2.0 * np.pi / period * sd * usable, color=colour, label=name)
+        ratio.semilogx(period, per / sd * usable, color=colour, label=name)
+    radius.set(ylabel="radius, displacement (m)")
+    velocity.set(ylabel="pseudo-velocity (m/s)")
+    ratio.set(ylabel="PER / SD (1)")
+    for axes in (radius, velocity, ratio):
+        axes.set_xlabel("natural period (s)")
+        axes.grid(which="both", alpha=0.25)
+        axes.legend(fontsize=8)
+    title = f"{station['station'].item()}, damping {float(chosen['damping']):.0%}, usable periods only"
+    figure.suptitle(title)
+    save(figure, path, station.attrs["simulated"] == "true")
+
+
+def draw_state_space(acceleration: ArrayLike, dt: float, period: float, damping: float, path: Path) -> None:
+    """
+    Draw the motion of one oscillator in the plane of displacement and velocity over frequency, and its PER circle.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        m/s².
+    dt : float
+        Sampling interval, s.
+    period, damping : float
+        Of the oscillator, s; fraction of critical.
+    path : Path
+        PNG file.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), 11WCEE, Fig. 2a.
+    """
+    motion = bilinear_response(acceleration, dt, period, damping, np.inf, 0.0)
+    across, up = motion.displacement, motion.velocity * period / (2.0 * np.pi)
+    radius, angle = float(np.max(np.hypot(across, up))), np.linspace(0.0, 2.0 * np.pi, 361)
+    figure = Figure(figsize=(5.5, 5.5), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(across, up, color=MOTION_COLOUR, linewidth=0.6)
+    axes.plot(radius * np.cos(angle), radius * np.sin(angle), color=COMPONENT_COLOURS[1], label=f"PER = {radius:.3g} m")
+    axes.set_aspect("equal")
+    axes.set(xlabel="displacement (m)", ylabel="velocity / frequency (m)", title=f"T = {period:g} s, ξ = {damping:g}")
+    axes.legend(fontsize=9, loc="upper right")
+    save(figure, path, simulated=False)

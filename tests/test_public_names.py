@@ -1,0 +1,51 @@
+"""What ``import per_obspy`` offers, and that it costs nothing until it is used."""
+
+import subprocess
+import sys
+
+import per_obspy
+
+NAMES = {
+    "Structure",
+    "absolute_gap",
+    "asce7_period",
+    "azimuthal_per_spectrum",
+    "bilinear_response",
+    "critical_gap",
+    "ddc_correlation",
+    "ec8_period",
+    "equivalent_sdof",
+    "per_spectrum",
+    "post_impact_velocities",
+    "process",
+    "read_pairs",
+    "response_spectra",
+    "risk_table",
+    "rotd",
+    "shear_building",
+    "single_hit",
+    "srss_gap",
+    "station_spectra",
+    "transfer_energies",
+}
+
+
+def test_the_public_names_are_the_intended_ones():
+    assert set(dir(per_obspy)) == set(per_obspy.__all__) == NAMES
+
+
+def test_every_public_name_is_there_and_documented():
+    for name in NAMES:
+        assert getattr(per_obspy, name).__doc__, name
+
+
+def test_import_is_lazy():
+    code = "import sys, per_obspy; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numba", "pandas", "xarray", "obspy", "scipy", "matplotlib"} & set(loaded)
+
+
+def test_a_format_plugin_loads_nothing_heavy():
+    code = "import sys, obspy; before = set(sys.modules); import per_obspy.formats.peer_at2; print(*set(sys.modules) - before)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numba", "pandas", "xarray", "matplotlib"} & set(loaded)
