@@ -23,6 +23,7 @@ _CHANNEL = re.compile(
 )
 _FILTERED = re.compile(rf"below\s+{DECIMAL}\s*Hz.*above\s+{DECIMAL}\s*Hz")
 _SERIAL = re.compile(r"Recorder:\s*(.*?)\s*s/n\s*(\S+)")
+_TEXT_LINES = 13
 _UNKNOWN = -999.0
 #: unit of the samples -> unit in SI, factor
 _UNITS = {
@@ -83,6 +84,8 @@ def _channel(text: Text, first: int) -> tuple[Trace, int]:
 
 
 def _header(text: Text, first: int, text_lines: int) -> _Header:
+    if text_lines < _TEXT_LINES:
+        refuse(text, first, "text lines", f"{text_lines}, the format has {_TEXT_LINES}")
     line_at(text, first + text_lines, "integer header")
     line = first + text_lines
     integers, line = _numbers(text, line, "Integer")

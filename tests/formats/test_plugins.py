@@ -200,3 +200,62 @@ def test_samples_are_read_at_20_megabytes_a_second():
     rate = 3.0 / (perf_counter() - began)
     assert len(values) == 200_000
     assert rate > 5
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("cosmos_v2c", "with 13 text lines", "with 2 text lines", "line 1, text lines: 2, the format has 13"),
+        (
+            "cosmos_v2c",
+            "approx   0 secs",
+            "approx  99 secs",
+            "line 48, interval: 0.005 s in the header, but 23 samples",
+        ),
+        ("cosmos_v2c", "units=cm/sec2(04)", "units=furlong(99)", "line 48, units: "),
+        ("cosmos_v0c", "       4.000000", "    -999.000000", "line 1, gain: unknown: 2.0 microvolts"),
+        ("csmip_v1", "No. of Points =  23", "No. of Points =  24", "line 28, number of points: 23, but 24 on line 11"),
+        ("csmip_v1", "sec and g ", "sec and furlong ", "line 12, unit: .* is neither g nor g/10"),
+        ("csmip_v1", "/&", "??", "end of channel: expected '/&' after the samples"),
+        ("csmip_v2", "in cm/sec2", "in furlongs", "line 46, unit: "),
+        ("csmip_v2", "points of veloc", "points of other", "title of veloc: expected points at an interval"),
+        (
+            "csmip_raw",
+            "  0.020  2.000",
+            "  0.009  2.000",
+            "line 28, time 3: 0.009 s breaks the mean interval of 0.01 s",
+        ),
+        ("renadic", "23  Record", "0  Record", "line 11, number of points: must be a positive whole number"),
+        ("usc_v1", "UNITS ARE SEC AND G/10", "UNITS ARE FURLONGS    ", "line 12, unit: "),
+        (
+            "geonet_v1a",
+            "      23       0       0      23",
+            "      23       0       0      22",
+            "number of points: 22, but 23 on line 10",
+        ),
+        ("geonet_v2a", "Component Up", "Component Up\nmore", r"line \d+, "),
+        ("itaca", "in m/s/s", "in furlongs", "line 10, unit: "),
+        ("dyna", "UNITS: cm/s^2", "UNITS: furlong", "line 21, UNITS: 'furlong' is none of"),
+        (
+            "dyna",
+            "DATA_TYPE: ACCELERATION",
+            "DATA_TYPE: SPECTRUM",
+            "line 27, DATA_TYPE: 'SPECTRUM' is not a time series",
+        ),
+        ("afad", "SAMPLING_INTERVAL_S: 0.005000", "SAMPLING_INTERVAL_S:", "line 21, SAMPLING_INTERVAL_S: empty"),
+        ("nsmn", "NUMBER OF DATA ", "NUMBER OF DATE ", "line 1, NUMBER OF DATA: the header has no such field"),
+        ("unam", "Gal (cm/s/s)", "Furlongs", "UNIDADES DE LOS DATOS: 'Furlongs' is not gal"),
+        ("unam", "/23/23/23", "/23/23/22", "NUM. TOTAL DE MUESTRAS: channels must share length"),
+        ("unam", "/23/23/23", "/23/23", "2 values for 3 channels"),
+        ("cwb", "\n    0.0300", "\n    0.0390", "line 24, time: 0.039 s breaks the spacing of 0.01 s"),
+        ("cwb", "gal. DCoffset", "furlong", "AmplitudeUnit: 'furlong.*is not gal"),
+        ("smc", "  2.0000000E+02", "  0.0000000E+00", "line 18, sampling rate: must be positive and plausible"),
+        ("bhrc", ".200000E+03", ".100000E+03", "line 22, sampling rate: 100 Hz, but 23 samples last"),
+        ("bhrc", "SECONDS AND G/10", "FURLONGS", "line 12, unit: 'UNITS ARE FURLONGS' is not g/10"),
+    ],
+)
+def test_a_header_that_contradicts_itself_is_refused(name: str, old: str, new: str, message: str):
+    sample = SAMPLES[name]
+    assert old in sample.text
+    with pytest.raises(RecordRejected, match=message):
+        read(sample, sample.text.replace(old, new, 1))
