@@ -9,14 +9,15 @@ from obspy.core import AttribDict
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
 from per_obspy.processing.automatic import corners_noted, offset_kept
-from per_obspy.processing.corners import LOWPASS_OF_NYQUIST, corners_shared
+from per_obspy.processing.corners import corners_shared
 from per_obspy.processing.filtering import filtered, padded
 from per_obspy.processing.findings import Finding, judged, surviving
 from per_obspy.processing.gathering import is_horizontal, paired
 from per_obspy.processing.outcome import final_findings
+from per_obspy.processing.passing import passed_through
 from per_obspy.processing.physical import in_acceleration
-from per_obspy.processing.provenance import is_processed, noted, remembered
-from per_obspy.processing.quality import header_findings, outlier_findings, raw_findings
+from per_obspy.processing.provenance import is_processed
+from per_obspy.processing.quality import outlier_findings, raw_findings
 from per_obspy.processing.usable import usable_periods_noted
 from per_obspy.processing.windows import Source, noise_window_noted, trimmed
 
@@ -123,40 +124,3 @@ def _marked(stream: Stream) -> Stream:
         trace.stats.processing_level = "processed"
         trace.stats.corners = AttribDict(highpass=corners.highpass, lowpass=corners.lowpass)
     return out
-
-
-def passed_through(stream: Stream, settings: Processing) -> Stream:
-    """
-    Return a copy of records that others have processed, with their corners and usable periods.
-
-    A header that tells no corner leaves one cycle in the record, and 0.75 of the Nyquist frequency, as the limits.
-    Velocity or displacement that does not come to rest is a warning: the samples are not ours to change.
-
-    Parameters
-    ----------
-    stream : obspy Stream
-        Acceleration, m/s2.
-    settings : Processing
-        Every number of the chain.
-
-    Returns
-    -------
-    obspy Stream
-    """
-    out = stream.copy()
-    for trace in out:
-        told = trace.stats.get("corners", {})
-        guesses = {
-            "highpass": (1 / (trace.stats.npts * trace.stats.delta), "one cycle in the record, the header is silent"),
-            "lowpass": (LOWPASS_OF_NYQUIST * trace.stats.sampling_rate / 2, "0.75 Nyquist, the header is silent"),
-        }
-        noted(trace, "processed already, passed through")
-        for name, (guess, reason) in guesses.items():
-            source = {f"{name}_source": "header" if name in told else reason}
-            remembered(trace, **{name: float(told.get(name, guess))}, **source)
-    checked = Stream()
-    for trace in usable_periods_noted(out, settings.usable):
-        found = (*header_findings(trace, settings.checks), *final_findings(trace, settings.checks))
-        findings = [one._replace(level="warn") for one in found]
-        checked += judged(trace, findings)
-    return checked

@@ -73,13 +73,6 @@ def test_records_processed_already_pass_through():
     assert out.stats.per_obspy.highpass_source == "header"
 
 
-def test_silent_headers_leave_the_duration_as_the_limit():
-    out = process(station(processing_level="processed"))[0].stats.per_obspy
-    assert out.highpass == pytest.approx(RATE / COUNT)
-    assert out.longest_period == pytest.approx(0.8 * COUNT / RATE)
-    assert "silent" in out.highpass_source
-
-
 def test_one_bad_trace_never_loses_the_others():
     stream = station()
     stream[0].data[5] = np.nan

@@ -6,7 +6,7 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_instruments, process_station
-from per_obspy.processing.instrument import passed_through, process_instrument
+from per_obspy.processing.instrument import process_instrument
 from per_obspy.processing.outcome import integrated
 from per_obspy.processing.windows import Source
 
@@ -76,14 +76,6 @@ def test_a_second_pass_changes_nothing(record):
     twice, _ = process_instrument(once, SETTINGS, None)
     assert_array_equal(twice[0].data, once[0].data)
     assert twice[0].stats.per_obspy.longest_period == once[0].stats.per_obspy.longest_period
-
-
-def test_others_motion_that_does_not_rest_is_a_warning(record):
-    drifting = record(processing_level="processed")
-    drifting.data = drifting.data + 0.05
-    kept = passed_through(Stream([drifting]), SETTINGS)[0]
-    assert_array_equal(kept.data, drifting.data)
-    assert "final velocity over its peak" in kept.stats.per_obspy.warnings
 
 
 def test_a_raw_record_goes_before_the_same_record_processed_by_others(record):
