@@ -204,9 +204,22 @@ def may_exceed(u, z, start, end, damping, phase, largest):
 
 
 @kernel
-def may_vanish(at_start, at_end, variation):
-    """Tell whether a function can have a root within a step over which it varies by no more than this."""
-    return at_start * at_end <= 0.0 or abs(at_start) + abs(at_end) <= variation
+def dips(rates, damping, phase):
+    """
+    Return how far ``2 xi z + a``, ``z``, ``z'`` and ``z + 2 xi z'`` can leave the straight line between two samples.
+
+    Each is ``phase² / 8`` times a bound of its second derivative, which for ``z'`` is ``-2 xi z'' - z'``.
+    """
+    speed, change, _ = rates
+    z = 0.125 * phase * change
+    change_dip = 0.125 * phase * (2.0 * damping * change + speed)
+    return 2.0 * damping * z, z, change_dip, z + 2.0 * damping * change_dip
+
+
+@kernel
+def may_vanish(at_start, at_end, dip):
+    """Tell whether a function can have a root within a step over which it leaves the straight line by no more."""
+    return at_start * at_end <= 0.0 or min(abs(at_start), abs(at_end)) <= dip
 
 
 @kernel
@@ -219,21 +232,21 @@ def find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantiti
     """
     if phase > LONGEST_SPAN and not may_exceed(u, z, start, end, damping, phase, largest):
         return False
-    twice, jump = 2.0 * damping, abs(end - start)
-    rates = rate_bounds(radius, max(abs(start), abs(end)), jump, damping, phase)
-    slack = slacks(rates, damping, phase)
+    twice = 2.0 * damping
+    rates = rate_bounds(radius, max(abs(start), abs(end)), abs(end - start), damping, phase)
+    slack, dip = slacks(rates, damping, phase), dips(rates, damping, phase)
     higher = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > largest[0]
-    wanted[0] = higher and may_vanish(twice * z + start, twice * z_end + end, twice * rates[0] + jump)
+    wanted[0] = higher and may_vanish(twice * z + start, twice * z_end + end, dip[0])
     wanted[1] = wanted[2] = wanted[3] = False
     if quantities > 1:
         felt, felt_end = u + twice * z, u_end + twice * z_end
         change, change_end = -felt - start, -felt_end - end
         higher |= max(abs(u), abs(u_end)) + slack[1] > largest[1]
         if max(abs(z), abs(z_end)) + slack[2] > largest[2]:
-            wanted[2] = may_vanish(change, change_end, rates[1])
+            wanted[2] = may_vanish(change, change_end, dip[2])
         if max(abs(felt), abs(felt_end)) + slack[3] > largest[3]:
-            wanted[3] = may_vanish(z + twice * change, z_end + twice * change_end, rates[0] + twice * rates[1])
-    wanted[1] = higher and may_vanish(z, z_end, rates[0])
+            wanted[3] = may_vanish(z + twice * change, z_end + twice * change_end, dip[3])
+    wanted[1] = higher and may_vanish(z, z_end, dip[1])
     return wanted[0] or wanted[1] or wanted[2] or wanted[3]
 
 

@@ -86,7 +86,7 @@ def free_vibration(packed, dampings, largest):
         z_1 = -twice * z - u  # first and second derivative of z
         z_2 = -twice * z_1 - z
         for rate, change in ((z, z_1), (z_1, z_2), (z + twice * z_1, z_1 + twice * z_2)):
-            phase = _first_root(rate, change, damping)
+            phase = first_root(rate, change, damping)
             impulse, slope, once, _ = unit_responses(phase, damping)
             u_then, z_then = u * (1.0 - once) + z * impulse, z * slope - u * impulse
             largest[1, lane] = max(largest[1, lane], abs(u_then))
@@ -95,7 +95,7 @@ def free_vibration(packed, dampings, largest):
 
 
 @kernel
-def _first_root(start, change, damping):
+def first_root(start, change, damping):
     """Return the first phase at which a free vibration vanishes, from its value and its derivative at phase 0."""
     root = math.sqrt((1.0 - damping) * (1.0 + damping))
     quadrature = change + damping * start

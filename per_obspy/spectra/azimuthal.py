@@ -5,7 +5,10 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..checks import FloatArray
-from .elastic import OscillatorMaxima, azimuth_maxima
+from ..kernels import azimuths as kernels
+from ..kernels import blocks
+from .blocks import Ground, Oscillators, over_blocks, prepare_ground, prepare_oscillators, stretches
+from .elastic import grid_of, row_of, two_components
 
 #: Every whole degree of a half turn; the other half repeats it.
 AZIMUTHS = np.arange(0, 180)
@@ -19,8 +22,43 @@ def azimuthal_per_spectrum(
     damping: ArrayLike = 0.05,
     azimuths: ArrayLike = AZIMUTHS,
 ) -> FloatArray:
-    """Return the PER spectrum along each azimuth, (n_periods, n_azimuths) or (n_damping, n_periods, n_azimuths), m."""
-    return _maxima(north, east, dt, periods, damping, azimuths).per
+    """
+    Pseudo energy radius spectrum along each of many horizontal azimuths.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) array_like
+        Components of the ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods : (n_periods,) array_like
+        Undamped periods, s.
+    damping : float or (n_damping,) array_like
+        Fraction of critical, at least 0 and below 1.
+    azimuths : (n_azimuths,) array_like
+        Degrees clockwise from north.
+
+    Returns
+    -------
+    per : (n_periods, n_azimuths) or (n_damping, n_periods, n_azimuths) ndarray
+        `per_spectrum` of ``north cos(azimuth) + east sin(azimuth)``, m.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape.
+
+    Notes
+    -----
+    Exact, between samples too, along each azimuth given, so that every percentile of `rotd` is exact for these
+    azimuths. Nothing is interpolated between azimuths.
+
+    Examples
+    --------
+    >>> azimuthal_per_spectrum([0.0, 3.0, 0.0], [0.0, 4.0, 0.0], 0.01, [1.0], azimuths=[0, 90]).round(4)
+    array([[0.0047, 0.0063]])
+    """
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0)
 
 
 def azimuthal_sd_spectrum(
@@ -31,20 +69,48 @@ def azimuthal_sd_spectrum(
     damping: ArrayLike = 0.05,
     azimuths: ArrayLike = AZIMUTHS,
 ) -> FloatArray:
-    """Return the largest displacement along each azimuth, as `azimuthal_per_spectrum`, m."""
-    return _maxima(north, east, dt, periods, damping, azimuths).sd
+    """Return the largest displacement along each azimuth, with free vibration, as `azimuthal_per_spectrum`, m."""
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0)
 
 
-def _maxima(
-    north: ArrayLike, east: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike, azimuths: ArrayLike
-) -> OscillatorMaxima:
-    dampings = checks.fraction_of_critical("damping", damping)
-    grid = np.broadcast_arrays(
-        np.atleast_1d(dampings)[:, None, None], np.atleast_1d(periods)[:, None], np.atleast_1d(azimuths)
+def _spectrum(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike,
+    azimuths: ArrayLike,
+    share: float,
+) -> FloatArray:
+    """Return the largest ``sqrt(u² + share z²)`` along each azimuth."""
+    ground = prepare_ground(*two_components(north, east))
+    dt = checks.number("dt", dt, checks.positive)
+    grid, shape = grid_of(periods, damping)
+    angles = np.radians(
+        row_of("azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths))))
     )
-    maxima = azimuth_maxima(north, east, dt, grid[1].ravel(), grid[0].ravel(), grid[2].ravel())
-    shape = (*dampings.shape, *grid[0].shape[1:])
-    return OscillatorMaxima(*(values.reshape(shape) for values in maxima))
+    directions = np.stack([np.cos(angles), np.sin(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
+    oscillators = prepare_oscillators(dt, *grid)
+    squares = over_blocks(lambda block: _block_squares(ground, block, share, directions).T, oscillators, ground)
+    lengths = np.sqrt(squares.T) / oscillators.omegas[:, np.newaxis] ** 2 * ground.scale
+    return np.asarray(lengths.reshape(*shape, angles.size))
+
+
+def _block_squares(ground: Ground, block: Oscillators, share: float, directions: FloatArray) -> FloatArray:
+    """Return the largest squares of one block, (lanes, azimuths), in units of the scaled acceleration / omega²."""
+    packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
+    kept = np.empty((blocks.TILES, 6, blocks.LANES))
+    steps, largest = np.empty((blocks.TILES * blocks.TILE, 12)), np.zeros((blocks.LANES, directions.shape[1]))
+    kernels.pack_steps(block.phases, block.dampings, packed)
+    for stretch in stretches(ground):
+        kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
+        for lane in range(block.count):
+            oscillator = float(block.phases[lane]), float(block.dampings[lane]), share, directions
+            count = kernels.list_steps(*stretch[:4], kept, lane, *oscillator, largest[lane], steps)
+            kernels.search_steps(steps[:count], *oscillator, largest[lane])
+    if share == 0.0:
+        kernels.free_displacements(state, block.dampings, block.count, directions, largest)
+    return largest
 
 
 def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:

@@ -204,11 +204,9 @@ def azimuth_maxima(
     OscillatorMaxima
         Two arrays (n,), m, exact between samples, with the free vibration after the record.
     """
-    components = checks.record("north", north), checks.record("east", east)
-    if components[0].size != components[1].size:
-        raise ValueError(f"north and east must be equally long, got {components[0].size} and {components[1].size}")
+    ground = prepare_ground(*two_components(north, east))
     oscillators = _paired(dt, periods, dampings, azimuths)
-    return OscillatorMaxima(*_responses(prepare_ground(*components), oscillators, exact=True)[:2])
+    return OscillatorMaxima(*_responses(ground, oscillators, exact=True)[:2])
 
 
 def _arguments(
@@ -216,13 +214,25 @@ def _arguments(
 ) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray], tuple[int, ...]]:
     """Return record, dt, the grid as paired periods and dampings, and the shape of the result."""
     record = checks.record("acceleration", acceleration)
-    dt = checks.number("dt", dt, checks.positive)
+    return record, checks.number("dt", dt, checks.positive), *grid_of(periods, damping)
+
+
+def grid_of(periods: ArrayLike, damping: ArrayLike) -> tuple[tuple[FloatArray, FloatArray], tuple[int, ...]]:
+    """Return every damping with every period as paired rows, and the shape of the grid."""
     row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
     dampings = checks.fraction_of_critical("damping", damping)
     if dampings.ndim > 1 or dampings.size == 0:
         raise ValueError(f"damping must be a number or one row of numbers, got the shape {dampings.shape}")
     grid = np.broadcast_arrays(row, np.atleast_1d(dampings)[:, np.newaxis])
-    return record, dt, (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
+    return (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
+
+
+def two_components(north: ArrayLike, east: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return two components of the same length."""
+    components = checks.record("north", north), checks.record("east", east)
+    if components[0].size != components[1].size:
+        raise ValueError(f"north and east must be equally long, got {components[0].size} and {components[1].size}")
+    return components
 
 
 def row_of(name: str, values: FloatArray) -> FloatArray:
