@@ -5,9 +5,9 @@ Only ``run.py`` and ``cli.py`` see a configuration as a whole. Rooms below take 
 configuration are relative to the folder of its file.
 """
 
-import datetime
 import os
 import tomllib
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
@@ -66,13 +66,81 @@ class Columns(Section):
     raw: bool = Field(False, description="not corrected yet")
 
 
+class Fdsn(Section):
+    """Records from FDSN web services around an epicentre; what was fetched stays in the cache."""
+
+    providers: tuple[str, ...] = Field(
+        min_length=1, description="in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator"
+    )
+    cache: RelativePath = Field(description="folder that keeps what was fetched")
+    event_id: str | None = Field(None, description="of the event service, instead of records.event")
+    event_provider: str = Field("USGS", description="ObsPy's name or base URL of the event service")
+    latitude: float | None = Field(None, ge=-90, le=90, description="centre, degrees north; not given: epicentre")
+    longitude: float | None = Field(None, ge=-180, le=180, description="centre, degrees east; not given: epicentre")
+    radius: float = Field(100_000.0, gt=0, le=20_000_000, description="m, of the circle in which stations are wanted")
+    start: str | None = Field(None, description="of the window, ISO 8601, UTC; not given: before the origin time")
+    end: str | None = Field(None, description="of the window, ISO 8601, UTC; not given: after the origin time")
+    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
+    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
+    networks: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
+    stations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
+    locations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed; empty: --")
+    channels: tuple[str, ...] = Field(
+        ("HN?", "BN?", "CN?", "EN?"), min_length=1, description="SEED codes, * and ? allowed; accelerometers"
+    )
+    timeout: float = Field(60.0, gt=0, description="s without an answer, or without more of it")
+    retries: int = Field(5, ge=0, description="after a fault that may pass (429, 5xx, time-out, cut answer)")
+    wait: float = Field(1.0, ge=0, description="s; the second retry waits twice as long, and so on; Retry-After counts")
+    connections: int = Field(3, ge=1, le=16, description="stations asked for at the same time")
+
+    @field_validator("start", "end")
+    @classmethod
+    def _moment(cls, text: str | None) -> str | None:
+        if text is not None:
+            datetime.fromisoformat(text)
+        return text
+
+    @property
+    def knows_where_and_when(self) -> bool:
+        """Whether centre and window are given, so that no event is needed."""
+        return None not in (self.latitude, self.longitude, self.start, self.end)
+
+
+class Sds(Section):
+    """A time window of an SDS archive."""
+
+    folder: RelativePath = Field(description="with YEAR/NET/STA/CHAN.D/ below it")
+    start: str | None = Field(None, description="ISO 8601, UTC; not given: before the origin time of records.event")
+    end: str | None = Field(None, description="ISO 8601, UTC; not given: after the origin time of records.event")
+    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
+    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
+
+
+class Asdf(Section):
+    """A workspace of gmprocess, or another ASDF file."""
+
+    file: RelativePath = Field(description="HDF5 file")
+    tag: str = Field("*_unprocessed", description="of the waveforms, * and ? allowed; *_default is gmprocess's result")
+
+
 class Records(Section):
-    """Where the records are."""
+    """Where the records are; several sources may be given."""
 
     folder: RelativePath | None = Field(None, description="folder of waveform files, with StationXML beside them")
     stationxml: RelativePath | None = Field(None, description="StationXML file or folder, if not beside the records")
     event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
+    fdsn: Fdsn | None = Field(None, description="FDSN web services")
+    sds: Sds | None = Field(None, description="SDS archive")
+    asdf: Asdf | None = Field(None, description="ASDF workspace of gmprocess")
+
+    @model_validator(mode="after")
+    def _known_window(self) -> Self:
+        if self.fdsn and not (self.fdsn.knows_where_and_when or self.fdsn.event_id or self.event):
+            raise ValueError("fdsn needs event_id, or event, or latitude, longitude, start and end")
+        if self.sds and not (self.event or (self.sds.start and self.sds.end)):
+            raise ValueError("sds needs start and end, or event")
+        return self
 
 
 class Check(Section):
@@ -200,7 +268,7 @@ class Scenario(Section):
     @field_validator("origin_time")
     @classmethod
     def _a_time(cls, origin_time: str) -> str:
-        datetime.datetime.fromisoformat(origin_time)
+        datetime.fromisoformat(origin_time)
         return origin_time
 
 
@@ -299,10 +367,35 @@ def load(path: Path, section: type[SectionType]) -> SectionType:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise CatalogError(str(path), f"cannot be read as TOML: {error}") from error
+    return checked(section, content, str(path), path.resolve().parent)
+
+
+def checked(
+    section: type[SectionType], content: dict[str, object], source: str = "command line", folder: Path | None = None
+) -> SectionType:
+    """
+    Return the settings of a section.
+
+    Parameters
+    ----------
+    section : type of Section
+        What the content belongs to.
+    content : dict
+        Key to value, as TOML gives it.
+    source : str
+        Where the content comes from, for the error.
+    folder : Path, optional
+        What paths are relative to.
+
+    Raises
+    ------
+    CatalogError
+        Naming every key that is unknown, missing or has a wrong value.
+    """
     try:
-        return section.model_validate(content, context={"folder": path.resolve().parent})
+        return section.model_validate(content, context=folder and {"folder": folder})
     except ValidationError as error:
-        raise CatalogError(str(path), "; ".join(_fault(fault) for fault in error.errors())) from error
+        raise CatalogError(source, "; ".join(_fault(fault) for fault in error.errors())) from error
 
 
 def _fault(fault: ErrorDetails) -> str:

@@ -69,9 +69,9 @@ class Rejection(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``"record"``, ``"pair"``, ``"file"``, ``"station"`` or ``"building"``.
+        ``"record"``, ``"pair"``, ``"file"``, ``"station"``, ``"service"`` or ``"building"``.
     name : str
-        Identifier of the trace, station or pair.
+        Identifier of the trace, station, service or pair.
     source : str
         The file it came from.
     row : int or None

@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from per_obspy.config import Columns, Processing, Spectra
+from per_obspy.config import Processing, Spectra
 from per_obspy.errors import PerError, Rejection
 from per_obspy.files import written_whole
 from per_obspy.processing.chain import process_station
 from per_obspy.records.archives import open_file
-from per_obspy.records.columns import read_columns
+from per_obspy.records.events import read_event
+from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
-from per_obspy.records.folder import read_event, read_station
 from per_obspy.spectra.station import station_spectra
 from per_obspy.spectra.storage import write_spectra
 
@@ -42,28 +42,31 @@ class Job(NamedTuple):
     ----------
     station : str
         ``NETWORK.STATION``.
-    source : tuple of Path or Columns
-        Its waveform files, or the description of a plain table.
+    source : tuple of Path
+        Its waveform files.
     inventory : Inventory or None
         Its metadata.
     event : Path or None
-        QuakeML file.
+        QuakeML file or ASDF workspace.
     processing, spectra : Processing, Spectra
         Settings.
     shard : Path
         Where its Dataset goes.
     simulated : bool
         Whether the motion was made by a scenario.
+    reader : partial
+        How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
     """
 
     station: str
-    source: tuple[Path, ...] | Columns
+    source: tuple[Path, ...]
     inventory: "Inventory | None"
     event: Path | None
     processing: Processing
     spectra: Spectra
     shard: Path
     simulated: bool
+    reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
 
 
 class Done(NamedTuple):
@@ -102,9 +105,9 @@ def do_station(job: Job) -> Done:
 
 def _make_shard(job: Job) -> tuple[Rejection, ...]:
     """Write the shard if anything usable is left; return what was left out."""
-    source = ", ".join(path.name for path in _files(job))
+    source = ", ".join(path.name for path in job.source)
     try:
-        stream, unread = _read(job)
+        stream, unread = job.reader(job.source, job.inventory, job.station)
         event = read_event(job.event) if job.event else None
         clean, unfit = process_station(stream, job.processing, event)
         rejected = (*unread, *(one._replace(source=one.source or source) for one in unfit))
@@ -121,22 +124,11 @@ def _make_shard(job: Job) -> tuple[Rejection, ...]:
     return rejected
 
 
-def _read(job: Job) -> tuple["Stream", tuple[Rejection, ...]]:
-    if isinstance(job.source, Columns):
-        described = job.source.model_dump()
-        return read_columns(described.pop("file"), **described), ()
-    return read_station(job.source, job.inventory, job.station)
-
-
-def _files(job: Job) -> tuple[Path, ...]:
-    return (job.source.file,) if isinstance(job.source, Columns) else job.source
-
-
 def _key(job: Job) -> str:
     """Return the hash of everything the shard depends on."""
     parts = [version("per_obspy"), job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
-    parts += [f"{path.name} {_content_hash(path)}" for path in (*_files(job), *([job.event] if job.event else []))]
-    parts += [job.source.model_dump_json()] if isinstance(job.source, Columns) else []
+    parts += [f"{path.name} {_content_hash(path)}" for path in (*job.source, *([job.event] if job.event else []))]
+    parts += [job.reader.func.__name__, job.reader.keywords]
     parts += [metadata_text(job.inventory)] if job.inventory else []
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
 
@@ -214,5 +206,5 @@ def _caught(job: Job, work: Callable[[], Done]) -> Done:
 
 
 def _lost(job: Job, reason: str) -> Done:
-    source = ", ".join(path.name for path in _files(job))
+    source = ", ".join(path.name for path in job.source)
     return Done(job.station, None, (Rejection("station", job.station, source, None, (reason,)),), resumed=False)

@@ -30,8 +30,9 @@ from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import read_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs import Done, Job, do_stations, do_stations_on
-from per_obspy.records.folder import find_stations, read_event
+from per_obspy.records.fdsn import Fetched
 from per_obspy.records.simulated import simulate, write_simulation
+from per_obspy.records.sources import fetched_records, find_sources, input_files
 from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.tables import write_rejected, write_risk
 from per_obspy.screening.risk import risk_table
@@ -96,31 +97,39 @@ def run(
     CatalogError
         If the configuration, the folder of records or the pair table is wrong as a whole, or another run holds the
         output folder.
+    ServiceError
+        If services fail and no record is at hand.
     """
     configuration = configuration.resolve()
     settings = load(configuration, Run)
     folder = (output or settings.output).resolve()
     with _held(folder):
-        inputs = _input_hashes(settings, configuration)
+        fetched = fetched_records(settings.records, progress)
+        inputs = _input_hashes(settings, fetched, configuration)
         said = settings.model_dump(mode="json", context={"folder": configuration.parent})
         key = _hash({"version": version("per_obspy"), "configuration": {**said, "workers": 0}, "inputs": inputs})
         if earlier := _earlier(folder, key):
             return Result(folder, earlier, did_nothing=True)
         (folder / RECORD).unlink(missing_ok=True)
         head = {"key": key, "configuration": said, "inputs": inputs}
-        record = _work(settings, folder, head, executor, progress)
+        record = _work(settings, folder, fetched, head, executor, progress)
         with written_whole(folder / RECORD) as part:
             part.write_text(json.dumps(record, indent=1), encoding="utf-8")
         return Result(folder, record, did_nothing=False)
 
 
 def _work(
-    settings: Run, folder: Path, head: dict[str, Any], executor: Executor | None, progress: Progress
+    settings: Run,
+    folder: Path,
+    fetched: Fetched | None,
+    head: dict[str, Any],
+    executor: Executor | None,
+    progress: Progress,
 ) -> dict[str, Any]:
     """Do the stages in their order and return what ``run.json`` will say."""
     started, seconds = datetime.now(UTC), dict[str, float]()
     with _timed(seconds, "records"):
-        jobs, rejected = _jobs(settings, folder, progress)
+        jobs, rejected = _jobs(settings, folder, fetched, progress)
     with _timed(seconds, "stations"):
         done = _stations(jobs, settings.workers or os.cpu_count() or 1, executor, progress)
     rejected += [one for station in done for one in station.rejected]
@@ -148,29 +157,29 @@ def _work(
     }
 
 
-def _jobs(settings: Run, folder: Path, progress: Progress) -> tuple[list[Job], list[Rejection]]:
-    """Return one job a station, and the files that are no records."""
-    shards = folder / "stations"
-    common = {"processing": settings.processing, "spectra": settings.spectra, "event": None}
+def _jobs(
+    settings: Run, folder: Path, fetched: Fetched | None, progress: Progress
+) -> tuple[list[Job], list[Rejection]]:
+    """Return one job a station, and what cannot be used of the sources."""
     records = settings.records or _simulated_records(settings, folder, progress)
-    if records.event:
-        read_event(records.event)  # a wrong file stops the run here, not every station
-        common["event"] = records.event
-    jobs, rejected = [], []
-    for table in records.columns:
-        name = f"{table.network}.{table.station}"
-        jobs.append(Job(name, table, None, shard=shards / f"{name}.nc", simulated=False, **common))
-    if records.folder:
-        progress("finding records", 0, 1)
-        found = find_stations(records.folder, records.stationxml)
-        progress("finding records", 1, 1)
-        rejected += found.rejected
-        for name, paths in sorted(found.stations.items()):
-            network, station = name.split(".", 1)
-            known = found.inventory and found.inventory.select(network=network, station=station)
-            simulated = settings.simulation is not None
-            jobs.append(Job(name, paths, known, shard=shards / f"{name}.nc", simulated=simulated, **common))
-    return jobs, rejected
+    progress("finding records", 0, 1)
+    found = find_sources(records, fetched)
+    progress("finding records", 1, 1)
+    jobs = [
+        Job(
+            station=name,
+            source=source.files,
+            inventory=source.inventory,
+            event=found.event,
+            processing=settings.processing,
+            spectra=settings.spectra,
+            shard=folder / "stations" / f"{name}.nc",
+            simulated=settings.simulation is not None,
+            reader=source.reader,
+        )
+        for name, source in sorted(found.stations.items())
+    ]
+    return jobs, list(found.rejected)
 
 
 def _simulated_records(settings: Run, folder: Path, progress: Progress) -> Records:
@@ -246,24 +255,16 @@ def _counts(done: Sequence[Done], table: pd.DataFrame | None, rejected: Sequence
         **{state: states.count(state) for state in ("yes", "possible", "no")},
         **{
             f"rejected_{kind}": sum(one.kind == kind for one in rejected)
-            for kind in ("file", "record", "station", "pair")
+            for kind in ("file", "record", "station", "service", "pair")
         },
     }
 
 
-def _input_hashes(settings: Run, configuration: Path) -> dict[str, str]:
+def _input_hashes(settings: Run, fetched: Fetched | None, configuration: Path) -> dict[str, str]:
     """Return the hash of every input file by its path relative to the configuration."""
-    records = settings.records or Records()
-    given = [
-        records.folder,
-        records.stationxml,
-        records.event,
-        settings.simulation,
-        settings.pairs and settings.pairs.file,
-    ]
-    given += [table.file for table in records.columns]
-    files = [path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])]
-    return {os.path.relpath(path, configuration.parent): file_hash(path) for path in files if path.is_file()}
+    given = [settings.simulation, settings.pairs and settings.pairs.file]
+    files = [*input_files(settings.records, fetched), *(path for path in given if path and path.is_file())]
+    return {os.path.relpath(path, configuration.parent): file_hash(path) for path in files}
 
 
 def _hash(content: dict[str, Any]) -> str:
