@@ -6,11 +6,13 @@ The errors that a user can meet.
     PerError
     ├── RecordRejected   a record cannot be used; the run goes on without it
     ├── CatalogError     a file that the run needs (configuration, table, folder) is wrong; the run stops
+    ├── MissingExtra     an optional library that was asked for is not installed
     └── ServiceError     a service did not answer; try later
 
 Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error it amounts to.
 """
 
+from importlib.util import find_spec
 from typing import NamedTuple
 
 
@@ -56,6 +58,33 @@ class CatalogError(PerError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.source}: {self.problem}"
+
+
+class MissingExtra(PerError, ImportError):
+    """
+    An optional part of the package was asked for, but its libraries are not installed.
+
+    Parameters
+    ----------
+    extra : str
+        Name of the extra that installs them.
+    modules : list of str
+        What is missing.
+    """
+
+    def __init__(self, extra: str, modules: list[str]) -> None:
+        super().__init__(extra, modules)
+        self.extra, self.modules = extra, modules
+
+    def __str__(self) -> str:
+        return f"{', '.join(self.modules)} not installed: pip install 'per_obspy[{self.extra}]'"
+
+
+def require_extra(extra: str, *modules: str) -> None:
+    """Raise :class:`MissingExtra` if one of the modules that an optional part needs is not installed."""
+    missing = [module for module in modules if find_spec(module) is None]
+    if missing:
+        raise MissingExtra(extra, missing)
 
 
 class ServiceError(PerError, ConnectionError):
