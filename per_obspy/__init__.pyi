@@ -14,3 +14,7 @@ from .spectra.station import station_spectra as station_spectra
 from .screening.risk import risk_table as risk_table
 from .spectra.azimuthal import azimuthal_per_spectrum as azimuthal_per_spectrum, rotd as rotd
 from .pounding.relative import relative_displacement as relative_displacement
+from .pounding.equivalent_linear import equivalent_linear as equivalent_linear
+from .pounding.ground import CloughPenzien as CloughPenzien, KanaiTajimi as KanaiTajimi, WhiteNoise as WhiteNoise
+from .pounding.linearization import linearized_correlation as linearized_correlation
+from .pounding.psd_correlation import psd_correlation as psd_correlation
