@@ -11,7 +11,7 @@ import os
 import platform
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -24,12 +24,13 @@ import pandas as pd
 import xarray as xr
 from filelock import FileLock, Timeout
 
-from per_obspy.config import Records, Run, SimulatedPairs, Simulation, load
+from per_obspy.config import Records, Run, Simulation, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import read_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs import Done, Job, do_stations, do_stations_on
+from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn import Fetched
 from per_obspy.records.simulated import simulate, write_simulation
 from per_obspy.records.sources import fetched_records, find_sources, input_files
@@ -37,9 +38,6 @@ from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.tables import write_rejected, write_risk
 from per_obspy.screening.risk import risk_table
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
-
-#: Told of every stage: its name, how much of it is done, and how much there is.
-Progress = Callable[[str, int, int], None]
 
 #: Written last.
 RECORD = "run.json"
@@ -71,7 +69,7 @@ def run(
     configuration: Path,
     output: Path | None = None,
     executor: Executor | None = None,
-    progress: Progress = lambda stage, done, total: None,
+    progress: Progress = silent,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -129,6 +127,7 @@ def _work(
     """Do the stages in their order and return what ``run.json`` will say."""
     started, seconds = datetime.now(UTC), dict[str, float]()
     with _timed(seconds, "records"):
+        pairs = read_pairs(settings.pairs.file) if settings.pairs and settings.pairs.file else None
         jobs, rejected = _jobs(settings, folder, fetched, progress)
     with _timed(seconds, "stations"):
         done = _stations(jobs, settings.workers or os.cpu_count() or 1, executor, progress)
@@ -138,7 +137,8 @@ def _work(
     with _timed(seconds, "screening"):
         progress("screening", 0, 1)
         if stations:
-            table = risk_table(stations, _pairs(settings, folder, stations), settings.building, settings.screening)
+            pairs = _simulated_pairs(settings, folder, stations) if pairs is None else pairs
+            table = risk_table(stations, pairs, settings.building, settings.screening)
             rejected += table.attrs["rejected"]
         progress("screening", 1, 1)
     with _timed(seconds, "report"):
@@ -173,7 +173,7 @@ def _jobs(
             event=found.event,
             processing=settings.processing,
             spectra=settings.spectra,
-            shard=folder / "stations" / f"{name}.nc",
+            shard=folder / "stations" / f"{name.strip('.')}.nc",
             simulated=settings.simulation is not None,
             reader=source.reader,
         )
@@ -209,11 +209,12 @@ def _stations(jobs: Sequence[Job], workers: int, executor: Executor | None, prog
     return sorted(finished, key=lambda one: one.station)
 
 
-def _pairs(settings: Run, folder: Path, stations: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """Return the pair table; a simulated one is written beside the results first and read back like any other."""
-    if settings.pairs and settings.pairs.file:
-        return read_pairs(settings.pairs.file)
-    wanted = settings.pairs and settings.pairs.simulated or load(settings.simulation, Simulation).pairs
+def _simulated_pairs(settings: Run, folder: Path, stations: Sequence[xr.Dataset]) -> pd.DataFrame:
+    """Return a simulated pair table, written beside the results first and read back like any other."""
+    if settings.simulation is not None and settings.pairs is None:
+        wanted = load(settings.simulation, Simulation).pairs
+    else:
+        wanted = settings.pairs.simulated
     longitudes = np.array([station["longitude"].item() for station in stations])
     latitudes = np.array([station["latitude"].item() for station in stations])
     with written_whole(folder / "pairs.csv") as part:

@@ -1,10 +1,16 @@
-"""How commands print tables."""
+"""How commands print tables and progress."""
 
 import sys
-from collections.abc import Iterable, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from per_obspy.progress import Progress
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[object]]") -> None:
     """Print rows as a table, numbers with three digits."""
     from rich.console import Console
     from rich.table import Table
@@ -22,3 +28,29 @@ def cell(value: object) -> str:
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
     return str(value)
+
+
+@contextmanager
+def shown_progress() -> "Iterator[Progress]":
+    """Give what is told of progress: bars on a terminal, plain lines elsewhere; both on standard error."""
+    from rich.console import Console
+    from rich.progress import Progress as Bars
+    from rich.progress import TaskID
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _print_line
+        return
+    tasks: dict[str, TaskID] = {}
+    with Bars(console=console) as bars:
+
+        def move(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield move
+
+
+def _print_line(stage: str, done: int, total: int) -> None:
+    print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)

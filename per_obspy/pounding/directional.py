@@ -1,5 +1,5 @@
 """
-Correlation of two responses to one record along any azimuth, for whole inventories.
+Two responses to one record along any azimuth, for whole inventories: their correlation, their worst azimuth.
 
 The covariance of two linear oscillators over all time follows from their equations of motion once the integrals of
 each response times the ground acceleration are known. These belong to one building, not to a pair: the record is run
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.input_moments import input_moments
+from per_obspy.kernels.resultant import furthest_apart
 
 
 def directional_correlation(
@@ -78,6 +79,65 @@ def directional_correlation(
         raise ValueError("north and east have no motion along an azimuth: there is no correlation")
     scale = np.sqrt(np.where(undamped, 1.0, own_1)) * np.sqrt(np.where(undamped, 1.0, own_2))
     return np.where(undamped, equal, np.clip(np.where(equal, scale, both) / scale, -1.0, 1.0))
+
+
+def worst_azimuth(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    period_1: ArrayLike,
+    damping_1: ArrayLike,
+    period_2: ArrayLike,
+    damping_2: ArrayLike,
+    participation_1: ArrayLike,
+    participation_2: ArrayLike,
+) -> FloatArray:
+    """
+    Return the azimuth of the axis from 1 to 2 along which the record moves a pair furthest towards each other.
+
+    The responses to the two components are the parts of a vector ``q1 u1 - q2 u2``; its largest length over time is
+    the largest one-sided relative displacement over all azimuths, and its direction is that azimuth.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) array_like
+        Ground acceleration, m/s²; two periods of free vibration after the record are included.
+    dt : float
+        Sampling interval, s. The vector is looked at at the samples; a direction is not sensitive to that.
+    period_1, damping_1, period_2, damping_2 : (n_pairs,) array_like
+        s; fraction of critical.
+    participation_1, participation_2 : (n_pairs,) array_like
+        Contact displacement over oscillator displacement, dimensionless.
+
+    Returns
+    -------
+    azimuth : (n_pairs,) ndarray
+        Degrees clockwise from north, from 0 to 360; 0 where the two never part.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+    pairs = np.stack(
+        [
+            2.0 * np.pi / checks.positive("period_1", period_1),
+            checks.fraction_of_critical("damping_1", damping_1),
+            checks.not_negative("participation_1", participation_1),
+            2.0 * np.pi / checks.positive("period_2", period_2),
+            checks.fraction_of_critical("damping_2", damping_2),
+            checks.not_negative("participation_2", participation_2),
+        ]
+    )
+    if not pairs.size:
+        return np.empty(0)
+    step = checks.number("dt", dt, checks.positive)
+    rest = np.zeros(int(np.ceil(2.0 * float(np.max(2.0 * np.pi / pairs[[0, 3]])) / step)))
+    motion = [np.append(part, rest) for part in _closed(checks.record("north", north), checks.record("east", east))]
+    apart = np.empty((2, pairs.shape[1]))
+    furthest_apart(*motion, step, np.ascontiguousarray(pairs), apart)
+    azimuth: FloatArray = np.degrees(np.arctan2(apart[1], apart[0])) % 360.0
+    return azimuth
 
 
 def _closed(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,7 +8,6 @@ fetch goes on where it stopped. ``complete-….json`` says that a request has no
 
 import json
 from collections import defaultdict
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +19,7 @@ from obspy import Inventory, UTCDateTime
 from .. import config
 from ..errors import RecordRejected, Rejection, ServiceError
 from ..files import written_whole
+from ..progress import Progress, silent
 from .events import fetched_event, read_event
 from .fdsn_station import Offer, Outcome, fetch_station
 from .folder import FolderContents, find_stations
@@ -27,13 +27,6 @@ from .foreign import foreign_bytes
 from .providers import base_urls
 from .wanted import Wanted, digest, folder_name, station_parameters, stations_inside, wanted_around
 from .web import answer, host, web_pool
-
-#: Told of every stage: its name, how much of it is done, and how much there is.
-Progress = Callable[[str, int, int], None]
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Tell nobody of progress."""
 
 
 class Fetched(NamedTuple):

@@ -47,7 +47,8 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     Parameters
     ----------
     folder : str or Path
-        Any mixture of waveform files, in archives too, or a single file; StationXML among them is used, QuakeML is passed over.
+        Any mixture of waveform files, in archives too, or a single file; StationXML among them is used, QuakeML is
+        passed over.
     stationxml : str or Path, optional
         A StationXML file, or a folder of them, in addition. FDSN station text does where only coordinates are missing.
 

@@ -10,10 +10,11 @@ from obspy import Inventory, Stream
 
 from .. import config
 from ..errors import Rejection
+from ..progress import Progress, silent
 from .asdf import find_asdf_stations, has_event, read_asdf_station
 from .columns import read_columns
 from .events import read_event
-from .fdsn import Fetched, Progress, fetch, fetched_stations, silent
+from .fdsn import Fetched, fetch, fetched_stations
 from .folder import FolderContents, find_stations, read_station
 from .sds import find_sds_stations, read_sds_station
 from .wanted import window

@@ -20,7 +20,7 @@ RESULTS: dict[str, Column] = {
         Column("risk_class", "str", "", "by demand ratio; names and thresholds are in the configuration"),
         Column("state", "str", "", "yes: gap < demand; possible: a derived input decides; no"),
         Column("demand", "float64", "m", "gap needed at contact height, by the rule in demand_rule"),
-        Column("demand_rule", "str", "", "which estimate is the demand: per_white_noise, per_record or srss"),
+        Column("demand_rule", "str", "", "what the demand is: exact, per_white_noise, per_record or srss"),
         Column("demand_ratio", "float64", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
         Column("impact_velocity", "float64", "m/s", "approach velocity of the single hit, larger of both branches"),
         Column("single_hit_status", "str", "", "ok, no_pounding, no_grazing_state or inconsistent_critical_gap"),
@@ -35,9 +35,14 @@ RESULTS: dict[str, Column] = {
         Column("correlation", "float64", "1", "of the two responses to white noise, eq. (16)"),
         Column("correlation_record", "float64", "1", "of the two responses to this record, over all time"),
         Column("critical_gap_per", "float64", "m", "eq. (15) from PER and eq. (16), at contact height"),
-        Column("critical_gap_record", "float64", "m", "eq. (15) from PER and the record's correlation, at contact height"),
+        Column("critical_gap_record", "float64", "m", "eq. (15) from PER and correlation_record, at contact height"),
         Column("critical_gap_sd", "float64", "m", "eq. (15) from SD and eq. (16), at contact height"),
         Column("srss_gap", "float64", "m", "root of the sum of the squared PER, at contact height"),
+        Column("demand_exact", "float64", "m", "exact largest relative displacement of 1 towards 2, linear"),
+        Column("demand_two_sided", "float64", "m", "the same in either order of the buildings, for design"),
+        Column("impacts", "int64", "1", "in the exact history with this record and gap"),
+        Column("impact_velocity_exact", "float64", "m/s", "largest approach velocity in that history"),
+        *_both("amplification_exact", "1", "largest radius with pounding / without, in that history"),
         Column("absolute_gap", "float64", "m", "sum of the PER, at contact height"),
     )
 }  # fmt: skip
@@ -45,10 +50,12 @@ RESULTS: dict[str, Column] = {
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
     "rank", "pair_id", "risk_class", "state", "gap", "demand", "demand_rule", "demand_ratio", "impact_velocity",
-    "single_hit_status", "amplification_1", "amplification_2", "flags", "station", "distance", "azimuth_used",
+    "impacts", "impact_velocity_exact", "amplification_exact_1", "amplification_exact_2", "single_hit_status",
+    "amplification_1", "amplification_2", "flags", "station", "distance", "azimuth_used",
     "azimuth_rule", "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2", "per_1",
     "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per", "critical_gap_record",
-    "critical_gap_sd", "srss_gap", "absolute_gap", "contact_mass_1", "contact_mass_2", "restitution", "derived",
+    "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact", "demand_two_sided", "contact_mass_1",
+    "contact_mass_2", "restitution", "derived",
 )  # fmt: skip
 
 #: Flags of a pair and what each means.

@@ -41,10 +41,10 @@ class PairMotion(NamedTuple):
     correlation: FloatArray
 
 
-def motion_along_azimuths(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:
-    """Return the motion along each pair's own azimuth (column ``azimuth``)."""
+def motion_along_azimuths(station: xr.Dataset, pairs: pd.DataFrame, azimuth: FloatArray) -> PairMotion:
+    """Return the motion along one azimuth a pair, (n_pairs,), degrees."""
     north, east = station["acceleration"].to_numpy()
-    return _along(north, east, float(station["sampling_interval"]), pairs, pairs["azimuth"].to_numpy(np.float64))
+    return _along(north, east, float(station["sampling_interval"]), pairs, azimuth)
 
 
 def motion_of_one_horizontal(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:

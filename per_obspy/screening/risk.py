@@ -27,6 +27,7 @@ from per_obspy.screening.demand import (
     governing_demand,
     pounding_state,
 )
+from per_obspy.screening.exact import exact_decides, exact_outcome, furthest_azimuth
 from per_obspy.screening.flags import flag_text, period_is_derived
 from per_obspy.screening.motion import (
     PairMotion,
@@ -65,8 +66,8 @@ def risk_table(
     Returns
     -------
     DataFrame
-        Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair table; ``attrs["rejected"]`` holds a
-        :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
+        Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair table.
+        ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
 
     Raises
     ------
@@ -107,32 +108,49 @@ def _assigned(
 
 
 def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Give blocks of pairs that share a station and know, or do not know, their azimuth."""
-    for (index, _), group in pairs.groupby(["station_index", pairs["azimuth"].isna()]):
+    """Give blocks of pairs that share a station."""
+    for index, group in pairs.groupby("station_index"):
         for start in range(0, len(group), BLOCK):
             yield int(index), group.iloc[start : start + BLOCK]
 
 
-def _rows(station: xr.Dataset, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the finished rows of one block, not ranked yet."""
-    motion, rule = _motion(station, pairs)
-    judged = _judged(motion, pairs)
-    hit = _hits(judged, pairs)
-    table = pairs.assign(azimuth_rule=rule, **judged.columns, **hit)
-    table["demand_ratio"] = demand_ratio(table["gap"].to_numpy(), table["demand"].to_numpy())
-    table["state"] = pounding_state(table["gap"].to_numpy(), table["demand"].to_numpy(), period_is_derived(table))
+    parts = [_judged_rows(station, pairs, motion, rule) for pairs, motion, rule in _motions(station, block)]
+    table = pd.concat(parts)
+    gap, demand = table["gap"].to_numpy(np.float64), table["demand"].to_numpy(np.float64)
+    table["demand_ratio"] = demand_ratio(gap, demand)
+    table["state"] = pounding_state(gap, demand, period_is_derived(table))
     table["risk_class"] = _risk_class(table["demand_ratio"].to_numpy(), screening.classes)
     table["flags"] = flag_text(table, station, screening)
     return table
 
 
-def _motion(station: xr.Dataset, pairs: pd.DataFrame) -> tuple[PairMotion, str]:
-    """Return the motion of a block and how its azimuth was found."""
+def _motions(station: xr.Dataset, block: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
+    """Give the pairs of a block by how their azimuth is found, with their motion and the name of that way."""
     if station.sizes["horizontal"] == 1:
-        return motion_of_one_horizontal(station, pairs), "station"
-    if pairs["azimuth"].isna().any():
-        return motion_along_every_azimuth(station, pairs), "worst"
-    return motion_along_azimuths(station, pairs), "given"
+        yield block, motion_of_one_horizontal(station, block), "station"
+        return
+    unknown, exact = block["azimuth"].isna().to_numpy(), exact_decides(station, block)
+    if len(given := block[~unknown]):
+        yield given, motion_along_azimuths(station, given, given["azimuth"].to_numpy(np.float64)), "given"
+    if len(worst := block[unknown & exact]):
+        yield worst, motion_along_azimuths(station, worst, furthest_azimuth(station, worst)), "worst"
+    if len(worst := block[unknown & ~exact]):
+        yield worst, motion_along_every_azimuth(station, worst), "worst"
+
+
+def _judged_rows(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: str) -> pd.DataFrame:
+    """Return the pairs with estimates, single hit, exact outcome and the demand that decides."""
+    judged = _judged(motion, pairs)
+    hit = _hits(judged, pairs)
+    azimuth = judged.columns["azimuth_used"] if rule != "station" else np.zeros(len(pairs))
+    outcome = exact_outcome(station, pairs, azimuth, judged.per)
+    table = pairs.assign(azimuth_rule=rule, **judged.columns, **hit, **outcome)
+    exact = exact_decides(station, pairs)
+    table["demand"] = np.where(exact, table["demand_exact"], table["demand"])
+    table["demand_rule"] = np.where(exact, "exact", table["demand_rule"])
+    return table
 
 
 class _Judged(NamedTuple):

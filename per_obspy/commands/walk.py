@@ -1,0 +1,132 @@
+"""``per-obspy run`` and its parts on records: ``simulate`` and ``spectra``."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from per_obspy.commands.printing import print_table, shown_progress
+
+NOTHING_USABLE = 3
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+
+#: Columns of the worst pairs that are printed, with their titles.
+SHOWN = {
+    "pair_id": "pair",
+    "station": "station",
+    "period_1": "T1 (s)",
+    "period_2": "T2 (s)",
+    "gap": "gap (m)",
+    "demand": "demand (m)",
+    "state": "pounding",
+    "impact_velocity": "impact (m/s)",
+    "amplification_1": "ampl. 1",
+    "amplification_2": "ampl. 2",
+}
+
+
+def run(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Do a whole run: records to spectra to risk table to figures.
+
+    Example: per-obspy run workflows/demo.toml
+    """
+    from per_obspy.run import run as whole_run
+
+    with shown_progress() as progress:
+        result = whole_run(configuration, output, progress=progress)
+    if as_json:
+        print(json.dumps({"folder": str(result.folder), "did_nothing": result.did_nothing, **result.record}))
+    else:
+        _print_result(result.folder, result.record, result.did_nothing)
+    if result.record["state"] == "nothing_usable":
+        print(f"nothing usable was left: see {result.folder / 'rejected.csv'}", file=sys.stderr)
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def simulate(
+    scenario: Annotated[Path, typer.Argument(help="TOML file of the scenario.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for MiniSEED, StationXML and QuakeML.")],
+) -> None:
+    """
+    Simulate the records of a scenario earthquake.
+
+    Example: per-obspy simulate catalogs/demo/scenario.toml -o output/simulated
+    """
+    from per_obspy.config import Simulation, load
+    from per_obspy.records.simulated import simulate as simulated
+    from per_obspy.records.simulated import write_simulation
+
+    simulation = simulated(load(scenario, Simulation).scenario)
+    write_simulation(simulation, output)
+    print(f"{len(simulation.stream)} simulated records are in {output}")
+
+
+def spectra(
+    sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="netCDF file.")] = Path("spectra.nc"),
+    damping: Annotated[list[float] | None, typer.Option(help="Fraction of critical; repeat for several.")] = None,
+    shortest: Annotated[float, typer.Option(help="Shortest period, s.")] = 0.05,
+    longest: Annotated[float, typer.Option(help="Longest period, s.")] = 10.0,
+    count: Annotated[int, typer.Option(help="Number of periods.")] = 100,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw spectra and state space of every station.")] = False,
+    plot_period: Annotated[float, typer.Option(help="Of the oscillator in the state-space figure, s.")] = 1.0,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write the spectra of records to one netCDF file.
+
+    Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
+    """
+    import os
+
+    from per_obspy.config import Processing, Spectra, checked
+    from per_obspy.steps import plot_station, spectra_of
+
+    given = {"shortest": shortest, "longest": longest, "count": count}
+    grid = checked(Spectra, given | ({"dampings": damping} if damping else {}))
+    with shown_progress() as progress:
+        done, rejected = spectra_of(sources, output, Processing(), grid, os.cpu_count() or 1, progress)
+    shards = [one.shard for one in done if one.shard]
+    figures = [plot_station(shard, grid.dampings[0], plot_period, output.parent) for shard in shards] if plot else []
+    files = [str(output)] * bool(shards) + [str(path) for pair in figures for path in pair]
+    if as_json:
+        print(json.dumps({"stations": len(shards), "rejected": [one._asdict() for one in rejected], "files": files}))
+    else:
+        print(
+            f"{len(shards)} stations, {len(rejected)} rejected", output.with_suffix(".rejected.csv"), *files, sep="\n  "
+        )
+    if not shards:
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def _print_result(folder: Path, record: dict[str, Any], did_nothing: bool) -> None:
+    counts = record["counts"]
+    if did_nothing:
+        print("Nothing to do: the same inputs were run before.")
+    if record["simulated"]:
+        print("The ground motion is SIMULATED.")
+    rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
+    print(
+        f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
+        f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
+    )
+    if (folder / "risk.csv").exists():
+        _print_worst(folder / "risk.parquet", 10)
+    for name in sorted({*record["outputs"], "run.json"}):
+        print(f"  {folder / name}")
+
+
+def _print_worst(path: Path, count: int) -> None:
+    """Print the worst pairs as a table."""
+    import pandas as pd
+
+    worst = pd.read_parquet(path).head(count)
+    print_table(f"The {len(worst)} worst pairs", list(SHOWN.values()), worst[list(SHOWN)].itertuples(index=False))
