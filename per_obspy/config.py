@@ -194,7 +194,6 @@ class Processing(Section):
     highest_lowpass: float = Field(40.0, gt=0, description="Hz, where the noise does not ask for less")
     highpass_range: tuple[float, float] = Field((0.001, 0.5), description="Hz; never below 1 / duration")
     drift: float = Field(0.02, gt=0, lt=1, description="polynomial part of the displacement that counts as clean")
-    drifting: float = Field(0.2, gt=0, description="Hz; a clean corner above it makes the chain try other baselines")
     fallback_highpass: dict[float, float] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
         description="without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)",
@@ -279,6 +278,17 @@ class SimulatedPairs(Section):
     seed: int = Field(20, ge=0, description="of every random number")
     radius: float = Field(2000.0, gt=0, description="m, largest distance of a pair from its station")
     touching: float = Field(0.5, ge=0, le=1, description="share of pairs without a gap")
+
+
+class Codes(Section):
+    """What code rules ask of a region (``screening/codes.py``); a rule stays empty where its value is not given."""
+
+    ntc_zone: str | None = Field(None, pattern="^(I|II|III)$", description="NTC Mexico City 2004: I, II or III")
+    gb_intensity: int | None = Field(None, ge=6, le=9, description="GB 50011-2010: fortification intensity")
+    fema_seismicity: str | None = Field(
+        None, pattern="^(very_high|high|moderately_high|lower)$", description="FEMA P-154: of the region"
+    )
+    floor_tolerance: float = Field(0.61, ge=0, description="m; floors no further apart than 2 ft align (FEMA P-154)")
 
 
 class Screening(Section):
