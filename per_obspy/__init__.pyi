@@ -18,3 +18,4 @@ from .pounding.equivalent_linear import equivalent_linear as equivalent_linear
 from .pounding.ground import CloughPenzien as CloughPenzien, KanaiTajimi as KanaiTajimi, WhiteNoise as WhiteNoise
 from .pounding.linearization import linearized_correlation as linearized_correlation
 from .pounding.psd_correlation import psd_correlation as psd_correlation
+from .pounding.record_correlation import record_correlation as record_correlation

@@ -198,5 +198,5 @@ def _structure(which: str, period: ArrayLike, damping: ArrayLike, participation:
     return (
         2.0 * np.pi / checks.positive(f"period_{which}", period),
         checks.fraction_of_critical(f"damping_{which}", damping),
-        checks.positive(f"participation_{which}", participation),
+        checks.not_negative(f"participation_{which}", participation),
     )

@@ -40,7 +40,7 @@ def quadrature(density, one, two, end=np.inf, points=()):
     middle = min(end, 400.0)
     peaks = sorted({p for p in (*points, 2 * np.pi / one[0], 2 * np.pi / two[0]) if 0 < p < middle})
     near = quad(integrand, 0, middle, points=peaks, limit=4000, epsabs=0, epsrel=1e-11)[0]
-    # beyond 400 rad/s the integrand is smooth and below 1e-7 of the whole; the substitution w = 1/t makes its interval finite
+    # beyond 400 rad/s the integrand is smooth and below 1e-7 of the whole; w = 1/t makes it finite
     far = quad(lambda t: integrand(1 / t) / t**2, 0, 1 / middle, epsabs=0, epsrel=1e-4)[0] if end > middle else 0.0
     return near + far
 

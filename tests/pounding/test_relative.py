@@ -143,7 +143,7 @@ def test_surface():
 
 @pytest.mark.parametrize(("name", "changed"), [
     ("acceleration", {"acceleration": [0.0, np.nan]}), ("dt", {"dt": 0.0}), ("period_1", {"period_1": -1.0}),
-    ("damping_2", {"damping_2": 1.0}), ("participation_1", {"participation_1": 0.0}),
+    ("damping_2", {"damping_2": 1.0}), ("participation_1", {"participation_1": -1.0}),
 ])  # fmt: skip
 def test_bad_arguments_are_named(name, changed):
     arguments = {
