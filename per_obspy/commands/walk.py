@@ -95,7 +95,7 @@ def spectra(
     with shown_progress() as progress:
         done, rejected = spectra_of(sources, output, Processing(), grid, os.cpu_count() or 1, progress)
     shards = [one.shard for one in done if one.shard]
-    figures = [plot_station(shard, grid.dampings[0], plot_period, output.parent) for shard in shards] if plot else []
+    figures = [plot_station(shard, 0.05, plot_period, output.parent) for shard in shards] if plot else []
     files = [str(output)] * bool(shards) + [str(path) for pair in figures for path in pair]
     if as_json:
         print(json.dumps({"stations": len(shards), "rejected": [one._asdict() for one in rejected], "files": files}))

@@ -39,7 +39,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     Raises
     ------
     RecordRejected
-        If units, coordinates or, for counts, the response are unknown, or StationXML contradicts itself.
+        If units or, for counts, the response are unknown, or StationXML contradicts itself.
     """
     result = with_knet_words(trace) if "knet" in trace.stats else trace.copy()
     channel = _channel(result, inventory)
@@ -48,7 +48,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     elif "units" not in result.stats:
         raise RecordRejected(trace.id, f"{_missing(trace, inventory)}, so what its samples measure is unknown")
     if not result.stats.get("coordinates"):
-        result.stats.coordinates = _station_coordinates(result, inventory)
+        _place_station(result, inventory)
     result.data = _samples(result)
     return result
 
@@ -155,12 +155,12 @@ def _quantity(trace: Trace, unit: str | None) -> str:
     return _QUANTITIES[str(unit).upper()]
 
 
-def _station_coordinates(trace: Trace, inventory: Inventory | None) -> AttribDict:
+def _place_station(trace: Trace, inventory: Inventory | None) -> None:
+    """Fill the coordinates from StationXML; where nobody knows them they stay absent: spectra need none."""
+    trace.stats.pop("coordinates", None)
     station = _only(trace, "station", list(_stations(trace, inventory)), _station_facts)
-    if station is None:
-        place = f"{trace.stats.network}.{trace.stats.station}"
-        raise RecordRejected(trace.id, f"coordinates are in neither its header nor StationXML (station {place})")
-    return _place(station)
+    if station is not None:
+        trace.stats.coordinates = _place(station)
 
 
 def metadata_text(inventory: Inventory) -> bytes:

@@ -68,21 +68,19 @@ def risk_table(
     DataFrame
         Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair table.
         ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
-
-    Raises
-    ------
-    ValueError
-        If no station has coordinates.
     """
     stations = [spectra] if isinstance(spectra, xr.Dataset) else list(spectra)
     located = [station for station in stations if np.isfinite(station["latitude"].item())]
-    if not located:
-        raise ValueError(f"spectra must hold a station with coordinates, got {len(stations)} without")
+    nowhere = tuple(
+        Rejection("station", station["station"].item(), "", None, ("its coordinates are unknown: it serves no pair",))
+        for station in stations
+        if not np.isfinite(station["latitude"].item())
+    )
     complete = completed_pairs(pairs, building)
-    assigned, rejected = _assigned(complete, located, screening)
+    assigned, far = _assigned(complete, located, screening)
     blocks = [_rows(located[index], block, screening) for index, block in _blocks(assigned)]
     table = _ranked(pd.concat(blocks, ignore_index=True)) if blocks else assigned.reindex(columns=[*ORDER])
-    table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
+    table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *nowhere, *far)
     return table
 
 
@@ -90,6 +88,9 @@ def _assigned(
     pairs: pd.DataFrame, stations: list[xr.Dataset], screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """Return the pairs with the index of their station and its distance, and those with none in reach."""
+    if not stations:
+        lost = (Rejection("pair", name, "", None, ("no station has coordinates",)) for name in pairs["pair_id"])
+        return pairs.iloc[:0], tuple(lost)
     index, distance = nearest_station(
         pairs["longitude"].to_numpy(),
         pairs["latitude"].to_numpy(),

@@ -1,0 +1,104 @@
+"""``per-obspy events``, ``fetch`` and ``info``: earthquakes and records, listed, fetched and looked at."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from per_obspy.commands.printing import print_table, shown_progress
+
+if TYPE_CHECKING:
+    from per_obspy.errors import Rejection
+
+NOTHING_USABLE = 3
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+
+
+def events(
+    source: Annotated[str, typer.Argument(help="QuakeML or GeoJSON file, URL of a feed, FDSN service (URL or name).")],
+    start: Annotated[str | None, typer.Option(help="Earliest origin time, ISO 8601, UTC.")] = None,
+    end: Annotated[str | None, typer.Option(help="Latest origin time, ISO 8601, UTC.")] = None,
+    magnitude: Annotated[float | None, typer.Option(help="Smallest magnitude.")] = None,
+    latitude: Annotated[float | None, typer.Option(help="Centre, degrees north.")] = None,
+    longitude: Annotated[float | None, typer.Option(help="Centre, degrees east.")] = None,
+    radius: Annotated[float | None, typer.Option(help="Of the circle around the centre, degrees.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    List earthquakes; their identifiers go into a configuration as records.fdsn.event_id.
+
+    Example: per-obspy events USGS --start 2019-07-06 --end 2019-07-07 --magnitude 5
+    """
+    from per_obspy.records.events import EventRow, find_events
+
+    query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
+    query |= {"latitude": latitude, "longitude": longitude, "maxradius": radius}
+    rows = find_events(source, {name: str(value) for name, value in query.items() if value is not None})
+    if as_json:
+        print(json.dumps([row._asdict() for row in rows]))
+    else:
+        print_table(f"{len(rows)} events, the latest first", EventRow._fields, rows)
+    if not rows:
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def fetch(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of a run with a section [records.fdsn].")],
+    again: Annotated[bool, typer.Option("--again", help="Ask again for stations that had no data.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Fetch the records of a run into its cache, and nothing else; what is there is not fetched again.
+
+    Example: per-obspy fetch run.toml
+    """
+    from per_obspy.records.fetching import fetch_configured
+
+    with shown_progress() as progress:
+        folder, stations, rejected = fetch_configured(configuration, again, progress)
+    if as_json:
+        print(
+            json.dumps(
+                {"folder": str(folder), "stations": stations, "rejected": [one._asdict() for one in rejected]},
+            )
+        )
+    else:
+        print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
+        _print_rejected(rejected)
+    if not stations:
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def info(
+    path: Annotated[Path, typer.Argument(help="Folder, archive, waveform file or ASDF workspace.")],
+    stationxml: Annotated[Path | None, typer.Option(help="StationXML file or folder, if not beside.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Say what records there are, and why the others cannot be used.
+
+    Example: per-obspy info shared/records
+    """
+    from per_obspy.records.info import RecordInfo, describe_records
+
+    records, rejected = describe_records(path, stationxml)
+    if as_json:
+        print(
+            json.dumps(
+                {name: [one._asdict() for one in rows] for name, rows in (("records", records), ("rejected", rejected))}
+            )
+        )
+    else:
+        print_table(f"{len(records)} records", RecordInfo._fields, records)
+        _print_rejected(rejected)
+    if not records:
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:
+    """Print everything that cannot be used with all its reasons, on standard error."""
+    for one in rejected:
+        print(f"rejected {one.kind} {one.name}: {'; '.join(one.reasons)}", file=sys.stderr)
