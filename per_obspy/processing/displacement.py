@@ -42,8 +42,8 @@ def displacement_drift(acceleration: FloatArray, dt: float, lowest: float, order
 
     References
     ----------
-    Ramos-Sepulveda, Brandenberg, Parker & Stewart 2023: automated selection of high-pass corners from the polynomial
-    trend of the displacement, as adopted by gmprocess.
+    Ramos-Sepulveda et al. 2023 (algorithm auto_fchp of Brandenberg and others; gmprocess adopted it): the criterion
+    and its target; the polynomial of fifth order and the search from above are our choices.
     """
     thin = max(int(0.5 / (FASTEST * dt)), 1)
     side = thin * int(np.ceil(0.75 * order / lowest / dt / thin))
@@ -57,7 +57,7 @@ def displacement_drift(acceleration: FloatArray, dt: float, lowest: float, order
 
     def drift(highpass: float) -> float:
         displacement = irfft(spectrum * butterworth_amplitude(frequencies, highpass, np.inf, order), points)
-        record = displacement[first : first + count] - displacement[0]
+        record = displacement[first : first + count]
         largest = np.abs(record).max()
         return float(np.abs(basis @ (basis.T @ record)).max() / largest) if largest > 0 else 0.0
 

@@ -101,7 +101,7 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
 
     References
     ----------
-    Wong et al. 2009, CREWES Research Report 21, 80: energy ratio.
+    Akram & Eaton 2016, Geophysics 81, KS71-KS91: energy ratio.
     """
     energy = np.concatenate(([0.0], np.cumsum(samples**2)))
     places = np.arange(window, samples.size - window)

@@ -187,7 +187,6 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     shift = NEIGHBOURS + 1 + width // 2
     around = np.maximum(np.roll(side, shift), np.roll(side, -shift))
     large = jumps > SMALLEST_SPIKE * np.abs(samples).max()
-    large[: shift + width // 2] = large[-(shift + width // 2) :] = False  # no vicinity on one side
     floor = 1e-9 * np.abs(samples).max()
     return float((jumps[large] / np.maximum(around[large], floor)).max()) if large.any() else 0.0
 

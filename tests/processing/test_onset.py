@@ -42,6 +42,11 @@ def test_a_silent_record_has_no_onset(count):
     assert picked_onset(Trace(np.zeros(count), {"sampling_rate": RATE})) is None
 
 
+def test_an_onset_shortly_before_the_peak_is_found():
+    samples = np.random.default_rng(6).normal(size=4000) * np.repeat([0.01, 1.0], [3900, 100])
+    assert aic_onset(samples) == pytest.approx(3900, abs=5)
+
+
 def test_each_picker_finds_a_step_of_noise():
     samples = np.random.default_rng(5).normal(size=4000) * np.repeat([0.01, 1.0], 2000)
     assert aic_onset(samples) == pytest.approx(2000, abs=5)

@@ -110,6 +110,16 @@ def test_quiet_recorders_may_stand_still_before_the_shaking(earthquake):
     assert "dropout" not in checks_that_fail(Trace(samples, {"sampling_rate": RATE}))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_coarse_recorders_are_not_clipped(earthquake, seed):
+    # a slow sensor with few levels stands still at each turn of the motion, also at the largest
+    slow = np.cumsum(earthquake(seed))
+    samples = np.round(10 * slow / np.ptp(slow))
+    assert longest_extreme_run(samples) == 1
+    # mutation: counting the run alone gives more than 1
+    assert (samples == samples.max()).sum() > 1
+
+
 @pytest.mark.parametrize(("order", "ratio"), [(1, 0.5), (-1, 0.5)])
 def test_another_event_is_found_before_and_after(earthquake, order, ratio):
     both = (earthquake(3) + ratio * np.roll(earthquake(3), 6000))[::order]

@@ -28,6 +28,14 @@ def test_pieces_are_joined_where_their_samples_agree(earthquake, clock_error):
     assert joined.stats.per_obspy.splice_shift == pytest.approx(-clock_error, abs=1e-6)
 
 
+def test_one_piece_fades_into_the_other(earthquake):
+    # mutation: taking either piece for the whole overlap makes a step
+    first, second = pieces(earthquake(onset=40.0), 20.0, 3.0)
+    second.data = second.data + 0.05
+    joined = spliced(Stream([first, second])).data - earthquake(onset=40.0)
+    assert_allclose(joined[4000:6000], np.linspace(0, 0.05, 2000), atol=1e-12)
+
+
 def test_pieces_that_agree_nowhere_are_not_joined(earthquake):
     one, other = pieces(earthquake(onset=40.0), 20.0, 0.0)
     other.data = other.data[::-1].copy()

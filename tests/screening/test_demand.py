@@ -44,9 +44,7 @@ def test_equal_derived_periods_do_not_make_a_pair_safe():
 def test_demands_are_proportional_to_the_motion():
     # would catch: a radius that misses its participation in one of the estimates
     once = _estimates(np.full(40, 0.3))
-    twice = gap_estimates(
-        tuple(2 * r for r in PER), tuple(2 * r for r in SD), PERIOD, DAMPING, np.full(40, 0.3)
-    )
+    twice = gap_estimates(tuple(2 * r for r in PER), tuple(2 * r for r in SD), PERIOD, DAMPING, np.full(40, 0.3))
     for name in ("per", "record", "sd", "srss", "absolute"):
         assert_allclose(getattr(twice, name), 2 * getattr(once, name), rtol=1e-12)  # round-off
 
