@@ -19,3 +19,4 @@ from .pounding.ground import CloughPenzien as CloughPenzien, KanaiTajimi as Kana
 from .pounding.linearization import linearized_correlation as linearized_correlation
 from .pounding.psd_correlation import psd_correlation as psd_correlation
 from .pounding.record_correlation import record_correlation as record_correlation
+from .spectra.bilinear import bilinear_response as bilinear_response

@@ -38,13 +38,17 @@ def series_terms(span):
 
 
 @kernel
-def fill_series(u, z, acceleration, rate, damping, terms, motion, speed):
-    """Fill the Taylor coefficients of displacement and velocity from the state and the acceleration at the start."""
+def fill_series(u, z, acceleration, rate, stiffness, damping, terms, motion, speed):
+    """
+    Fill the Taylor coefficients of displacement and velocity from the state and the acceleration at the start.
+
+    ``u'' + 2 xi u' + stiffness u = -(acceleration + rate phase)``; the stiffness of the linear oscillator is 1.
+    """
     motion[0], motion[1] = u, z
-    motion[2] = -0.5 * (2.0 * damping * z + u + acceleration)
-    motion[3] = -(4.0 * damping * motion[2] + z + rate) / 6.0
+    motion[2] = -0.5 * (2.0 * damping * z + stiffness * u + acceleration)
+    motion[3] = -(4.0 * damping * motion[2] + stiffness * z + rate) / 6.0
     for n in range(2, terms - 1):
-        motion[n + 2] = -(2.0 * damping * (n + 1) * motion[n + 1] + motion[n]) / ((n + 2) * (n + 1))
+        motion[n + 2] = -(2.0 * damping * (n + 1) * motion[n + 1] + stiffness * motion[n]) / ((n + 2) * (n + 1))
     for n in range(terms):
         speed[n] = (n + 1) * motion[n + 1]
 
@@ -133,7 +137,7 @@ def largest_in_step(u, z, start, end, damping, phase, wanted, work, largest):
     motion, speed, condition, points = work[0], work[1], work[2], work[3]
     for i in range(spans):
         acceleration = start + rate * (i * span)
-        fill_series(u, z, acceleration, rate, damping, terms, motion, speed)
+        fill_series(u, z, acceleration, rate, 1.0, damping, terms, motion, speed)
         for number in range(4):
             points[0], points[1] = 0.0, span
             count = 2

@@ -1,0 +1,275 @@
+"""The bilinear oscillator: its history, and inelastic PER spectra of constant strength and of constant ductility."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from .. import checks
+from ..checks import FloatArray
+from ..kernels import bilinear as kernels
+from .elastic import row_of
+
+#: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.
+GRAVITY = 9.80665
+#: Ratio of neighbouring yield displacements in the search for the largest one that gives a ductility.
+SCAN_RATIO = 0.97
+#: Yield displacements below this part of the elastic displacement are not tried.
+SMALLEST_YIELD = 1e-4
+
+
+class BilinearResponse(NamedTuple):
+    """
+    Response of one bilinear oscillator.
+
+    Attributes
+    ----------
+    displacement, velocity, plastic_displacement : (n_time,) ndarray
+        At the samples of the record, relative to the ground, m, m/s, m.
+    ductility : float
+        Largest displacement over yield displacement (0 for an infinite one), dimensionless.
+    hysteretic_energy : float
+        Dissipated by yielding, per unit mass, m²/s².
+    displacement_maximum : float
+        Largest displacement, between samples and in the free vibration after the record too, m.
+    residual : float
+        Displacement at which the oscillator comes to rest, m.
+    displacement_radius : float
+        Largest ``sqrt(u² + (v / omega0)²)`` with the total displacement; it bounds the displacement, m.
+    energy_radius : float
+        Largest ``sqrt(alpha u² + (1 - alpha) y² + (v / omega0)²)`` with the elastic part ``y`` of the displacement:
+        the radius of the recoverable energy, m.
+    """
+
+    displacement: FloatArray
+    velocity: FloatArray
+    plastic_displacement: FloatArray
+    ductility: float
+    hysteretic_energy: float
+    displacement_maximum: float
+    residual: float
+    displacement_radius: float
+    energy_radius: float
+
+
+class InelasticSpectra(NamedTuple):
+    """
+    Largest responses of bilinear oscillators, each (n_periods,).
+
+    Attributes
+    ----------
+    displacement_radius, energy_radius : ndarray
+        Inelastic PER of the total displacement and of the recoverable energy, as in `BilinearResponse`, m.
+    sd : ndarray
+        Largest displacement, m.
+    ductility : ndarray
+        Largest displacement over yield displacement, dimensionless.
+    yield_coefficient : ndarray
+        Yield force over weight, dimensionless.
+    residual : ndarray
+        Displacement at rest, m.
+    hysteretic_energy : ndarray
+        Per unit mass, m²/s².
+    """
+
+    displacement_radius: FloatArray
+    energy_radius: FloatArray
+    sd: FloatArray
+    ductility: FloatArray
+    yield_coefficient: FloatArray
+    residual: FloatArray
+    hysteretic_energy: FloatArray
+
+
+def bilinear_response(
+    acceleration: ArrayLike, dt: float, period: float, damping: float, yield_displacement: float, hardening: float
+) -> BilinearResponse:
+    """
+    Response of a bilinear oscillator with kinematic hardening, exact between the samples and at its events.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    period : float
+        Undamped elastic period, s.
+    damping : float
+        Fraction of critical of the elastic oscillator; the damping coefficient stays the same while yielding.
+    yield_displacement : float
+        m; infinity for a linear oscillator.
+    hardening : float
+        Stiffness after yielding over elastic stiffness, 0 to 1.
+
+    Returns
+    -------
+    BilinearResponse
+        Histories at the samples and largest values, between samples and after the record too.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape.
+
+    Notes
+    -----
+    ``u'' + 2 xi omega0 u' + omega0² [alpha u + (1 - alpha) y] = -a`` with ``y`` the elastic part of the displacement,
+    never beyond the yield displacement.
+
+    Examples
+    --------
+    >>> response = bilinear_response([0.0, 20.0, 0.0], 0.5, 1.0, 0.05, 0.1, 0.1)
+    >>> round(response.ductility, 2), round(response.residual, 3)
+    (26.46, 0.103)
+    """
+    record = checks.record("acceleration", acceleration)
+    dt = checks.number("dt", dt, checks.positive)
+    omega = 2.0 * np.pi / checks.number("period", period, checks.positive)
+    ratio = checks.number("damping", damping, checks.fraction_of_critical)
+    limit = checks.number("yield_displacement", yield_displacement, checks.positive_or_infinite)
+    alpha = _hardening(hardening)
+    return _response(record, dt, omega, ratio, limit, alpha)
+
+
+def constant_yield_spectra(
+    acceleration: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: float,
+    yield_coefficients: ArrayLike,
+    hardening: float,
+) -> InelasticSpectra:
+    """
+    Inelastic spectra of oscillators of given strength.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods : (n_periods,) array_like
+        Undamped elastic periods, s.
+    damping, hardening : float
+        As for `bilinear_response`.
+    yield_coefficients : float or (n_periods,) array_like
+        Yield force over weight, dimensionless.
+
+    Returns
+    -------
+    InelasticSpectra
+        Arrays (n_periods,).
+    """
+    record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
+    coefficients = np.broadcast_to(checks.positive("yield_coefficients", yield_coefficients), omegas.shape)
+    limits = coefficients * GRAVITY / omegas**2
+    rows = [_response(record, dt, omega, ratio, limit, alpha) for omega, limit in zip(omegas, limits, strict=True)]
+    return _spectra(rows, coefficients.copy())
+
+
+def constant_ductility_spectra(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, ductility: float, hardening: float
+) -> InelasticSpectra:
+    """
+    Inelastic spectra of oscillators that are just strong enough not to exceed a ductility.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s², as for `per_spectrum`.
+    dt : float
+        Time between samples, s.
+    periods : (n_periods,) array_like
+        Undamped elastic periods, s.
+    damping, hardening : float
+        As for `bilinear_response`.
+    ductility : float
+        Largest displacement over yield displacement, at least 1.
+
+    Returns
+    -------
+    InelasticSpectra
+        Arrays (n_periods,); NaN where the ductility is not reached down to 1e-4 of the elastic displacement.
+
+    Notes
+    -----
+    Several strengths can give the same ductility. The largest is returned: the yield displacement is lowered from the
+    elastic displacement in steps of 3 % until the ductility is exceeded, and the root in that step is found by Brent's
+    method (two roots within one step can be missed).
+    """
+    record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
+    target = checks.number("ductility", ductility, checks.finite)
+    if target < 1.0:
+        raise ValueError(f"ductility must be at least 1, got {target}")
+    limits = np.array([_largest_yield(record, dt, omega, ratio, alpha, target) for omega in omegas])
+    empty, nan = np.full(record.size, np.nan), np.nan
+    unreached = BilinearResponse(empty, empty, empty, nan, nan, nan, nan, nan, nan)
+    rows = [
+        unreached if np.isnan(limit) else _response(record, dt, omega, ratio, limit, alpha)
+        for omega, limit in zip(omegas, limits, strict=True)
+    ]
+    return _spectra(rows, limits * omegas**2 / GRAVITY)
+
+
+def _hardening(hardening: float) -> float:
+    return checks.number("hardening", hardening, lambda name, value: checks.between(name, value, 0.0, 1.0))
+
+
+def _arguments(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, hardening: float
+) -> tuple[FloatArray, float, FloatArray, float, float]:
+    record = checks.record("acceleration", acceleration)
+    row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
+    ratio = checks.number("damping", damping, checks.fraction_of_critical)
+    return record, checks.number("dt", dt, checks.positive), 2.0 * np.pi / row, ratio, _hardening(hardening)
+
+
+def _response(
+    record: FloatArray, dt: float, omega: float, damping: float, limit: float, hardening: float
+) -> BilinearResponse:
+    strength = np.append(record, 0.0) / omega**2
+    history, state, largest = np.empty((3, record.size)), np.zeros(4), np.zeros(4)
+    kernels.bilinear_history(strength, omega * dt, damping, limit, hardening, history, state, largest)
+    farthest, square, energy, path = largest
+    # an infinite yield displacement is never reached: its path is zero
+    work = (1.0 - hardening) * omega**2 * limit * path if path > 0.0 else 0.0
+    residual = (1.0 - hardening) * state[2]
+    radii = float(np.sqrt(square)), float(np.sqrt(energy))
+    ductility = float(farthest / limit)
+    return BilinearResponse(
+        history[0], history[1] * omega, history[2], ductility, float(work), float(farthest), float(residual), *radii
+    )
+
+
+def _largest_yield(
+    record: FloatArray, dt: float, omega: float, damping: float, hardening: float, ductility: float
+) -> float:
+    """Return the largest yield displacement that gives a ductility, m; NaN if there is none."""
+
+    def excess(limit: float) -> float:
+        return _response(record, dt, omega, damping, limit, hardening).ductility - ductility
+
+    elastic = _response(record, dt, omega, damping, np.inf, hardening).displacement_maximum
+    if ductility == 1.0 or elastic == 0.0:
+        return elastic if elastic > 0.0 else np.nan
+    stronger = elastic
+    while stronger > SMALLEST_YIELD * elastic:
+        weaker = stronger * SCAN_RATIO
+        if excess(weaker) >= 0.0:
+            return float(brentq(excess, weaker, stronger, xtol=1e-12 * elastic))
+        stronger = weaker
+    return np.nan
+
+
+def _spectra(rows: list[BilinearResponse], coefficients: FloatArray) -> InelasticSpectra:
+    return InelasticSpectra(
+        displacement_radius=np.array([row.displacement_radius for row in rows]),
+        energy_radius=np.array([row.energy_radius for row in rows]),
+        sd=np.array([row.displacement_maximum for row in rows]),
+        ductility=np.array([row.ductility for row in rows]),
+        yield_coefficient=coefficients,
+        residual=np.array([row.residual for row in rows]),
+        hysteretic_energy=np.array([row.hysteretic_energy for row in rows]),
+    )
