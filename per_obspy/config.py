@@ -280,6 +280,14 @@ class SimulatedPairs(Section):
     touching: float = Field(0.5, ge=0, le=1, description="share of pairs without a gap")
 
 
+class Interpolation(Section):
+    """How the motion between stations is estimated (``screening/interpolation.py``)."""
+
+    log_std: float = Field(0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7")
+    log_std_weight: float = Field(5.0, gt=0, description="number of stations that this value counts as")
+    vs30_clustered: bool = Field(False, description="Vs30 varies smoothly over the region (Jayaram & Baker, case 2)")
+
+
 class Codes(Section):
     """What code rules ask of a region (``screening/codes.py``); a rule stays empty where its value is not given."""
 

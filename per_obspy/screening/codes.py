@@ -128,12 +128,13 @@ def _zone_share(pairs: pd.DataFrame, codes: Codes) -> FloatArray:
     """Return the share of the height that NTC 2004 adds in the pair's zone, NaN where the zone is unknown."""
     region = pd.Series(codes.ntc_zone, index=pairs.index, dtype=object)
     zone = pairs["ntc_zone"].where(pairs["ntc_zone"].isin(list(NTC_SHARE)), region) if "ntc_zone" in pairs else region
-    return zone.map(NTC_SHARE).to_numpy(np.float64)
+    return np.asarray(zone.map(NTC_SHARE), dtype=np.float64)
 
 
 def _ntc2004(pair: _Pair, share: FloatArray) -> FloatArray:
     first, second = (np.maximum(0.05, side + share * pair.contact_height) for side in pair.displacement)
-    return np.where(pair.alike, 0.5, 1.0) * (first + second)
+    gap: FloatArray = np.where(pair.alike, 0.5, 1.0) * (first + second)
+    return gap
 
 
 def _gb50011(pair: _Pair, codes: Codes) -> FloatArray:
@@ -144,17 +145,20 @@ def _gb50011(pair: _Pair, codes: Codes) -> FloatArray:
 
 def _tbdy2018(pair: _Pair) -> FloatArray:
     least = 0.03 + 0.01 * _started(pair.lower_height - 6.0, 3.0)
-    return np.maximum(least, np.where(pair.aligned, 0.25, 0.5) * np.add(*pair.displacement))
+    gap: FloatArray = np.maximum(least, np.where(pair.aligned, 0.25, 0.5) * np.add(*pair.displacement))
+    return gap
 
 
 def _started(height: FloatArray, step: float) -> FloatArray:
     """Return how many steps a further height has started; a rounding error starts none."""
-    return np.maximum(np.ceil(height / step - 1e-9), 0.0)
+    steps: FloatArray = np.maximum(np.ceil(height / step - 1e-9), 0.0)
+    return steps
 
 
 def _fema_gap(pair: _Pair, codes: Codes) -> FloatArray:
     each = np.nan if codes.fema_seismicity is None else FEMA_GAP[codes.fema_seismicity]
-    return each * np.minimum(*pair.storeys)
+    gap: FloatArray = each * np.minimum(*pair.storeys)
+    return gap
 
 
 def _fema_flags(pair: _Pair, codes: Codes) -> NDArray[np.object_]:
@@ -169,7 +173,8 @@ def _fema_flags(pair: _Pair, codes: Codes) -> NDArray[np.object_]:
     code = sum(raised.astype(np.int64) << bit for bit, raised in enumerate(flags.values()))
     names = list(flags)
     texts = [" ".join(name for bit, name in enumerate(names) if one >> bit & 1) for one in range(1 << len(names))]
-    return np.array(texts, dtype=object)[code]
+    chosen: NDArray[np.object_] = np.array(texts, dtype=object)[code]
+    return chosen
 
 
 def _nzsee_factor(pair: _Pair) -> FloatArray:

@@ -1,0 +1,215 @@
+"""Motion between stations: exact at them, the trend far away, and a textbook's matrix in between."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from per_obspy.config import Interpolation
+from per_obspy.screening.assignment import nearest_station
+from per_obspy.screening.interpolation import (
+    great_circle,
+    interpolated_motion,
+    sites,
+    spatial_correlation,
+)
+
+SETTINGS = Interpolation()
+PERIODS = [0.3, 1.0, 3.0]
+
+
+@pytest.fixture
+def city():
+    """Twelve stations around a city with distances to a source, and their ln PER."""
+    random = np.random.default_rng(7)
+    longitude, latitude = random.uniform(-0.2, 0.2, (2, 12))
+    distance = 1000.0 * np.hypot(111.2 * (longitude + 0.6), 111.2 * latitude)
+    values = -3.0 - 1.2 * np.log(distance / 50e3)[:, None] + random.normal(0.0, 0.5, (12, 3))
+    return sites(longitude, latitude, "", distance), values
+
+
+def test_a_station_gives_its_own_record(city):
+    stations, values = city
+    motion = interpolated_motion(stations, values, PERIODS, stations, SETTINGS)
+    # the equations are solved with a condition number of 1e4 at most
+    assert_allclose(motion.ln_median, values, atol=1e-11)
+    # a deviation is the root of a difference of two ones: sqrt of a few 1e-16 times that condition
+    assert_allclose(motion.log_std, 0.0, atol=1e-6)
+    assert not motion.fallback.any()
+
+
+def test_a_textbooks_matrix_gives_the_same(city):
+    # ordinary Lagrange form of universal kriging (Cressie 1993, 3.4.2), one place at a time, without Cholesky factors;
+    # would catch a lost term of the trend's own uncertainty
+    stations, values = city
+    places = sites([0.01, -0.1, 0.3], [0.02, 0.15, -0.4], "", [52e3, 61e3, 110e3])
+    motion = interpolated_motion(stations, values, PERIODS, places, SETTINGS)
+    logs = np.log(stations.source_distance)
+    trend = np.stack([np.ones(12), logs], axis=1)
+    for column, period in enumerate(PERIODS):
+        range_ = 1000 * {0.3: 8.5 + 17.2 * 0.3, 1.0: 25.7, 3.0: 22.0 + 11.1}[period]
+
+        def covariance(a, b, range_=range_):
+            apart = nearest_station(*(np.array([x]) for x in a), *(np.array([x]) for x in b))[1]
+            return float(np.exp(-3 * apart / range_)[0])
+
+        points = list(zip(stations.longitude, stations.latitude, strict=True))
+        between = np.array([[covariance(a, b) for b in points] for a in points])
+        inverse = np.linalg.inv(between)
+        hat = trend @ np.linalg.inv(trend.T @ inverse @ trend) @ trend.T @ inverse
+        residual = values[:, column] - hat @ values[:, column]
+        variance = (5 * 0.6**2 + residual @ inverse @ residual) / (5 + 12 - 2)
+        system = np.block([[between, trend], [trend.T, np.zeros((2, 2))]])
+        for row in range(3):
+            place = (places.longitude[row], places.latitude[row])
+            right = [*(covariance(a, place) for a in points), 1.0, np.log(places.source_distance[row])]
+            solution = np.linalg.solve(system, right)
+            # chord and haversine distances differ by 1e-8 m, the conditions are as above
+            assert_allclose(motion.ln_median[row, column], solution[:12] @ values[:, column], rtol=1e-8)
+            assert_allclose(motion.log_std[row, column] ** 2, variance * (1 - solution @ right), rtol=1e-7)
+
+
+def test_far_away_the_trend_and_the_whole_deviation_are_left():
+    # stations so far apart that nothing correlates: ordinary least squares and its prediction error, from a textbook
+    values = np.array([[-2.0], [-3.0], [-2.5]])
+    stations = sites([0.0, 10.0, 20.0], [0.0, 0.0, 0.0])
+    motion = interpolated_motion(stations, values, [1.0], sites([100.0], [50.0]), SETTINGS)
+    assert_allclose(motion.ln_median, -2.5, rtol=1e-12)
+    variance = (5 * 0.6**2 + 0.5) / (5 + 3 - 1)
+    assert_allclose(motion.log_std, np.sqrt(variance * (1 + 1 / 3)), rtol=1e-12)
+
+
+def test_one_station_serves_and_its_assumed_deviation_grows_with_distance():
+    # would catch a division by the degrees of freedom of the data alone, which are none
+    motion = interpolated_motion(sites([0.0], [0.0]), [[-2.0]], [1.0], sites([0.0, 0.05, 90.0], [0.0] * 3), SETTINGS)
+    assert_allclose(motion.ln_median[:, 0], -2.0, rtol=1e-12)
+    near = spatial_correlation(great_circle(0.0, 0.0, 0.05, 0.0), 1.0)
+    assert_allclose(motion.log_std[:, 0], 0.6 * np.sqrt([0.0, 2 * (1 - near), 2.0]), rtol=1e-9, atol=1e-9)
+
+
+def test_a_place_between_two_stations_is_between_them():
+    stations, places = sites([0.0, 0.1], [0.0, 0.0]), sites([0.05, 0.02, 0.08], [0.0] * 3)
+    motion = interpolated_motion(stations, [[-2.0], [-4.0]], [1.0], places, SETTINGS)
+    assert_allclose(motion.ln_median[0], -3.0, rtol=1e-12)
+    # mirrored places are mirrored in value and equal in deviation
+    assert_allclose(motion.ln_median[1] + motion.ln_median[2], -6.0, rtol=1e-12)
+    assert_allclose(motion.log_std[1], motion.log_std[2], rtol=1e-12)
+    assert motion.ln_median[1] > -3.0
+
+
+@given(st.permutations(range(12)))
+def test_the_order_of_stations_does_not_matter(order):
+    random = np.random.default_rng(3)
+    longitude, latitude = random.uniform(-0.2, 0.2, (2, 12))
+    values = random.normal(-3.0, 0.5, (12, 1))
+    places = sites([0.0, 0.1], [0.0, 0.1])
+    one = interpolated_motion(sites(longitude, latitude), values, [1.0], places, SETTINGS)
+    other = interpolated_motion(sites(longitude[order], latitude[order]), values[order], [1.0], places, SETTINGS)
+    assert_allclose(other.ln_median, one.ln_median, rtol=1e-10)
+    assert_allclose(other.log_std, one.log_std, rtol=1e-10)
+
+
+def test_more_motion_is_more_motion_everywhere(city):
+    # PER times 3 adds ln 3 and changes no deviation; would catch a trend forced through something
+    stations, values = city
+    places = sites([0.01, 0.3], [0.02, -0.4], "", [52e3, 110e3])
+    once = interpolated_motion(stations, values, PERIODS, places, SETTINGS)
+    thrice = interpolated_motion(stations, values + np.log(3.0), PERIODS, places, SETTINGS)
+    assert_allclose(thrice.ln_median, once.ln_median + np.log(3.0), rtol=1e-10)
+    assert_allclose(thrice.log_std, once.log_std, rtol=1e-10)
+
+
+def test_two_instruments_at_one_place_count_as_one():
+    # their rows of the covariance are equal, so that it has no inverse
+    twice = sites([0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    once = sites([0.0, 0.1], [0.0, 0.0])
+    places = sites([0.0, 0.03], [0.0, 0.02])
+    got = interpolated_motion(twice, [[-2.0], [-2.2], [-4.0]], [1.0], places, SETTINGS)
+    expected = interpolated_motion(once, [[-2.1], [-4.0]], [1.0], places, SETTINGS)
+    assert_allclose(got.ln_median, expected.ln_median, rtol=1e-12)
+    assert_allclose(got.log_std, expected.log_std, rtol=1e-12, atol=1e-9)
+
+
+def test_site_classes_are_not_crossed():
+    # would catch a lakebed's motion reaching rock
+    stations = sites([0.0, 0.001, 0.1], [0.0, 0.0, 0.0], ["lakebed", "rock", "rock"])
+    values = [[0.0], [-4.0], [-4.0]]
+    places = sites([0.0, 0.0, 0.0, 0.0], [0.0] * 4, ["rock", "lakebed", "hill", ""])
+    motion = interpolated_motion(stations, values, [1.0], places, SETTINGS)
+    assert_allclose(motion.ln_median[:2, 0], [-4.0, 0.0], atol=1e-12)
+    assert motion.fallback.tolist() == [False, False, True, True]
+    alone = interpolated_motion(stations.at(np.array([1, 2])), values[1:], [1.0], places.at(np.array([0])), SETTINGS)
+    assert_allclose(motion.log_std[0], alone.log_std[0], rtol=1e-12)
+    # a fallback uses every station
+    assert_allclose(motion.ln_median[2], 0.0, atol=1e-12)
+
+
+def test_unknown_classes_everywhere_are_no_fallback():
+    stations = sites([0.0], [0.0])
+    motion = interpolated_motion(stations, [[-2.0]], [1.0], sites([0.0, 0.0], [0.0, 0.0], ["", "rock"]), SETTINGS)
+    assert motion.fallback.tolist() == [False, True]
+
+
+def test_periods_that_a_record_does_not_support_are_left_to_the_others():
+    stations, places = sites([0.0, 0.1], [0.0, 0.0]), sites([0.0], [0.0])
+    motion = interpolated_motion(stations, [[-2.0, np.nan, np.nan], [-4.0, -4.5, np.nan]], PERIODS, places, SETTINGS)
+    assert_allclose(motion.ln_median[0, :2], [-2.0, -4.5], rtol=1e-12)
+    assert np.isnan(motion.ln_median[0, 2])
+    assert np.isnan(motion.log_std[0, 2])
+    assert motion.log_std[0, 1] > 0.1
+
+
+def test_the_trend_follows_distance_and_vs30_where_stations_tell():
+    # motion that is exactly a trend is found everywhere, with a place of unknown Vs30 at the stations' mean
+    random = np.random.default_rng(5)
+    longitude, latitude = random.uniform(-2, 2, (2, 20))
+    distance, vs30 = random.uniform(20e3, 200e3, 20), random.uniform(200, 800, 20)
+    values = (1.0 - 1.3 * np.log(distance) - 0.6 * np.log(vs30))[:, None]
+    places = sites([50.0, 50.0], [0.0, 0.0], "", 90e3, [400.0, np.nan])
+    motion = interpolated_motion(sites(longitude, latitude, "", distance, vs30), values, [1.0], places, SETTINGS)
+    at_mean = 1.0 - 1.3 * np.log(90e3) - 0.6 * np.log(vs30).mean()
+    # exact up to the conditions of the equations
+    assert_allclose(motion.ln_median[:, 0], [1.0 - 1.3 * np.log(90e3) - 0.6 * np.log(400.0), at_mean], rtol=1e-9)
+
+
+def test_few_stations_do_not_tell_a_slope():
+    # would catch an attenuation drawn through two points
+    stations = sites([0.0, 5.0], [0.0, 0.0], "", [10e3, 500e3])
+    motion = interpolated_motion(stations, [[-2.0], [-6.0]], [1.0], sites([90.0], [0.0], "", 5000e3), SETTINGS)
+    assert_allclose(motion.ln_median, -4.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("period", "clustered", "reach"),
+    # ranges worked by hand from Jayaram & Baker (2009), equations (17), (18) and (19), km
+    [
+        (0.0, False, 8.5),
+        (0.5, False, 17.1),
+        (0.0, True, 40.7),
+        (0.5, True, 33.2),
+        (2.0, False, 29.4),
+        (30.0, True, 59.0),
+    ],
+)
+def test_the_published_ranges(period, clustered, reach):
+    assert_allclose(spatial_correlation(reach * 1000.0, period, clustered), np.exp(-3.0), rtol=1e-12)
+
+
+def test_distances_are_those_of_the_nearest_station():
+    # an implementation by chords; would catch degrees taken for radians, and the date line
+    east, north = np.array([179.99, 0.0, 12.0]), np.array([0.0, 60.0, -45.0])
+    for other in ((-179.99, 0.0), (0.5, 60.0), (12.0, 80.0)):
+        chord = nearest_station(east, north, *(np.array([x]) for x in other))[1]
+        # arcs of near-opposite places are badly told by chords; these are within 1e-9
+        assert_allclose(great_circle(east, north, *other), chord, rtol=1e-9)
+
+
+def test_inputs_that_cannot_be_used_are_named():
+    one = sites([0.0], [0.0])
+    with pytest.raises(ValueError, match=r"ln_per must be \(1, 2\)"):
+        interpolated_motion(one, [[-2.0]], [1.0, 2.0], one, SETTINGS)
+    with pytest.raises(ValueError, match="latitude must be between -90 and 90, got 95"):
+        sites([0.0], [95.0])
+    with pytest.raises(ValueError, match="periods must be positive, got 0"):
+        interpolated_motion(one, [[-2.0]], [0.0], one, SETTINGS)
