@@ -9,6 +9,7 @@ import sys
 import typer
 
 from per_obspy.commands.inventory import catalog, pairs
+from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.walk import run, simulate, spectra
 from per_obspy.errors import PerError, ServiceError
 
@@ -24,7 +25,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, spectra):
+for command in (run, simulate, spectra, events, fetch, info):
     app.command()(command)
 
 

@@ -11,8 +11,12 @@ from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
     from per_obspy.errors import Rejection
+    from per_obspy.records.info import RecordInfo
 
 NOTHING_USABLE = 3
+
+#: What the table of records shows of each; JSON has everything.
+SHOWN = ("record", "format", "level", "start", "dt", "duration", "azimuth", "peak", "unit", "file")
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 
@@ -40,7 +44,8 @@ def events(
     if as_json:
         print(json.dumps([row._asdict() for row in rows]))
     else:
-        print_table(f"{len(rows)} events, the latest first", EventRow._fields, rows)
+        cells = [["" if value is None else value for value in row] for row in rows]
+        print_table(f"{len(rows)} events, the latest first", EventRow._fields, cells)
     if not rows:
         raise typer.Exit(NOTHING_USABLE)
 
@@ -60,11 +65,8 @@ def fetch(
     with shown_progress() as progress:
         folder, stations, rejected = fetch_configured(configuration, again, progress)
     if as_json:
-        print(
-            json.dumps(
-                {"folder": str(folder), "stations": stations, "rejected": [one._asdict() for one in rejected]},
-            )
-        )
+        rows = [one._asdict() for one in rejected]
+        print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
     else:
         print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
         _print_rejected(rejected)
@@ -82,20 +84,23 @@ def info(
 
     Example: per-obspy info shared/records
     """
-    from per_obspy.records.info import RecordInfo, describe_records
+    from per_obspy.records.info import describe_records
 
     records, rejected = describe_records(path, stationxml)
     if as_json:
-        print(
-            json.dumps(
-                {name: [one._asdict() for one in rows] for name, rows in (("records", records), ("rejected", rejected))}
-            )
-        )
+        both = {"records": records, "rejected": rejected}
+        print(json.dumps({name: [row._asdict() for row in rows] for name, rows in both.items()}))
     else:
-        print_table(f"{len(records)} records", RecordInfo._fields, records)
+        print_table(f"{len(records)} records", SHOWN, [_shown(record) for record in records])
         _print_rejected(rejected)
     if not records:
         raise typer.Exit(NOTHING_USABLE)
+
+
+def _shown(record: "RecordInfo") -> list[object]:
+    """Return the cells of a record; times to the second, nothing for what is unknown."""
+    known = record._asdict() | {"start": record.start[:19]}
+    return ["" if known[name] is None else known[name] for name in SHOWN]
 
 
 def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:

@@ -3,7 +3,8 @@ Records from FDSN web services, kept in a folder that any later run reads withou
 
 A cache holds ``event-ID.xml`` and one folder for each window and choice of channels, with ``NET.STA.mseed`` and
 ``NET.STA.xml`` of every station. Files appear whole or not at all and are never asked for again, so that a killed
-fetch goes on where it stopped. ``complete-….json`` says that a request has nothing left to ask for.
+fetch goes on where it stopped; what it left half written (``.….part.…``) is passed over. ``complete-….json`` says that
+a request has nothing left to ask for.
 """
 
 import json
@@ -83,7 +84,7 @@ def fetch(
         event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
     wanted = wanted_around(request, read_event(event) if event else None)
     folder = request.cache / folder_name(wanted)
-    mark = folder / f"complete-{digest((wanted, request.providers))}.json"
+    mark = request.cache / f"complete-{digest((wanted, request.providers))}.json"
     if mark.is_file() and not again:
         return Fetched(folder, event, wanted, _noted(mark))
     if wanted.end > UTCDateTime():
@@ -110,9 +111,9 @@ def fetched_stations(fetched: Fetched) -> FolderContents:
         return FolderContents({}, None, fetched.rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
-    stations = {name: paths for name, paths in found.stations.items() if name in inside}
-    unread = tuple(one for one in found.rejected if not one.name.startswith("complete-"))
-    return FolderContents(stations, found.inventory, (*fetched.rejected, *unread))
+    whole = {name: tuple(path for path in paths if path.stem == name) for name, paths in found.stations.items()}
+    stations = {name: paths for name, paths in whole.items() if paths and name in inside}
+    return FolderContents(stations, found.inventory, fetched.rejected)
 
 
 def _offers(

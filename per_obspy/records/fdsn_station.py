@@ -99,6 +99,8 @@ def _fetch_records(pool: urllib3.PoolManager, wanted: Wanted, path: Path, offer:
     if not content:
         raise _NoData(f"{host(url)} has no data of the window")
     traces = foreign_bytes(obspy.read, content, url, format="MSEED")
+    if surplus := len(content) % min(trace.stats.mseed.record_length for trace in traces):
+        raise RecordRejected(url, f"the answer is cut: its last MiniSEED record has {surplus} bytes")
     _check(url, path.stem, {f"{trace.stats.network}.{trace.stats.station}" for trace in traces})
     _write(path, content)
 

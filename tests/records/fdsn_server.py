@@ -3,7 +3,8 @@
 import copy
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import BytesIO, StringIO
 from typing import NamedTuple
@@ -65,6 +66,17 @@ class FdsnServer(ThreadingHTTPServer):
                     del self.faults[number]
                     return fault
         return None
+
+
+@contextmanager
+def serving(simulation: Simulation) -> Iterator[FdsnServer]:
+    """Give a running server."""
+    with FdsnServer(simulation) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -170,7 +182,8 @@ def whole(handler: _Handler, body: bytes) -> None:
 def status(code: int, **headers: str) -> Fault:
     """Answer with a status and a page of text; ``_`` in the name of a header stands for ``-``."""
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
-    return lambda handler, body: handler.reply(code, b"" if code == 204 else b"the service\nis unwell", headers=sent)
+    said = b"" if code == 204 else b"the service\nis unwell"
+    return lambda handler, _: handler.reply(code, said, headers=sent)
 
 
 def late(seconds: float) -> Fault:
@@ -221,4 +234,4 @@ def shortened(handler: _Handler, body: bytes) -> None:
 
 def content(wrong: bytes) -> Fault:
     """Answer 200 with something else."""
-    return lambda handler, body: handler.reply(200, wrong)
+    return lambda handler, _: handler.reply(200, wrong)

@@ -1,0 +1,154 @@
+"""ASDF workspaces of gmprocess: what it wrote, and what we make of its raw records."""
+
+import json
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+from obspy import UTCDateTime
+from obspy.core.event import Catalog
+
+from per_obspy.config import Scenario
+from per_obspy.errors import CatalogError
+from per_obspy.processing.chain import process
+from per_obspy.records.asdf import find_asdf_stations, has_event, is_asdf, read_asdf_event, read_asdf_station
+from per_obspy.records.metadata import metadata_text
+from per_obspy.records.simulated import Simulation, simulate
+
+PROCESSED = json.dumps({"standard": {"process_level": "corrected physical units"}})
+CORNERS = json.dumps({"corner_frequencies": {"type": "snr", "highpass": 0.1, "lowpass": 30.0}})
+PROVENANCE = "<x><seis_prov:output_units a='b'>{}</seis_prov:output_units></x>"
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Simulation:
+    return simulate(Scenario(stations=2, dt=0.02, magnitude=5.0))
+
+
+def put_text(group, name: str, text: str | bytes) -> None:
+    """Write bytes as ASDF keeps them: as an array."""
+    content = np.frombuffer(text.encode() if isinstance(text, str) else text, np.int8)
+    group.createDimension(f"{name} bytes", content.size)
+    group.createVariable(name, "i1", (f"{name} bytes",))[:] = content
+
+
+def put_waveform(group, trace, tag: str, samples: np.ndarray) -> None:
+    times = (
+        f"{trace.stats.starttime.strftime('%Y-%m-%dT%H:%M:%S')}__{trace.stats.endtime.strftime('%Y-%m-%dT%H:%M:%S')}"
+    )
+    name = f"{trace.id}__{times}__{tag}"
+    group.createDimension(name, samples.size)
+    variable = group.createVariable(name, samples.dtype, (name,))
+    variable[:] = samples
+    variable.starttime = np.int64(trace.stats.starttime.ns)
+    variable.sampling_rate = float(trace.stats.sampling_rate)
+
+
+@pytest.fixture
+def workspace(simulation: Simulation, tmp_path: Path) -> Path:
+    """A workspace as gmprocess leaves it: raw counts, and cm/s2 of which auxiliary data and provenance tell."""
+    path = tmp_path / "workspace.h5"
+    with netCDF4.Dataset(path, "w") as file:
+        file.setncattr("file_format", "ASDF")
+        event = simulation.event.copy()
+        content = tmp_path / "event.xml"
+        Catalog([event]).write(str(content), format="QUAKEML")
+        put_text(file, "QuakeML", content.read_bytes())
+        for trace in simulation.stream:
+            station, stream_name = ".".join(trace.id.split(".")[:2]), f"{trace.id[:-1]}_e1_default"
+            group = file.createGroup(f"Waveforms/{station}")
+            if "StationXML" not in group.variables:
+                put_text(group, "StationXML", metadata_text(simulation.inventory.select(station=station[3:])))
+                put_text(file.createGroup(f"AuxiliaryData/StreamSupplementalStats/{station}"), stream_name, PROCESSED)
+            put_waveform(group, trace, "e1_unprocessed", trace.data.astype(np.int32))
+            put_waveform(group, trace, "e1_default", trace.data / 2000.0)  # 200 000 counts a m/s2, cm/s2
+            parameters = file.createGroup(f"AuxiliaryData/TraceProcessingParameters/{station}")
+            put_text(parameters, f"{trace.id}_e1_default", CORNERS)
+            put_text(file.createGroup("Provenance"), f"{trace.id}_e1_default", PROVENANCE.format("cm/s^2"))
+    return path
+
+
+def test_raw_records_are_counts_with_their_response(workspace: Path, simulation: Simulation):
+    found = find_asdf_stations(workspace)
+    assert found.stations == {"XX.S001": (workspace,), "XX.S002": (workspace,)}
+    stream, rejected = read_asdf_station((workspace,), found.inventory, "XX.S002")
+    assert rejected == ()
+    assert len(stream) == 3
+    for trace in stream:
+        (sent,) = simulation.stream.select(id=trace.id)
+        assert np.array_equal(trace.data, sent.data)
+        assert (trace.stats.starttime.ns, trace.stats.delta) == (sent.stats.starttime.ns, sent.stats.delta)
+        assert (trace.stats.units, trace.stats.processing_level) == ("counts", "raw")
+        assert trace.stats.response.instrument_sensitivity.value == 2e5
+        assert trace.stats.coordinates == sent.stats.coordinates
+
+
+def test_processed_records_are_si_with_their_corners(workspace: Path, simulation: Simulation):
+    found = find_asdf_stations(workspace, "*_default")
+    stream, rejected = read_asdf_station((workspace,), found.inventory, "XX.S001", "*_default")
+    assert (len(stream), rejected) == (3, ())
+    for trace in stream:
+        (sent,) = simulation.stream.select(id=trace.id)
+        # one division and one multiplication
+        assert trace.data == pytest.approx(sent.data / 2e5, rel=1e-15)
+        assert (trace.stats.units, trace.stats.processing_level) == ("m/s2", "processed")
+        assert dict(trace.stats.corners) == {"highpass": 0.1, "lowpass": 30.0}
+
+
+@pytest.mark.parametrize(("unit", "reason"), [("furlong", "gives furlong as output_units"), ("", "gives no unit")])
+def test_an_unknown_unit_is_a_reason(workspace: Path, unit: str, reason: str):
+    with netCDF4.Dataset(workspace, "a") as file:
+        said = file["Provenance"].variables["XX.S001..HNE_e1_default"]
+        said[:] = np.frombuffer(PROVENANCE.format(unit).encode().ljust(said.size), np.int8)[: said.size]
+    found = find_asdf_stations(workspace, "*_default")
+    stream, (rejection,) = read_asdf_station((workspace,), found.inventory, "XX.S001", "*_default")
+    assert len(stream) == 2
+    assert rejection.name == "XX.S001..HNE"
+    assert reason in rejection.reasons[0]
+
+
+def test_a_tag_that_is_not_there_names_those_that_are(workspace: Path):
+    with pytest.raises(CatalogError, match=r"no waveform of tag x, only of e1_default, e1_unprocessed"):
+        find_asdf_stations(workspace, "x")
+
+
+def test_the_event(workspace: Path, simulation: Simulation):
+    assert has_event(workspace)
+    assert read_asdf_event(workspace).origins[0].time == simulation.event.origins[0].time
+
+
+def test_other_files_are_refused(tmp_path: Path):
+    (tmp_path / "text.h5").write_text("no HDF5")
+    assert not is_asdf(tmp_path / "text.h5")
+    with pytest.raises(CatalogError, match=r"text\.h5: cannot be read as ASDF"):
+        find_asdf_stations(tmp_path / "text.h5")
+    with netCDF4.Dataset(tmp_path / "spectra.nc", "w"):
+        pass
+    with pytest.raises(CatalogError, match="is HDF5, but no ASDF file"):
+        find_asdf_stations(tmp_path / "spectra.nc")
+    with pytest.raises(CatalogError, match=r"none\.h5: cannot be read as ASDF"):
+        read_asdf_event(tmp_path / "none.h5")
+
+
+def test_a_workspace_without_its_event(workspace: Path):
+    with netCDF4.Dataset(workspace, "a") as file:
+        file.renameVariable("QuakeML", "Other")
+    assert not has_event(workspace)
+    with pytest.raises(CatalogError, match="must hold one event with an origin, holds 0"):
+        read_asdf_event(workspace)
+
+
+@pytest.mark.real_data
+def test_our_processing_of_gmprocess_s_raw_records_comes_to_its_results(real_data: Path):
+    path = real_data / "records" / "asdf" / "nc72282711_workspace.h5"
+    found = find_asdf_stations(path)
+    assert (list(found.stations), found.rejected) == (["CE.68150"], ())
+    assert read_asdf_event(path).origins[0].time == UTCDateTime("2014-08-24T10:20:44.07")
+    ours = process(read_asdf_station((path,), found.inventory, "CE.68150")[0])
+    theirs, _ = read_asdf_station((path,), found.inventory, "CE.68150", "*_default")
+    assert {trace.stats.processing_level for trace in theirs} == {"processed"}
+    for trace in theirs:
+        (same,) = ours.select(id=trace.id)
+        # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse by less than 1 %
+        assert np.abs(same.data).max() == pytest.approx(np.abs(trace.data).max(), rel=0.01)

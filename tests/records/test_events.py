@@ -1,0 +1,106 @@
+"""Lists of earthquakes from files, feeds and services."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fdsn_server import FdsnServer, content, serving, status
+from obspy import UTCDateTime
+from obspy.core.event import Catalog, Event
+
+from per_obspy.config import Scenario
+from per_obspy.errors import CatalogError, ServiceError
+from per_obspy.records.events import EventRow, find_events
+from per_obspy.records.simulated import Simulation, simulate
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Simulation:
+    return simulate(Scenario(stations=1, dt=0.05, magnitude=6.5, latitude=-1.5, depth=12_000.0))
+
+
+@pytest.fixture
+def server(simulation: Simulation) -> Iterator[FdsnServer]:
+    with serving(simulation) as running:
+        yield running
+
+
+def feature(**changes: object) -> dict[str, object]:
+    """Return an event as the USGS feeds write it."""
+    known = {"mag": 7.1, "place": "18km W of Searles Valley, CA", "time": 1562383193040, "magType": "mw"}
+    return {
+        "type": "Feature",
+        "id": "ci38457511",
+        "properties": known | changes,
+        "geometry": {"type": "Point", "coordinates": [-117.599, 35.77, 8.0]},
+    }
+
+
+def feed(*features: object) -> bytes:
+    return json.dumps({"type": "FeatureCollection", "features": features}).encode()
+
+
+SEARLES = EventRow(
+    "ci38457511", "2019-07-06T03:19:53.040", 35.77, -117.599, 8000.0, 7.1, "mw", "18km W of Searles Valley, CA"
+)
+
+
+def test_a_feed_from_the_web_and_from_a_file(server: FdsnServer, tmp_path: Path):
+    server.extra["/all_day.geojson"] = feed(feature())
+    assert find_events(f"{server.url}/all_day.geojson", {}) == [SEARLES]
+    (tmp_path / "feed.json").write_bytes(feed(feature()))
+    assert find_events(str(tmp_path / "feed.json"), {}) == [SEARLES]
+
+
+def test_the_latest_comes_first_and_gaps_stay_gaps(tmp_path: Path):
+    later = feature(time=1562383193041, mag=None, place=None, magType=None)
+    later["geometry"] = {"coordinates": [1, 2, None]}
+    (tmp_path / "feed.json").write_bytes(feed(feature(), later))
+    rows = find_events(str(tmp_path / "feed.json"), {})
+    assert rows[1] == SEARLES
+    assert rows[0][2:] == (2.0, 1.0, None, None, "", "")
+
+
+def test_a_service_is_asked_what_was_asked(server: FdsnServer, simulation: Simulation):
+    (row,) = find_events(server.url, {"minmagnitude": "6"})
+    origin = simulation.event.origins[0]
+    assert row[:1] + row[2:] == ("xx1", origin.latitude, origin.longitude, origin.depth, 6.5, "Mw", "Nowhere")
+    assert UTCDateTime(row.time) == origin.time
+    assert server.requests[0].parameters == {"minmagnitude": "6", "format": "text"}
+
+
+def test_no_event_is_an_empty_list(server: FdsnServer):
+    server.fail("event", "*", status(204))
+    assert find_events(server.url, {}) == []
+
+
+def test_quakeml(simulation: Simulation, tmp_path: Path):
+    Catalog([simulation.event]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    (row,) = find_events(str(tmp_path / "event.xml"), {})
+    assert (row.latitude, row.depth, row.magnitude) == (-1.5, 12_000.0, 6.5)
+
+
+@pytest.mark.parametrize("wrong", [b"{", b"{}", feed({"id": 1}), b"<html>", b"", b"\xff\xfe"])
+def test_files_that_are_no_list_are_wrong_input(tmp_path: Path, wrong: bytes):
+    (tmp_path / "file").write_bytes(wrong)
+    with pytest.raises(CatalogError, match="file: is no list of events"):
+        find_events(str(tmp_path / "file"), {})
+
+
+def test_an_event_without_origin_is_refused(tmp_path: Path):
+    Catalog([Event()]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match="has no origin"):
+        find_events(str(tmp_path / "event.xml"), {})
+
+
+@pytest.mark.parametrize("wrong", [b"<html>", b"EventID\nxx", b"\xff\xfe", b"#EventID|Time\nxx|yesterday"])
+def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wrong: bytes):
+    server.fail("event", "*", content(wrong))
+    with pytest.raises(ServiceError, match="something else than a list of events"):
+        find_events(server.url, {})
+
+
+def test_unknown_sources_are_wrong_input():
+    with pytest.raises(CatalogError, match="absent: is no base URL"):
+        find_events("absent", {})
