@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from per_obspy.checks import FloatArray, number, positive, record
 
 LATEST_START = 0.9  # of the record, where the quiet end must have begun
-TRIAL_ENDS = 6
+TRIAL_ENDS = 12
 
 
 def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> FloatArray:
@@ -125,7 +125,7 @@ def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> 
             f"onset and end must be times within the first 90 % of the record, got {onset:g} and {end:g} s"
         )
     velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
-    outside = (time < onset) | (time >= latest)
+    outside = (time < onset) | (time >= end)
     candidates = _residual_baselines(velocity, time, onset, np.linspace(end, latest, TRIAL_ENDS))
     best = min(candidates, key=lambda baseline: float(np.mean((velocity - baseline)[outside] ** 2)))
     return samples - np.gradient(best, dt)

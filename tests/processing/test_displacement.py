@@ -46,6 +46,10 @@ def test_the_corner_is_clean_from_there_on():
     assert clean_highpass(bumpy, 0.009) == pytest.approx(0.1, rel=2e-3)
 
 
+def test_a_narrow_band_of_drift_is_not_stepped_over():
+    assert clean_highpass(lambda f: 0.03 if 0.1 < f < 0.125 else 0.01, 0.001) == pytest.approx(0.125, rel=2e-3)
+
+
 def test_limits_of_the_corner():
     assert clean_highpass(lambda _: 0.0, 0.03) == 0.03
     assert clean_highpass(lambda _: 1.0, 0.03) is None

@@ -104,6 +104,15 @@ def test_checks_do_not_stop_each_other(earthquake):
     assert {"spike", "dropout"} <= found
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_sharp_beginning_is_no_spike(order):
+    # mutation: with the vicinity on one side only, the first sample of a burst stands out of the silence before it
+    burst = np.random.default_rng(12).normal(size=6000)
+    burst[:3000] = 1e-4 * burst[:3000]
+    burst[3000] = 3.0
+    assert "spike" not in checks_that_fail(Trace(burst[::order], {"sampling_rate": RATE, "units": "m/s2"}))
+
+
 def test_quiet_recorders_may_stand_still_before_the_shaking(earthquake):
     # mutation: looking for stillness in the whole record rejects every coarse recorder
     samples = np.round(earthquake() * 200)
