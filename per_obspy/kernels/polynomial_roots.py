@@ -1,4 +1,9 @@
-"""First root of a polynomial, found so that no earlier root can be passed."""
+"""
+First root of a polynomial, found so that no earlier root can be passed.
+
+A polynomial is a stretch of a table's line: its coefficients, lowest first, start at a column. (Passing views instead
+costs more in reference counts than the arithmetic.)
+"""
 
 import math
 
@@ -11,24 +16,24 @@ LEAST_ADVANCE = 1e-7
 
 
 @kernel
-def value_and_slope(polynomial, terms, time):
+def value_and_slope(table, line, column, terms, time):
     """Return the polynomial and its derivative at a time, by Horner's rule."""
     value = slope = 0.0
     for n in range(terms - 1, -1, -1):
         slope = slope * time + value
-        value = value * time + polynomial[n]
+        value = value * time + table[line, column + n]
     return value, slope
 
 
 @kernel
-def size_and_curvature(polynomial, terms, end):
+def size_and_curvature(table, line, column, terms, end):
     """Return bounds on [0, end]: of the polynomial without its constant, and of its second derivative."""
     size = curvature = 0.0
     power = 1.0  # end**(n - 2)
     if terms > 1:
-        size = abs(polynomial[1]) * end
+        size = abs(table[line, column + 1]) * end
     for n in range(2, terms):
-        term = abs(polynomial[n]) * power
+        term = abs(table[line, column + n]) * power
         size += term * end * end
         curvature += n * (n - 1) * term
         power *= end
@@ -36,20 +41,20 @@ def size_and_curvature(polynomial, terms, end):
 
 
 @kernel
-def first_fall(polynomial, terms, sign, start, end, rounding):
+def first_fall(table, line, column, terms, sign, start, end, rounding):
     """
     Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, or -1 if it does not.
 
     With K >= |p''| the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends like Newton's.
     A start at zero that rises is not a fall: the same step, written for c < 0, leaves it by 2 p' / K at least.
     """
-    size, curvature = size_and_curvature(polynomial, terms, end)
-    if sign * polynomial[0] > size + rounding:
+    size, curvature = size_and_curvature(table, line, column, terms, end)
+    if sign * table[line, column] > size + rounding:
         return -1.0
-    tolerance = rounding + ROUNDING * (abs(polynomial[0]) + size)
+    tolerance = rounding + ROUNDING * (abs(table[line, column]) + size)
     time = start
     while True:
-        value, slope = value_and_slope(polynomial, terms, time)
+        value, slope = value_and_slope(table, line, column, terms, time)
         value, closing = sign * value, -sign * slope
         if value <= tolerance and closing > 0.0:
             return time

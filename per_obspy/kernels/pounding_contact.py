@@ -2,18 +2,34 @@
 What happens at the instant of a contact: stereomechanical impacts, and which interfaces stay closed.
 
 Impacts are pairwise and sequential, from left to right, repeated until no touching pair approaches. Interfaces that
-touch without speed then stay closed where the forces that keep them closed are compressive.
+touch without speed then stay closed where the forces that keep them closed are compressive. Bounces end, and an
+interface may stay closed, when it separates slower than STILL (m/s), or slower than DELAY (s) times its closing
+acceleration, or after MOST_BOUNCES impacts in a segment.
 """
 
 import math
-from typing import Any, NamedTuple
 
 from ._jit import kernel
 from .pounding_motion import (
+    APPROACH,
+    BOUNCES,
+    CURVE,
+    DELAY,
+    GAP,
+    GIVEN,
+    IMPACTS,
+    LINGERING,
     MASS,
+    MOST_BOUNCES,
+    ORDER,
     PARTICIPATION,
+    PHASE,
     PLASTIC,
     RATE,
+    RESTITUTION,
+    STILL,
+    STUCK,
+    UNLOADING,
     YIELD,
     U,
     V,
@@ -24,111 +40,87 @@ from .pounding_motion import (
     size_of_forces,
 )
 
-# columns of Tally.log, one row an impact
+# columns of the log of impacts, one line an impact as long as there is room
 TIME, LEFT, BEFORE_1, AFTER_1, BEFORE_2, AFTER_2, IMPULSE, PLACE_1, PLACE_2 = range(9)
 LOG_COLUMNS = 9
-# places in Tally.counts
-IMPACTS, IN_SEGMENT = 0, 1
 #: Clearance below which two structures touch at the instant of another contact, relative to displacements and gap.
 TOUCH = 1e-12
 #: Opening acceleration, relative to the forces per unit mass, that is rounding.
 PRESSED = 1e-14
 
 
-class Tally(NamedTuple):
-    """
-    What is counted: arrays.
-
-    ``peaks`` (N, 3): largest displacement, squared radius and squared energy radius; ``approach`` (1,): largest
-    approach speed; ``counts`` (2,): impacts of the history and of the current segment; ``transfer`` (N,): energy given
-    to the neighbours by impacts; ``log`` (capacity, 9): impacts, as long as there is room.
-    """
-
-    peaks: Any
-    approach: Any
-    counts: Any
-    transfer: Any
-    log: Any
-
-
-class Rules(NamedTuple):
-    """
-    When bounces end and pressed structures stay in contact.
-
-    An interface may stay closed that separates slower than ``speed`` (m/s), or slower than ``delay`` (s) times its
-    closing acceleration, or in a segment with ``bounces`` impacts or more.
-    """
-
-    speed: float
-    delay: float
-    bounces: int
-
-
 @kernel
 def touches(row, interface):
     """Tell whether an interface is closed or has no clearance."""
-    if row.stuck[interface] or row.order[interface] > 0:
+    if row[interface, STUCK] or row[interface, ORDER] > 0:
         return True
-    left, right = row.state[interface, U], row.state[interface + 1, U]
-    clearance = row.gaps[interface] - left + right
-    return clearance <= TOUCH * (abs(left) + abs(right) + row.gaps[interface])
+    left, right = row[interface, U], row[interface + 1, U]
+    clearance = row[interface, GAP] - left + right
+    return clearance <= TOUCH * (abs(left) + abs(right) + row[interface, GAP])
 
 
 @kernel
-def strike(row, tally, interface, time):
+def write_impact(log, row, j, time, impulse, before_1, before_2):
+    """Write an impact that has just changed the velocities to the log, if it has room."""
+    count = 0.0
+    for k in range(row.shape[0] - 1):
+        count += row[k, IMPACTS]
+    if count < log.shape[0]:
+        line = int(count)
+        log[line, TIME], log[line, LEFT], log[line, IMPULSE] = time, j, impulse
+        log[line, BEFORE_1], log[line, AFTER_1], log[line, PLACE_1] = before_1, row[j, V], row[j, U]
+        log[line, BEFORE_2], log[line, AFTER_2], log[line, PLACE_2] = before_2, row[j + 1, V], row[j + 1, U]
+
+
+@kernel
+def strike(row, log, j, time):
     """Let the two structures of an interface hit each other."""
-    j, state, structures = interface, row.state, row.structures
-    before_1, before_2 = state[j, V], state[j + 1, V]
+    before_1, before_2 = row[j, V], row[j + 1, V]
     approach = before_1 - before_2
-    change = (1.0 + row.restitution[j]) * approach
-    after_1 = before_1 - change * mass_share(structures, j, j + 1, j + 1)
-    after_2 = before_2 + change * mass_share(structures, j, j + 1, j)
-    if structures[j, MASS] < math.inf:
-        impulse = structures[j, MASS] * (before_1 - after_1)
+    change = (1.0 + row[j, RESTITUTION]) * approach
+    after_1 = before_1 - change * mass_share(row, j, j + 1, j + 1)
+    after_2 = before_2 + change * mass_share(row, j, j + 1, j)
+    if row[j, MASS] < math.inf:
+        impulse = row[j, MASS] * (before_1 - after_1)
     else:
-        impulse = structures[j + 1, MASS] * (after_2 - before_2)
-    state[j, V], state[j + 1, V] = after_1, after_2
-    tally.transfer[j] += 0.5 * impulse * (before_1 + after_1)
-    tally.transfer[j + 1] -= 0.5 * impulse * (before_2 + after_2)
-    tally.approach[0] = max(tally.approach[0], approach)
-    count = tally.counts[IMPACTS]
-    if count < tally.log.shape[0]:
-        line = tally.log[count]
-        line[TIME], line[LEFT], line[IMPULSE] = time, j, impulse
-        line[BEFORE_1], line[AFTER_1], line[PLACE_1] = before_1, after_1, state[j, U]
-        line[BEFORE_2], line[AFTER_2], line[PLACE_2] = before_2, after_2, state[j + 1, U]
-    tally.counts[IMPACTS] += 1
-    tally.counts[IN_SEGMENT] += 1
+        impulse = row[j + 1, MASS] * (after_2 - before_2)
+    row[j, V], row[j + 1, V] = after_1, after_2
+    row[j, GIVEN] += 0.5 * impulse * (before_1 + after_1)
+    row[j + 1, GIVEN] -= 0.5 * impulse * (before_2 + after_2)
+    row[j, APPROACH] = max(row[j, APPROACH], approach)
+    write_impact(log, row, j, time, impulse, before_1, before_2)
+    row[j, IMPACTS] += 1.0
+    row[0, BOUNCES] += 1.0
 
 
 @kernel
-def strike_all(row, tally, rules, hit, time):
+def strike_all(row, log, hit, time):
     """Let touching pairs hit each other, from left to right, until none approaches."""
     approaching = True
     while approaching:
         approaching = False
-        for j in range(row.stuck.size):
-            if row.state[j, V] - row.state[j + 1, V] > rules.speed and (j == hit or touches(row, j)):
-                strike(row, tally, j, time)
-                approaching = tally.counts[IN_SEGMENT] < rules.bounces
+        for j in range(row.shape[0] - 1):
+            if row[j, V] - row[j + 1, V] > row[0, STILL] and (j == hit or touches(row, j)):
+                strike(row, log, j, time)
+                approaching = row[0, BOUNCES] < row[0, MOST_BOUNCES]
 
 
 @kernel
 def free_acceleration(row, i, acceleration):
     """Return the acceleration that a structure has by itself."""
-    stiffness, constant = restoring(row.structures, row.state, row.phase, i)
-    damping = 2.0 * row.structures[i, RATE] * row.state[i, V]
-    return constant - stiffness * row.state[i, U] - damping - row.structures[i, PARTICIPATION] * acceleration
+    stiffness, constant = restoring(row, i)
+    damping = 2.0 * row[i, RATE] * row[i, V]
+    return constant - stiffness * row[i, U] - damping - row[i, PARTICIPATION] * acceleration
 
 
 @kernel
-def lingers(row, tally, rules, interface, acceleration):
+def lingers(row, interface, acceleration):
     """Tell whether a touching pair separates so slowly that it may stay in contact."""
-    separation = row.state[interface + 1, V] - row.state[interface, V]
-    if separation <= rules.speed or tally.counts[IN_SEGMENT] >= rules.bounces:
+    separation = row[interface + 1, V] - row[interface, V]
+    if separation <= row[0, STILL] or row[0, BOUNCES] >= row[0, MOST_BOUNCES]:
         return True
     closing = free_acceleration(row, interface, acceleration) - free_acceleration(row, interface + 1, acceleration)
-    return separation <= rules.delay * closing
+    return separation <= row[0, DELAY] * closing
 
 
 @kernel
@@ -142,54 +134,55 @@ def close_pressed(row, acceleration, slope, duration):
     while closed:
         closed = False
         fill_curves(row, acceleration, 0.0, 4)
-        for j in range(row.stuck.size):
-            if row.lingering[j] and not row.stuck[j]:
-                opening = 2.0 * (row.curve[j + 1, 2] - row.curve[j, 2])
+        for j in range(row.shape[0] - 1):
+            if row[j, LINGERING] and not row[j, STUCK]:
+                opening = 2.0 * (row[j + 1, CURVE + 2] - row[j, CURVE + 2])
                 size = size_of_forces(row, j, acceleration, slope, duration)
                 size += size_of_forces(row, j + 1, acceleration, slope, duration)
                 if opening <= PRESSED * size:
-                    row.stuck[j] = closed = True
+                    row[j, STUCK] = 1.0
+                    closed = True
 
 
 @kernel
-def join(row, tally, first, last):
+def join(row, first, last):
     """Give a cluster its common velocity, by momentum."""
     common = 0.0
     for i in range(first, last + 1):
-        common += mass_share(row.structures, first, last, i) * row.state[i, V]
+        common += mass_share(row, first, last, i) * row[i, V]
     for i in range(first, last + 1):
-        mass, velocity = row.structures[i, MASS], row.state[i, V]
+        mass, velocity = row[i, MASS], row[i, V]
         if mass < math.inf:
-            tally.transfer[i] += 0.5 * mass * (velocity - common) * (velocity + common)
-        row.state[i, V] = common
+            row[i, GIVEN] += 0.5 * mass * (velocity - common) * (velocity + common)
+        row[i, V] = common
 
 
 @kernel
 def unload_reversed(row):
     """Return yielding structures whose velocity was reversed to their elastic phase."""
-    for i in range(row.phase.size):
-        side = row.phase[i]
-        if side != 0 and side * row.state[i, V] <= 0.0:
-            row.phase[i], row.unloading[i] = 0, side
-            row.state[i, PLASTIC] = row.state[i, U] - side * row.structures[i, YIELD]
+    for i in range(row.shape[0]):
+        side = row[i, PHASE]
+        if side != 0 and side * row[i, V] <= 0.0:
+            row[i, PHASE], row[i, UNLOADING] = 0.0, side
+            row[i, PLASTIC] = row[i, U] - side * row[i, YIELD]
 
 
 @kernel
-def meet(row, tally, rules, segment, elapsed, hit):
+def meet(row, log, segment, elapsed, hit):
     """Carry out a contact of one interface, with all that it causes in the row at the same instant."""
     acceleration = segment.acceleration + segment.slope * elapsed
-    strike_all(row, tally, rules, hit, segment.start + elapsed)
-    for j in range(row.stuck.size):
-        row.lingering[j] = False
+    strike_all(row, log, hit, segment.start + elapsed)
+    for j in range(row.shape[0] - 1):
+        row[j, LINGERING] = 0.0
         if j == hit or touches(row, j):
-            row.order[j] = 1 if row.state[j + 1, V] > row.state[j, V] else 2
-            row.stuck[j] = False
-            row.lingering[j] = lingers(row, tally, rules, j, acceleration)
+            row[j, ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
+            row[j, STUCK] = 0.0
+            row[j, LINGERING] = lingers(row, j, acceleration)
     close_pressed(row, acceleration, segment.slope, segment.duration)
     first = 0
-    while first < row.phase.size:
-        last = last_in_contact(row.stuck, first)
+    while first < row.shape[0]:
+        last = last_in_contact(row, first)
         if last > first:
-            join(row, tally, first, last)
+            join(row, first, last)
         first = last + 1
     unload_reversed(row)

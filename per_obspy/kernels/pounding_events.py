@@ -11,9 +11,19 @@ from ._jit import kernel
 from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
 from .pounding_contact import meet
 from .pounding_motion import (
+    CURVE,
+    GAP_ROUNDING,
+    GUARD,
     HARDENING,
+    HIGHEST,
+    ORDER,
+    PHASE,
     PLASTIC,
+    RICHEST,
     STIFFNESS,
+    STUCK,
+    UNLOADING,
+    WIDEST,
     YIELD,
     U,
     V,
@@ -24,9 +34,7 @@ from .pounding_motion import (
 )
 
 # what ends a piece
-NOTHING, HIT, RELEASE, YIELDING, UNLOADING = 0, 1, 2, 3, 4
-# columns of Tally.peaks
-DISPLACEMENT, RADIUS, ENERGY_RADIUS = 0, 1, 2
+NOTHING, HIT, RELEASE, YIELDING, REVERSAL = 0, 1, 2, 3, 4
 
 
 @kernel
@@ -36,18 +44,18 @@ def find_event(row, segment, elapsed):
     acceleration, span = segment.acceleration + slope * elapsed, segment.duration - elapsed
     fill_curves(row, acceleration, slope, terms)
     kind, place = NOTHING, -1
-    for j in range(row.stuck.size):
-        if row.stuck[j]:
+    for j in range(row.shape[0] - 1):
+        if row[j, STUCK]:
             rounding = fill_force(row, j, acceleration, slope, segment.duration, terms)
-            row.guard[0] += rounding  # a force that is zero but for rounding does not open the interface
-            time, found = first_fall(row.guard, terms, 1.0, 0.0, span, 0.0), RELEASE
+            row[j, GUARD] += rounding  # a force that is zero but for rounding does not open the interface
+            time, found = first_fall(row, j, GUARD, terms, 1.0, 0.0, span, 0.0), RELEASE
         else:
             rounding = fill_clearance(row, j, terms)
-            time, found = first_fall(row.guard, terms, 1.0, 0.0, span, rounding), HIT
+            time, found = first_fall(row, j, GUARD, terms, 1.0, 0.0, span, rounding), HIT
         if time >= 0.0:
             span, kind, place = time, found, j
-    for i in range(row.phase.size):
-        if row.structures[i, YIELD] < math.inf:
+    for i in range(row.shape[0]):
+        if row[i, YIELD] < math.inf:
             time, found = _change_of_stiffness(row, i, span, terms)
             if time >= 0.0:
                 span, kind, place = time, found, i
@@ -57,123 +65,115 @@ def find_event(row, segment, elapsed):
 @kernel
 def _change_of_stiffness(row, i, span, terms):
     """Return when a bilinear structure starts to yield or to unload within a span (-1: not), and which."""
-    guard, curve, side = row.guard, row.curve[i], row.phase[i]
-    if side != 0:
-        for n in range(1, terms):
-            guard[n - 1] = n * curve[n]
-        return first_fall(guard, terms - 1, float(side), 0.0, span, 0.0), UNLOADING
+    side = row[i, PHASE]
+    if side != 0.0:
+        _fill_velocity(row, i, terms)
+        return first_fall(row, i, GUARD, terms - 1, side, 0.0, span, 0.0), REVERSAL
     earliest = -1.0
     for sign in (1, -1):
-        order = sign * row.unloading[i]
-        if order <= 0:
-            order = 0
+        order = max(0, int(sign * row[i, UNLOADING]))
         for n in range(order, terms):
-            guard[n - order] = -sign * curve[n]
+            row[i, GUARD + n - order] = -sign * row[i, CURVE + n]
         rounding = 0.0
         if order == 0:
-            guard[0] = row.structures[i, YIELD] - sign * (curve[0] - row.state[i, PLASTIC])
-            rounding = 1e-15 * (row.structures[i, YIELD] + abs(curve[0]))
-        time = first_fall(guard, terms - order, 1.0, 0.0, span, rounding)
+            row[i, GUARD] = row[i, YIELD] - sign * (row[i, U] - row[i, PLASTIC])
+            rounding = GAP_ROUNDING * (row[i, YIELD] + abs(row[i, U]))
+        time = first_fall(row, i, GUARD, terms - order, 1.0, 0.0, span, rounding)
         if time >= 0.0:
             earliest, span = time, time
     return earliest, YIELDING
 
 
 @kernel
-def finish_piece(row, tally, rules, segment, elapsed, span, kind, place):
+def finish_piece(row, log, segment, elapsed, span, kind, place):
     """Move the row to the end of a piece, by then so much of the segment has elapsed, and carry out its event."""
     terms = segment.terms
-    for i in range(row.phase.size):
-        row.state[i, U], row.state[i, V] = value_and_slope(row.curve[i], terms, span)
-        side = row.phase[i]
-        if side != 0:
-            row.state[i, PLASTIC] = row.state[i, U] - side * row.structures[i, YIELD]
+    for i in range(row.shape[0]):
+        row[i, U], row[i, V] = value_and_slope(row, i, CURVE, terms, span)
+        side = row[i, PHASE]
+        if side != 0.0:
+            row[i, PLASTIC] = row[i, U] - side * row[i, YIELD]
         if span > 0.0:
-            row.unloading[i] = 0
-    if span > 0.0:
-        row.order[:] = 0
+            row[i, UNLOADING] = row[i, ORDER] = 0.0
     if kind == HIT:
-        meet(row, tally, rules, segment, elapsed, place)
+        meet(row, log, segment, elapsed, place)
     elif kind == RELEASE:
-        row.stuck[place], row.order[place] = False, 2
+        row[place, STUCK], row[place, ORDER] = 0.0, 2.0
     elif kind == YIELDING:
-        row.phase[place] = 1 if row.state[place, U] > row.state[place, PLASTIC] else -1
-    elif kind == UNLOADING:
-        row.unloading[place], row.phase[place] = 2 * row.phase[place], 0
+        row[place, PHASE] = 1.0 if row[place, U] > row[place, PLASTIC] else -1.0
+    elif kind == REVERSAL:
+        row[place, UNLOADING], row[place, PHASE] = 2.0 * row[place, PHASE], 0.0
 
 
 @kernel
-def raise_peaks(row, tally, span, terms):
+def raise_peaks(row, span, terms):
     """Raise the largest displacement and the largest radii to those of a piece, exact between its ends."""
-    for i in range(row.phase.size):
-        _raise_at(row, tally, i, 0.0, terms)
-        _raise_at(row, tally, i, span, terms)
-        if _may_exceed(row, tally, i, span, terms):
+    for i in range(row.shape[0]):
+        _raise_at(row, i, 0.0, terms)
+        _raise_at(row, i, span, terms)
+        if _may_exceed(row, i, span, terms):
             _fill_velocity(row, i, terms)
-            _raise_at_roots(row, tally, i, span, terms, terms - 1)
-            _fill_power(row, i, row.structures[i, STIFFNESS], 0.0, terms)
-            _raise_at_roots(row, tally, i, span, terms, terms - 2)
-            if row.structures[i, YIELD] < math.inf:
-                stiffness, constant = restoring(row.structures, row.state, row.phase, i)
+            _raise_at_roots(row, i, span, terms, terms - 1)
+            _fill_power(row, i, row[i, STIFFNESS], 0.0, terms)
+            _raise_at_roots(row, i, span, terms, terms - 2)
+            if row[i, YIELD] < math.inf:
+                stiffness, constant = restoring(row, i)
                 # while yielding, the elastoplastic part does not store more
-                _fill_power(row, i, stiffness, constant if row.phase[i] == 0 else 0.0, terms)
-                _raise_at_roots(row, tally, i, span, terms, terms - 2)
+                _fill_power(row, i, stiffness, constant if row[i, PHASE] == 0.0 else 0.0, terms)
+                _raise_at_roots(row, i, span, terms, terms - 2)
 
 
 @kernel
-def _may_exceed(row, tally, i, span, terms):
+def _may_exceed(row, i, span, terms):
     """Tell whether a bound on displacement and velocity of a piece is above what was reached before."""
-    curve, peaks = row.curve[i], tally.peaks[i]
-    reach, _ = size_and_curvature(curve, terms, span)
-    reach += abs(curve[0])
+    reach, _ = size_and_curvature(row, i, CURVE, terms, span)
+    reach += abs(row[i, U])
     _fill_velocity(row, i, terms)
-    speed, _ = size_and_curvature(row.guard, terms - 1, span)
-    squared = (speed + abs(row.guard[0])) ** 2 / row.structures[i, STIFFNESS]
-    stretch = reach + abs(row.state[i, PLASTIC])
-    if reach > peaks[DISPLACEMENT] or reach**2 + squared > peaks[RADIUS]:
+    speed, _ = size_and_curvature(row, i, GUARD, terms - 1, span)
+    squared = (speed + abs(row[i, GUARD])) ** 2 / row[i, STIFFNESS]
+    stretch = reach + abs(row[i, PLASTIC])
+    if reach > row[i, HIGHEST] or reach**2 + squared > row[i, WIDEST]:
         return True
-    return stretch**2 + squared > peaks[ENERGY_RADIUS]
+    return stretch**2 + squared > row[i, RICHEST]
 
 
 @kernel
 def _fill_velocity(row, i, terms):
     """Fill the guard with the velocity of a structure."""
     for n in range(1, terms):
-        row.guard[n - 1] = n * row.curve[i, n]
+        row[i, GUARD + n - 1] = n * row[i, CURVE + n]
 
 
 @kernel
 def _fill_power(row, i, stiffness, constant, terms):
     """Fill the guard with ``u'' + stiffness u - constant``: what makes a squared radius grow, over 2 v / omega²."""
-    guard, curve = row.guard, row.curve[i]
     for n in range(terms - 2):
-        guard[n] = (n + 2) * (n + 1) * curve[n + 2] + stiffness * curve[n]
-    guard[0] -= constant
+        row[i, GUARD + n] = (n + 2) * (n + 1) * row[i, CURVE + n + 2] + stiffness * row[i, CURVE + n]
+    row[i, GUARD] -= constant
 
 
 @kernel
-def _raise_at_roots(row, tally, i, span, terms, guard_terms):
+def _raise_at_roots(row, i, span, terms, guard_terms):
     """Raise the peaks of a structure at every root of the guard within a piece."""
-    value, slope = value_and_slope(row.guard, guard_terms, 0.0)
+    value, slope = value_and_slope(row, i, GUARD, guard_terms, 0.0)
     sign = 1.0 if value > 0.0 or (value == 0.0 and slope > 0.0) else -1.0
-    time = first_fall(row.guard, guard_terms, sign, 0.0, span, 0.0)
+    time = first_fall(row, i, GUARD, guard_terms, sign, 0.0, span, 0.0)
     while time >= 0.0:
-        _raise_at(row, tally, i, time, terms)
+        _raise_at(row, i, time, terms)
         sign = -sign
-        time = first_fall(row.guard, guard_terms, sign, time, span, 0.0)
+        time = first_fall(row, i, GUARD, guard_terms, sign, time, span, 0.0)
 
 
 @kernel
-def _raise_at(row, tally, i, time, terms):
+def _raise_at(row, i, time, terms):
     """Raise the peaks of a structure to the state at a time of the piece."""
-    u, v = value_and_slope(row.curve[i], terms, time)
-    peaks, stiffness = tally.peaks[i], row.structures[i, STIFFNESS]
-    speed = v * v / stiffness
-    peaks[DISPLACEMENT] = max(peaks[DISPLACEMENT], abs(u))
-    peaks[RADIUS] = max(peaks[RADIUS], u * u + speed)
-    limit, hardening = row.structures[i, YIELD], row.structures[i, HARDENING]
+    u, v = value_and_slope(row, i, CURVE, terms, time)
+    speed = v * v / row[i, STIFFNESS]
+    row[i, HIGHEST] = max(row[i, HIGHEST], abs(u))
+    row[i, WIDEST] = max(row[i, WIDEST], u * u + speed)
+    limit, hardening = row[i, YIELD], row[i, HARDENING]
     if limit < math.inf:
-        stretch = limit if row.phase[i] != 0 else u - row.state[i, PLASTIC]
-        peaks[ENERGY_RADIUS] = max(peaks[ENERGY_RADIUS], hardening * u * u + (1 - hardening) * stretch**2 + speed)
+        stretch = limit if row[i, PHASE] != 0.0 else u - row[i, PLASTIC]
+        row[i, RICHEST] = max(row[i, RICHEST], hardening * u * u + (1 - hardening) * stretch**2 + speed)
     else:
-        peaks[ENERGY_RADIUS] = peaks[RADIUS]
+        row[i, RICHEST] = row[i, WIDEST]

@@ -7,12 +7,16 @@ cubic Hermite interpolation tell which lanes may have met, parted, yielded, unlo
 step. Those are repeated from the step's start, event by event, by the code of single histories.
 
 Everything of a lane stands in one array, row by row of 32 lanes, because the compiler would have to check every pair of
-arrays for overlap. A lane's numbers depend on nothing but the pair: 32 lanes are always computed.
+arrays for overlap; each function is one loop over the lanes, so that it vectorises. A lane's numbers depend on nothing
+but the pair: 32 lanes are always computed.
 """
 
 from ._jit import kernel
 
 LANES = 32
+
+#: Flags, which add up: a maximum of the first or second structure, an event.
+LEFT_PEAK, RIGHT_PEAK, EVENT = 1, 2, 4
 
 # rows of one structure; those of the second follow after STRUCTURE_ROWS
 PLACE, SPEED, NEXT_PLACE, NEXT_SPEED = 0, 1, 2, 3
@@ -21,28 +25,27 @@ STEP_PLACE, STEP_SPEED = 4, 9
 #: Acceleration from place, speed, ground acceleration and a constant.
 PULL = 14
 STIFF, FLEXIBILITY, LARGEST_PLACE, LARGEST_RADIUS = 18, 19, 20, 21
-LIMIT, CENTRE, SIDE, PLACE_MARGIN, SPEED_MARGIN = 22, 23, 24, 25, 26
-STRUCTURE_ROWS = 27
+LIMIT, CENTRE, SIDE, PLACE_MARGIN, POWER_MARGIN = 22, 23, 24, 25, 26
+#: Of the current step: ground acceleration and acceleration at its ends, and the sum of the accelerations' sizes, to
+#: which the error of the bounds is proportional.
+GROUND, NEXT_GROUND, START_PULL, END_PULL, STRENGTH = 27, 28, 29, 30, 31
+#: 1, or 0 where nothing can happen any more.
+ACTIVE = 32
+STRUCTURE_ROWS = 33
 # rows of the pair
-COSINE, SINE = 54, 55
-#: The clearance, or in contact the force per unit mass: from both places, speed 1, ground acceleration and a constant.
-GUARD = 56
-MARGIN_SHARE, FORCE_FLOOR, ACTIVE = 61, 62, 63
-ROWS = 64
+COSINE, SINE = 66, 67
+#: The gap, infinite in contact.
+CLEAR = 68
+#: Force of a contact per unit mass: from both places, speed 1, ground acceleration and a constant; above any if free.
+FORCE = 69
+FORCE_FLOOR = 74
+ROWS = 75
 
 
 @kernel
 def at(row, lane):
     """Return where a lane's number of a row stands."""
     return row * LANES + lane
-
-
-@kernel
-def _linear(lanes, row, lane, place, speed, ground):
-    """Return a linear form of place, speed and ground acceleration, with its constant."""
-    constant = lanes[at(row + 3, lane)]
-    form = lanes[at(row + 2, lane)] * ground + constant
-    return lanes[at(row, lane)] * place + (lanes[at(row + 1, lane)] * speed + form)
 
 
 @kernel
@@ -54,99 +57,137 @@ def _step(lanes, row, lane, place, speed, ground, next_ground):
 
 
 @kernel
-def _hull(first, first_rate, last, last_rate, third):
-    """Return the least and largest Bernstein control point of a cubic, ``third`` being a third of the step."""
-    early, late = first + third * first_rate, last - third * last_rate
-    return min(first, last, early, late), max(first, last, early, late)
+def _pull(lanes, row, lane, place, speed, ground):
+    """Return the acceleration of a structure."""
+    form = lanes[at(row + 2, lane)] * ground + lanes[at(row + 3, lane)]
+    return lanes[at(row, lane)] * place + (lanes[at(row + 1, lane)] * speed + form)
 
 
 @kernel
-def _step_structure(lanes, first, lane, ground, next_ground, slope, duration):
-    """
-    Step one structure; return its start, its end, its pulls, its margin, and whether something may happen in between.
-
-    Something: a displacement or radius above its maximum between the ends, yielding, or unloading.
-    """
-    third = duration / 3.0
-    place, speed = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
-    next_place = _step(lanes, first + STEP_PLACE, lane, place, speed, ground, next_ground)
-    next_speed = _step(lanes, first + STEP_SPEED, lane, place, speed, ground, next_ground)
-    pull = _linear(lanes, first + PULL, lane, place, speed, ground)
-    next_pull = _linear(lanes, first + PULL, lane, next_place, next_speed, next_ground)
-    lanes[at(first + NEXT_PLACE, lane)], lanes[at(first + NEXT_SPEED, lane)] = next_place, next_speed
-
-    flexibility, active = lanes[at(first + FLEXIBILITY, lane)], lanes[at(ACTIVE, lane)]
-    radius = place * place + flexibility * speed * speed
-    next_radius = next_place * next_place + flexibility * next_speed * next_speed
-    highest = max(lanes[at(first + LARGEST_PLACE, lane)], active * abs(place))
-    widest = max(lanes[at(first + LARGEST_RADIUS, lane)], active * radius)
-    lanes[at(first + LARGEST_PLACE, lane)], lanes[at(first + LARGEST_RADIUS, lane)] = highest, widest
-
-    strength = abs(pull) + abs(next_pull)
-    speed_margin = lanes[at(first + SPEED_MARGIN, lane)] * strength
-    low, high = _hull(speed, pull, next_speed, next_pull, third)
-    low, high = low - speed_margin, high + speed_margin
-    passing = max(abs(place), abs(next_place)) + 0.5 * duration * max(-low, high)
-    happens = (low <= 0.0) & (high >= 0.0) & (passing > highest)
-    happens |= _may_widen(
-        lanes, first, lane, (place, speed, pull), (next_place, next_speed, next_pull), slope, duration,
-        (max(radius, next_radius), widest),
-    )  # fmt: skip
-
-    margin, centre = lanes[at(first + PLACE_MARGIN, lane)] * strength, lanes[at(first + CENTRE, lane)]
-    left, right = _hull(place - centre, speed, next_place - centre, next_speed, third)
-    side = lanes[at(first + SIDE, lane)]
-    happens |= max(-left, right) + margin > lanes[at(first + LIMIT, lane)]
-    early, late = side * (speed + third * pull), side * (next_speed - third * next_pull)
-    happens |= min(early, late, side * next_speed) < 0.0
-    return (place, speed, pull), (next_place, next_speed, next_pull), margin, happens
-
-
-@kernel
-def _may_widen(lanes, first, lane, start, end, slope, duration, radii):
-    """Tell whether the squared radius may exceed its maximum where ``u'' + omega² u`` is zero inside the step."""
-    stiff = lanes[at(first + STIFF, lane)]
-    by_place, by_speed = lanes[at(first + PULL, lane)], lanes[at(first + PULL + 1, lane)]
-    jerk = lanes[at(first + PULL + 2, lane)] * slope
-    rate = stiff * start[1] + by_place * start[1] + by_speed * start[2] + jerk
-    next_rate = stiff * end[1] + by_place * end[1] + by_speed * end[2] + jerk
-    power, next_power = stiff * start[0] + start[2], stiff * end[0] + end[2]
-    low, high = _hull(power, rate, next_power, next_rate, duration / 3.0)
-    # (r + e)² <= 1.125 r² + 9 e², e = duration / 2 times the largest rate of r, |u'' + omega² u| / omega
-    largest = duration * max(-low, high)
-    bound = 1.125 * radii[0] + 2.25 * lanes[at(first + FLEXIBILITY, lane)] * largest * largest
-    return (low <= 0.0) & (high >= 0.0) & (bound > radii[1])
-
-
-@kernel
-def step_lanes(lanes, flags, north, east, next_north, next_east, duration):
-    """Step every lane as if nothing happened; flag those where something may."""
+def shake(lanes, north, east, next_north, next_east):
+    """Write the ground acceleration of every lane at both ends of the step."""
     for lane in range(LANES):
         cosine, sine = lanes[at(COSINE, lane)], lanes[at(SINE, lane)]
         ground, next_ground = cosine * north + sine * east, cosine * next_north + sine * next_east
-        slope = (next_ground - ground) / duration
-        start_1, end_1, margin_1, happens_1 = _step_structure(lanes, 0, lane, ground, next_ground, slope, duration)
-        start_2, end_2, margin_2, happens_2 = _step_structure(
-            lanes, STRUCTURE_ROWS, lane, ground, next_ground, slope, duration
-        )
-        by_1, by_2 = lanes[at(GUARD, lane)], lanes[at(GUARD + 1, lane)]
-        by_speed, by_ground = lanes[at(GUARD + 2, lane)], lanes[at(GUARD + 3, lane)]
-        constant = lanes[at(GUARD + 4, lane)]
-        third = duration / 3.0
-        guard = by_1 * start_1[0] + by_2 * start_2[0] + by_speed * start_1[1] + by_ground * ground + constant
-        last = by_1 * end_1[0] + by_2 * end_2[0] + by_speed * end_1[1] + by_ground * next_ground + constant
-        rate = by_1 * start_1[1] + by_2 * start_2[1] + by_speed * start_1[2] + by_ground * slope
-        last_rate = by_1 * end_1[1] + by_2 * end_2[1] + by_speed * end_1[2] + by_ground * slope
-        least = min(last, guard + third * rate, last - third * last_rate)
-        floor = lanes[at(FORCE_FLOOR, lane)] * lanes[at(LARGEST_PLACE, lane)]
-        closes = least < lanes[at(MARGIN_SHARE, lane)] * (margin_1 + margin_2) - floor
-        happens = (closes | happens_1 | happens_2) & (lanes[at(ACTIVE, lane)] > 0.0)
-        flags[lane] = 1 if happens else 0
+        lanes[at(GROUND, lane)], lanes[at(NEXT_GROUND, lane)] = ground, next_ground
+        lanes[at(STRUCTURE_ROWS + GROUND, lane)], lanes[at(STRUCTURE_ROWS + NEXT_GROUND, lane)] = ground, next_ground
 
 
 @kernel
-def count_flags(flags):
-    """Return how many lanes are flagged."""
+def _turns(place, next_place, speed, next_speed, bend, duration, highest):
+    """
+    Tell whether a displacement may pass its maximum where the velocity has a root inside the step.
+
+    The velocity leaves its chord by a quarter of ``bend`` at most, so that it has no root where |v0 + v1| is larger
+    than |v0 - v1| by half of it; from an end to a root the displacement grows by an eighth of the step times that.
+    """
+    spread = abs(speed - next_speed) + 0.5 * bend
+    reach = max(abs(place), abs(next_place)) + 0.125 * duration * spread
+    return (abs(speed + next_speed) <= spread) & (reach > highest)
+
+
+@kernel
+def _widens(power, next_power, margin, squared_change, radius, widest):
+    """
+    Tell whether a squared radius may pass its maximum where the power ``u'' + omega² u`` has a root inside the step.
+
+    As ``(r + e)² <= 33/32 r² + 33 e²`` and r grows from an end to the root at most by an eighth of the step times
+    ``(|p0 - p1| + margin) / omega``, which is e.
+    """
+    spread = abs(power - next_power) + margin
+    bound = 1.03125 * radius + squared_change * spread * spread
+    return (abs(power + next_power) <= spread) & (bound > widest)
+
+
+@kernel
+def move(own, flags, peak, duration):
+    """
+    Step one structure of every lane as if nothing happened, and raise its maxima to the step's start.
+
+    Flag lanes where it may pass a maximum inside the step by ``peak``.
+    """
+    squared = 33.0 / 64.0 * duration * duration
+    for lane in range(LANES):
+        ground, next_ground = own[at(GROUND, lane)], own[at(NEXT_GROUND, lane)]
+        place, speed = own[at(PLACE, lane)], own[at(SPEED, lane)]
+        next_place = _step(own, STEP_PLACE, lane, place, speed, ground, next_ground)
+        next_speed = _step(own, STEP_SPEED, lane, place, speed, ground, next_ground)
+        pull = _pull(own, PULL, lane, place, speed, ground)
+        next_pull = _pull(own, PULL, lane, next_place, next_speed, next_ground)
+        own[at(NEXT_PLACE, lane)], own[at(NEXT_SPEED, lane)] = next_place, next_speed
+        own[at(START_PULL, lane)], own[at(END_PULL, lane)] = pull, next_pull
+        strength = abs(pull) + abs(next_pull)
+        own[at(STRENGTH, lane)] = strength
+        flexibility, active = own[at(FLEXIBILITY, lane)], own[at(ACTIVE, lane)]
+        radius = place * place + flexibility * (speed * speed)
+        highest = max(own[at(LARGEST_PLACE, lane)], active * abs(place))
+        widest = max(own[at(LARGEST_RADIUS, lane)], active * radius)
+        own[at(LARGEST_PLACE, lane)], own[at(LARGEST_RADIUS, lane)] = highest, widest
+        larger = max(radius, next_place * next_place + flexibility * (next_speed * next_speed))
+        bend = duration * abs(next_pull - pull)
+        turns = _turns(place, next_place, speed, next_speed, bend, duration, highest)
+        stiff, margin = own[at(STIFF, lane)], own[at(POWER_MARGIN, lane)] * strength
+        power, next_power = stiff * place + pull, stiff * next_place + next_pull
+        widens = _widens(power, next_power, margin, squared * flexibility, larger, widest)
+        flags[lane] |= peak if turns | widens else 0
+
+
+@kernel
+def flag_yielding(own, flags, duration):
+    """Flag lanes where a bilinear structure may yield or unload inside the step."""
+    third = duration / 3.0
+    for lane in range(LANES):
+        speed, next_speed, side = own[at(SPEED, lane)], own[at(NEXT_SPEED, lane)], own[at(SIDE, lane)]
+        early = side * (speed + third * own[at(START_PULL, lane)])
+        late = side * (next_speed - third * own[at(END_PULL, lane)])
+        centre, after = own[at(CENTRE, lane)], own[at(NEXT_PLACE, lane)]
+        stretch = max(abs(own[at(PLACE, lane)] + third * speed - centre), abs(after - third * next_speed - centre))
+        margin = own[at(PLACE_MARGIN, lane)] * own[at(STRENGTH, lane)]
+        yields = max(stretch, abs(after - centre)) + margin > own[at(LIMIT, lane)]
+        flags[lane] |= EVENT if yields | (min(early, late, side * next_speed) < 0.0) else 0
+
+
+@kernel
+def flag_hits(lanes, flags, duration):
+    """Flag lanes whose clearance may close inside the step."""
+    third, second = duration / 3.0, STRUCTURE_ROWS
+    for lane in range(LANES):
+        gap = lanes[at(CLEAR, lane)]
+        start = gap + (lanes[at(second + PLACE, lane)] - lanes[at(PLACE, lane)])
+        end = gap + (lanes[at(second + NEXT_PLACE, lane)] - lanes[at(NEXT_PLACE, lane)])
+        early = start + third * (lanes[at(second + SPEED, lane)] - lanes[at(SPEED, lane)])
+        late = end - third * (lanes[at(second + NEXT_SPEED, lane)] - lanes[at(NEXT_SPEED, lane)])
+        margin = lanes[at(PLACE_MARGIN, lane)] * lanes[at(STRENGTH, lane)]
+        margin += lanes[at(second + PLACE_MARGIN, lane)] * lanes[at(second + STRENGTH, lane)]
+        flags[lane] |= EVENT if min(end, early, late) < margin else 0
+
+
+@kernel
+def flag_releases(lanes, flags, duration):
+    """Flag lanes whose contact may open inside the step."""
+    third, rate_of_ground = duration / 3.0, 1.0 / duration
+    for lane in range(LANES):
+        ground, next_ground = lanes[at(GROUND, lane)], lanes[at(NEXT_GROUND, lane)]
+        by_1, by_2 = lanes[at(FORCE, lane)], lanes[at(FORCE + 1, lane)]
+        by_speed, by_ground = lanes[at(FORCE + 2, lane)], lanes[at(FORCE + 3, lane)]
+        constant, second = lanes[at(FORCE + 4, lane)], STRUCTURE_ROWS
+        speed, next_speed = lanes[at(SPEED, lane)], lanes[at(NEXT_SPEED, lane)]
+        start = by_1 * lanes[at(PLACE, lane)] + by_2 * lanes[at(second + PLACE, lane)]
+        start += by_speed * speed + (by_ground * ground + constant)
+        end = by_1 * lanes[at(NEXT_PLACE, lane)] + by_2 * lanes[at(second + NEXT_PLACE, lane)]
+        end += by_speed * next_speed + (by_ground * next_ground + constant)
+        change = by_ground * (next_ground - ground) * rate_of_ground
+        rate = (by_1 + by_2) * speed + by_speed * lanes[at(START_PULL, lane)] + change
+        end_rate = (by_1 + by_2) * next_speed + by_speed * lanes[at(END_PULL, lane)] + change
+        least = min(end, start + third * rate, end - third * end_rate)
+        flags[lane] |= EVENT if least < -lanes[at(FORCE_FLOOR, lane)] * lanes[at(LARGEST_PLACE, lane)] else 0
+
+
+@kernel
+def count_flags(own, flags):
+    """Return the sum of the flags, those of lanes at rest left out."""
+    for lane in range(LANES):
+        flags[lane] = flags[lane] if own[at(ACTIVE, lane)] > 0.0 else 0
     count = 0
     for lane in range(LANES):
         count += flags[lane]
@@ -154,9 +195,31 @@ def count_flags(flags):
 
 
 @kernel
+def step_lanes(block, flags, duration, bilinear, touching):
+    """
+    Step every lane as if nothing happened, flag those where something may, and return the sum of the flags.
+
+    ``block`` is all lanes' array, its half of the first structures, and the rest from the second structures on.
+    """
+    lanes, left, right = block
+    for lane in range(LANES):
+        flags[lane] = 0
+    move(left, flags, LEFT_PEAK, duration)
+    move(right, flags, RIGHT_PEAK, duration)
+    flag_hits(lanes, flags, duration)
+    if bilinear:
+        flag_yielding(left, flags, duration)
+        flag_yielding(right, flags, duration)
+    if touching:
+        flag_releases(lanes, flags, duration)
+    return count_flags(left, flags)
+
+
+@kernel
 def accept_step(lanes):
     """Make the ends of the step the starts of the next."""
     for lane in range(LANES):
-        for first in (0, STRUCTURE_ROWS):
-            lanes[at(first + PLACE, lane)] = lanes[at(first + NEXT_PLACE, lane)]
-            lanes[at(first + SPEED, lane)] = lanes[at(first + NEXT_SPEED, lane)]
+        lanes[at(PLACE, lane)] = lanes[at(NEXT_PLACE, lane)]
+        lanes[at(SPEED, lane)] = lanes[at(NEXT_SPEED, lane)]
+        lanes[at(STRUCTURE_ROWS + PLACE, lane)] = lanes[at(STRUCTURE_ROWS + NEXT_PLACE, lane)]
+        lanes[at(STRUCTURE_ROWS + SPEED, lane)] = lanes[at(STRUCTURE_ROWS + NEXT_SPEED, lane)]

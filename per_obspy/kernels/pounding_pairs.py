@@ -3,29 +3,28 @@
 import math
 
 from ._jit import kernel
-from .polynomial_roots import value_and_slope
-from .pounding_contact import IMPACTS, IN_SEGMENT
-from .pounding_events import DISPLACEMENT, ENERGY_RADIUS, RADIUS, find_event, finish_piece, raise_peaks
+from .polynomial_roots import first_fall, value_and_slope
+from .pounding_events import find_event, finish_piece, raise_peaks
 from .pounding_lanes import (
     ACTIVE,
     CENTRE,
+    CLEAR,
     COSINE,
     FLEXIBILITY,
+    FORCE,
     FORCE_FLOOR,
-    GUARD,
     LARGEST_PLACE,
     LARGEST_RADIUS,
     LIMIT,
-    MARGIN_SHARE,
     NEXT_PLACE,
     NEXT_SPEED,
     PLACE,
     PLACE_MARGIN,
+    POWER_MARGIN,
     PULL,
     SIDE,
     SINE,
     SPEED,
-    SPEED_MARGIN,
     STEP_PLACE,
     STEP_SPEED,
     STIFF,
@@ -33,11 +32,21 @@ from .pounding_lanes import (
     at,
 )
 from .pounding_motion import (
+    BOUNCES,
+    CURVE,
+    GAP,
+    GUARD,
+    HIGHEST,
     MASS,
+    MOST_BOUNCES,
     PARTICIPATION,
+    PHASE,
     PLASTIC,
     RATE,
+    RICHEST,
     STIFFNESS,
+    STUCK,
+    WIDEST,
     YIELD,
     U,
     V,
@@ -51,14 +60,14 @@ from .pounding_motion import (
 def write_step(lanes, row, lane, i, equation, duration, terms):
     """Write the coefficients of one step of structure i, whose displacement obeys the equation (see below)."""
     damping, stiffness, drive, constant = equation
-    first, curve = i * STRUCTURE_ROWS, row.guard
-    curve[0] = 0.0
-    fill_taylor(curve, terms, 1.0, damping, stiffness, 0.0, 0.0)
-    by_speed = value_and_slope(curve, terms, duration)
-    fill_taylor(curve, terms, 0.0, damping, stiffness, 1.0, 0.0)
-    by_force = value_and_slope(curve, terms, duration)
-    fill_taylor(curve, terms, 0.0, damping, stiffness, 0.0, 1.0 / duration)
-    by_ramp = value_and_slope(curve, terms, duration)
+    first = i * STRUCTURE_ROWS
+    row[i, GUARD] = 0.0
+    fill_taylor(row, i, GUARD, terms, 1.0, damping, stiffness, 0.0, 0.0)
+    by_speed = value_and_slope(row, i, GUARD, terms, duration)
+    fill_taylor(row, i, GUARD, terms, 0.0, damping, stiffness, 1.0, 0.0)
+    by_force = value_and_slope(row, i, GUARD, terms, duration)
+    fill_taylor(row, i, GUARD, terms, 0.0, damping, stiffness, 0.0, 1.0 / duration)
+    by_ramp = value_and_slope(row, i, GUARD, terms, duration)
     for k in range(2):
         to = first + (STEP_PLACE if k == 0 else STEP_SPEED)
         lanes[at(to, lane)] = (1.0 - k) - stiffness * by_force[k]
@@ -75,30 +84,30 @@ def write_step(lanes, row, lane, i, equation, duration, terms):
 @kernel
 def equation_of(row, i):
     """Return damping, stiffness, drive and constant of ``u'' + damping u' + stiffness u = constant - drive a``."""
-    first, last = (0, 1) if row.stuck[0] else (i, i)
+    first, last = (0, 1) if row[0, STUCK] else (i, i)
     _, damping, stiffness, force, force_rate = cluster_equation(row, first, last, 0.0, 1.0)
-    return damping, stiffness, -force_rate, force + stiffness * row.state[i, U]
+    return damping, stiffness, -force_rate, force + stiffness * row[i, U]
 
 
 @kernel
-def write_guard(lanes, row, lane, equation):
-    """Write the clearance, or in contact the force on the structure of finite mass over its mass."""
-    if not row.stuck[0]:
-        form, share, floor = (-1.0, 1.0, 0.0, 0.0, row.gaps[0]), 1.0, 0.0
-    else:
-        damping, stiffness, drive, constant = equation
-        i = 0 if row.structures[0, MASS] < math.inf else 1
-        sign = -1.0 if i == 0 else 1.0
-        own, own_constant = restoring(row.structures, row.state, row.phase, i)
-        by_place = sign * (own - stiffness)
-        by_speed = sign * (2.0 * row.structures[i, RATE] - damping)
-        by_ground = sign * (row.structures[i, PARTICIPATION] - drive)
-        rest = sign * (constant - own_constant)
-        form = (by_place, 0.0, by_speed, by_ground, rest) if i == 0 else (0.0, by_place, by_speed, by_ground, rest)
-        share, floor = 0.0, 1e-12 * max(row.structures[0, STIFFNESS], row.structures[1, STIFFNESS])
-    for k in range(5):
-        lanes[at(GUARD + k, lane)] = form[k]
-    lanes[at(MARGIN_SHARE, lane)], lanes[at(FORCE_FLOOR, lane)] = share, floor
+def write_guard(lanes, row, lane, i, equation):
+    """Write the gap of a free pair, or what force contact exerts on structure i over its mass."""
+    if not row[0, STUCK]:
+        lanes[at(CLEAR, lane)] = row[0, GAP]
+        for k in range(5):
+            lanes[at(FORCE + k, lane)] = 0.0
+        lanes[at(FORCE + 4, lane)] = 1.0
+        return
+    damping, stiffness, drive, constant = equation
+    sign = -1.0 if i == 0 else 1.0
+    own, own_constant = restoring(row, i)
+    lanes[at(CLEAR, lane)] = math.inf
+    lanes[at(FORCE + i, lane)] = sign * (own - stiffness)
+    lanes[at(FORCE + 1 - i, lane)] = 0.0
+    lanes[at(FORCE + 2, lane)] = sign * (2.0 * row[i, RATE] - damping)
+    lanes[at(FORCE + 3, lane)] = sign * (row[i, PARTICIPATION] - drive)
+    lanes[at(FORCE + 4, lane)] = sign * (constant - own_constant)
+    lanes[at(FORCE_FLOOR, lane)] = 1e-12 * max(row[0, STIFFNESS], row[1, STIFFNESS])
 
 
 @kernel
@@ -107,79 +116,112 @@ def write_phase(lanes, row, lane, duration, terms):
     for i in range(2):
         equation = equation_of(row, i)
         write_step(lanes, row, lane, i, equation, duration, terms)
-        first, side = i * STRUCTURE_ROWS, row.phase[i]
-        lanes[at(first + LIMIT, lane)] = row.structures[i, YIELD] if side == 0 else math.inf
-        lanes[at(first + CENTRE, lane)] = row.state[i, PLASTIC]
+        first, side = i * STRUCTURE_ROWS, row[i, PHASE]
+        lanes[at(first + LIMIT, lane)] = row[i, YIELD] if side == 0 else math.inf
+        lanes[at(first + CENTRE, lane)] = row[i, PLASTIC]
         lanes[at(first + SIDE, lane)] = side
-    finite = 0 if row.structures[0, MASS] < math.inf else 1
-    write_guard(lanes, row, lane, equation_of(row, finite))
+        # more than twice what u'' + omega² u can leave its chord by, h²/8 of its own second derivative
+        softening = abs(row[i, STIFFNESS] - equation[1])
+        lanes[at(first + POWER_MARGIN, lane)] = 0.5 * duration * (softening * duration + equation[0])
+    finite = 0 if row[0, MASS] < math.inf else 1
+    write_guard(lanes, row, lane, finite, equation_of(row, finite))
 
 
 @kernel
 def write_constants(lanes, row, lane, cosine, sine, duration):
     """Write what stays the same for a pair, and set its state to rest."""
-    lanes[at(COSINE, lane)], lanes[at(SINE, lane)], lanes[at(ACTIVE, lane)] = cosine, sine, 1.0
+    lanes[at(COSINE, lane)], lanes[at(SINE, lane)] = cosine, sine
     for i in range(2):
-        first, stiffness = i * STRUCTURE_ROWS, row.structures[i, STIFFNESS]
-        for k in (PLACE, SPEED, LARGEST_PLACE, LARGEST_RADIUS):
-            lanes[at(first + k, lane)] = 0.0
+        first, stiffness = i * STRUCTURE_ROWS, row[i, STIFFNESS]
+        lanes[at(first + ACTIVE, lane)] = 1.0
         lanes[at(first + STIFF, lane)], lanes[at(first + FLEXIBILITY, lane)] = stiffness, 1.0 / stiffness
         # four times the error h⁴/384 u'''' of cubic Hermite interpolation, u'''' from the pulls at both ends
         phase = math.sqrt(stiffness) * duration
-        share = (phase * phase + 2.0 * row.structures[i, RATE] * duration) / 96.0
+        share = (phase * phase + 2.0 * row[i, RATE] * duration) / 96.0
         lanes[at(first + PLACE_MARGIN, lane)] = share * duration * duration
-        lanes[at(first + SPEED_MARGIN, lane)] = share * duration
 
 
 @kernel
-def load_pair(lanes, row, tally, lane, pairs):
-    """Copy a pair, as it was at the start of the step, to the row and the tally that the event code works on."""
-    row.structures[:], row.gaps[0], row.restitution[0] = (
-        pairs.structures[lane],
-        pairs.gaps[lane],
-        pairs.restitution[lane],
-    )
-    row.stuck[0], row.order[0] = pairs.stuck[lane], pairs.order[lane]
+def load_pair(lanes, row, lane):
+    """Copy a lane, as it was at the start of the step, to the pair's row, on which the event code works."""
     for i in range(2):
         first = i * STRUCTURE_ROWS
-        row.state[i, U], row.state[i, V] = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
-        row.state[i, PLASTIC] = lanes[at(first + CENTRE, lane)]
-        row.phase[i], row.unloading[i] = pairs.phase[lane, i], pairs.unloading[lane, i]
-        if row.phase[i] != 0:
-            row.state[i, PLASTIC] = row.state[i, U] - row.phase[i] * row.structures[i, YIELD]
-        tally.peaks[i, DISPLACEMENT] = lanes[at(first + LARGEST_PLACE, lane)]
-        tally.peaks[i, RADIUS] = lanes[at(first + LARGEST_RADIUS, lane)]
-        tally.peaks[i, ENERGY_RADIUS] = math.inf  # not asked for
-    tally.counts[IMPACTS], tally.approach[0] = pairs.impacts[lane], pairs.approach[lane]
+        row[i, U], row[i, V] = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
+        if row[i, PHASE] != 0.0:
+            row[i, PLASTIC] = row[i, U] - row[i, PHASE] * row[i, YIELD]
+        row[i, HIGHEST] = lanes[at(first + LARGEST_PLACE, lane)]
+        row[i, WIDEST] = lanes[at(first + LARGEST_RADIUS, lane)]
+        row[i, RICHEST] = math.inf  # not asked for
 
 
 @kernel
-def store_pair(lanes, row, tally, lane, pairs):
-    """Copy a pair back, as it is at the end of the step; tell whether its phase has changed."""
-    changed = row.stuck[0] != pairs.stuck[lane]
-    pairs.stuck[lane], pairs.order[lane] = row.stuck[0], row.order[0]
+def store_pair(lanes, row, lane):
+    """Copy a pair back to its lane, as it is at the end of the step."""
     for i in range(2):
         first = i * STRUCTURE_ROWS
-        changed |= row.phase[i] != pairs.phase[lane, i]
-        changed |= row.phase[i] == 0 and row.state[i, PLASTIC] != lanes[at(first + CENTRE, lane)]
-        lanes[at(first + NEXT_PLACE, lane)], lanes[at(first + NEXT_SPEED, lane)] = row.state[i, U], row.state[i, V]
-        pairs.phase[lane, i], pairs.unloading[lane, i] = row.phase[i], row.unloading[i]
-        lanes[at(first + LARGEST_PLACE, lane)] = tally.peaks[i, DISPLACEMENT]
-        lanes[at(first + LARGEST_RADIUS, lane)] = tally.peaks[i, RADIUS]
-    pairs.impacts[lane], pairs.approach[lane] = tally.counts[IMPACTS], tally.approach[0]
-    return changed
+        lanes[at(first + NEXT_PLACE, lane)], lanes[at(first + NEXT_SPEED, lane)] = row[i, U], row[i, V]
+        lanes[at(first + LARGEST_PLACE, lane)] = row[i, HIGHEST]
+        lanes[at(first + LARGEST_RADIUS, lane)] = row[i, WIDEST]
 
 
 @kernel
-def repeat_step(row, tally, rules, segment):
+def changes_phase(lanes, row, lane):
+    """Tell whether a lane's coefficients are no longer those of its pair's phase."""
+    changes = (lanes[at(CLEAR, lane)] == math.inf) != (row[0, STUCK] != 0.0)
+    for i in range(2):
+        first = i * STRUCTURE_ROWS
+        changes |= lanes[at(first + SIDE, lane)] != row[i, PHASE]
+        changes |= row[i, PHASE] == 0.0 and lanes[at(first + CENTRE, lane)] != row[i, PLASTIC]
+    return changes
+
+
+@kernel
+def repeat_step(row, log, segment):
     """Carry a pair through one step, event by event; tell whether it got through."""
-    tally.counts[IN_SEGMENT] = 0
+    row[0, BOUNCES] = 0.0
     elapsed = 0.0
-    for _ in range(100 * rules.bounces):
+    for _ in range(100 * int(row[0, MOST_BOUNCES])):
         span, kind, place = find_event(row, segment, elapsed)
-        raise_peaks(row, tally, span, segment.terms)
+        raise_peaks(row, span, segment.terms)
         elapsed = elapsed + span if kind else segment.duration
-        finish_piece(row, tally, rules, segment, elapsed, span, kind, place)
+        finish_piece(row, log, segment, elapsed, span, kind, place)
         if elapsed >= segment.duration:
             return True
     return False
+
+
+@kernel
+def raise_inside(lanes, row, lane, first, ground, slope, terms, duration):
+    """
+    Raise the maxima of one structure of a lane to what it reaches inside the step, where nothing else happens.
+
+    Line 0 of ``row`` lends the room for Taylor coefficients.
+    """
+    place, speed = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
+    stiffness, damping = -lanes[at(first + PULL, lane)], -lanes[at(first + PULL + 1, lane)]
+    drive, constant = lanes[at(first + PULL + 2, lane)], lanes[at(first + PULL + 3, lane)]
+    row[0, CURVE] = place
+    force = constant + drive * ground - stiffness * place
+    fill_taylor(row, 0, CURVE, terms, speed, damping, stiffness, force, drive * slope)
+    for n in range(1, terms):
+        row[0, GUARD + n - 1] = n * row[0, CURVE + n]
+    _raise_lane(lanes, row, lane, first, terms, terms - 1, duration)
+    stiff = lanes[at(first + STIFF, lane)]
+    for n in range(terms - 2):
+        row[0, GUARD + n] = (n + 2) * (n + 1) * row[0, CURVE + n + 2] + stiff * row[0, CURVE + n]
+    _raise_lane(lanes, row, lane, first, terms, terms - 2, duration)
+
+
+@kernel
+def _raise_lane(lanes, row, lane, first, terms, guard_terms, duration):
+    """Raise the maxima of one structure of a lane at the roots of the guard."""
+    highest, widest = at(first + LARGEST_PLACE, lane), at(first + LARGEST_RADIUS, lane)
+    value, slope = value_and_slope(row, 0, GUARD, guard_terms, 0.0)
+    sign = 1.0 if value > 0.0 or (value == 0.0 and slope > 0.0) else -1.0
+    time = first_fall(row, 0, GUARD, guard_terms, sign, 0.0, duration, 0.0)
+    while time >= 0.0:
+        u, v = value_and_slope(row, 0, CURVE, terms, time)
+        lanes[highest] = max(lanes[highest], abs(u))
+        lanes[widest] = max(lanes[widest], u * u + lanes[at(first + FLEXIBILITY, lane)] * v * v)
+        sign = -sign
+        time = first_fall(row, 0, GUARD, guard_terms, sign, time, duration, 0.0)

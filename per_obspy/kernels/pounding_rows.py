@@ -6,15 +6,23 @@ import numpy as np
 
 from ._jit import kernel
 from .polynomial_roots import value_and_slope
-from .pounding_contact import IN_SEGMENT
-from .pounding_events import DISPLACEMENT, find_event, finish_piece, raise_peaks
+from .pounding_events import find_event, finish_piece, raise_peaks
 from .pounding_motion import (
+    BOUNCES,
+    CURVE,
+    GAP,
+    GIVEN,
+    GUARD,
     HARDENING,
+    HIGHEST,
     MASS,
+    MOST_BOUNCES,
     PARTICIPATION,
+    PHASE,
     PLASTIC,
     RATE,
     STIFFNESS,
+    STUCK,
     YIELD,
     Segment,
     U,
@@ -35,15 +43,15 @@ SETTLED = 1e-13
 @kernel
 def _velocity_at(row, i, terms, time):
     """Return the velocity of a structure at a time of the piece."""
-    return value_and_slope(row.curve[i], terms, time)[1]
+    return value_and_slope(row, i, CURVE, terms, time)[1]
 
 
 @kernel
 def _add_ground_and_damping(row, work, acceleration, slope, span, terms):
     """Add input (per participation), viscous and hysteretic energy of a piece."""
     half = 0.5 * span
-    for i in range(row.phase.size):
-        mass, drive = row.structures[i, MASS], row.structures[i, PARTICIPATION]
+    for i in range(row.shape[0]):
+        mass, drive = row[i, MASS], row[i, PARTICIPATION]
         if mass == math.inf:
             continue  # the energies of a wall are not defined
         for node in range(NODES.size):
@@ -51,10 +59,10 @@ def _add_ground_and_damping(row, work, acceleration, slope, span, terms):
             velocity = _velocity_at(row, i, terms, time)
             weight = half * WEIGHTS[node] * mass * velocity
             work[i, INPUT] -= weight * drive * (acceleration + slope * time)
-            work[i, DAMPING] += weight * 2.0 * row.structures[i, RATE] * velocity
-        if row.phase[i] != 0:
-            moved = value_and_slope(row.curve[i], terms, span)[0] - row.curve[i, 0]
-            lost = (1.0 - row.structures[i, HARDENING]) * row.structures[i, STIFFNESS] * row.structures[i, YIELD]
+            work[i, DAMPING] += weight * 2.0 * row[i, RATE] * velocity
+        if row[i, PHASE] != 0.0:
+            moved = value_and_slope(row, i, CURVE, terms, span)[0] - row[i, U]
+            lost = (1.0 - row[i, HARDENING]) * row[i, STIFFNESS] * row[i, YIELD]
             work[i, HYSTERETIC] += mass * lost * abs(moved)
 
 
@@ -62,69 +70,69 @@ def _add_ground_and_damping(row, work, acceleration, slope, span, terms):
 def _add_contact_work(row, work, acceleration, slope, span, terms):
     """Add the work of the contact forces of a piece to the energy that each structure has transferred."""
     half = 0.5 * span
-    for j in range(row.stuck.size):
-        if row.stuck[j]:
+    for j in range(row.shape[0] - 1):
+        if row[j, STUCK]:
             fill_force(row, j, acceleration, slope, span, terms)
             for node in range(NODES.size):
                 time = half * (1.0 + NODES[node])
-                force = value_and_slope(row.guard, terms - 2, time)[0]
+                force = value_and_slope(row, j, GUARD, terms - 2, time)[0]
                 done = half * WEIGHTS[node] * force * _velocity_at(row, j, terms, time)
                 work[j, TRANSFER] += done
                 work[j + 1, TRANSFER] -= done
 
 
 @kernel
-def advance(row, tally, rules, work, segment):
+def advance(row, log, work, segment):
     """Carry the row through one segment, event by event; tell whether it got through."""
-    tally.counts[IN_SEGMENT] = 0
+    row[0, BOUNCES] = 0.0
     elapsed, slope, terms = 0.0, segment.slope, segment.terms
-    for _ in range(2 * rules.bounces):
+    for _ in range(int(2 * row[0, MOST_BOUNCES])):
         span, kind, place = find_event(row, segment, elapsed)
-        raise_peaks(row, tally, span, terms)
+        raise_peaks(row, span, terms)
         acceleration = segment.acceleration + slope * elapsed
         _add_ground_and_damping(row, work, acceleration, slope, span, terms)
         _add_contact_work(row, work, acceleration, slope, span, terms)
         elapsed = elapsed + span if kind else segment.duration
-        finish_piece(row, tally, rules, segment, elapsed, span, kind, place)
+        finish_piece(row, log, segment, elapsed, span, kind, place)
         if elapsed >= segment.duration:
             return True
     return False
 
 
 @kernel
-def reach_in_free_vibration(structures, state, i):
+def reach_in_free_vibration(row, i):
     """
     Return the least and largest displacement that a structure can still reach in undisturbed free vibration.
 
     The radius about the place without force only falls. Infinite if the structure can still yield.
     """
-    stiffness = structures[i, STIFFNESS]
+    stiffness = row[i, STIFFNESS]
     centre = 0.0
-    if structures[i, YIELD] < math.inf:
-        centre = (1.0 - structures[i, HARDENING]) * state[i, PLASTIC]
-    radius = math.sqrt((state[i, U] - centre) ** 2 + state[i, V] ** 2 / stiffness)
+    if row[i, YIELD] < math.inf:
+        centre = (1.0 - row[i, HARDENING]) * row[i, PLASTIC]
+    radius = math.sqrt((row[i, U] - centre) ** 2 + row[i, V] ** 2 / stiffness)
     low, high = centre - radius, centre + radius
-    if high > state[i, PLASTIC] + structures[i, YIELD] or low < state[i, PLASTIC] - structures[i, YIELD]:
+    if high > row[i, PLASTIC] + row[i, YIELD] or low < row[i, PLASTIC] - row[i, YIELD]:
         return -math.inf, math.inf
     return low, high
 
 
 @kernel
-def is_settled(row, tally):
+def is_settled(row):
     """Tell whether in free vibration no gap can close any more and no displacement can exceed its maximum."""
     left_high = -math.inf
-    for i in range(row.phase.size):
-        low, high = reach_in_free_vibration(row.structures, row.state, i)
-        if max(high, -low) > (1.0 + SETTLED) * tally.peaks[i, DISPLACEMENT]:
+    for i in range(row.shape[0]):
+        low, high = reach_in_free_vibration(row, i)
+        if max(high, -low) > (1.0 + SETTLED) * row[i, HIGHEST]:
             return False
-        if i > 0 and left_high - low >= row.gaps[i - 1]:
+        if i > 0 and left_high - low >= row[i - 1, GAP]:
             return False
         left_high = high
     return True
 
 
 @kernel
-def run_history(acceleration, dt, refinement, row, tally, rules, motion, work):
+def run_history(acceleration, dt, refinement, row, log, motion, work):
     """
     Fill motion (n_time, N, 3) and work (n_time, N, 4) at every sample; return how many samples were used.
 
@@ -133,21 +141,21 @@ def run_history(acceleration, dt, refinement, row, tally, rules, motion, work):
     After the record the ground rests, and the history goes on until it is settled or its arrays are full.
     """
     duration = dt / refinement
-    terms = taylor_terms(row.structures, duration)
+    terms = taylor_terms(row, duration)
     done = work[0].copy()
-    motion[0] = row.state
+    motion[0] = row[:, U : PLASTIC + 1]
     for k in range(1, motion.shape[0]):
         slope = start = 0.0
         if k < acceleration.size:
             start, slope = acceleration[k - 1], (acceleration[k] - acceleration[k - 1]) / dt
-        elif is_settled(row, tally):
+        elif is_settled(row):
             return k
         for part in range(refinement):
             shift = part * duration
             segment = Segment((k - 1) * dt + shift, duration, start + slope * shift, slope, terms)
-            if not advance(row, tally, rules, done, segment):
+            if not advance(row, log, done, segment):
                 return -k
-        motion[k] = row.state
+        motion[k] = row[:, U : PLASTIC + 1]
         work[k] = done
-        work[k, :, TRANSFER] += tally.transfer
+        work[k, :, TRANSFER] += row[:, GIVEN]
     return motion.shape[0]

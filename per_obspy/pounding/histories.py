@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_block import Pairs, run_block
-from per_obspy.kernels.pounding_contact import Rules
+from per_obspy.kernels import pounding_motion as columns
+from per_obspy.kernels.pounding_block import run_block
+from per_obspy.kernels.pounding_contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes import LANES, LARGEST_PLACE, LARGEST_RADIUS, ROWS, STRUCTURE_ROWS
 from per_obspy.pounding.history import FREE_PERIODS, SPEED_SHARE
-from per_obspy.pounding.rows import closed_record, largest_ground_velocity, new_tally, refinement, row_at_rest
+from per_obspy.pounding.rows import closed_record, largest_ground_velocity, refinement, row_at_rest
 
 #: A bounce that lasts less than this share of a sampling interval ends in contact, and so does the 25th within one.
 SHORTEST_BOUNCE = 1e-3
@@ -172,68 +173,49 @@ def _structures(fields: dict[str, FloatArray]) -> FloatArray:
     return table
 
 
-def _pairs(
-    fields: dict[str, FloatArray],
-    table: FloatArray,
-    chosen: NDArray[np.int64],
-    dt: float,
-    free_vibration: bool,
-    ground_velocity: float,
-) -> Pairs:
-    """Return chosen pairs at rest."""
-    count = chosen.size
-    longest = np.maximum(fields["period_1"], fields["period_2"])[chosen]
-    azimuth = np.radians(fields["azimuth"][chosen])
-    return Pairs(
-        structures=table[chosen],
-        gaps=fields["gap"][chosen],
-        restitution=fields["restitution"][chosen],
-        cosine=np.cos(azimuth),
-        sine=np.sin(azimuth),
-        free_steps=np.ceil(FREE_PERIODS * longest / dt).astype(np.int64) * free_vibration,
-        still=SPEED_SHARE * ground_velocity * table[chosen, :, 4].max(axis=1),
-        stuck=fields["gap"][chosen] <= 0.0,
-        order=np.zeros(count, np.int64),
-        phase=np.zeros((count, 2), np.int64),
-        unloading=np.zeros((count, 2), np.int64),
-        impacts=np.zeros(count, np.int64),
-        approach=np.zeros(count),
-    )
-
-
 def _maxima(
     components: FloatArray, dt: float, fields: dict[str, FloatArray], free_vibration: bool, shape: tuple[int, ...]
 ) -> PoundingMaxima:
-    """Run the pairs in blocks of equal refinement, a thread a processor."""
+    """Run the pairs in blocks of equal refinement, on all processors."""
     table = _structures(fields)
-    frequency = np.sqrt(table[:, :, 1].max(axis=1))
-    parts = np.array([refinement(value, dt) for value in frequency], dtype=np.int64)
+    frequencies = np.sqrt(table[:, :, 1].max(axis=1))
+    refinements = np.array([refinement(frequency, dt) for frequency in frequencies], dtype=np.int64)
+    rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
     ground_velocity = sum(largest_ground_velocity(component, dt) for component in components)
-    count = fields["gap"].size
-    peaks, impacts, approach = np.zeros((2, 2, count)), np.zeros(count, np.int64), np.zeros(count)
+    rows[:, 0, columns.STILL] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
+    rows[:, 0, columns.DELAY] = 0.5 * SHORTEST_BOUNCE * dt / refinements
+    rows[:, 0, columns.MOST_BOUNCES] = MOST_BOUNCES
+    longest = np.maximum(fields["period_1"], fields["period_2"])
+    free_steps = np.ceil(FREE_PERIODS * longest / dt).astype(np.int64) * free_vibration
+    azimuth = np.radians(fields["azimuth"])
 
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
-        pairs = _pairs(fields, table, filled, dt, free_vibration, ground_velocity)
-        part = int(parts[block[0]])
-        lanes = np.zeros(ROWS * LANES)
-        rules = Rules(0.0, 0.5 * SHORTEST_BOUNCE * dt / part, MOST_BOUNCES)
-        row, tally = row_at_rest(np.zeros((2, 6)), np.zeros(1), np.zeros(1)), new_tally(2, 0)
-        flags = np.zeros(LANES, np.int64)
-        if not run_block(components[0], components[1], dt, part, lanes, flags, row, tally, rules, pairs):
-            raise RuntimeError(f"no end of contacts among pairs {block.tolist()}")
-        of_lane = lanes.reshape(ROWS, LANES)[:, : block.size]
-        for i in range(2):
-            peaks[0, i, block] = np.sqrt(of_lane[i * STRUCTURE_ROWS + LARGEST_RADIUS])
-            peaks[1, i, block] = of_lane[i * STRUCTURE_ROWS + LARGEST_PLACE]
-        impacts[block], approach[block] = pairs.impacts[: block.size], pairs.approach[: block.size]
+        own, parts = rows[filled], int(refinements[block[0]])
+        arrays = np.zeros(ROWS * LANES), np.zeros(LANES, np.int64), own, np.zeros((0, LOG_COLUMNS))
+        pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
+        bilinear = bool(np.isfinite(table[block, :, 3]).any())
+        if not run_block(components, dt, parts, *arrays, *pairs, bilinear):
+            raise RuntimeError(f"no end of contacts among the pairs {block.tolist()}")
+        lanes = arrays[0].reshape(ROWS, LANES)
+        own[:, :, columns.WIDEST] = lanes[[LARGEST_RADIUS, STRUCTURE_ROWS + LARGEST_RADIUS]].T
+        own[:, :, columns.HIGHEST] = lanes[[LARGEST_PLACE, STRUCTURE_ROWS + LARGEST_PLACE]].T
+        rows[block] = own[: block.size]
 
-    blocks = []
-    for part in np.unique(parts):
-        same = np.flatnonzero(parts == part)
-        blocks += [same[start : start + LANES] for start in range(0, same.size, LANES)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, blocks))
+        list(pool.map(run, _blocks(refinements)))
     return PoundingMaxima(
-        peaks[0].reshape(2, *shape), peaks[1].reshape(2, *shape), impacts.reshape(shape), approach.reshape(shape)
+        per=np.sqrt(rows[:, :, columns.WIDEST]).T.reshape(2, *shape),
+        displacement_maxima=rows[:, :, columns.HIGHEST].T.reshape(2, *shape),
+        impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
+        impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
     )
+
+
+def _blocks(refinements: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the pairs of each block: at most 32, of equal refinement."""
+    blocks = []
+    for parts in np.unique(refinements):
+        same = np.flatnonzero(refinements == parts)
+        blocks += [same[start : start + LANES] for start in range(0, same.size, LANES)]
+    return blocks

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_contact import Rules, Tally
+from per_obspy.kernels import pounding_motion as columns
+from per_obspy.kernels.pounding_contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_rows import run_history
 from per_obspy.pounding.energies import Energies, closure_of, energies_of
 from per_obspy.pounding.rows import (
     closed_record,
     largest_ground_velocity,
-    new_tally,
     refinement,
     row_at_rest,
     structure_table,
@@ -155,37 +155,40 @@ def pounding_history(
     if free_vibration:
         record = closed_record(record)
         samples = record.size + math.ceil(FREE_PERIODS * max(s.period for s in structures) / step)
-    tally, motion, work = _run(record, step, table, gap, bounce, samples)
+    row, log, motion, work = _run(record, step, table, gap, bounce, samples)
     energies = energies_of(table, motion, work)
-    per, energy_radius = np.sqrt(tally.peaks[:, 1]), np.sqrt(tally.peaks[:, 2])
+    displacement, velocity, plastic = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
     return PoundingHistory(
-        step * np.arange(len(motion)),
-        *np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy(),
-        impact_table(tally.log[: tally.counts[0]]),
-        per,
-        tally.peaks[:, 0],
-        energy_radius,
-        energies,
-        closure_of(energies),
+        time=step * np.arange(len(motion)),
+        displacement=displacement,
+        velocity=velocity,
+        plastic_displacement=plastic,
+        impacts=impact_table(log),
+        per=np.sqrt(row[:, columns.WIDEST]),
+        displacement_maxima=row[:, columns.HIGHEST].copy(),
+        energy_radius=np.sqrt(row[:, columns.RICHEST]),
+        energies=energies,
+        closure=closure_of(energies),
     )
 
 
 def _run(
     record: FloatArray, step: float, table: FloatArray, gap: FloatArray, bounce: FloatArray, samples: int
-) -> tuple[Tally, FloatArray, FloatArray]:
-    """Run the kernel, a second time if the log of impacts was too short; return tally, motion and work."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Run the kernel, a second time if the log of impacts was too short; return row, log, motion and work."""
     parts = refinement(math.sqrt(table[:, 1].max()), step)
-    rules = Rules(SPEED_SHARE * largest_ground_velocity(record, step) * table[:, 4].max(), 0.0, MOST_BOUNCES)
     motion, work = np.zeros((samples, len(table), 3)), np.zeros((samples, len(table), 4))
     room, impacts = -1, FIRST_ROOM
     while room < impacts:
         room = impacts
-        tally = new_tally(len(table), room)
-        used = run_history(record, step, parts, row_at_rest(table, gap, bounce), tally, rules, motion, work)
+        row, log = row_at_rest(table, gap, bounce), np.zeros((room, LOG_COLUMNS))
+        row[0, columns.STILL] = SPEED_SHARE * largest_ground_velocity(record, step) * table[:, 4].max()
+        row[0, columns.MOST_BOUNCES] = MOST_BOUNCES
+        used = run_history(record, step, parts, row, log, motion, work)
         if used < 0:
             raise RuntimeError(f"no end of contacts at {-used * step:g} s: more than {2 * MOST_BOUNCES} events")
-        impacts = int(tally.counts[0])
-    return tally, motion[:used], work[:used]
+        impacts = int(row[:, columns.IMPACTS].sum())
+    return row, log[:impacts], motion[:used], work[:used]
 
 
 def impact_table(log: FloatArray) -> pd.DataFrame:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_contact import LOG_COLUMNS, Tally
-from per_obspy.kernels.pounding_motion import LARGEST_PHASE, MOST_TERMS, Row
+from per_obspy.kernels import pounding_motion as motion
 from per_obspy.pounding.structure import Structure
 
 
@@ -34,63 +33,30 @@ def structure_table(structures: Sequence[Structure]) -> FloatArray:
     )
 
 
-def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> Row:
+def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> FloatArray:
     """
-    Return a row of structures at rest; structures without a gap start in contact.
+    Return rows of structures at rest, as the kernels' tables; structures without a gap start in contact.
 
     Parameters
     ----------
-    table : (n_structures, 6) ndarray
+    table : (..., n_structures, 6) ndarray
         As from `structure_table`.
-    gaps : (n_structures - 1,) ndarray
+    gaps : (..., n_structures - 1) ndarray
         In m.
-    restitution : (n_structures - 1,) ndarray
+    restitution : (..., n_structures - 1) ndarray
         Dimensionless.
 
     Returns
     -------
-    Row
-        For the kernels.
+    (..., n_structures, COLUMNS) ndarray
+        For the kernels; when bounces end is still to be set.
     """
-    count = len(table)
-    return Row(
-        structures=table,
-        gaps=gaps,
-        restitution=restitution,
-        state=np.zeros((count, 3)),
-        phase=np.zeros(count, np.int64),
-        stuck=gaps <= 0.0,
-        lingering=np.zeros(count - 1, np.bool_),
-        order=np.zeros(count - 1, np.int64),
-        unloading=np.zeros(count, np.int64),
-        curve=np.zeros((count, MOST_TERMS)),
-        guard=np.zeros(MOST_TERMS),
-    )
-
-
-def new_tally(count: int, capacity: int) -> Tally:
-    """
-    Return a tally for a number of structures, with room for a number of impacts in its log.
-
-    Parameters
-    ----------
-    count : int
-        Structures.
-    capacity : int
-        Impacts.
-
-    Returns
-    -------
-    Tally
-        All zero.
-    """
-    return Tally(
-        peaks=np.zeros((count, 3)),
-        approach=np.zeros(1),
-        counts=np.zeros(2, np.int64),
-        transfer=np.zeros(count),
-        log=np.zeros((capacity, LOG_COLUMNS)),
-    )
+    row = np.zeros((*table.shape[:-1], motion.COLUMNS))
+    row[..., :6] = table
+    row[..., :-1, motion.GAP] = gaps
+    row[..., :-1, motion.RESTITUTION] = restitution
+    row[..., :-1, motion.STUCK] = gaps <= 0.0
+    return row
 
 
 def refinement(largest_frequency: float, dt: float) -> int:
@@ -109,7 +75,7 @@ def refinement(largest_frequency: float, dt: float) -> int:
     int
         A power of two; 1 where the shortest period is above about 9 dt.
     """
-    return 2 ** max(0, math.ceil(math.log2(largest_frequency * dt / LARGEST_PHASE)))
+    return 2 ** max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_PHASE)))
 
 
 def closed_record(acceleration: FloatArray) -> FloatArray:
