@@ -133,16 +133,17 @@ def spatial_correlation(distance: ArrayLike, period: float, vs30_clustered: bool
     >>> print(spatial_correlation([0.0, 25_700.0], 1.0).round(4))
     [1.     0.0498]
     """
-    reach = 1000.0 * _range(min(checks.number("period", period, checks.not_negative), LONGEST), vs30_clustered)
-    correlation: FloatArray = np.exp(-3.0 * checks.not_negative("distance", distance) / reach)
-    return correlation
+    period = checks.number("period", period, checks.not_negative)
+    return _correlation(checks.not_negative("distance", distance), period, vs30_clustered)
 
 
-def _range(period: float, vs30_clustered: bool) -> float:
-    """Return the distance beyond which residuals hardly agree, km."""
+def _correlation(distance: FloatArray, period: float, vs30_clustered: bool) -> FloatArray:
     if period >= 1.0:
-        return 22.0 + 3.7 * period
-    return 40.7 - 15.0 * period if vs30_clustered else 8.5 + 17.2 * period
+        reach = 22.0 + 3.7 * min(period, LONGEST)
+    else:
+        reach = 40.7 - 15.0 * period if vs30_clustered else 8.5 + 17.2 * period
+    correlation: FloatArray = np.exp(distance * (-3.0 / (1000.0 * reach)))
+    return correlation
 
 
 def interpolated_motion(
@@ -194,11 +195,11 @@ def interpolated_motion(
     for rows, serving, is_fallback in _served(stations, places):
         fallback[rows] = is_fallback
         near, mean = _one_a_place(stations.at(serving), values[serving])
+        field = _Field(near, places.at(rows), _distances(near, near), _distances(near, places.at(rows)))
         for column in np.flatnonzero(np.isfinite(mean).any(axis=0)):
             known = np.isfinite(mean[:, column])
-            median[rows, column], deviation[rows, column] = _kriged(
-                near.at(known), mean[known, column], float(grid[column]), places.at(rows), settings
-            )
+            one = _kriged(field.knowing(known), mean[known, column], float(grid[column]), settings)
+            median[rows, column], deviation[rows, column] = one
     return InterpolatedMotion(median, deviation, fallback)
 
 
@@ -223,13 +224,31 @@ def _one_a_place(stations: Sites, values: FloatArray) -> tuple[Sites, FloatArray
     return stations.at(first), mean
 
 
-def _kriged(
-    stations: Sites, values: FloatArray, period: float, places: Sites, settings: Interpolation
-) -> tuple[FloatArray, FloatArray]:
+class _Field(NamedTuple):
+    """Stations, places that they serve, and the distances between them, m."""
+
+    stations: Sites
+    places: Sites
+    between: FloatArray
+    across: FloatArray
+
+    def knowing(self, known: NDArray[np.bool_]) -> "_Field":
+        """Return the field with some of the stations."""
+        if known.all():
+            return self
+        return _Field(self.stations.at(known), self.places, self.between[np.ix_(known, known)], self.across[known])
+
+
+def _distances(some: Sites, others: Sites) -> FloatArray:
+    return great_circle(
+        some.longitude[:, None], some.latitude[:, None], others.longitude[None, :], others.latitude[None, :]
+    )
+
+
+def _kriged(field: _Field, values: FloatArray, period: float, settings: Interpolation) -> tuple[FloatArray, FloatArray]:
     """Return median and deviation at the places, of one period and from stations that all know it."""
-    trend, trend_there = _trends(stations, places)
-    between = _correlation(stations, stations, period, settings)
-    across = _correlation(stations, places, period, settings)
+    trend, trend_there = _trends(field.stations, field.places)
+    between, across = (_correlation(d, period, settings.vs30_clustered) for d in (field.between, field.across))
     factor = cho_factor(between, lower=True)
     weighted = cho_solve(factor, trend)
     normal = cho_factor(trend.T @ weighted, lower=True)
@@ -243,13 +262,6 @@ def _kriged(
     of_trend = np.einsum("ij,ij->j", unknown, cho_solve(normal, unknown))
     deviation = np.sqrt(variance * np.maximum(left + of_trend, 0.0))
     return trend_there @ coefficients + told @ across, deviation
-
-
-def _correlation(some: Sites, others: Sites, period: float, settings: Interpolation) -> FloatArray:
-    distance = great_circle(
-        some.longitude[:, None], some.latitude[:, None], others.longitude[None, :], others.latitude[None, :]
-    )
-    return spatial_correlation(distance, period, settings.vs30_clustered)
 
 
 def _trends(stations: Sites, places: Sites) -> tuple[FloatArray, FloatArray]:
