@@ -46,7 +46,8 @@ def _with_corners(trace: Trace, settings: Processing) -> Trace:
     highpass = Corner(told["highpass"], "header") if told.get("highpass") else _silent_highpass(trace, settings)
     nyquist = trace.stats.sampling_rate / 2
     silent = Corner(LOWPASS_OF_NYQUIST * nyquist, "0.75 Nyquist, the header is silent")
-    lowpass = Corner(told["lowpass"], "header") if told.get("lowpass") else silent
+    known = 0 < told.get("lowpass", 0) < nyquist  # 999 Hz and the like stand for none
+    lowpass = Corner(told["lowpass"], "header") if known else silent
     remembered(out, highpass=float(highpass.frequency), highpass_source=highpass.reason)
     remembered(out, lowpass=float(lowpass.frequency), lowpass_source=lowpass.reason)
     return out

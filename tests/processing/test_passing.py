@@ -26,6 +26,11 @@ def test_samples_and_corners_pass(earthquake):
     assert "per_obspy" not in given[0].stats
 
 
+def test_a_low_pass_beyond_the_sampling_is_none(earthquake):
+    given = others(earthquake(), corners=AttribDict(highpass=0.1, lowpass=999.0))
+    assert passed_through(given, SETTINGS)[0].stats.per_obspy.lowpass == 37.5
+
+
 @pytest.mark.parametrize(("drift", "longest"), [(0.0, (14.0, 96.0)), (3e-3, (1.0, 14.0))])
 def test_silent_headers_are_limited_by_their_drift(earthquake, drift, longest):
     # the drift has 20 s; mutation: taking the duration as the limit calls the record usable to 96 s
