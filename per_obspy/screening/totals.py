@@ -1,0 +1,183 @@
+"""Totals of a risk table by administrative area or by cell of a grid."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.schema import Column
+from per_obspy.screening.assignment import EARTH_RADIUS
+
+STATES = ("yes", "possible", "no")
+
+#: Unit and meaning of the columns of a table of totals; every risk class has a column ``class_...`` besides.
+TOTALS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("area", "str", "", "name of the area or of the cell; empty where the pair table does not tell"),
+        Column("pairs", "int64", "1", "pairs in the area"),
+        Column("yes", "int64", "1", "pairs whose gap is below their demand"),
+        Column("possible", "int64", "1", "pairs that may pound"),
+        Column("no", "int64", "1", "the other pairs"),
+        Column("expected_pounding", "float64", "1", "expected number of pounding pairs: sum of their probabilities"),
+        Column("expected_pounding_std_independent", "float64", "1", "its standard deviation if pairs were independent"),
+        Column("expected_pounding_std_common", "float64", "1", "its standard deviation if one cause decided all pairs"),
+        Column("worst_pair", "str", "", "pair_id of the area's worst pair"),
+        Column("worst_state", "str", "", "its state"),
+        Column("worst_demand_ratio", "float64", "1", "its gap / demand; empty where its demand is 0"),
+        Column("longitude", "float64", "degrees", "of the middle of the area's pairs, east"),
+        Column("latitude", "float64", "degrees", "of the middle of the area's pairs, north"),
+    )
+}
+
+
+class ExpectedCount(NamedTuple):
+    """
+    Expected number of events and what its standard deviation may be.
+
+    Attributes
+    ----------
+    mean : float
+        Sum of the probabilities.
+    std_independent, std_common : float
+        If nothing links the events, and if one cause decides all of them (each happens when the same uniform random
+        number stays below its probability). Pairs that share an earthquake lie in between.
+    """
+
+    mean: float
+    std_independent: float
+    std_common: float
+
+
+class GridCells(NamedTuple):
+    """
+    Cells of a grid.
+
+    Attributes
+    ----------
+    cell : (n_places,) ndarray of str
+        The cell of each place.
+    boxes : DataFrame
+        ``west, south, east, north`` in degrees, indexed by the cell.
+    """
+
+    cell: NDArray[np.object_]
+    boxes: pd.DataFrame
+
+
+def expected_count(probability: ArrayLike) -> ExpectedCount:
+    """
+    Return the expected number of events of given probabilities, with both limits of its standard deviation.
+
+    Parameters
+    ----------
+    probability : (n_events,) array_like
+        From 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If a probability is outside [0, 1].
+
+    Examples
+    --------
+    >>> expected_count([0.5, 0.5, 0.5, 0.5])
+    ExpectedCount(mean=2.0, std_independent=1.0, std_common=2.0)
+    """
+    falling = -np.sort(-np.atleast_1d(checks.between("probability", probability, 0.0, 1.0)))
+    mean = float(falling.sum())
+    # all pairs of events: the smaller of two probabilities is the later one, twice for each earlier one, once itself
+    both = float(falling @ (2.0 * np.arange(falling.size) + 1.0))
+    independent = float(np.sqrt((falling * (1.0 - falling)).sum()))
+    return ExpectedCount(mean, independent, float(np.sqrt(max(both - mean**2, 0.0))))
+
+
+def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
+    """
+    Count the pairs of every area.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Risk table; with a column ``probability`` (of pounding) expected numbers are given, of the pairs that have one.
+    area : (n_pairs,) array_like of str
+        Area or cell of each pair.
+
+    Returns
+    -------
+    DataFrame
+        One row an area, in the order of their names: the columns of ``TOTALS`` and ``class_...`` for every risk class.
+    """
+    rows = table.assign(area=np.asarray(area, dtype=object)).sort_values("rank", kind="stable")
+    groups = rows.groupby("area", sort=True)
+    counted = pd.DataFrame({"pairs": groups.size()})
+    for state in STATES:
+        counted[state] = (rows["state"] == state).groupby(rows["area"]).sum()
+    for name in rows["risk_class"].unique():
+        counted[f"class_{name}"] = (rows["risk_class"] == name).groupby(rows["area"]).sum()
+    if "probability" in rows:
+        expected = [expected_count(values.dropna()) for _, values in groups["probability"]]
+        names = [f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common")]
+        counted[names] = np.array(expected).reshape(-1, 3)
+    worst = rows.drop_duplicates("area").set_index("area")[["pair_id", "state", "demand_ratio"]]
+    counted = counted.join(worst.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1))
+    return counted.join(_middles(rows)).rename_axis("area").reset_index()
+
+
+def _middles(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the middle of each area's pairs, across the date line too."""
+    east, north = np.radians(rows["longitude"]), np.radians(rows["latitude"])
+    parts = {"x": np.cos(north) * np.cos(east), "y": np.cos(north) * np.sin(east), "z": np.sin(north)}
+    mean = pd.DataFrame(parts).groupby(rows["area"]).mean()
+    latitude = np.degrees(np.arctan2(mean["z"], np.hypot(mean["x"], mean["y"])))
+    return pd.DataFrame({"longitude": np.degrees(np.arctan2(mean["y"], mean["x"])), "latitude": latitude})
+
+
+def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCells:
+    """
+    Return the cell of each place in a grid of about equal areas over the whole earth.
+
+    Parameters
+    ----------
+    longitude, latitude : (n_places,) array_like
+        Degrees east and north.
+    size : float
+        Extent of a cell, m. Rows are exactly that high; cells are as wide as a whole number around the row allows.
+
+    Raises
+    ------
+    ValueError
+        If a coordinate is out of range or the size is not above 1 m.
+
+    Examples
+    --------
+    >>> grid_cells([0.001, 0.002, -0.001], [0.001, 0.001, 0.001], 500.0).cell
+    array(['r0 c0', 'r0 c0', 'r0 c80059'], dtype=object)
+    """
+    east = np.atleast_1d(checks.between("longitude", longitude, -180.0, 180.0))
+    north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0))
+    high = np.degrees(checks.number("size", size, _above_one_metre) / EARTH_RADIUS)
+    row = np.floor(north / high).astype(np.int64)
+    around = _cells_around(row, high)
+    column = np.minimum(np.floor((east % 360.0) / 360.0 * around).astype(np.int64), around - 1)
+    cells, which = np.unique(np.stack([row, column], axis=1), axis=0, return_inverse=True)
+    names = np.array([f"r{one} c{other}" for one, other in cells.tolist()], dtype=object)
+    wide = 360.0 / _cells_around(cells[:, 0], high)
+    west = (cells[:, 1] * wide + 180.0) % 360.0 - 180.0
+    south = cells[:, 0] * high
+    boxes = {"west": west, "south": south, "east": west + wide, "north": south + high}
+    return GridCells(names[which], pd.DataFrame(boxes, index=names))
+
+
+def _cells_around(row: NDArray[np.int64], high: float) -> NDArray[np.int64]:
+    """Return how many cells there are around the earth in a row."""
+    middle = np.radians(np.minimum(np.abs(row + 0.5) * high, 90.0))
+    around: NDArray[np.int64] = np.maximum(np.rint(360.0 * np.cos(middle) / high).astype(np.int64), 1)
+    return around
+
+
+def _above_one_metre(name: str, values: ArrayLike) -> FloatArray:
+    return checks.between(name, values, 1.0, 1e7)
