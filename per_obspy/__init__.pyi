@@ -20,3 +20,6 @@ from .pounding.linearization import linearized_correlation as linearized_correla
 from .pounding.psd_correlation import psd_correlation as psd_correlation
 from .pounding.record_correlation import record_correlation as record_correlation
 from .spectra.bilinear import bilinear_response as bilinear_response
+from .pounding.probability import pounding_probability as pounding_probability
+from .pounding.restitution import bumper_restitution as bumper_restitution, kelvin_voigt_damping as kelvin_voigt_damping, kelvin_voigt_restitution as kelvin_voigt_restitution, required_restitution as required_restitution
+from .pounding.supplemental_damping import supplemental_damping as supplemental_damping

@@ -59,7 +59,10 @@ def record_correlation(
         checks.positive("period_2", period_2),
         checks.fraction_of_critical("damping_2", damping_2),
     )
-    rows = [array.ravel() for array in pairs]
-    correlation = directional_correlation(acceleration, np.zeros_like(acceleration), dt, *rows, [[0.0]])
+    period_1, damping_1, period_2, damping_2 = (array.ravel() for array in pairs)
+    still = np.zeros_like(acceleration)
+    correlation = directional_correlation(
+        acceleration, still, dt, period_1, damping_1, period_2, damping_2, azimuths=[[0.0]]
+    )
     shaped: FloatArray = correlation[:, 0].reshape(pairs[0].shape)
     return shaped

@@ -1,0 +1,125 @@
+"""Probability of pounding: Monte Carlo, SciPy's integration, limits, monotony, combination of dispersions."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import dblquad
+from scipy.stats import norm
+
+from per_obspy.pounding.probability import (
+    combined_dispersion,
+    combined_dispersion_correlation,
+    demand_probability,
+    first_order_probability,
+    lognormal_dispersion,
+    period_dispersion,
+    pounding_probability,
+    simulated_probability,
+)
+
+CASES = [
+    (0.2, 0.1, 0.0, 0.25, 0.4, 0.4, 0.5, 0.1, 0.1), (0.2, 0.2, 0.99, 0.02, 0.4, 0.4, 0.8, 0.0, 0.0),
+    (0.2, 0.2, 1.0, 0.02, 0.4, 0.4, 0.8, 0.0, 0.0), (0.2, 0.15, -0.5, 0.3, 0.3, 0.4, 1.0, 0.0, 0.0),
+    (0.2, 0.15, 0.5, 0.1, 0.0, 0.4, 0.8, 0.0, 0.0), (0.3, 0.1, 0.3, 0.3, 0.5, 0.2, -0.4, 0.14, 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_against_monte_carlo(case):
+    # mutation: variance of the difference with the wrong sign, conditional mean without its slope, e^d for e^2d.
+    # 400 000 samples: a standard error of 8e-4, four of them
+    assert pounding_probability(*case) == pytest.approx(simulated_probability(*case, count=400_000), abs=3.2e-3)
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[5]])
+def test_against_integration_over_both_radii(case):
+    # mutation: anything in the reduction to one dimension. SciPy integrates over the plane of ln r1 and ln r2
+    r1, r2, rho, gap, b1, b2, shared, model, spread = case
+    rest = np.hypot(model, spread)
+
+    def integrand(y, x):
+        first, second = r1 * np.exp(b1 * x), r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y))
+        demand = np.sqrt(first**2 + second**2 - 2 * rho * first * second)
+        return norm.pdf(x) * norm.pdf(y) * norm.cdf(np.log(demand / gap) / rest)
+
+    expected = dblquad(integrand, -7, 7, -7, 7, epsabs=1e-8, epsrel=1e-8)[0]  # beyond 7: 1e-12
+    assert pounding_probability(*case) == pytest.approx(expected, abs=1e-7)
+
+
+@given(st.floats(0.01, 1.0), st.floats(0.01, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 1.0), st.floats(0.05, 0.6))
+@settings(max_examples=40)
+def test_radii_that_move_together_have_a_closed_form(r1, r2, correlation, gap, dispersion):
+    # mutation: dispersion of the ratio not vanishing. Then ln g_cr is normal around its median
+    demand = np.sqrt((r1 - r2) ** 2 + 2 * (1 - correlation) * r1 * r2)
+    expected = norm.cdf(np.log(demand / gap) / np.hypot(dispersion, 0.2)) if demand > 0 else 0.0
+    found = pounding_probability(r1, r2, correlation, gap, dispersion, dispersion, 1.0, 0.2)
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.floats(0.05, 0.5), st.floats(0.05, 0.5), st.floats(-0.99, 0.99), st.floats(-0.9, 0.9))
+@settings(max_examples=25)
+def test_symmetry_scale_and_monotony(r1, r2, correlation, shared):
+    # mutation: structure 1 favoured; a length in metres where a ratio should stand; gap and demand exchanged
+    gaps = np.array([0.05, 0.1, 0.2, 0.4])
+    here = pounding_probability(r1, r2, correlation, gaps, 0.3, 0.5, shared, 0.1)
+    there = pounding_probability(r2, r1, correlation, gaps, 0.5, 0.3, shared, 0.1)
+    np.testing.assert_allclose(here, there, atol=1e-10)
+    larger = pounding_probability(7 * r1, 7 * r2, correlation, 7 * gaps, 0.3, 0.5, shared, 0.1)
+    np.testing.assert_allclose(here, larger, atol=1e-10)
+    assert np.all(np.diff(here) < 0)
+
+
+def test_certainty_walls_and_touching_pairs():
+    # mutation: log of zero, NaN in place of an answer
+    assert pounding_probability(0.1, 0.1, 0.0, [0.1, 0.2], 0.0, 0.0, 0.0).tolist() == [1.0, 0.0]
+    assert pounding_probability(0.1, 0.1, 0.5, 0.0, 0.3, 0.3, 0.5) == 1.0
+    assert pounding_probability(0.0, 0.0, 0.5, 0.0, 0.3, 0.3, 0.5) == 0.0
+    wall = pounding_probability([0.1, 0.0], [0.0, 0.1], 0.3, 0.1, 0.3, 0.3, 0.5)
+    np.testing.assert_allclose(wall, 0.5, atol=1e-12)
+    # no model error and only structure 2 uncertain: r2 must exceed a root of the quadratic, 3-4-5
+    expected = norm.cdf(np.log(0.4 / 0.5) / 0.3)
+    assert pounding_probability(0.3, 0.4, 0.0, np.hypot(0.3, 0.5), 0.0, 0.3, 0.0) == pytest.approx(expected, abs=1e-9)
+
+
+def test_demand_of_a_record():
+    np.testing.assert_allclose(demand_probability(0.2, [0.1, 0.2, 0.4], 0.3), norm.cdf(np.log([2.0, 1.0, 0.5]) / 0.3))
+    assert demand_probability([0.2, 0.0, 0.0], [0.0, 0.1, 0.0], 0.3).tolist() == [1.0, 0.0, 0.0]
+    assert demand_probability([0.2, 0.1], 0.15, 0.0).tolist() == [1.0, 0.0]
+
+
+def test_first_order_warns_and_is_close_where_it_may_be():
+    case = CASES[0]
+    with pytest.warns(UserWarning, match="use pounding_probability"):
+        assert first_order_probability(*case) == pytest.approx(pounding_probability(*case), abs=0.05)
+
+
+def test_dispersions_combine():
+    assert combined_dispersion([0.3, 0.4]) == pytest.approx(0.5)
+    # shared ground motion 0.3 and 0.4 at 0.9, own periods 0.4 and 0.3: 0.9 * 0.12 / 0.25
+    assert combined_dispersion_correlation([0.3, 0.4], [0.4, 0.3], [0.9, 0.0]) == pytest.approx(0.432)
+    assert combined_dispersion_correlation([0.0], [0.3], [1.0]) == 0.0
+    rng = np.random.default_rng(2)
+    dispersion = float(lognormal_dispersion(0.1, 0.05))
+    sample = 0.1 * np.exp(-(dispersion**2) / 2 + dispersion * rng.standard_normal(400_000))
+    assert sample.mean() == pytest.approx(0.1, rel=5e-3)  # three standard errors
+    assert sample.std() == pytest.approx(0.05, rel=1e-2)
+
+
+def test_period_dispersion_is_the_slope_over_a_span():
+    periods = np.geomspace(0.1, 10.0, 50)
+    assert period_dispersion(periods, 0.1 * periods**1.5, 1.0, 0.3) == pytest.approx(0.45)
+    with pytest.raises(ValueError, match="do not cover"):
+        period_dispersion(periods, periods, 9.0, 0.3)
+
+
+@pytest.mark.parametrize(("place", "value", "name"), [
+    (0, -1.0, "per_1"), (1, np.nan, "per_2"), (2, 1.1, "correlation"), (3, -0.1, "gap"), (4, -0.1, "dispersion_1"),
+    (5, np.inf, "dispersion_2"), (6, 1.2, "dispersion_correlation"), (7, -1.0, "model_dispersion"),
+    (8, -1.0, "gap_dispersion"),
+])  # fmt: skip
+def test_bad_arguments_are_named(place, value, name):
+    arguments = list(CASES[0])
+    arguments[place] = value
+    with pytest.raises(ValueError, match=name):
+        pounding_probability(*arguments)
