@@ -1,0 +1,161 @@
+"""GeoPackages of a risk table and of its totals; QGIS draws the pairs in the colours of their risk class."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pyogrio
+import shapely
+from matplotlib.colors import LinearSegmentedColormap, to_hex
+from numpy.typing import NDArray
+
+from per_obspy.files import written_whole
+from per_obspy.report.style import STATE_COLOURS
+
+#: WGS 84; a GeoPackage keeps longitude before latitude, whatever EPSG says.
+CRS = "EPSG:4326"
+GEOMETRY = "geom"
+PAIRS, TOTALS, STYLES = "pairs", "totals", "layer_styles"
+
+#: Diameter of a pair's mark, worst and mildest class, millimetres on the screen.
+LARGEST, SMALLEST = 2.6, 1.2
+
+
+def write_pairs_layer(
+    tables: Iterable[pd.DataFrame], classes: Sequence[str], path: Path, facts: Mapping[str, str]
+) -> None:
+    """
+    Write the pairs of a risk table as points of a GeoPackage, whole or not at all.
+
+    Parameters
+    ----------
+    tables : iterable of DataFrame
+        The risk table, in one piece or in several with the same columns; only one is held at a time.
+    classes : sequence of str
+        Names of the risk classes, worst first.
+    path : Path
+        ``.gpkg``.
+    facts : mapping of str to str
+        What the layer says of all its rows, for example whether the motion is simulated.
+    """
+    with written_whole(path) as part:
+        for number, table in enumerate(tables):
+            points = shapely.points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
+            _write(part, PAIRS, points, table, number > 0, facts)
+        _write_style(part, PAIRS, class_style(classes))
+
+
+def write_totals_layer(totals: pd.DataFrame, boxes: pd.DataFrame | None, path: Path, facts: Mapping[str, str]) -> None:
+    """
+    Write totals as the polygons of their cells, or as points in the middle of their pairs; whole or not at all.
+
+    Parameters
+    ----------
+    totals : DataFrame
+        From :func:`per_obspy.screening.totals.totals`.
+    boxes : DataFrame or None
+        ``west, south, east, north`` in degrees indexed by ``area``; None for areas whose outline nobody gave.
+    path : Path
+        ``.gpkg``.
+    facts : mapping of str to str
+        What the layer says of all its rows.
+    """
+    if boxes is None:
+        shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())
+    else:
+        shapes = shapely.box(*boxes.loc[totals["area"], ["west", "south", "east", "north"]].to_numpy().T)
+    with written_whole(path) as part:
+        _write(part, TOTALS, shapes, totals, False, facts)
+
+
+def _write(
+    path: Path, layer: str, shapes: NDArray[np.object_], table: pd.DataFrame, append: bool, facts: Mapping[str, str]
+) -> None:
+    pyogrio.raw.write(
+        path,
+        shapely.to_wkb(shapes),
+        [_values(table[name]) for name in table],
+        list(table),
+        geometry_type="Polygon" if (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any() else "Point",
+        crs=CRS,
+        layer=layer,
+        append=append,
+        driver="GPKG",
+        layer_options={"GEOMETRY_NAME": GEOMETRY, "DESCRIPTION": "; ".join(f"{k}: {v}" for k, v in facts.items())},
+    )
+
+
+def _values(column: pd.Series) -> NDArray[Any]:
+    """Return a column as GDAL takes it: numbers and truth values as they are, anything else as text."""
+    if column.dtype.kind in "biuf":
+        return column.to_numpy()
+    text: NDArray[np.object_] = column.astype(object).where(column.notna(), None).to_numpy(object)
+    return text
+
+
+def _write_style(path: Path, layer: str, style: str) -> None:
+    """Add the table in which QGIS keeps styles, with the style that it takes for this layer when it is opened."""
+    texts = {
+        "f_table_catalog": "", "f_table_schema": "", "f_table_name": layer, "f_geometry_column": GEOMETRY,
+        "styleName": "risk class", "styleQML": style, "styleSLD": "", "description": "colour by risk class",
+        "owner": "", "ui": "",
+    }  # fmt: skip
+    columns: dict[str, NDArray[Any]] = {name: np.array([text], dtype=object) for name, text in texts.items()}
+    columns["useAsDefault"] = np.array([True])
+    columns["update_time"] = np.array([datetime.now(UTC).replace(tzinfo=None)], dtype="datetime64[ms]")
+    pyogrio.raw.write(
+        path,
+        None,
+        list(columns.values()),
+        list(columns),
+        geometry_type=None,
+        layer=STYLES,
+        append=True,
+        driver="GPKG",
+        layer_options={"FID": "id"},
+    )
+
+
+def class_style(classes: Sequence[str]) -> str:
+    """Return a QGIS style (QML): one mark a risk class, the worst largest, and the worst pairs drawn on top."""
+    root = ElementTree.Element("qgis", version="3.28.0", styleCategories="Symbology")
+    renderer = ElementTree.SubElement(
+        root, "renderer-v2", type="categorizedSymbol", attr="risk_class", enableorderby="1", symbollevels="0"
+    )
+    categories, symbols = (ElementTree.SubElement(renderer, name) for name in ("categories", "symbols"))
+    colours = LinearSegmentedColormap.from_list("risk", list(STATE_COLOURS.values()))
+    for number, name in enumerate(classes):
+        share = number / max(len(classes) - 1, 1)
+        ElementTree.SubElement(categories, "category", value=name, label=name, symbol=str(number), render="true")
+        _add_mark(symbols, number, to_hex(colours(share)), LARGEST + share * (SMALLEST - LARGEST))
+    order = ElementTree.SubElement(
+        ElementTree.SubElement(renderer, "orderby"), "orderByClause", asc="0", nullsFirst="0"
+    )
+    order.text = '"rank"'
+    ElementTree.SubElement(root, "layerGeometryType").text = "0"
+    return "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n" + ElementTree.tostring(
+        root, encoding="unicode"
+    )
+
+
+def _add_mark(symbols: ElementTree.Element, number: int, colour: str, size: float) -> None:
+    red, green, blue = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
+    symbol = ElementTree.SubElement(symbols, "symbol", type="marker", name=str(number), alpha="1", clip_to_extent="1")
+    layer = ElementTree.SubElement(
+        symbol, "layer", {"class": "SimpleMarker", "enabled": "1", "locked": "0", "pass": "0"}
+    )
+    options = {
+        "name": "circle",
+        "color": f"{red},{green},{blue},255",
+        "outline_color": "35,35,35,255",
+        "outline_width": "0.1",
+        "size": f"{size:.2f}",
+        "size_unit": "MM",
+    }
+    mapping = ElementTree.SubElement(layer, "Option", type="Map")
+    for name, value in options.items():
+        ElementTree.SubElement(mapping, "Option", type="QString", name=name, value=value)
