@@ -38,6 +38,13 @@ def _to_folder(path: Path, info: SerializationInfo) -> str:
     return os.path.relpath(path, info.context["folder"]) if info.context else str(path)
 
 
+def _moment(text: str) -> str:
+    """Return a time as it was given, if it is one."""
+    datetime.fromisoformat(text)
+    return text
+
+
+Moment = Annotated[str, AfterValidator(_moment)]
 RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to_folder)]
 
 
@@ -66,7 +73,16 @@ class Columns(Section):
     raw: bool = Field(False, description="not corrected yet")
 
 
-class Fdsn(Section):
+class Window(Section):
+    """A time window; what is not given is seen from the origin time of the event."""
+
+    start: Moment | None = Field(None, description="ISO 8601, UTC; not given: before the origin time")
+    end: Moment | None = Field(None, description="ISO 8601, UTC; not given: after the origin time")
+    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
+    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
+
+
+class Fdsn(Window):
     """Records from FDSN web services around an epicentre; what was fetched stays in the cache."""
 
     providers: tuple[str, ...] = Field(
@@ -78,10 +94,6 @@ class Fdsn(Section):
     latitude: float | None = Field(None, ge=-90, le=90, description="centre, degrees north; not given: epicentre")
     longitude: float | None = Field(None, ge=-180, le=180, description="centre, degrees east; not given: epicentre")
     radius: float = Field(100_000.0, gt=0, le=20_000_000, description="m, of the circle in which stations are wanted")
-    start: str | None = Field(None, description="of the window, ISO 8601, UTC; not given: before the origin time")
-    end: str | None = Field(None, description="of the window, ISO 8601, UTC; not given: after the origin time")
-    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
-    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
     networks: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
     stations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
     locations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed; empty: --")
@@ -93,27 +105,16 @@ class Fdsn(Section):
     wait: float = Field(1.0, ge=0, description="s; the second retry waits twice as long, and so on; Retry-After counts")
     connections: int = Field(3, ge=1, le=16, description="stations asked for at the same time")
 
-    @field_validator("start", "end")
-    @classmethod
-    def _moment(cls, text: str | None) -> str | None:
-        if text is not None:
-            datetime.fromisoformat(text)
-        return text
-
     @property
     def knows_where_and_when(self) -> bool:
         """Whether centre and window are given, so that no event is needed."""
         return None not in (self.latitude, self.longitude, self.start, self.end)
 
 
-class Sds(Section):
+class Sds(Window):
     """A time window of an SDS archive."""
 
     folder: RelativePath = Field(description="with YEAR/NET/STA/CHAN.D/ below it")
-    start: str | None = Field(None, description="ISO 8601, UTC; not given: before the origin time of records.event")
-    end: str | None = Field(None, description="ISO 8601, UTC; not given: after the origin time of records.event")
-    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
-    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
 
 
 class Asdf(Section):

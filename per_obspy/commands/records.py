@@ -88,8 +88,8 @@ def info(
 
     records, rejected = describe_records(path, stationxml)
     if as_json:
-        both = {"records": records, "rejected": rejected}
-        print(json.dumps({name: [row._asdict() for row in rows] for name, rows in both.items()}))
+        useless = [one._asdict() for one in rejected]
+        print(json.dumps({"records": [record._asdict() for record in records], "rejected": useless}))
     else:
         print_table(f"{len(records)} records", SHOWN, [_shown(record) for record in records])
         _print_rejected(rejected)

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from functools import reduce
 from operator import add
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import obspy
-from obspy import Inventory, Stream
+from obspy import Inventory, Stream, UTCDateTime
 from obspy.core.event import Event
 
 from ..errors import CatalogError, RecordRejected, Rejection
@@ -81,7 +81,11 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
 
 
 def read_station(
-    paths: Iterable[Path], inventory: Inventory | None, station: str | None = None
+    paths: Iterable[Path],
+    inventory: Inventory | None,
+    station: str | None = None,
+    start: UTCDateTime | None = None,
+    end: UTCDateTime | None = None,
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Read the files of one station, with coordinates, orientation and response attached.
@@ -94,6 +98,8 @@ def read_station(
         From ``FolderContents.inventory``.
     station : str, optional
         ``"NET.STA"``: keep only its traces, for files that hold several stations.
+    start, end : UTCDateTime, optional
+        Read only this window, for files that hold a day.
 
     Returns
     -------
@@ -105,7 +111,7 @@ def read_station(
     stream, rejected = Stream(), []
     for path in paths:
         try:
-            traces = _read(path, headonly=False)
+            traces = _read(path, headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
             continue
@@ -164,11 +170,11 @@ def _kind(path: Path) -> str:
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
-def _read(path: Path, *, headonly: bool) -> Stream:
+def _read(path: Path, **options: Any) -> Stream:
     with open_file(path) as file:
         if not file.read(1):
             raise RecordRejected(str(path), "the file is empty")
-    return foreign(obspy.read, path, headonly=headonly)
+    return foreign(obspy.read, path, **options)
 
 
 def _read_inventory(path: Path) -> Inventory:

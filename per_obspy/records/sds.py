@@ -64,8 +64,7 @@ def read_sds_station(
 
     A station without samples in the window is a rejection.
     """
-    stream, rejected = read_station(paths, inventory, station)
-    stream.trim(start, end)
+    stream, rejected = read_station(paths, inventory, station, start, end)
     if not stream and not rejected:
         rejected = (Rejection("station", station, "", None, (f"no samples from {start} to {end}",)),)
     return stream, rejected

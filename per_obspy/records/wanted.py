@@ -11,6 +11,7 @@ from obspy.core.inventory import Station
 from obspy.geodetics import kilometers2degrees, locations2degrees
 
 from .. import config
+from ..errors import CatalogError
 
 
 class Wanted(NamedTuple):
@@ -56,10 +57,19 @@ def wanted_around(request: config.Fdsn, event: Event | None) -> Wanted:
     )
 
 
-def window(request: config.Fdsn | config.Sds, event: Event | None) -> tuple[UTCDateTime, UTCDateTime]:
-    """Return the time window; where its start or end is not given, it is seen from the event's origin time."""
+def window(request: config.Window, event: Event | None) -> tuple[UTCDateTime, UTCDateTime]:
+    """
+    Return the time window; where its start or end is not given, it is seen from the event's origin time.
+
+    Raises
+    ------
+    CatalogError
+        If it ends before it starts.
+    """
     start = UTCDateTime(request.start) if request.start else _origin(event).time - request.before
     end = UTCDateTime(request.end) if request.end else _origin(event).time + request.after
+    if end <= start:
+        raise CatalogError("window", f"must end after its start, got {start} to {end}")
     return start, end
 
 

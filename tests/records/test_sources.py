@@ -92,6 +92,11 @@ def test_an_archive_needs_a_window():
         Records(sds=Sds(folder=Path("x")))
     with pytest.raises(ValueError, match="sds needs start and end, or event"):
         Records(sds=Sds(folder=Path("x"), start="2000-01-01"))
+    with pytest.raises(ValueError, match="start"):
+        Sds(folder=Path("x"), start="yesterday", end="2000-01-01")
+    records = Records(sds=Sds(folder=Path("x"), start="2000-01-02", end="2000-01-01"))
+    with pytest.raises(CatalogError, match="window: must end after its start, got 2000-01-02"):
+        find_sources(records, None)
 
 
 def test_what_a_result_depends_on(folder: Path, archive: Path, tmp_path: Path):
