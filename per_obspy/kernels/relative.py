@@ -30,13 +30,14 @@ def relative_maxima(north, east, dt, pairs, largest):
     The record ends with zero acceleration.
     """
     coefficients = np.zeros((22, PAIRS))
-    motion, start, bounds = np.empty((6, PAIRS)), np.empty((6, PAIRS)), np.empty((2, PAIRS))
+    motion, start, bounds = np.empty((6, PAIRS)), np.empty((6, PAIRS)), np.empty((4, PAIRS))
     ground = np.empty((2, TILE + 2))
     count, record = pairs.shape[1], north.size - 1
     largest[:] = 0.0
     for first in range(0, count, PAIRS):
         width = min(PAIRS, count - first)
         _load(pairs, first, width, dt, coefficients)
+        _raise_to_samples(north, east, coefficients, ground, motion, bounds, largest[:, first : first + width])
         motion[:] = 0.0
         begin, going = 0, True
         while going:
@@ -52,6 +53,19 @@ def relative_maxima(north, east, dt, pairs, largest):
             begin += TILE
             _flush(motion)
             going = begin < record or _any_can_grow(pairs, first, width, dt, motion, begin, record, largest)
+
+
+@kernel
+def _raise_to_samples(north, east, coefficients, ground, motion, bounds, largest):
+    """Raise the maxima of a block to the samples', so that few tiles are left to search in."""
+    motion[:] = 0.0
+    for begin in range(0, north.size - 1, TILE):
+        _copy_ground(north, east, begin, ground)
+        _advance(coefficients, ground, motion, bounds)
+        _flush(motion)
+        for pair in range(largest.shape[1]):
+            largest[0, pair] = max(largest[0, pair], bounds[2, pair])
+            largest[1, pair] = max(largest[1, pair], bounds[3, pair])
 
 
 @kernel
@@ -84,11 +98,12 @@ def _copy_ground(north, east, begin, ground):
 @kernel
 def _advance(coefficients, ground, motion, bounds):
     """
-    Step a block over a tile; keep the largest and the smallest control point of each pair.
+    Step a block over a tile; keep the largest and the smallest control point of each pair, and the same of the samples.
 
     The copies are local and of constant size, so that the compiler sees that nothing overlaps and makes vectors.
     """
     c, m, largest, smallest = np.empty((22, PAIRS)), np.empty((6, PAIRS)), np.zeros(PAIRS), np.zeros(PAIRS)
+    highest, lowest = np.zeros(PAIRS), np.zeros(PAIRS)
     c[:], m[:] = coefficients, motion
     for place in range(TILE):
         north_0, east_0, north_1, east_1 = (
@@ -111,9 +126,12 @@ def _advance(coefficients, ground, motion, bounds):
             m[4, pair], m[5, pair] = distance, slope
             largest[pair] = max(largest[pair], distance, leaving, distance - slope)
             smallest[pair] = min(smallest[pair], distance, leaving, distance - slope)
+            highest[pair] = max(highest[pair], distance)
+            lowest[pair] = min(lowest[pair], distance)
     motion[:] = m
     for pair in range(PAIRS):
         bounds[0, pair], bounds[1, pair] = largest[pair], -smallest[pair]
+        bounds[2, pair], bounds[3, pair] = highest[pair], -lowest[pair]
 
 
 @kernel
