@@ -11,6 +11,7 @@ from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
     from per_obspy.errors import Rejection
+    from per_obspy.records.events import EventRow
     from per_obspy.records.info import RecordInfo
 
 NOTHING_USABLE = 3
@@ -36,7 +37,7 @@ def events(
 
     Example: per-obspy events USGS --start 2019-07-06 --end 2019-07-07 --magnitude 5
     """
-    from per_obspy.records.events import EventRow, find_events
+    from per_obspy.records.events import find_events
 
     query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
     query |= {"latitude": latitude, "longitude": longitude, "maxradius": radius}
@@ -44,8 +45,8 @@ def events(
     if as_json:
         print(json.dumps([row._asdict() for row in rows]))
     else:
-        cells = [["" if value is None else value for value in row] for row in rows]
-        print_table(f"{len(rows)} events, the latest first", EventRow._fields, cells)
+        titles = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
+        print_table(f"{len(rows)} events, the latest first", titles, [_shown_event(row) for row in rows])
     if not rows:
         raise typer.Exit(NOTHING_USABLE)
 
@@ -95,6 +96,14 @@ def info(
         _print_rejected(rejected)
     if not records:
         raise typer.Exit(NOTHING_USABLE)
+
+
+def _shown_event(row: "EventRow") -> list[object]:
+    """Return the cells of an earthquake; nothing for what is unknown."""
+    depth = "" if row.depth is None else f"{row.depth:.0f}"
+    magnitude = "" if row.magnitude is None else f"{row.magnitude:g} {row.magnitude_type}"
+    place = (f"{row.latitude:.3f}", f"{row.longitude:.3f}", depth)
+    return [row.event_id, row.time[:19], *place, magnitude, row.place]
 
 
 def _shown(record: "RecordInfo") -> list[object]:

@@ -1,16 +1,23 @@
 """Every source of a configuration under one contract."""
 
+import re
+import tomllib
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from per_obspy.config import Asdf, Columns, Records, Scenario, Sds
+from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
+from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
+from per_obspy.records.events import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulated import Simulation, simulate, write_simulation
+from per_obspy.records.simulated_metadata import scenario_event
 from per_obspy.records.sources import find_sources, input_files
+
+CHECKOUT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -135,3 +142,22 @@ def test_a_workspace_brings_its_event(real_data: Path):
     assert found.event == path
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
+
+
+def test_the_sections_in_the_documentation_are_valid():
+    text = (CHECKOUT / "docs" / "sources.md").read_text(encoding="utf-8")
+    examples = [tomllib.loads(block.split("```")[0])["records"] for block in text.split("```toml")[1:]]
+    assert [name for example in examples for name in Records(**example).model_fields_set - {"event", "stationxml"}] == [
+        "fdsn",
+        "sds",
+        "asdf",
+    ]
+    table = text.split("| key |")[1].split("\n\n")[0]
+    keys = {key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert keys == set(Fdsn.model_fields) - {"providers", "cache"}
+
+
+def test_the_demo_s_event_is_that_of_its_scenario():
+    known = read_event(CHECKOUT / "catalogs" / "demo" / "event.xml")
+    made = scenario_event(load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Demo).scenario)
+    assert (known.origins, known.magnitudes) == (made.origins, made.magnitudes)
