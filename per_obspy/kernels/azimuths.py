@@ -19,6 +19,8 @@ from .response import first_root
 
 #: ``sqrt(1 + x²) <= 1 + 0.4143 x`` for x from 0 to 1: a bound of the eigenvalue without a square root.
 CHORD = 0.41422
+#: Neighbouring azimuths that are ruled out together.
+GROUP = 12
 #: Tiles whose bound exceeds this part of the largest are visited first, to raise the smallest maximum early.
 EARLY = 0.7
 #: Phase between the samples at which maxima are raised on the way; a peak exceeds them by 1 - cos(0.05) at most.
@@ -92,8 +94,9 @@ def _form(un, zn, ue, ze, share):
 
 
 @kernel
-def _eigenvalue_bound(mean, difference, product):
-    """Return what the form cannot exceed along any azimuth."""
+def _eigenvalue_bound(form):
+    """Return what a form cannot exceed along any azimuth."""
+    mean, difference, product = form
     one, other = abs(difference), abs(product)
     return mean + max(one, other) + CHORD * min(one, other)
 
@@ -108,18 +111,50 @@ def _slack(radius, peak, jump, damping, phase, share):
 
 
 @kernel
-def list_steps(north, east, peaks, jumps, kept, lane, phase, damping, share, directions, best, steps):
+def _may_raise(before, after, slack, edges, floors):
+    """
+    Tell whether a step with these forms at its ends can hold more than the smallest maximum of any group of azimuths.
+
+    Over a group ``cos 2(t - t0)`` exceeds its larger value at the ends by no more than ``1 - cos`` of half its width.
+    """
+    mean_0, difference_0, product_0 = before
+    mean_1, difference_1, product_1 = after
+    size_0, size_1 = math.hypot(difference_0, product_0), math.hypot(difference_1, product_1)
+    count = 0
+    for j in range(floors.size):
+        first = difference_0 * edges[0, j] + product_0 * edges[1, j]
+        last = difference_0 * edges[2, j] + product_0 * edges[3, j]
+        start = mean_0 + max(first, last) + size_0 * edges[4, j]
+        first = difference_1 * edges[0, j] + product_1 * edges[1, j]
+        last = difference_1 * edges[2, j] + product_1 * edges[3, j]
+        end = mean_1 + max(first, last) + size_1 * edges[4, j]
+        count += max(start, end) + slack > floors[j]
+    return count > 0
+
+
+@kernel
+def _lower(best, floors):
+    """Fill the smallest of the largest squares of each group of azimuths."""
+    for j in range(floors.size):
+        floors[j] = best[j * GROUP]
+        for k in range(j * GROUP + 1, min((j + 1) * GROUP, best.size)):
+            floors[j] = min(floors[j], best[k])
+
+
+@kernel
+def list_steps(north, east, peaks, jumps, kept, lane, phase, damping, share, directions, edges, best, steps):
     """
     Raise the largest squares along all azimuths to samples of one oscillator; list the steps that may hold more.
 
-    ``best`` starts with what is known and is raised at so few samples as show most of it. ``steps`` (count, 12)
-    receives the states before (u and z of north, u and z of east), the states after, and both accelerations of both
-    components. Returns how many.
+    ``directions`` (4, n): cosine and sine of the ascending azimuths and of twice them; ``edges`` (5, groups): cosine
+    and sine of twice the first and the last azimuth of each group, and what may lie between. ``best`` starts with what
+    is known and is raised at so few samples as show most of it. ``steps`` (count, 12) receives the states before (u
+    and z of north, u and z of east), the states after, and both accelerations of both components. Returns how many.
     """
     coefficients = step(1.0, damping, phase)
     row = 4 if share == 1.0 else 5
     tiles = peaks.shape[1]
-    slacks, waiting = np.empty(tiles), np.ones(tiles)
+    slacks, waiting, floors = np.empty(tiles), np.ones(tiles), np.empty(edges.shape[1])
     highest = 0.0
     for tile in range(tiles):
         peak, jump = math.hypot(peaks[0, tile], peaks[1, tile]), math.hypot(jumps[0, tile], jumps[1, tile])
@@ -127,49 +162,68 @@ def list_steps(north, east, peaks, jumps, kept, lane, phase, damping, share, dir
         slacks[tile] = _slack(radius, peak, jump, damping, phase, share)
         highest = max(highest, kept[tile, row, lane])
     count = 0
+    _lower(best, floors)
     for visit in range(2 * tiles):
         tile = visit % tiles
         bound = kept[tile, row, lane]
         early = visit >= tiles or bound > EARLY * highest
-        if early and waiting[tile] > 0.0 and bound + slacks[tile] > _least(best):
+        if early and waiting[tile] > 0.0 and bound + slacks[tile] > _least(floors):
             waiting[tile] = 0.0
+            slack = slacks[tile]
             count = _run_tile(
-                north, east, tile, kept, lane, coefficients, phase, share, slacks[tile], directions, best, steps, count
+                north,
+                east,
+                tile,
+                kept,
+                lane,
+                coefficients,
+                phase,
+                share,
+                slack,
+                directions,
+                edges,
+                floors,
+                best,
+                steps,
+                count,
             )
+            _lower(best, floors)
     return count
 
 
 @kernel
-def _least(best):
-    """Return the smallest of the largest squares."""
-    least = best[0]
-    for k in range(1, best.size):
-        least = min(least, best[k])
+def _least(values):
+    """Return the smallest value."""
+    least = values[0]
+    for k in range(1, values.size):
+        least = min(least, values[k])
     return least
 
 
 @kernel
-def _run_tile(north, east, tile, kept, lane, coefficients, phase, share, slack, directions, best, steps, count):
+def _run_tile(
+    north, east, tile, kept, lane, coefficients, phase, share, slack, directions, edges, floors, best, steps, count
+):
     """Repeat one tile: raise the largest squares at some samples, list the steps that may hold more."""
     a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
     un, zn, ue, ze = kept[tile, 0, lane], kept[tile, 1, lane], kept[tile, 2, lane], kept[tile, 3, lane]
-    floor, stride = _least(best), max(1, int(STRIDE / phase))
-    mean, difference, product = _form(un, zn, ue, ze, share)
-    bound = _eigenvalue_bound(mean, difference, product)
+    floor, stride = _least(floors), max(1, int(STRIDE / phase))
+    after = _form(un, zn, ue, ze, share)
     for i in range(tile * TILE, tile * TILE + TILE):
-        u, z, v, w, before = un, zn, ue, ze, bound
+        u, z, v, w, before = un, zn, ue, ze, after
         n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
         un = a11 * u + (a12 * z + (b11 * n0 + b12 * n1))
         zn = a21 * u + (a22 * z + (b21 * n0 + b22 * n1))
         ue = a11 * v + (a12 * w + (b11 * e0 + b12 * e1))
         ze = a21 * v + (a22 * w + (b21 * e0 + b22 * e1))
-        mean, difference, product = _form(un, zn, ue, ze, share)
-        bound = _eigenvalue_bound(mean, difference, product)
-        if bound > floor and i % stride == 0:
+        after = _form(un, zn, ue, ze, share)
+        if i % stride == 0 and _eigenvalue_bound(after) > floor:
+            mean, difference, product = after
             for k in range(best.size):
                 value = mean + (difference * directions[2, k] + product * directions[3, k])
                 best[k] = max(best[k], value)
-        if max(before, bound) + slack > floor:
+        highest = max(_eigenvalue_bound(before), _eigenvalue_bound(after))
+        if highest + slack > floor and _may_raise(before, after, slack, edges, floors):
             steps[count, 0], steps[count, 1], steps[count, 2], steps[count, 3] = u, z, v, w
             steps[count, 4], steps[count, 5], steps[count, 6], steps[count, 7] = un, zn, ue, ze
             steps[count, 8], steps[count, 9], steps[count, 10], steps[count, 11] = n0, n1, e0, e1
@@ -178,16 +232,23 @@ def _run_tile(north, east, tile, kept, lane, coefficients, phase, share, slack, 
 
 
 @kernel
-def search_steps(steps, phase, damping, share, directions, best):
+def search_steps(steps, phase, damping, share, directions, edges, best):
     """Raise the largest squares along all azimuths to those in the listed steps, between their samples too."""
     work, wanted, here, beyond = workspace(), np.zeros(4, np.bool_), np.full(4, np.inf), np.empty(best.size)
     quantities, row = (1, 0) if share == 1.0 else (4, 1)
+    floors = np.empty(edges.shape[1])
+    _lower(best, floors)
     for number in range(steps.shape[0]):
         one = steps[number]
         peak = math.hypot(max(abs(one[8]), abs(one[9])), max(abs(one[10]), abs(one[11])))
         jump = math.hypot(one[9] - one[8], one[11] - one[10])
         radius = radius_bound(_largest_trace(one), peak, damping, phase)
-        if _mark_azimuths(one, radius, peak, jump, phase, damping, share, directions, best, beyond) == 0:
+        slack = _slack(radius, peak, jump, damping, phase, share)
+        before, after = _form(one[0], one[1], one[2], one[3], share), _form(one[4], one[5], one[6], one[7], share)
+        if not _may_raise(before, after, slack, edges, floors):
+            continue
+        dip = dips(rate_bounds(radius, peak, jump, damping, phase), damping, phase)
+        if _mark_azimuths(one, before, after, slack, dip, damping, share, directions, best, beyond) == 0:
             continue
         for k in range(best.size):
             if beyond[k] > 0.0:
@@ -198,16 +259,15 @@ def search_steps(steps, phase, damping, share, directions, best):
                 if find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantities, here, wanted):
                     largest_in_step(u, z, start, end, damping, phase, wanted, work, here)
                     best[k] = max(best[k], here[0] if row == 0 else here[1] * here[1])
+        _lower(best, floors)
 
 
 @kernel
-def _mark_azimuths(one, radius, peak, jump, phase, damping, share, directions, best, beyond):
+def _mark_azimuths(one, before, after, slack, dip, damping, share, directions, best, beyond):
     """Mark with a positive number the azimuths along which a step may raise the largest square; return how many."""
     twice = 2.0 * damping
-    slack = _slack(radius, peak, jump, damping, phase, share)
-    dip = dips(rate_bounds(radius, peak, jump, damping, phase), damping, phase)
-    mean_0, difference_0, product_0 = _form(one[0], one[1], one[2], one[3], share)
-    mean_1, difference_1, product_1 = _form(one[4], one[5], one[6], one[7], share)
+    mean_0, difference_0, product_0 = before
+    mean_1, difference_1, product_1 = after
     zn0, ze0, zn1, ze1 = one[1], one[3], one[5], one[7]
     bn0, be0, bn1, be1 = twice * zn0 + one[8], twice * ze0 + one[10], twice * zn1 + one[9], twice * ze1 + one[11]
     far, count = (0.0 if share == 1.0 else np.inf), 0

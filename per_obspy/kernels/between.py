@@ -25,6 +25,8 @@ POINTS = 9
 #: At a stationary point an error of the root changes the value by its square only.
 ROOT_TOLERANCE = 1e-8
 ROOT_STEPS = 60
+#: ``1 / ((n + 2) (n + 1))``: a division takes as long as three multiply-adds.
+INVERSES = tuple(1.0 / ((n + 2) * (n + 1)) for n in range(TERMS))
 
 
 @kernel
@@ -48,7 +50,7 @@ def fill_series(u, z, acceleration, rate, stiffness, damping, terms, motion, spe
     motion[2] = -0.5 * (2.0 * damping * z + stiffness * u + acceleration)
     motion[3] = -(4.0 * damping * motion[2] + stiffness * z + rate) / 6.0
     for n in range(2, terms - 1):
-        motion[n + 2] = -(2.0 * damping * (n + 1) * motion[n + 1] + stiffness * motion[n]) / ((n + 2) * (n + 1))
+        motion[n + 2] = -(2.0 * damping * (n + 1) * motion[n + 1] + stiffness * motion[n]) * INVERSES[n]
     for n in range(terms):
         speed[n] = (n + 1) * motion[n + 1]
 

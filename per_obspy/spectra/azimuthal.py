@@ -86,30 +86,39 @@ def _spectrum(
     ground = prepare_ground(*two_components(north, east))
     dt = checks.number("dt", dt, checks.positive)
     grid, shape = grid_of(periods, damping)
-    angles = np.radians(
-        row_of("azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths))))
-    )
-    directions = np.stack([np.cos(angles), np.sin(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
+    given = row_of("azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths))))
+    ascending = np.argsort(given % 180.0)
+    fan = _fan(np.radians(given[ascending] % 180.0))
     oscillators = prepare_oscillators(dt, *grid)
-    squares = over_blocks(lambda block: _block_squares(ground, block, share, directions).T, oscillators, ground)
-    lengths = np.sqrt(squares.T) / oscillators.omegas[:, np.newaxis] ** 2 * ground.scale
-    return np.asarray(lengths.reshape(*shape, angles.size))
+    squares = over_blocks(lambda block: _block_squares(ground, block, share, fan).T, oscillators, ground)
+    lengths = np.empty((given.size, oscillators.count))
+    lengths[ascending] = np.sqrt(squares) / oscillators.omegas**2 * ground.scale
+    return lengths.T.reshape(*shape, given.size)
 
 
-def _block_squares(ground: Ground, block: Oscillators, share: float, directions: FloatArray) -> FloatArray:
+def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return directions and edges of groups of the ascending azimuths (rad) as `list_steps` takes them."""
+    directions = np.stack([np.cos(angles), np.sin(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
+    firsts = np.arange(0, angles.size, kernels.GROUP)
+    lasts = np.minimum(firsts + kernels.GROUP, angles.size) - 1
+    rise = 1.0 - np.cos(angles[lasts] - angles[firsts])
+    return directions, np.concatenate([directions[2:, firsts], directions[2:, lasts], rise[np.newaxis]])
+
+
+def _block_squares(ground: Ground, block: Oscillators, share: float, fan: tuple[FloatArray, FloatArray]) -> FloatArray:
     """Return the largest squares of one block, (lanes, azimuths), in units of the scaled acceleration / omega²."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
     kept = np.empty((blocks.TILES, 6, blocks.LANES))
-    steps, largest = np.empty((blocks.TILES * blocks.TILE, 12)), np.zeros((blocks.LANES, directions.shape[1]))
+    steps, largest = np.empty((blocks.TILES * blocks.TILE, 12)), np.zeros((blocks.LANES, fan[0].shape[1]))
     kernels.pack_steps(block.phases, block.dampings, packed)
     for stretch in stretches(ground):
         kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
         for lane in range(block.count):
-            oscillator = float(block.phases[lane]), float(block.dampings[lane]), share, directions
+            oscillator = float(block.phases[lane]), float(block.dampings[lane]), share, *fan
             count = kernels.list_steps(*stretch[:4], kept, lane, *oscillator, largest[lane], steps)
             kernels.search_steps(steps[:count], *oscillator, largest[lane])
     if share == 0.0:
-        kernels.free_displacements(state, block.dampings, block.count, directions, largest)
+        kernels.free_displacements(state, block.dampings, block.count, fan[0], largest)
     return largest
 
 
