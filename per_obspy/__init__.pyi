@@ -13,6 +13,8 @@ from .pounding.gap import srss_gap as srss_gap
 from .pounding.ground import CloughPenzien as CloughPenzien
 from .pounding.ground import KanaiTajimi as KanaiTajimi
 from .pounding.ground import WhiteNoise as WhiteNoise
+from .pounding.histories import pounding_histories as pounding_histories
+from .pounding.history import pounding_history as pounding_history
 from .pounding.impact import post_impact_velocities as post_impact_velocities
 from .pounding.impact import transfer_energies as transfer_energies
 from .pounding.linearization import linearized_correlation as linearized_correlation

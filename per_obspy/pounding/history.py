@@ -159,7 +159,7 @@ def pounding_history(
     energies = energies_of(table, motion, work)
     displacement, velocity, plastic = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
     return PoundingHistory(
-        time=step * np.arange(len(motion)),
+        time=step * np.arange(len(motion), dtype=np.float64),
         displacement=displacement,
         velocity=velocity,
         plastic_displacement=plastic,

@@ -75,7 +75,8 @@ def refinement(largest_frequency: float, dt: float) -> int:
     int
         A power of two; 1 where the shortest period is above about 9 dt.
     """
-    return 2 ** max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_PHASE)))
+    doublings = max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_PHASE)))
+    return 1 << doublings
 
 
 def closed_record(acceleration: FloatArray) -> FloatArray:

@@ -1,0 +1,105 @@
+"""
+Pairs a second of ``pounding_histories`` on one core, beside OpenSeesPy on the same pairs.
+
+Run as ``python tests/benchmarks/pounding.py``. OpenSees integrates with the record's own step, contact by a stiff
+no-tension gap; its cost is what is compared, not its accuracy.
+"""
+
+import importlib.util
+import time
+
+import numpy as np
+
+from per_obspy.pounding.histories import pounding_histories
+
+DT, SAMPLES, PAIRS, PEER_PAIRS = 0.01, 12_000, 1024, 4
+YIELDING = {"yield_displacement_1": 0.03, "hardening_1": 0.05, "yield_displacement_2": 0.03, "hardening_2": 0.05}
+
+
+def record():
+    """Two minutes of smoothed noise that rise and fall like an earthquake."""
+    noise = np.convolve(np.random.default_rng(0).normal(size=SAMPLES), np.ones(5) / 5, mode="same")
+    seconds = DT * np.arange(SAMPLES)
+    return 5.0 * noise * (seconds / 10.0) * np.exp(1.0 - seconds / 10.0)
+
+
+def random_pairs(count):
+    """Periods of 0.2 to 3 s, 5 % damping, mass ratios up to 15, gaps of 2 to 20 cm."""
+    random = np.random.default_rng(1)
+    draw = {
+        "period_1": (0.2, 3.0),
+        "mass_1": (0.2, 3.0),
+        "period_2": (0.2, 3.0),
+        "mass_2": (0.2, 3.0),
+        "gap": (0.02, 0.2),
+    }
+    pairs = {name: random.uniform(*limits, count) for name, limits in draw.items()}
+    return {**pairs, "damping_1": 0.05, "damping_2": 0.05, "restitution": 0.65}
+
+
+def rate(acceleration, pairs):
+    """Return pairs a second of processor time, best of three, and the mean number of impacts."""
+    best = np.inf
+    for _ in range(3):
+        start = time.process_time()
+        maxima = pounding_histories(acceleration, DT, **pairs)
+        best = min(best, time.process_time() - start)
+    return maxima.impacts.size / best, maxima.impacts.mean()
+
+
+def opensees_rate(acceleration, pairs, count):
+    """Return pairs a second of OpenSees, Newmark with the record's step."""
+    import openseespy.opensees as ops  # noqa: PLC0415 - optional peer
+
+    start = time.process_time()
+    for i in range(count):
+        ops.wipe()
+        ops.model("basic", "-ndm", 1, "-ndf", 1)
+        stiffest = 0.0
+        for k in (1, 2):
+            mass, omega = pairs[f"mass_{k}"][i], 2 * np.pi / pairs[f"period_{k}"][i]
+            stiffest = max(stiffest, mass * omega**2)
+            ops.node(10 * k, 0.0)
+            ops.node(10 * k + 1, 0.0, "-mass", mass)
+            ops.fix(10 * k, 1)
+            ops.uniaxialMaterial("Elastic", k, mass * omega**2, 2 * 0.05 * mass * omega)
+            ops.element("zeroLength", k, 10 * k, 10 * k + 1, "-mat", k, "-dir", 1)
+        ops.uniaxialMaterial("ElasticPPGap", 3, -1e3 * stiffest, -1e9, -pairs["gap"][i])
+        ops.element("zeroLength", 3, 11, 21, "-mat", 3, "-dir", 1)
+        ops.timeSeries("Path", 1, "-dt", DT, "-values", *acceleration)
+        ops.pattern("UniformExcitation", 1, 1, "-accel", 1)
+        ops.constraints("Plain")
+        ops.numberer("Plain")
+        ops.system("BandGeneral")
+        ops.test("NormDispIncr", 1e-10, 50)
+        ops.algorithm("Newton")
+        ops.integrator("Newmark", 0.5, 0.25)
+        ops.analysis("Transient")
+        ops.analyze(SAMPLES, DT)
+    return count / (time.process_time() - start)
+
+
+def main():
+    """Print the table."""
+    acceleration, pairs = record(), random_pairs(PAIRS)
+    pounding_histories(acceleration[:100], DT, **random_pairs(2))  # compiles
+    cases = {
+        "no contact": {**pairs, "gap": 100.0},
+        "linear": pairs,
+        "touching": {**pairs, "gap": 0.0},
+        "bilinear": {**pairs, **YIELDING},
+    }
+    peer = None
+    if importlib.util.find_spec("openseespy") is None:
+        print("OpenSeesPy is not installed: no comparison")
+    else:
+        peer = opensees_rate(acceleration, pairs, PEER_PAIRS)
+        print(f"OpenSeesPy, linear, {SAMPLES} samples, record's step: {peer:.1f} pairs/s on one core")
+    print(f"{'case':>12} {'pairs/s core':>13} {'impacts':>8} {'x OpenSees':>11}")
+    for name, fields in cases.items():
+        speed, impacts = rate(acceleration, fields)
+        print(f"{name:>12} {speed:13.0f} {impacts:8.1f} {speed / peer if peer else float('nan'):11.0f}")
+
+
+if __name__ == "__main__":
+    main()
