@@ -36,8 +36,9 @@ def estimate(arguments, status, branches, bounds):
     velocity difference that 1 and 2 receive), (1 + e) m1 m2/M, critical gap, gap; M = m1 + m2.
     """
     states = np.empty((4, PAIRS))
-    constants = np.empty((11, PAIRS))
-    work = np.empty((6, PAIRS))
+    constants = np.zeros((11, PAIRS))
+    constants[:2] = constants[10] = 1.0
+    times = np.empty(PAIRS)
     count = status.size
     for first in range(0, count, PAIRS):
         pairs = min(PAIRS, count - first)
@@ -45,13 +46,13 @@ def estimate(arguments, status, branches, bounds):
             status[first + pair] = _grazing_state(arguments, first + pair, states, pair)
         for branch in range(2):
             _load(arguments, first, pairs, states, 1.0 - 2.0 * branch, constants)
-            _first_contact(constants, work, pairs)
-            _impact(arguments, first, pairs, constants, work[0], branches[branch])
+            _first_contact(constants, times)
+            _impact(arguments, first, pairs, constants, times, branches[branch])
             for index in range(first, first + pairs):
                 if status[index] != OK:
                     _no_impact(status[index], arguments, index, branches[branch])
         for body in range(2):
-            _largest_radius(arguments, body, first, pairs, constants, work, bounds)
+            _largest_radius(arguments, body, first, pairs, bounds)
 
 
 @kernel
@@ -116,70 +117,76 @@ def _sine_products(phase):
 
 
 @kernel
-def _first_contact(constants, work, pairs):
+def _first_contact(constants, first_contact):
     """
-    Find the smallest time before the grazing state at which the pair is the actual gap apart: ``work[0]``.
+    Find the smallest time before the grazing state at which the pair is the actual gap apart.
 
     The distance to contact d has |d''| <= K2, so the step 2 d/(d' + sqrt(d'² + 2 K2 d)) never passes the first root.
     """
-    for pair in range(pairs):
-        work[0, pair] = 0.0
+    c, times, advances = np.empty((11, PAIRS)), np.zeros(PAIRS), np.empty(PAIRS)
+    c[:] = constants
     moving = True
     while moving:
-        for pair in range(pairs):
-            time = work[0, pair]
-            square_1, product_1 = _sine_products(constants[0, pair] * time)
-            square_2, product_2 = _sine_products(constants[1, pair] * time)
-            velocity, x_1, x_2 = constants[4, pair], constants[2, pair], constants[3, pair]
-            swing = product_1 * constants[5, pair] - product_2 * constants[6, pair]
-            distance = max(constants[9, pair] - 2.0 * (x_1 * square_1 - x_2 * square_2 + swing), 0.0)
-            turn = constants[7, pair] * product_1 - constants[8, pair] * product_2
+        for pair in range(PAIRS):
+            time = times[pair]
+            square_1, product_1 = _sine_products(c[0, pair] * time)
+            square_2, product_2 = _sine_products(c[1, pair] * time)
+            velocity, x_1, x_2 = c[4, pair], c[2, pair], c[3, pair]
+            swing = product_1 * c[5, pair] - product_2 * c[6, pair]
+            distance = max(c[9, pair] - 2.0 * (x_1 * square_1 - x_2 * square_2 + swing), 0.0)
+            turn = c[7, pair] * product_1 - c[8, pair] * product_2
             closing = 2.0 * (turn - velocity * (square_1 - square_2))
-            root = math.sqrt(closing * closing + 2.0 * constants[10, pair] * distance)
+            root = math.sqrt(closing * closing + 2.0 * c[10, pair] * distance)
             above = 2.0 * distance if closing > 0.0 else root - closing
-            below = closing + root if closing > 0.0 else constants[10, pair]
+            below = closing + root if closing > 0.0 else c[10, pair]
             advance = above / below if distance > 0.0 else 0.0
-            work[0, pair] = time + advance
-            work[1, pair] = advance - STILL * time
+            times[pair] = time + advance
+            advances[pair] = advance - STILL * time
         moving = False
-        for pair in range(pairs):
-            moving = moving or work[1, pair] > 0.0
+        for pair in range(PAIRS):
+            moving = moving or advances[pair] > 0.0
+    first_contact[:] = times
 
 
 @kernel
 def _impact(arguments, first, pairs, constants, times, branch):
-    """Store the states of a block at the actual contact and after it."""
-    for pair in range(pairs):
-        index, time = first + pair, times[pair]
-        square_1, product_1 = _sine_products(constants[0, pair] * time)
-        square_2, product_2 = _sine_products(constants[1, pair] * time)
-        velocity = constants[4, pair]
-        velocity_1 = velocity * (1.0 - 2.0 * square_1) + 2.0 * constants[7, pair] * product_1
-        velocity_2 = velocity * (1.0 - 2.0 * square_2) + 2.0 * constants[8, pair] * product_2
-        branch[0, index] = time
-        branch[1, index] = constants[2, pair] * (1.0 - 2.0 * square_1) - 2.0 * constants[5, pair] * product_1
-        branch[2, index] = velocity_1
-        branch[3, index] = velocity_1 - arguments[4, index] * (velocity_1 - velocity_2)
-        branch[7, index] = constants[3, pair] * (1.0 - 2.0 * square_2) - 2.0 * constants[6, pair] * product_2
-        branch[8, index] = velocity_2
-        branch[9, index] = velocity_2 + arguments[5, index] * (velocity_1 - velocity_2)
-    for body in range(2):
-        _after(arguments, body, first, pairs, branch)
+    """Store the states of a block at the actual contact and after it, with radii, amplifications and energies."""
+    c, given, fields = np.empty((11, PAIRS)), np.ones((7, PAIRS)), np.empty((13, PAIRS))
+    c[:], fields[0] = constants, times
+    for row in range(7):
+        for pair in range(pairs):
+            given[row, pair] = arguments[row, first + pair]
+    for pair in range(PAIRS):
+        square_1, product_1 = _sine_products(c[0, pair] * fields[0, pair])
+        square_2, product_2 = _sine_products(c[1, pair] * fields[0, pair])
+        velocity_1 = c[4, pair] * (1.0 - 2.0 * square_1) + 2.0 * c[7, pair] * product_1
+        velocity_2 = c[4, pair] * (1.0 - 2.0 * square_2) + 2.0 * c[8, pair] * product_2
+        fields[1, pair] = c[2, pair] * (1.0 - 2.0 * square_1) - 2.0 * c[5, pair] * product_1
+        fields[2, pair] = velocity_1
+        fields[3, pair] = velocity_1 - given[4, pair] * (velocity_1 - velocity_2)
+        fields[7, pair] = c[3, pair] * (1.0 - 2.0 * square_2) - 2.0 * c[6, pair] * product_2
+        fields[8, pair] = velocity_2
+        fields[9, pair] = velocity_2 + given[5, pair] * (velocity_1 - velocity_2)
+    _radii(given, fields)
+    for row in range(13):
+        for pair in range(pairs):
+            branch[row, first + pair] = fields[row, pair]
 
 
 @kernel
-def _after(arguments, body, first, pairs, branch):
-    """Store radius, amplification and transfer energy; a structure at rest that stays so has amplification 1."""
-    field = 6 * body
-    for index in range(first, first + pairs):
-        displacement, before, after = branch[1 + field, index], branch[2 + field, index], branch[3 + field, index]
-        shifted = after / arguments[2 + body, index]
-        radius = math.sqrt(displacement * displacement + shifted * shifted)
-        resting = radius == 0.0 and arguments[body, index] == 0.0
-        impulse = arguments[6, index] * (branch[2, index] - branch[8, index]) * (1.0 - 2.0 * body)
-        branch[4 + field, index] = radius
-        branch[5 + field, index] = 1.0 if resting else radius / arguments[body, index]
-        branch[6 + field, index] = impulse * 0.5 * (before + after)
+def _radii(given, fields):
+    """Fill radius, amplification and transfer energy; a structure at rest that stays so has amplification 1."""
+    for body in range(2):
+        field = 6 * body
+        for pair in range(PAIRS):
+            before, after = fields[2 + field, pair], fields[3 + field, pair]
+            shifted = after / given[2 + body, pair]
+            radius = math.sqrt(fields[1 + field, pair] ** 2 + shifted * shifted)
+            resting = radius == 0.0 and given[body, pair] == 0.0
+            impulse = given[6, pair] * (fields[2, pair] - fields[8, pair]) * (1.0 - 2.0 * body)
+            fields[4 + field, pair] = radius
+            fields[5 + field, pair] = 1.0 if resting else radius / given[body, pair]
+            fields[6 + field, pair] = impulse * 0.5 * (before + after)
 
 
 @kernel
@@ -194,7 +201,7 @@ def _no_impact(status, arguments, index, branch):
 
 
 @kernel
-def _largest_radius(arguments, body, first, pairs, constants, work, bounds):
+def _largest_radius(arguments, body, first, pairs, bounds):
     """
     Store the largest radius that contact at the actual gap can leave to one structure, whatever the phases.
 
@@ -202,27 +209,57 @@ def _largest_radius(arguments, body, first, pairs, constants, work, bounds):
     of opposite direction: the largest |v'| is the sum of both contributions. What remains is a maximum over x, with at
     most two peaks in all cases tried: the two highest of a scan are refined.
     """
+    constants, peaks = np.zeros((7, PAIRS)), np.zeros((4, PAIRS))
     _load_bound(arguments, body, first, pairs, constants)
+    _scan(constants, peaks)
+    _refine(constants, peaks)
     for pair in range(pairs):
-        work[0, pair] = work[1, pair] = 0.0  # nodes of the highest and of the second peak
-        work[2, pair] = work[3, pair] = work[4, pair] = 0.0  # their heights, and the height before
-        work[5, pair] = _radius_squared(constants, pair, NODES[0])
-    for node in range(NODES.size):
-        following = NODES[min(node + 1, NODES.size - 1)]
-        for pair in range(pairs):
-            left, here, right = work[4, pair], work[5, pair], _radius_squared(constants, pair, following)
-            height = here if here >= left and here >= right else 0.0
-            highest, second = height > work[2, pair], height > work[3, pair]
-            work[3, pair] = work[2, pair] if highest else (height if second else work[3, pair])
-            work[1, pair] = work[0, pair] if highest else (NODES[node] if second else work[1, pair])
-            work[2, pair] = height if highest else work[2, pair]
-            work[0, pair] = NODES[node] if highest else work[0, pair]
-            work[4, pair], work[5, pair] = here, right
-    for peak in range(2):
-        _refine(constants, work[peak], work[2 + peak], pairs)
-    for pair in range(pairs):
-        square = max(work[2, pair], work[3, pair])
+        square = max(peaks[2, pair], peaks[3, pair])
         bounds[body, first + pair] = max(math.sqrt(square), arguments[body, first + pair])
+
+
+@kernel
+def _scan(constants, peaks):
+    """Find the places (two rows) and heights (two rows) of the two highest peaks among the nodes."""
+    c, p = np.empty((7, PAIRS)), np.zeros((6, PAIRS))  # two more rows: the heights before
+    c[:] = constants
+    for pair in range(PAIRS):
+        p[5, pair] = _radius_squared(c, pair, NODES[0])
+    for node in range(NODES.size):
+        y, following = NODES[node], NODES[min(node + 1, NODES.size - 1)]
+        for pair in range(PAIRS):
+            left, here, right = p[4, pair], p[5, pair], _radius_squared(c, pair, following)
+            height = here if here >= left and here >= right else 0.0
+            highest, second = height > p[2, pair], height > p[3, pair]
+            p[3, pair] = p[2, pair] if highest else (height if second else p[3, pair])
+            p[1, pair] = p[0, pair] if highest else (y if second else p[1, pair])
+            p[2, pair] = height if highest else p[2, pair]
+            p[0, pair] = y if highest else p[0, pair]
+            p[4, pair], p[5, pair] = here, right
+    peaks[:] = p[:4]
+
+
+@kernel
+def _refine(constants, peaks):
+    """Climb to the vertex of the parabola through three phases, ever closer together."""
+    c, p = np.empty((7, PAIRS)), np.empty((4, PAIRS))
+    c[:], p[:] = constants, peaks
+    closeness = WIDTH
+    for _ in range(ROUNDS):
+        for peak in range(2):
+            for pair in range(PAIRS):
+                y, here = p[peak, pair], p[2 + peak, pair]
+                width = closeness * min(1.0 - y + FINEST, 1.0)
+                left = _radius_squared(c, pair, max(y - width, -1.0))
+                right = _radius_squared(c, pair, min(y + width, 1.0))
+                bend = min(left - 2.0 * here + right, -1e-300)
+                shift = min(max(0.5 * width * (left - right) / bend, -2.0 * width), 2.0 * width)
+                vertex = min(max(y + shift, -1.0), 1.0)
+                there = _radius_squared(c, pair, vertex)
+                p[peak, pair] = vertex if there > here else y
+                p[2 + peak, pair] = max(here, there)
+        closeness *= 0.125
+    peaks[:] = p
 
 
 @kernel
@@ -241,25 +278,6 @@ def _load_bound(arguments, body, first, pairs, constants):
         constants[5, pair] = abs(1.0 - received) if touching else 0.0
         share = received * arguments[3 - body, first + pair] / arguments[2 + body, first + pair]
         constants[6, pair] = share if touching else 0.0
-
-
-@kernel
-def _refine(constants, places, heights, pairs):
-    """Climb to the vertex of the parabola through three phases, ever closer together."""
-    closeness = WIDTH
-    for _ in range(ROUNDS):
-        for pair in range(pairs):
-            y, here = places[pair], heights[pair]
-            width = closeness * min(1.0 - y + FINEST, 1.0)
-            left = _radius_squared(constants, pair, max(y - width, -1.0))
-            right = _radius_squared(constants, pair, min(y + width, 1.0))
-            bend = min(left - 2.0 * here + right, -1e-300)
-            shift = min(max(0.5 * width * (left - right) / bend, -2.0 * width), 2.0 * width)
-            vertex = min(max(y + shift, -1.0), 1.0)
-            there = _radius_squared(constants, pair, vertex)
-            places[pair] = vertex if there > here else y
-            heights[pair] = max(here, there)
-        closeness *= 0.125
 
 
 @kernel
