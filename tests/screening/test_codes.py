@@ -1,5 +1,8 @@
 """Rules of codes against their clauses worked by hand, and what they must not say."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -38,6 +41,12 @@ def test_every_column_stands_in_the_table_of_rules_and_says_what_it_is():
         assert name.endswith("_unverified") == (rule["verified"] == "no")
         assert ("event_based" in name) == ("SD" in rule["inputs"])
         assert all(rule[["clause", "edition", "inputs", "source", "meaning"]])
+
+
+def test_the_page_of_the_documentation_names_every_rule():
+    page = (Path(__file__).parents[2] / "docs" / "screening.md").read_text(encoding="utf-8")
+    named = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert named == code_rules()["column"].tolist()
 
 
 def test_asce_and_eurocode_combine_by_the_root_of_the_squares():
