@@ -12,6 +12,7 @@ from per_obspy.processing.gathering import instruments, is_horizontal, oriented
 from per_obspy.processing.instrument import process_instrument
 from per_obspy.processing.merging import merged
 from per_obspy.processing.provenance import rejection
+from per_obspy.processing.structures import kept_apart
 from per_obspy.processing.windows import source_of
 
 DEFAULTS = Processing()
@@ -78,15 +79,18 @@ def process_station(
     kept : obspy Stream
         Empty if no horizontal survived.
     rejected : tuple of Rejection
-        One row a trace; one bad trace never loses the others.
+        One row a trace; one bad trace never loses the others. Sensors in structures are among them: they recorded the
+        structure, not the ground; `process_instruments` processes them.
     """
-    candidates, rejected = process_instruments(stream, settings, event)
+    ground, structure = kept_apart(stream)
+    candidates, rejected = process_instruments(ground, settings, event)
     best = max(candidates, key=lambda traces: sum(map(is_horizontal, traces)), default=Stream())
     others = (trace for traces in candidates if traces is not best for trace in traces)
     beside = [rejection(trace, f"the instrument of {best[0].id} at the same station goes first") for trace in others]
     if not any(map(is_horizontal, best)):
         beside += [rejection(trace, "no horizontal of its instrument is usable") for trace in best]
         best = Stream()
+    beside += [rejection(trace, f"in a structure ({trace.stats.sensor_location}): kept apart") for trace in structure]
     return best, (*rejected, *beside)
 
 
