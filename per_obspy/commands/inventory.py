@@ -3,6 +3,7 @@
 import datetime
 import json
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 
 WRONG_INPUT, NOTHING_USABLE = 2, 3
 
-#: Rejected rows that are printed; the others are counted.
-SHOWN = 10
+#: Rejected rows that are printed, the others are counted; and the most common reasons for rejections.
+SHOWN, COMMON = 10, 3
 
 
 class _FindByDefault(TyperGroup):
@@ -75,6 +76,8 @@ def find_pairs(
         print(json.dumps({"output": str(output), **facts}))
     else:
         print(f"{facts['pairs']} pairs, {facts['touching']} of them touching, {len(rejected)} rejected: {output}")
+        for reason, count in Counter(reason for one in rejected for reason in one.reasons).most_common(COMMON):
+            print(f"  {count} times: {reason}")
     if table.empty:
         raise typer.Exit(NOTHING_USABLE)
 
@@ -112,8 +115,10 @@ def _print_profile(file: Path, count: int, rejected: "Sequence[Rejection]", prof
         print(f"  line {one.row}, {one.name}: {'; '.join(one.reasons)}")
     if len(rejected) > SHOWN:
         print(f"  and {len(rejected) - SHOWN} more")
+    # the commonest of many numbers says nothing
+    described = profile.assign(most_frequent=profile["most_frequent"].where(profile["median"].isna(), ""))
     titles = [str(name).replace("_", " ") for name in profile.columns]
-    print_table("What it gives", titles, profile.itertuples(index=False))
+    print_table("What it gives", titles, described.itertuples(index=False))
 
 
 @catalog.command("add")
