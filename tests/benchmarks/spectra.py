@@ -1,0 +1,254 @@
+"""
+Speed and agreement of the spectra, beside other programs, in one process on one core unless the table says otherwise.
+
+    python tests/benchmarks/spectra.py
+
+Every time is the best of several. Peers that are not installed are named and left out
+(``pip install per_obspy[benchmark]`` brings them).
+"""
+
+import importlib
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.signal import lsim
+
+from per_obspy.kernels._jit import kernel
+from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum, rotd
+from per_obspy.spectra.bilinear import bilinear_response
+from per_obspy.spectra.elastic import (
+    per_spectrum,
+    response_spectra,
+    sampled_per_spectrum,
+    sampled_response_spectra,
+)
+
+DT, SAMPLES, DAMPING = 0.005, 12_000, 0.05
+PERIODS = np.geomspace(0.05, 10.0, 100)
+#: Multiply-adds of one step of the PER kernel.
+PER_STEP = 8
+PEAK_LANES, PEAK_ROUNDS, PEAK_CHAIN = 128, 20_000, 16
+
+
+def ground_motion(samples: int, seed: int = 0) -> np.ndarray:
+    """Low-passed noise under an envelope, m/s²: 0 to 20 Hz at 200 Hz."""
+    noise = np.random.default_rng(seed).normal(size=samples + 9)
+    smooth = np.convolve(noise, np.hanning(12)[1:-1], "valid")
+    return smooth * np.exp(-(((np.arange(samples) / samples - 0.3) / 0.2) ** 2))
+
+
+@kernel
+def multiply_add(rounds):
+    """Run chains of multiply-adds that stay in registers: what the machine can do at most."""
+    values = np.ones(PEAK_LANES)
+    for _ in range(rounds):
+        for lane in range(PEAK_LANES):
+            value = values[lane]
+            for _ in range(PEAK_CHAIN):
+                value = value * 0.999 + 0.001
+            values[lane] = value
+    return values.sum()
+
+
+def best(work: Callable[[], Any], seconds: float = 1.0) -> tuple[float, Any]:
+    """Return the shortest time of a call, and its result; at least 2 calls after a first one."""
+    result, shortest, begun, calls = work(), np.inf, time.perf_counter(), 0
+    while calls < 2 or time.perf_counter() - begun < seconds:
+        start = time.perf_counter()
+        result = work()
+        shortest = min(shortest, time.perf_counter() - start)
+        calls += 1
+    return shortest, result
+
+
+def row(what: str, seconds: float, *others: str) -> None:
+    """Print one line of a table."""
+    print(f"{what:<58}{1e3 * seconds:>12.3f} ms  {'  '.join(others)}", flush=True)
+
+
+def error(ours: np.ndarray, theirs: np.ndarray) -> str:
+    """Return median and largest relative difference in words."""
+    differences = np.abs(np.asarray(theirs) / ours - 1)
+    return f"differs by {100 * np.median(differences):.2g} %, at most {100 * differences.max():.2g} %"
+
+
+def module(name: str, install: str) -> Any:
+    """Return a peer, or None after saying that it is not here."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as missing:
+        print(f"{install}: left out ({missing})")
+        return None
+
+
+def pyrotd_sd_sv(pyrotd: Any, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity spectra by FFT, each its own pass; the record is padded to twice its length."""
+    padded = np.concatenate([motion, np.zeros(motion.size)])
+    sd, sv = (
+        pyrotd.calc_spec_accels(DT, padded, 1 / PERIODS, DAMPING, osc_type=kind)["spec_accel"] for kind in ("sd", "sv")
+    )
+    return sd, sv
+
+
+def eqsig_per(eqsig: Any, motion: np.ndarray) -> np.ndarray:
+    """PER from the histories of Nigam and Jennings' method."""
+    u, v, _ = eqsig.nigam_and_jennings_response(motion, DT, PERIODS, DAMPING)
+    return np.sqrt((u**2 + (v * PERIODS[:, None] / (2 * np.pi)) ** 2).max(axis=1))
+
+
+def esi_per(oscillators: Any, motion: np.ndarray) -> np.ndarray:
+    """PER from the histories of gmprocess' C code, one period after the other."""
+    per = []
+    for period in PERIODS:
+        _, v, u, *_ = oscillators.calculate_spectrals(motion, motion.size, DT, 1 / DT, period, DAMPING)
+        per.append(np.sqrt((u**2 + (v * period / (2 * np.pi)) ** 2).max()))
+    return np.array(per)
+
+
+def lsim_per(motion: np.ndarray) -> np.ndarray:
+    """PER from SciPy's general linear simulation."""
+    per = []
+    for omega in 2 * np.pi / PERIODS:
+        system = ([[0, 1], [-(omega**2), -2 * DAMPING * omega]], [[0], [-1]], np.eye(2), [[0], [0]])
+        _, states, _ = lsim(system, motion, np.arange(motion.size) * DT)
+        per.append(np.hypot(states[:, 0], states[:, 1] / omega).max())
+    return np.array(per)
+
+
+def one_component() -> None:
+    """One record, 100 periods."""
+    motion = ground_motion(SAMPLES)
+    print(f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, damping {DAMPING}")
+    share_of_peak()
+    sampled, sampled_per = best(lambda: sampled_per_spectrum(motion, DT, PERIODS))
+    row("PER at samples", sampled)
+    exact, _ = best(lambda: per_spectrum(motion, DT, PERIODS))
+    row("PER exact between samples", exact, f"{exact / sampled:.2f} times the sampled")
+    seconds, at_samples = best(lambda: sampled_response_spectra(motion, DT, PERIODS))
+    row("PER, SD, SV, SA at samples", seconds)
+    seconds, spectra = best(lambda: response_spectra(motion, DT, PERIODS))
+    row("PER, SD, SV, SA exact, with free vibration", seconds)
+    peers_of_one_component(motion, sampled, sampled_per, at_samples, spectra.per)
+
+
+def share_of_peak() -> None:
+    """What the core can do, and what the PER of whole blocks of oscillators makes of it."""
+    periods, long = np.geomspace(0.05, 10.0, 128), 4 * SAMPLES
+    motion = ground_motion(long)
+    rounds = best(lambda: multiply_add(PEAK_ROUNDS))[0]
+    seconds, _ = best(lambda: sampled_per_spectrum(motion, DT, periods))
+    rounds = min(rounds, best(lambda: multiply_add(PEAK_ROUNDS))[0])
+    peak, rate = PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds, long * periods.size / seconds
+    print(f"multiply-adds of this core: {peak / 1e9:.1f} billion/s")
+    share = f"{rate / 1e9:.2f} billion steps/s = {100 * PER_STEP * rate / peak:.0f} % of the multiply-adds"
+    row(f"PER at samples, {long} samples, 128 periods", seconds, share)
+
+
+def peers_of_one_component(motion, sampled, sampled_per, at_samples, exact_per) -> None:
+    """Compare with whoever is installed; ratios are to our sampled PER, which does the same job."""
+    if pyrotd := module("pyrotd", "pyrotd"):
+        pyrotd.processes = 1
+        seconds, (sd, sv) = best(lambda: pyrotd_sd_sv(pyrotd, motion))
+        row("pyrotd: SD and SV", seconds, f"{seconds / sampled:.0f} times ours", error(at_samples.sd, sd))
+        row("", seconds, " " * 14, f"SV {error(at_samples.sv, sv)}")
+        seconds = best(
+            lambda: [pyrotd.calc_spec_accels(DT, motion, 1 / PERIODS, DAMPING, osc_type=kind) for kind in ("sd", "sv")]
+        )[0]
+        row("pyrotd: SD and SV, not padded", seconds, f"{seconds / sampled:.0f} times ours")
+    if oscillators := module("esi_core.gmprocess.metrics.oscillators", "esi-core"):
+        seconds, per = best(lambda: esi_per(oscillators, motion))
+        row("esi-core (C of gmprocess): PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
+    if eqsig := module("eqsig.sdof", "eqsig"):
+        seconds, per = best(lambda: eqsig_per(eqsig, motion))
+        row("eqsig: PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
+    seconds, per = best(lambda: lsim_per(motion))
+    row("SciPy lsim: PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
+    row("(what samples alone miss of the exact PER)", 0.0, error(exact_per, sampled_per))
+
+
+def azimuths() -> None:
+    """180 azimuths of two components."""
+    north, east = ground_motion(SAMPLES, 1), ground_motion(SAMPLES, 2)
+    print(f"\n180 azimuths, {SAMPLES} samples, {PERIODS.size} periods")
+    ours, per = best(lambda: azimuthal_per_spectrum(north, east, DT, PERIODS))
+    row("PER along every azimuth, exact between samples", ours)
+    seconds, sd = best(lambda: azimuthal_sd_spectrum(north, east, DT, PERIODS))
+    row("SD along every azimuth, exact, with free vibration", seconds)
+    seconds, plain = best(
+        lambda: [
+            per_spectrum(north * np.cos(angle) + east * np.sin(angle), DT, PERIODS)
+            for angle in np.radians(np.arange(180))
+        ]
+    )
+    row("PER of 180 rotated records, one by one", seconds, error(per, np.transpose(plain)))
+    if pyrotd := module("pyrotd", "pyrotd"):
+        pyrotd.processes = 1
+        padded = [np.concatenate([motion, np.zeros(SAMPLES)]) for motion in (north, east)]
+        for method in ("optimized", "rigorous"):
+            seconds, found = best(
+                lambda method=method: pyrotd.calc_rotated_spec_accels(
+                    DT, *padded, 1 / PERIODS, DAMPING, [50, 100], method=method
+                )
+            )
+            table = np.sort(found, order=["osc_freq", "percentile"])["spec_accel"].reshape(-1, 2)[::-1]
+            pseudo = (2 * np.pi / PERIODS) ** 2
+            row(f"pyrotd {method}: RotD50, RotD100", seconds, f"{seconds / ours:.0f} times ours")
+            for column, percentile in enumerate((50, 100)):
+                print(f"{'':>12}RotD{percentile} {error(rotd(sd, percentile) * pseudo, table[:, column])}")
+        seconds, _ = best(lambda: pyrotd.calc_rotated_spec_accels(DT, north, east, 1 / PERIODS, DAMPING, [50, 100]))
+        row("pyrotd optimized, not padded", seconds, f"{seconds / ours:.0f} times ours")
+
+
+def scaling() -> None:
+    """How times grow with samples, oscillators, azimuths and threads."""
+    print("\nScaling of PER exact between samples")
+    for samples in (3_000, 12_000, 48_000, 192_000):
+        motion = ground_motion(samples)
+        seconds, _ = best(lambda motion=motion: per_spectrum(motion, DT, PERIODS), 0.5)
+        row(f"{samples} samples, 100 periods", seconds, f"{1e9 * seconds / samples / 100:.3f} ns a sample and period")
+    motion = ground_motion(SAMPLES)
+    for count in (1, 64, 256, 1024):
+        periods = np.geomspace(0.05, 10, count)
+        seconds, _ = best(lambda periods=periods: per_spectrum(motion, DT, periods), 0.5)
+        row(f"{count} periods, 12000 samples", seconds, f"{1e9 * seconds / SAMPLES / count:.3f} ns a sample and period")
+    east = ground_motion(SAMPLES, 1)
+    for count in (4, 36, 180, 720):
+        angles = np.arange(count) * 180 / count
+        seconds, _ = best(lambda angles=angles: azimuthal_per_spectrum(motion, east, DT, PERIODS, azimuths=angles), 0.5)
+        row(f"{count} azimuths, 100 periods, 12000 samples", seconds)
+    seconds, _ = best(lambda: bilinear_response(motion, DT, 1.0, DAMPING, 0.01, 0.05), 0.5)
+    row("bilinear_response, 12000 samples", seconds, f"{1e9 * seconds / SAMPLES:.0f} ns a sample")
+
+
+def threads() -> None:
+    """The same job on one core and on all."""
+    cores = os.sched_getaffinity(0)
+    motion, periods = ground_motion(200_000), np.geomspace(0.05, 10, 640)
+    every, spectra = best(lambda: per_spectrum(motion, DT, periods), 2.0)
+    os.sched_setaffinity(0, {min(cores)})
+    one, alone = best(lambda: per_spectrum(motion, DT, periods), 2.0)
+    os.sched_setaffinity(0, cores)
+    print("\nThreads: 200000 samples, 640 periods, PER exact")
+    row("1 core", one)
+    same = "same bits" if np.array_equal(spectra, alone) else "DIFFERENT"
+    row(f"{len(cores)} cores", every, f"{one / every:.2f} times faster, {same}")
+
+
+def long_record() -> None:
+    """A day at 200 Hz."""
+    motion = ground_motion(17_280_000)
+    start = time.perf_counter()
+    per_spectrum(motion, DT, PERIODS)
+    print("\nA day at 200 Hz, 17.28 million samples, 100 periods")
+    row("PER exact, all cores", time.perf_counter() - start)
+
+
+if __name__ == "__main__":
+    one_component()
+    azimuths()
+    scaling()
+    threads()
+    long_record()
