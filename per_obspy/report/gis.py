@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyogrio
 import shapely
 from matplotlib.colors import LinearSegmentedColormap, to_hex
@@ -75,12 +76,12 @@ def write_totals_layer(totals: pd.DataFrame, boxes: pd.DataFrame | None, path: P
 def _write(
     path: Path, layer: str, shapes: NDArray[np.object_], table: pd.DataFrame, append: bool, facts: Mapping[str, str]
 ) -> None:
-    pyogrio.raw.write(
+    polygons = (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any()
+    pyogrio.raw.write_arrow(
+        _with_shapes(table, shapes),
         path,
-        shapely.to_wkb(shapes),
-        [_values(table[name]) for name in table],
-        list(table),
-        geometry_type="Polygon" if (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any() else "Point",
+        geometry_name=GEOMETRY,
+        geometry_type="Polygon" if polygons else "Point",
         crs=CRS,
         layer=layer,
         append=append,
@@ -89,12 +90,13 @@ def _write(
     )
 
 
-def _values(column: pd.Series) -> NDArray[Any]:
-    """Return a column as GDAL takes it: numbers and truth values as they are, anything else as text."""
-    if column.dtype.kind in "biuf":
-        return column.to_numpy()
-    text: NDArray[np.object_] = column.astype(object).where(column.notna(), None).to_numpy(object)
-    return text
+def _with_shapes(table: pd.DataFrame, shapes: NDArray[np.object_]) -> pa.Table:
+    """Return the table with its geometries as GDAL takes them; a column without any value counts as text."""
+    plain = table.copy(deep=False)
+    plain.attrs = {}
+    arrow = pa.Table.from_pandas(plain, preserve_index=False)
+    kinds = [pa.field(one.name, pa.string()) if pa.types.is_null(one.type) else one for one in arrow.schema]
+    return arrow.cast(pa.schema(kinds)).append_column(GEOMETRY, pa.array(shapely.to_wkb(shapes), pa.binary()))
 
 
 def _write_style(path: Path, layer: str, style: str) -> None:

@@ -13,6 +13,9 @@ from per_obspy.screening.assignment import EARTH_RADIUS
 
 STATES = ("yes", "possible", "no")
 
+#: More than the cells around the earth: a row and a column make one number.
+MANY = 1 << 32
+
 #: Unit and meaning of the columns of a table of totals; every risk class has a column ``class_...`` besides.
 TOTALS: dict[str, Column] = {
     column.name: column
@@ -163,11 +166,13 @@ def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCe
     row = np.floor(north / high).astype(np.int64)
     around = _cells_around(row, high)
     column = np.minimum(np.floor((east % 360.0) / 360.0 * around).astype(np.int64), around - 1)
-    cells, which = np.unique(np.stack([row, column], axis=1), axis=0, return_inverse=True)
-    names = np.array([f"r{one} c{other}" for one, other in cells.tolist()], dtype=object)
-    wide = 360.0 / _cells_around(cells[:, 0], high)
-    west = (cells[:, 1] * wide + 180.0) % 360.0 - 180.0
-    south = cells[:, 0] * high
+    _, first, which = np.unique(row * MANY + column, return_index=True, return_inverse=True)
+    row, column, wide = row[first], column[first], 360.0 / around[first]
+    names = np.array(
+        [f"r{one} c{other}" for one, other in zip(row.tolist(), column.tolist(), strict=True)], dtype=object
+    )
+    west = (column * wide + 180.0) % 360.0 - 180.0
+    south = row * high
     boxes = {"west": west, "south": south, "east": west + wide, "north": south + high}
     return GridCells(names[which], pd.DataFrame(boxes, index=names))
 

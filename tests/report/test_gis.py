@@ -26,6 +26,7 @@ TABLE = pd.DataFrame(
         "yield_displacement_1": [np.inf, 0.1, 0.2],
         "floors_misaligned": [True, False, False],
         "probability": [0.5, 0.25, 0.0],
+        "remark": [None, None, None],
     }
 )
 FACTS = {"name": "old town", "simulated": "true"}
