@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
+from per_obspy.pounding.histories import pounding_histories
 from per_obspy.pounding.relative import critical_gap_surface, directional_relative_displacement, relative_displacement
 
 dampings = st.floats(0.01, 0.3)
@@ -127,6 +128,19 @@ def test_many_pairs_answer_as_each_alone():
     for pair in (0, 31, 64, 69):
         alone = directional_relative_displacement(north, east, DT, *structures[:, pair], azimuth[pair])
         assert alone == tuple(field[pair] for field in together)
+
+
+def test_the_exact_history_first_touches_at_the_largest_relative_displacement():
+    # mutation: a peak missed between samples or after the record, on either side. The history shares no code with it
+    ground = noise(400)
+    period_1, period_2 = np.random.default_rng(9).uniform(0.2, 2.0, (2, 30))
+    gap = relative_displacement(ground, DT, period_1, 0.05, period_2, 0.05).one_before_two
+    apart, touching = (
+        pounding_histories(ground, DT, period_1, 0.05, 1.0, period_2, 0.05, 1.0, gap * factor, 0.65).impacts
+        for factor in (1 + 1e-9, 1 - 1e-6)
+    )
+    assert np.all(apart == 0)
+    assert np.all(touching >= 1)
 
 
 def test_surface():
