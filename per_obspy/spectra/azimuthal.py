@@ -91,7 +91,7 @@ def _spectrum(
     fan = _fan(np.radians(given[ascending] % 180.0))
     oscillators = prepare_oscillators(dt, *grid)
     squares = over_blocks(lambda block: _block_squares(ground, block, share, fan).T, oscillators, ground)
-    lengths = np.empty((given.size, oscillators.count))
+    lengths = np.empty((given.size, oscillators.wanted))
     lengths[ascending] = np.sqrt(squares) / oscillators.omegas**2 * ground.scale
     return lengths.T.reshape(*shape, given.size)
 
@@ -113,12 +113,12 @@ def _block_squares(ground: Ground, block: Oscillators, share: float, fan: tuple[
     kernels.pack_steps(block.phases, block.dampings, packed)
     for stretch in stretches(ground):
         kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
-        for lane in range(block.count):
+        for lane in range(block.wanted):
             oscillator = float(block.phases[lane]), float(block.dampings[lane]), share, *fan
             count = kernels.list_steps(*stretch[:4], kept, lane, *oscillator, largest[lane], steps)
             kernels.search_steps(steps[:count], *oscillator, largest[lane])
     if share == 0.0:
-        kernels.free_displacements(state, block.dampings, block.count, fan[0], largest)
+        kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
     return largest
 
 

@@ -36,13 +36,13 @@ class Ground(NamedTuple):
 
 
 class Oscillators(NamedTuple):
-    """Phase of one step, damping, weights of north and east (2, n), omega in rad/s; the first ``count`` are wanted."""
+    """Phase of one step, damping, weights of north and east (2, n), omega in rad/s; the first ``wanted`` count."""
 
     phases: FloatArray
     dampings: FloatArray
     weights: FloatArray
     omegas: FloatArray
-    count: int
+    wanted: int
 
 
 def prepare_ground(north: FloatArray, east: FloatArray | None = None) -> Ground:
@@ -86,7 +86,7 @@ def choose(stretch: Ground, block: Oscillators, kept: FloatArray, largest: Float
     """Raise the largest values to the samples of a stretch; return (tile, lane) where more may lie in between."""
     tiles = stretch.peaks.shape[1]
     chosen = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.select(kept, stretch.peaks, stretch.jumps, *block[:3], block.count, largest, chosen)
+    count = blocks.select(kept, stretch.peaks, stretch.jumps, *block[:3], block.wanted, largest, chosen)
     return chosen[:count]
 
 
@@ -109,18 +109,21 @@ def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> 
 
 def over_blocks(work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, ground: Ground) -> FloatArray:
     """Return the rows that the work gives for each block of oscillators, (rows, n); in threads where that pays."""
-    parts = [_block(oscillators, first) for first in range(0, oscillators.count, blocks.LANES)]
+    parts = [_block(oscillators, first) for first in range(0, oscillators.wanted, blocks.LANES)]
     threads = min(len(parts), len(os.sched_getaffinity(0)))
-    if threads == 1 or oscillators.count * ground.north.size < STEPS_WORTH_THREADS:
+    if threads == 1 or oscillators.wanted * ground.north.size < STEPS_WORTH_THREADS:
         rows = [work(part) for part in parts]
     else:
         with ThreadPoolExecutor(threads) as pool:
             rows = list(pool.map(work, parts))
-    return np.concatenate(rows, axis=1)[:, : oscillators.count]
+    return np.concatenate(rows, axis=1)[:, : oscillators.wanted]
 
 
 def _block(oscillators: Oscillators, first: int) -> Oscillators:
     """Return one block, filled up with copies of the last oscillator."""
-    count = min(blocks.LANES, oscillators.count - first)
+    count = min(blocks.LANES, oscillators.wanted - first)
     lanes = first + np.minimum(np.arange(blocks.LANES), count - 1)
-    return Oscillators(*(np.ascontiguousarray(values[..., lanes]) for values in oscillators[:4]), count)
+    weights = np.ascontiguousarray(oscillators.weights[:, lanes])
+    return Oscillators(
+        oscillators.phases[lanes], oscillators.dampings[lanes], weights, oscillators.omegas[lanes], count
+    )

@@ -1,7 +1,7 @@
 """
 Speed and agreement of the spectra, beside other programs, in one process on one core unless the table says otherwise.
 
-    python tests/benchmarks/spectra.py
+    OPENBLAS_NUM_THREADS=1 python tests/benchmarks/spectra.py
 
 Every time is the best of several. Peers that are not installed are named and left out
 (``pip install per_obspy[benchmark]`` brings them).
