@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad
 from scipy.stats import norm
 
-from per_obspy.pounding.probability import (
+from per_obspy.pounding.dispersion import (
     combined_dispersion,
     combined_dispersion_correlation,
-    demand_probability,
-    first_order_probability,
     lognormal_dispersion,
     period_dispersion,
+)
+from per_obspy.pounding.probability import (
+    demand_probability,
+    first_order_probability,
     pounding_probability,
     simulated_probability,
 )
@@ -67,7 +69,8 @@ def test_symmetry_scale_and_monotony(r1, r2, correlation, shared):
     np.testing.assert_allclose(here, there, atol=1e-10)
     larger = pounding_probability(7 * r1, 7 * r2, correlation, 7 * gaps, 0.3, 0.5, shared, 0.1)
     np.testing.assert_allclose(here, larger, atol=1e-10)
-    assert np.all(np.diff(here) < 0)
+    assert np.all(np.diff(here) <= 1e-12)  # nearly certain ones differ by rounding only
+    assert here[0] > here[-1]
 
 
 def test_certainty_walls_and_touching_pairs():
