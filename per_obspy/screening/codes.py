@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Codes
+from per_obspy.inventory.schema import Column
 
 INCH, FOOT = 0.0254, 0.3048
 
@@ -52,6 +53,16 @@ def code_rules() -> pd.DataFrame:
     """Return the rules: column, unit, clause, edition, inputs, verified (yes or no), source, meaning."""
     with files("per_obspy.screening").joinpath("code_rules.csv").open(encoding="utf-8") as table:
         return pd.read_csv(table, keep_default_na=False)
+
+
+def rule_columns() -> dict[str, Column]:
+    """Return the columns of the rules with unit and meaning; the meaning leads with clause and edition."""
+    columns = {}
+    for rule in code_rules().astype(str).to_dict("records"):
+        meaning = f"{rule['edition']}, {rule['clause']}: {rule['meaning']}"
+        kind = "float64" if rule["unit"] else "str"
+        columns[rule["column"]] = Column(rule["column"], kind, rule["unit"], meaning)
+    return columns
 
 
 def code_columns(

@@ -3,8 +3,8 @@ Screening by a design or user spectrum: demands and code rules without a record.
 
 There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral displacement. On
 broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact one, a log-standard deviation of 0.14,
-and is too small in two of three cases; the state here compares the gap with that value and with nothing larger, unless
-a derived period asks for SRSS.
+and is too small in two of three cases. A gap below it is a yes; the probability, which knows of that error, makes
+others possible, and derived periods ask for SRSS at least.
 """
 
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from per_obspy.pounding.gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.demand import demand_ratio, pounding_state
+from per_obspy.screening.design_probability import design_probability
 from per_obspy.screening.design_spectrum import DesignSpectrum, displacement_at, within
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.ranking import risk_class, worst_first
@@ -35,13 +36,14 @@ DESIGN: dict[str, Column] = {
         Column("srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"),
         Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
         Column("demand_rule", "str", "", "what the demand is: sd_white_noise, or sd_srss for derived periods"),
+        Column("probability", "float64", "1", "of pounding under the spectrum, with what is uncertain of the pair"),
     )
 }
 
 LEADING = (
-    "rank", "pair_id", "risk_class", "state", "gap", "demand", "demand_rule", "demand_ratio", "impact_velocity",
-    "single_hit_status", "amplification_1", "amplification_2", "spectrum", "sd_1", "sd_2", "correlation",
-    "critical_gap_sd", "srss_gap_sd", "absolute_gap_sd",
+    "rank", "pair_id", "risk_class", "state", "probability", "gap", "demand", "demand_rule", "demand_ratio",
+    "impact_velocity", "single_hit_status", "amplification_1", "amplification_2", "spectrum", "sd_1", "sd_2",
+    "correlation", "critical_gap_sd", "srss_gap_sd", "absolute_gap_sd",
 )  # fmt: skip
 
 
@@ -123,7 +125,7 @@ def _judged(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening)
     derived = period_is_derived(pairs)
     squares_decide = derived & (by_squares > by_correlation)
     demand = np.where(squares_decide, by_squares, by_correlation)
-    ratio = demand_ratio(gap, demand)
+    ratio, probability = demand_ratio(gap, demand), design_probability(spectrum, pairs)
     columns: dict[str, str | NDArray[np.generic]] = {
         "spectrum": spectrum.name,
         "sd_1": sd_1,
@@ -135,7 +137,8 @@ def _judged(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening)
         "demand": demand,
         "demand_rule": np.where(squares_decide, "sd_srss", "sd_white_noise").astype(object),
         "demand_ratio": ratio,
-        "state": pounding_state(gap, demand, derived),
+        "probability": probability,
+        "state": pounding_state(gap, demand, derived | (probability >= screening.possible_from)),
         "risk_class": risk_class(ratio, screening.classes),
         **_hits(radius, values, demand, pairs),
     }
