@@ -35,7 +35,7 @@ def pounding_probability(
     gap : array_like
         Median gap, m.
     dispersion_1, dispersion_2 : array_like
-        Standard deviations of the logarithms of the radii; see :func:`per_obspy.pounding.dispersion.combined_dispersion`.
+        Standard deviations of the logarithms of the radii; see :mod:`per_obspy.pounding.dispersion`.
     dispersion_correlation : array_like
         Correlation of the logarithms of the two radii, from -1 to 1, dimensionless. It has no default: the ground
         motion is shared, the periods are not; see the same module.
