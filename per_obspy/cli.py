@@ -8,6 +8,7 @@ import sys
 
 import typer
 
+from per_obspy.commands.design import design
 from per_obspy.commands.inventory import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.walk import run, simulate, spectra
@@ -25,7 +26,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, spectra, events, fetch, info):
+for command in (run, simulate, spectra, events, fetch, info, design):
     app.command()(command)
 
 

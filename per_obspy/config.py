@@ -324,6 +324,16 @@ class Screening(Section):
         return classes
 
 
+class Design(Section):
+    """A screening by a design or user spectrum instead of records."""
+
+    spectrum: RelativePath = Field(description="CSV: period (s), damping, and sd (m) or psa (m/s2)")
+    pairs: RelativePath = Field(description="pair table, CSV or Parquet")
+    output: RelativePath = Field(description="folder of the results")
+    building: Building = Building()
+    screening: Screening = Screening()
+
+
 class Pairs(Section):
     """Where the pairs of buildings come from: a stored table, or a simulated one around the stations."""
 

@@ -1,0 +1,51 @@
+"""``per-obspy design``: screening by a design or user spectrum, without a record."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from per_obspy.commands.printing import print_table
+
+NOTHING_USABLE = 3
+
+#: Columns of the worst pairs that are printed.
+SHOWN = ("pair_id", "period_1", "period_2", "gap", "demand", "demand_rule", "state", "probability", "impact_velocity")
+
+
+def design(
+    configuration: Annotated[Path, typer.Argument(help="TOML file: spectrum, pairs, output, assumptions.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")] = False,
+) -> None:
+    """
+    Screen pairs by a design or user spectrum instead of a record.
+
+    Example: per-obspy design design.toml
+    """
+    from per_obspy.config import Design, load
+    from per_obspy.inventory.reading import read_pairs
+    from per_obspy.report.design import write_design
+    from per_obspy.screening.design import design_table
+    from per_obspy.screening.design_spectrum import read_design_spectrum
+
+    settings = load(configuration, Design)
+    spectrum = read_design_spectrum(settings.spectrum)
+    table = design_table(spectrum, read_pairs(settings.pairs), settings.building, settings.screening)
+    files = write_design(table, settings.output)
+    states = {state: int((table["state"] == state).sum()) for state in ("yes", "possible", "no")}
+    rejected = len(table.attrs["rejected"])
+    if as_json:
+        said = {"pairs": len(table), **states, "rejected": rejected, "files": [str(path) for path in files]}
+        print(json.dumps(said))
+    else:
+        counts = ", ".join(f"{count} {state}" for state, count in states.items())
+        print(f"{len(table)} pairs ({counts}), {rejected} rejected; the radius is SD, a design spectrum has no PER")
+        worst = table.head(10)
+        titles = [name.replace("_", " ") for name in SHOWN]
+        print_table(f"The {len(worst)} worst pairs", titles, worst[list(SHOWN)].itertuples(index=False))
+        print(*files, sep="\n")
+    if table.empty:
+        print(f"nothing usable was left: see {files[-1]}", file=sys.stderr)
+        raise typer.Exit(NOTHING_USABLE)
