@@ -29,7 +29,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     write_pairs(table, paths[1])
     known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
-    rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in table]
+    rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in map(str, table)]
     with written_whole(paths[2]) as part:
         pd.DataFrame(rows, columns=["name", "unit", "meaning"]).to_csv(part, index=False)
     write_rejected(table.attrs["rejected"], paths[3])

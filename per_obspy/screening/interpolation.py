@@ -203,6 +203,36 @@ def interpolated_motion(
     return InterpolatedMotion(median, deviation, fallback)
 
 
+def at_period(motion: InterpolatedMotion, periods: ArrayLike, period: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the logarithm of the median (PER in m) and the log-standard deviation at each place's own period.
+
+    Parameters
+    ----------
+    motion : InterpolatedMotion
+        At the places, on a grid of periods.
+    periods : (n_periods,) array_like
+        The grid, s, rising; at least two.
+    period : (n_places,) array_like
+        One for each place, s. Between the grid's periods both are linear in the logarithm of the period.
+
+    Returns
+    -------
+    ln_median, log_std : (n_places,) ndarray
+        NaN outside the grid, and beside a period that no station supports.
+    """
+    grid, wanted = np.log(checks.positive("periods", periods)), np.log(checks.positive("period", period))
+    lower = np.clip(np.searchsorted(grid, wanted, side="right") - 1, 0, grid.size - 2)
+    share = (wanted - grid[lower]) / (grid[lower + 1] - grid[lower])
+    share = np.where((wanted < grid[0]) | (wanted > grid[-1]), np.nan, share)
+    row = np.arange(wanted.size)
+    median, deviation = (
+        (1.0 - share) * values[row, lower] + share * values[row, lower + 1]
+        for values in (motion.ln_median, motion.log_std)
+    )
+    return median, deviation
+
+
 def _served(stations: Sites, places: Sites) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], bool]]:
     """Give places with the stations that serve them, and whether these are of other site classes."""
     nobody_knows = bool((stations.site_class == "").all())

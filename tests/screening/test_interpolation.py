@@ -9,6 +9,8 @@ from numpy.testing import assert_allclose
 from per_obspy.config import Interpolation
 from per_obspy.screening.assignment import nearest_station
 from per_obspy.screening.interpolation import (
+    InterpolatedMotion,
+    at_period,
     great_circle,
     interpolated_motion,
     sites,
@@ -203,6 +205,17 @@ def test_distances_are_those_of_the_nearest_station():
         chord = nearest_station(east, north, *(np.array([x]) for x in other))[1]
         # arcs of near-opposite places are badly told by chords; these are within 1e-9
         assert_allclose(great_circle(east, north, *other), chord, rtol=1e-9)
+
+
+def test_every_place_has_its_own_period():
+    # a straight line in the logarithm of the period is met everywhere, and nothing outside the grid
+    grid = np.array([0.1, 0.5, 2.0])
+    line = np.array([[2.0], [-1.0], [3.0], [1.0], [1.0]]) * np.log(grid)
+    motion = InterpolatedMotion(line, np.abs(line), np.zeros(5, dtype=bool))
+    period = np.array([0.1, 0.3, 2.0, 0.09, 2.1])
+    median, deviation = at_period(motion, grid, period)
+    assert_allclose(median, [2.0 * np.log(0.1), -np.log(0.3), 3.0 * np.log(2.0), np.nan, np.nan], rtol=1e-12)
+    assert np.isnan(deviation).tolist() == [False, False, False, True, True]
 
 
 def test_inputs_that_cannot_be_used_are_named():
