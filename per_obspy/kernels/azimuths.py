@@ -36,6 +36,19 @@ def pack_steps(phases, dampings, packed):
 
 
 @kernel
+def _open_tile(un, zn, ue, ze, radius, displacement, kept):
+    """Keep the states before a tile and start its bounds with theirs (for the radius, the trace)."""
+    for lane in range(LANES):
+        un[lane] = un[lane] if abs(un[lane]) > SMALLEST_STATE else 0.0
+        zn[lane] = zn[lane] if abs(zn[lane]) > SMALLEST_STATE else 0.0
+        ue[lane] = ue[lane] if abs(ue[lane]) > SMALLEST_STATE else 0.0
+        ze[lane] = ze[lane] if abs(ze[lane]) > SMALLEST_STATE else 0.0
+        kept[0, lane], kept[1, lane], kept[2, lane], kept[3, lane] = un[lane], zn[lane], ue[lane], ze[lane]
+        displacement[lane] = un[lane] * un[lane] + ue[lane] * ue[lane]
+        radius[lane] = displacement[lane] + zn[lane] * zn[lane] + ze[lane] * ze[lane]
+
+
+@kernel
 def run_azimuth_tiles(north, east, packed, state, kept):
     """
     Advance a block; keep, per tile, the states before it and what squared radius and displacement cannot exceed.
@@ -48,15 +61,7 @@ def run_azimuth_tiles(north, east, packed, state, kept):
     radius, displacement = np.empty(LANES), np.empty(LANES)
     for first in range(0, north.size - 1, TILE):
         tile = first // TILE
-        for lane in range(LANES):
-            un[lane] = un[lane] if abs(un[lane]) > SMALLEST_STATE else 0.0
-            zn[lane] = zn[lane] if abs(zn[lane]) > SMALLEST_STATE else 0.0
-            ue[lane] = ue[lane] if abs(ue[lane]) > SMALLEST_STATE else 0.0
-            ze[lane] = ze[lane] if abs(ze[lane]) > SMALLEST_STATE else 0.0
-            kept[tile, 0, lane], kept[tile, 1, lane] = un[lane], zn[lane]
-            kept[tile, 2, lane], kept[tile, 3, lane] = ue[lane], ze[lane]
-            displacement[lane] = un[lane] * un[lane] + ue[lane] * ue[lane]
-            radius[lane] = displacement[lane] + zn[lane] * zn[lane] + ze[lane] * ze[lane]
+        _open_tile(un, zn, ue, ze, radius, displacement, kept[tile])
         for i in range(first, first + TILE, 2):
             n0, n1, n2, e0, e1, e2 = north[i], north[i + 1], north[i + 2], east[i], east[i + 1], east[i + 2]
             for lane in range(LANES):

@@ -26,6 +26,26 @@ def pack_response(weights, phases, dampings, packed):
 
 
 @kernel
+def _open_tile(u, z, twice, square, displacement, velocity, felt, kept):
+    """Keep the states before a tile and start its largest values with theirs."""
+    for lane in range(LANES):
+        u[lane] = u[lane] if abs(u[lane]) > SMALLEST_STATE else 0.0
+        z[lane] = z[lane] if abs(z[lane]) > SMALLEST_STATE else 0.0
+        kept[0, lane], kept[1, lane] = u[lane], z[lane]
+        square[lane] = u[lane] * u[lane] + z[lane] * z[lane]
+        displacement[lane], velocity[lane] = abs(u[lane]), abs(z[lane])
+        felt[lane] = abs(u[lane] + twice[lane] * z[lane])
+
+
+@kernel
+def _close_tile(square, displacement, velocity, felt, kept):
+    """Keep the largest values of a tile."""
+    for lane in range(LANES):
+        kept[2, lane], kept[3, lane] = square[lane], displacement[lane]
+        kept[4, lane], kept[5, lane] = velocity[lane], felt[lane]
+
+
+@kernel
 def run_response_tiles(north, east, packed, kept):
     """Advance a block; keep, per tile, the state before it and the largest ``u² + z², |u|, |z|, |u + 2 xi z|``."""
     u, z, p = packed[0].copy(), packed[1].copy(), packed[2].copy()
@@ -34,15 +54,9 @@ def run_response_tiles(north, east, packed, kept):
     a11, a12, a21, a22 = packed[6].copy(), packed[7].copy(), packed[8].copy(), packed[9].copy()
     b11, b12, b21, b22 = packed[10].copy(), packed[11].copy(), packed[12].copy(), packed[13].copy()
     for first in range(0, north.size - 1, TILE):
-        tile = first // TILE
         for lane in range(LANES):
-            u[lane] = u[lane] if abs(u[lane]) > SMALLEST_STATE else 0.0
-            z[lane] = z[lane] if abs(z[lane]) > SMALLEST_STATE else 0.0
             p[lane] = to_north[lane] * north[first] + to_east[lane] * east[first]
-            kept[tile, 0, lane], kept[tile, 1, lane] = u[lane], z[lane]
-            square[lane] = u[lane] * u[lane] + z[lane] * z[lane]
-            displacement[lane], velocity[lane] = abs(u[lane]), abs(z[lane])
-            felt[lane] = abs(u[lane] + twice[lane] * z[lane])
+        _open_tile(u, z, twice, square, displacement, velocity, felt, kept[first // TILE])
         for i in range(first + 1, first + TILE + 1, 4):
             north_1, north_2, north_3, north_4 = north[i], north[i + 1], north[i + 2], north[i + 3]
             east_1, east_2, east_3, east_4 = east[i], east[i + 1], east[i + 2], east[i + 3]
@@ -70,9 +84,7 @@ def run_response_tiles(north, east, packed, kept):
                 early = max(abs(u1 + twice[lane] * z1), abs(u2 + twice[lane] * z2))
                 late = max(abs(u3 + twice[lane] * z3), abs(u4 + twice[lane] * z4))
                 felt[lane] = max(felt[lane], early, late)
-        for lane in range(LANES):
-            kept[tile, 2, lane], kept[tile, 3, lane] = square[lane], displacement[lane]
-            kept[tile, 4, lane], kept[tile, 5, lane] = velocity[lane], felt[lane]
+        _close_tile(square, displacement, velocity, felt, kept[first // TILE])
     for lane in range(LANES):
         packed[0, lane], packed[1, lane], packed[2, lane] = u[lane], z[lane], p[lane]
 
