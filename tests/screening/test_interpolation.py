@@ -72,6 +72,25 @@ def test_a_textbooks_matrix_gives_the_same(city):
             assert_allclose(motion.log_std[row, column] ** 2, variance * (1 - solution @ right), rtol=1e-7)
 
 
+def test_the_deviation_is_that_of_the_error():
+    # fields drawn with the published correlation about an attenuation, one a column; would catch a deviation that is
+    # right at stations and far away but not in between
+    random = np.random.default_rng(12)
+    longitude, latitude = random.uniform(-0.15, 0.15, (2, 18))
+    distance = 1000.0 * np.hypot(111.2 * (longitude + 0.5), 111.2 * latitude)
+    apart = great_circle(longitude[:, None], latitude[:, None], longitude, latitude)
+    fields = 4000
+    root = np.linalg.cholesky(np.exp(-3.0 * apart / 25_700.0))
+    values = -3.0 - 1.5 * np.log(distance)[:, None] + 0.6 * root @ random.normal(size=(18, fields))
+    known, hidden = np.arange(15), np.arange(15, 18)
+    all_sites = sites(longitude, latitude, "", distance)
+    motion = interpolated_motion(all_sites.at(known), values[known], np.ones(fields), all_sites.at(hidden), SETTINGS)
+    error = motion.ln_median - values[hidden]
+    # a mean square of 4000 normal errors is within 9 % of its expectation (four standard errors)
+    assert_allclose((error**2).mean(axis=1), (motion.log_std**2).mean(axis=1), rtol=0.09)
+    assert_allclose(error.mean(axis=1), 0.0, atol=4 * 0.6 / np.sqrt(fields))
+
+
 def test_far_away_the_trend_and_the_whole_deviation_are_left():
     # stations so far apart that nothing correlates: ordinary least squares and its prediction error, from a textbook
     values = np.array([[-2.0], [-3.0], [-2.5]])
