@@ -27,7 +27,7 @@ event_provider = "{url}"
 cache = "cache"
 retries = 1
 wait = 0.01
-timeout = 2.0
+timeout = 10.0
 [pairs.simulated]
 count = 10
 [screening]
@@ -146,7 +146,7 @@ def test_fetch_says_what_had_no_data_and_asks_again_when_told(server, configurat
         ('event_id = "xx1"', 'event_id = "yy9"', "has no event yy9"),
         ('event_id = "xx1"', "", "fdsn needs event_id, or event, or latitude"),
         ('event_id = "xx1"', 'event_id = "xx1"\nstart = "yesterday"', "records.fdsn.start"),
-        ("timeout = 2.0", "timeout = 0", "records.fdsn.timeout"),
+        ("timeout = 10.0", "timeout = 0", "records.fdsn.timeout"),
     ],
 )
 def test_wrong_input_exits_with_2(server, tmp_path, call, old, new, message):
