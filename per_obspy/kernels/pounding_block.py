@@ -1,31 +1,15 @@
 """Histories of 32 pairs at once: the loop over the record and the free vibration that follows it."""
 
 from ._jit import kernel
-from .pounding_lanes import (
-    ACTIVE,
-    COSINE,
-    EVENT,
-    FLEXIBILITY,
-    LANES,
-    LARGEST_PLACE,
-    LARGEST_RADIUS,
-    LEFT_PEAK,
-    PLACE,
-    RIGHT_PEAK,
-    SINE,
-    SPEED,
-    STRUCTURE_ROWS,
-    accept_step,
-    at,
-    shake,
-    step_lanes,
-)
-from .pounding_motion import STUCK, Segment, taylor_terms
+from .pounding_lanes import COSINE, EVENT, LANES, SECOND, SINE, STRUCTURE_ROWS, at, step_lanes
+from .pounding_motion import STUCK, TERMS, Segment
 from .pounding_pairs import (
     changes_phase,
     load_pair,
     raise_inside,
+    read_end,
     repeat_step,
+    rest_lane,
     store_pair,
     write_constants,
     write_phase,
@@ -37,47 +21,47 @@ SETTLING_STEPS = 16
 
 
 @kernel
-def prepare_block(lanes, rows, cosine, sine, duration):
-    """Set all lanes to rest."""
+def prepare_block(lanes, flags, rows, cosine, sine, duration):
+    """Set all lanes to rest; the last flag is the number of pairs in contact."""
     lanes[:] = 0.0
+    flags[LANES] = 0
     for lane in range(LANES):
         write_constants(lanes, rows[lane], lane, cosine[lane], sine[lane], duration)
-        write_phase(lanes, rows[lane], lane, duration, taylor_terms(rows[lane], duration))
+        write_phase(lanes, rows[lane], lane, duration)
+        flags[LANES] += rows[lane, 0, STUCK] != 0.0
 
 
 @kernel
-def count_touching(rows):
-    """Return how many pairs are in contact."""
-    touching = 0
-    for lane in range(LANES):
-        touching += rows[lane, 0, STUCK] != 0.0
-    return touching
+def repair_lane(lanes, row, log, lane, flag, ground, duration):
+    """
+    Do for a flagged lane what the common step cannot; tell whether it got through.
+
+    ``ground`` is the acceleration of the north and the east component, and the slope of both.
+    """
+    cosine, sine = lanes[at(COSINE, lane)], lanes[at(SINE, lane)]
+    acceleration, slope = cosine * ground[0] + sine * ground[1], cosine * ground[2] + sine * ground[3]
+    through = True
+    if flag < EVENT:
+        raise_inside(lanes, row, lane, 0, flag, acceleration, slope, duration)
+        raise_inside(lanes, row, lane, STRUCTURE_ROWS, flag // SECOND, acceleration, slope, duration)
+    else:
+        load_pair(lanes, row, lane)
+        through = repeat_step(row, log, Segment(0.0, duration, acceleration, slope, int(row[0, TERMS])))
+        store_pair(lanes, row, lane)
+        if changes_phase(lanes, row, lane):
+            write_phase(lanes, row, lane, duration)
+    return through
 
 
 @kernel
 def repair_lanes(lanes, flags, rows, log, ground, duration):
-    """
-    Do for every flagged lane what the common step cannot; tell whether all got through.
-
-    ``ground`` is the acceleration of the north and the east component, and the slope of both.
-    """
+    """Repair every flagged lane; tell whether all got through."""
     through = True
     for lane in range(LANES):
         if flags[lane]:
-            row, cosine, sine = rows[lane], lanes[at(COSINE, lane)], lanes[at(SINE, lane)]
-            acceleration, slope = cosine * ground[0] + sine * ground[1], cosine * ground[2] + sine * ground[3]
-            terms = taylor_terms(row, duration)
-            if flags[lane] & EVENT:
-                load_pair(lanes, row, lane)
-                through &= repeat_step(row, log, Segment(0.0, duration, acceleration, slope, terms))
-                store_pair(lanes, row, lane)
-                if changes_phase(lanes, row, lane):
-                    write_phase(lanes, row, lane, duration, terms)
-            else:
-                if flags[lane] & LEFT_PEAK:
-                    raise_inside(lanes, row, lane, 0, acceleration, slope, terms, duration)
-                if flags[lane] & RIGHT_PEAK:
-                    raise_inside(lanes, row, lane, STRUCTURE_ROWS, acceleration, slope, terms, duration)
+            touched = rows[lane, 0, STUCK] != 0.0
+            through &= repair_lane(lanes, rows[lane], log, lane, flags[lane], ground, duration)
+            flags[LANES] += (rows[lane, 0, STUCK] != 0.0) - touched
     return through
 
 
@@ -89,22 +73,10 @@ def advance_block(block, flags, rows, log, start, end, dt, refinement, bilinear)
     for part in range(refinement):
         first, last = part * duration, (part + 1) * duration
         north, east = start[0] + slope_north * first, start[1] + slope_east * first
-        shake(block[0], north, east, start[0] + slope_north * last, start[1] + slope_east * last)
-        if step_lanes(block, flags, duration, bilinear, count_touching(rows) > 0):
-            ground = (north, east, slope_north, slope_east)
-            through &= repair_lanes(block[0], flags, rows, log, ground, duration)
-        accept_step(block[0])
+        ground = (north, east, start[0] + slope_north * last, start[1] + slope_east * last)
+        if step_lanes(block, flags, ground, duration, bilinear, flags[LANES] > 0):
+            through &= repair_lanes(block[0], flags, rows, log, (north, east, slope_north, slope_east), duration)
     return through
-
-
-@kernel
-def include_ends(lanes, lane):
-    """Raise the maxima of a lane to its last state."""
-    for first in (0, STRUCTURE_ROWS):
-        place, speed = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
-        radius = place * place + lanes[at(first + FLEXIBILITY, lane)] * speed * speed
-        lanes[at(first + LARGEST_PLACE, lane)] = max(lanes[at(first + LARGEST_PLACE, lane)], abs(place))
-        lanes[at(first + LARGEST_RADIUS, lane)] = max(lanes[at(first + LARGEST_RADIUS, lane)], radius)
 
 
 @kernel
@@ -112,14 +84,11 @@ def retire_lanes(lanes, rows, free_steps, step):
     """Rest the lanes in which nothing can happen any more after so many steps of free vibration; count the others."""
     active = 0
     for lane in range(LANES):
-        if lanes[at(ACTIVE, lane)] > 0.0:
-            done = step >= free_steps[lane]
-            if not done and step % SETTLING_STEPS == 0:
-                load_pair(lanes, rows[lane], lane)
-                done = is_settled(rows[lane])
-            if done:
-                include_ends(lanes, lane)
-                lanes[at(ACTIVE, lane)] = lanes[at(STRUCTURE_ROWS + ACTIVE, lane)] = 0.0
+        if free_steps[lane] >= 0:
+            read_end(lanes, rows[lane], lane)
+            if step >= free_steps[lane] or is_settled(rows[lane]):
+                free_steps[lane] = -1
+                rest_lane(lanes, lane)
             else:
                 active += 1
     return active
@@ -127,15 +96,20 @@ def retire_lanes(lanes, rows, free_steps, step):
 
 @kernel
 def run_block(components, dt, refinement, lanes, flags, rows, log, cosine, sine, free_steps, bilinear):
-    """Run 32 pairs through a record and the free vibration after it; tell whether all got through."""
+    """
+    Run 32 pairs through a record and the free vibration after it; tell whether all got through.
+
+    ``free_steps`` is how many sampling intervals of free vibration each pair has at most; it is used up.
+    """
     block = (lanes, lanes[: STRUCTURE_ROWS * LANES], lanes[STRUCTURE_ROWS * LANES :])
-    prepare_block(lanes, rows, cosine, sine, dt / refinement)
+    prepare_block(lanes, flags, rows, cosine, sine, dt / refinement)
     through, rest = True, (0.0, 0.0)
     for k in range(components.shape[1] - 1):
         start, end = (components[0, k], components[1, k]), (components[0, k + 1], components[1, k + 1])
         through &= advance_block(block, flags, rows, log, start, end, dt, refinement, bilinear)
     step = 0
     while retire_lanes(lanes, rows, free_steps, step):
-        through &= advance_block(block, flags, rows, log, rest, rest, dt, refinement, bilinear)
-        step += 1
+        for _ in range(SETTLING_STEPS):
+            through &= advance_block(block, flags, rows, log, rest, rest, dt, refinement, bilinear)
+        step += SETTLING_STEPS
     return through

@@ -15,31 +15,31 @@ from ._jit import kernel
 
 LANES = 32
 
-#: Flags, which add up: a maximum of the first or second structure, an event.
-LEFT_PEAK, RIGHT_PEAK, EVENT = 1, 2, 4
+#: Flags, which add up: a displacement or a radius may pass its maximum, of the second structure four times as much; an
+#: event.
+TURN, WIDEN, SECOND, EVENT = 1, 2, 4, 16
 
 # rows of one structure; those of the second follow after STRUCTURE_ROWS
-PLACE, SPEED, NEXT_PLACE, NEXT_SPEED = 0, 1, 2, 3
+#: Displacement and velocity, at the start of the last step too.
+PLACE, SPEED, START_PLACE, START_SPEED = 0, 1, 2, 3
 #: One step: place and speed from place, speed, ground acceleration at both ends, and a constant.
 STEP_PLACE, STEP_SPEED = 4, 9
 #: Acceleration from place, speed, ground acceleration and a constant.
 PULL = 14
-STIFF, FLEXIBILITY, LARGEST_PLACE, LARGEST_RADIUS = 18, 19, 20, 21
-LIMIT, CENTRE, SIDE, PLACE_MARGIN, POWER_MARGIN = 22, 23, 24, 25, 26
-#: Of the current step: ground acceleration and acceleration at its ends, and the sum of the accelerations' sizes, to
-#: which the error of the bounds is proportional.
-GROUND, NEXT_GROUND, START_PULL, END_PULL, STRENGTH = 27, 28, 29, 30, 31
-#: 1, or 0 where nothing can happen any more.
-ACTIVE = 32
-STRUCTURE_ROWS = 33
+STIFF, FLEXIBILITY = 18, 19
+#: Maxima before the last step; infinite where nothing can happen any more.
+HIGHEST_PLACE, WIDEST_RADIUS = 20, 21
+LIMIT, CENTRE, SIDE = 22, 23, 24
+#: How far displacement and power may leave their bounds, times the accelerations; and the former for the last step.
+PLACE_MARGIN, POWER_MARGIN, MARGIN = 25, 26, 27
+COSINE, SINE = 28, 29
+STRUCTURE_ROWS = 30
 # rows of the pair
-COSINE, SINE = 66, 67
 #: The gap, infinite in contact.
-CLEAR = 68
+CLEAR = 60
 #: Force of a contact per unit mass: from both places, speed 1, ground acceleration and a constant; above any if free.
-FORCE = 69
-FORCE_FLOOR = 74
-ROWS = 75
+FORCE, FORCE_FLOOR = 61, 66
+ROWS = 67
 
 
 @kernel
@@ -57,20 +57,10 @@ def _step(lanes, row, lane, place, speed, ground, next_ground):
 
 
 @kernel
-def _pull(lanes, row, lane, place, speed, ground):
+def _pull(lanes, lane, place, speed, ground):
     """Return the acceleration of a structure."""
-    form = lanes[at(row + 2, lane)] * ground + lanes[at(row + 3, lane)]
-    return lanes[at(row, lane)] * place + (lanes[at(row + 1, lane)] * speed + form)
-
-
-@kernel
-def shake(lanes, north, east, next_north, next_east):
-    """Write the ground acceleration of every lane at both ends of the step."""
-    for lane in range(LANES):
-        cosine, sine = lanes[at(COSINE, lane)], lanes[at(SINE, lane)]
-        ground, next_ground = cosine * north + sine * east, cosine * next_north + sine * next_east
-        lanes[at(GROUND, lane)], lanes[at(NEXT_GROUND, lane)] = ground, next_ground
-        lanes[at(STRUCTURE_ROWS + GROUND, lane)], lanes[at(STRUCTURE_ROWS + NEXT_GROUND, lane)] = ground, next_ground
+    form = lanes[at(PULL + 2, lane)] * ground + lanes[at(PULL + 3, lane)]
+    return lanes[at(PULL, lane)] * place + (lanes[at(PULL + 1, lane)] * speed + form)
 
 
 @kernel
@@ -100,51 +90,37 @@ def _widens(power, next_power, margin, squared_change, radius, widest):
 
 
 @kernel
-def move(own, flags, peak, duration):
+def move(own, flags, weight, ground, duration):
     """
     Step one structure of every lane as if nothing happened, and raise its maxima to the step's start.
 
-    Flag lanes where it may pass a maximum inside the step by ``peak``.
+    ``ground`` is north, east, next north and next east. Add to the flags, times a weight, where the structure may pass
+    a maximum inside the step.
     """
+    north, east, next_north, next_east = ground
     squared = 33.0 / 64.0 * duration * duration
     for lane in range(LANES):
-        ground, next_ground = own[at(GROUND, lane)], own[at(NEXT_GROUND, lane)]
+        cosine, sine = own[at(COSINE, lane)], own[at(SINE, lane)]
+        here, there = cosine * north + sine * east, cosine * next_north + sine * next_east
         place, speed = own[at(PLACE, lane)], own[at(SPEED, lane)]
-        next_place = _step(own, STEP_PLACE, lane, place, speed, ground, next_ground)
-        next_speed = _step(own, STEP_SPEED, lane, place, speed, ground, next_ground)
-        pull = _pull(own, PULL, lane, place, speed, ground)
-        next_pull = _pull(own, PULL, lane, next_place, next_speed, next_ground)
-        own[at(NEXT_PLACE, lane)], own[at(NEXT_SPEED, lane)] = next_place, next_speed
-        own[at(START_PULL, lane)], own[at(END_PULL, lane)] = pull, next_pull
+        next_place = _step(own, STEP_PLACE, lane, place, speed, here, there)
+        next_speed = _step(own, STEP_SPEED, lane, place, speed, here, there)
+        own[at(START_PLACE, lane)], own[at(START_SPEED, lane)] = place, speed
+        own[at(PLACE, lane)], own[at(SPEED, lane)] = next_place, next_speed
+        pull, next_pull = _pull(own, lane, place, speed, here), _pull(own, lane, next_place, next_speed, there)
         strength = abs(pull) + abs(next_pull)
-        own[at(STRENGTH, lane)] = strength
-        flexibility, active = own[at(FLEXIBILITY, lane)], own[at(ACTIVE, lane)]
+        own[at(MARGIN, lane)] = own[at(PLACE_MARGIN, lane)] * strength
+        flexibility = own[at(FLEXIBILITY, lane)]
         radius = place * place + flexibility * (speed * speed)
-        highest = max(own[at(LARGEST_PLACE, lane)], active * abs(place))
-        widest = max(own[at(LARGEST_RADIUS, lane)], active * radius)
-        own[at(LARGEST_PLACE, lane)], own[at(LARGEST_RADIUS, lane)] = highest, widest
+        highest, widest = max(own[at(HIGHEST_PLACE, lane)], abs(place)), max(own[at(WIDEST_RADIUS, lane)], radius)
+        own[at(HIGHEST_PLACE, lane)], own[at(WIDEST_RADIUS, lane)] = highest, widest
         larger = max(radius, next_place * next_place + flexibility * (next_speed * next_speed))
         bend = duration * abs(next_pull - pull)
         turns = _turns(place, next_place, speed, next_speed, bend, duration, highest)
         stiff, margin = own[at(STIFF, lane)], own[at(POWER_MARGIN, lane)] * strength
         power, next_power = stiff * place + pull, stiff * next_place + next_pull
         widens = _widens(power, next_power, margin, squared * flexibility, larger, widest)
-        flags[lane] |= peak if turns | widens else 0
-
-
-@kernel
-def flag_yielding(own, flags, duration):
-    """Flag lanes where a bilinear structure may yield or unload inside the step."""
-    third = duration / 3.0
-    for lane in range(LANES):
-        speed, next_speed, side = own[at(SPEED, lane)], own[at(NEXT_SPEED, lane)], own[at(SIDE, lane)]
-        early = side * (speed + third * own[at(START_PULL, lane)])
-        late = side * (next_speed - third * own[at(END_PULL, lane)])
-        centre, after = own[at(CENTRE, lane)], own[at(NEXT_PLACE, lane)]
-        stretch = max(abs(own[at(PLACE, lane)] + third * speed - centre), abs(after - third * next_speed - centre))
-        margin = own[at(PLACE_MARGIN, lane)] * own[at(STRENGTH, lane)]
-        yields = max(stretch, abs(after - centre)) + margin > own[at(LIMIT, lane)]
-        flags[lane] |= EVENT if yields | (min(early, late, side * next_speed) < 0.0) else 0
+        flags[lane] += (weight * TURN if turns else 0) + (weight * WIDEN if widens else 0)
 
 
 @kernel
@@ -153,73 +129,76 @@ def flag_hits(lanes, flags, duration):
     third, second = duration / 3.0, STRUCTURE_ROWS
     for lane in range(LANES):
         gap = lanes[at(CLEAR, lane)]
-        start = gap + (lanes[at(second + PLACE, lane)] - lanes[at(PLACE, lane)])
-        end = gap + (lanes[at(second + NEXT_PLACE, lane)] - lanes[at(NEXT_PLACE, lane)])
-        early = start + third * (lanes[at(second + SPEED, lane)] - lanes[at(SPEED, lane)])
-        late = end - third * (lanes[at(second + NEXT_SPEED, lane)] - lanes[at(NEXT_SPEED, lane)])
-        margin = lanes[at(PLACE_MARGIN, lane)] * lanes[at(STRENGTH, lane)]
-        margin += lanes[at(second + PLACE_MARGIN, lane)] * lanes[at(second + STRENGTH, lane)]
-        flags[lane] |= EVENT if min(end, early, late) < margin else 0
+        start = gap + (lanes[at(second + START_PLACE, lane)] - lanes[at(START_PLACE, lane)])
+        end = gap + (lanes[at(second + PLACE, lane)] - lanes[at(PLACE, lane)])
+        early = start + third * (lanes[at(second + START_SPEED, lane)] - lanes[at(START_SPEED, lane)])
+        late = end - third * (lanes[at(second + SPEED, lane)] - lanes[at(SPEED, lane)])
+        margin = lanes[at(MARGIN, lane)] + lanes[at(second + MARGIN, lane)]
+        flags[lane] += EVENT if min(end, early, late) < margin else 0
 
 
 @kernel
-def flag_releases(lanes, flags, duration):
-    """Flag lanes whose contact may open inside the step."""
-    third, rate_of_ground = duration / 3.0, 1.0 / duration
+def flag_yielding(own, flags, ground, duration):
+    """Flag lanes where a bilinear structure may yield or unload inside the step."""
+    north, east, next_north, next_east = ground
+    third = duration / 3.0
     for lane in range(LANES):
-        ground, next_ground = lanes[at(GROUND, lane)], lanes[at(NEXT_GROUND, lane)]
+        cosine, sine, side = own[at(COSINE, lane)], own[at(SINE, lane)], own[at(SIDE, lane)]
+        place, speed = own[at(START_PLACE, lane)], own[at(START_SPEED, lane)]
+        next_place, next_speed = own[at(PLACE, lane)], own[at(SPEED, lane)]
+        pull = _pull(own, lane, place, speed, cosine * north + sine * east)
+        next_pull = _pull(own, lane, next_place, next_speed, cosine * next_north + sine * next_east)
+        early, late = side * (speed + third * pull), side * (next_speed - third * next_pull)
+        unloads = min(early, late, side * next_speed) < 0.0
+        centre = own[at(CENTRE, lane)]
+        before, after = place + third * speed - centre, next_place - third * next_speed - centre
+        stretch = max(abs(before), abs(after), abs(next_place - centre)) + own[at(MARGIN, lane)]
+        flags[lane] |= EVENT if unloads | (stretch > own[at(LIMIT, lane)]) else 0
+
+
+@kernel
+def flag_releases(lanes, flags, ground, duration):
+    """Flag lanes whose contact may open inside the step."""
+    north, east, next_north, next_east = ground
+    third, rate_of_ground, second = duration / 3.0, 1.0 / duration, STRUCTURE_ROWS
+    for lane in range(LANES):
+        cosine, sine = lanes[at(COSINE, lane)], lanes[at(SINE, lane)]
+        here, there = cosine * north + sine * east, cosine * next_north + sine * next_east
         by_1, by_2 = lanes[at(FORCE, lane)], lanes[at(FORCE + 1, lane)]
         by_speed, by_ground = lanes[at(FORCE + 2, lane)], lanes[at(FORCE + 3, lane)]
-        constant, second = lanes[at(FORCE + 4, lane)], STRUCTURE_ROWS
-        speed, next_speed = lanes[at(SPEED, lane)], lanes[at(NEXT_SPEED, lane)]
-        start = by_1 * lanes[at(PLACE, lane)] + by_2 * lanes[at(second + PLACE, lane)]
-        start += by_speed * speed + (by_ground * ground + constant)
-        end = by_1 * lanes[at(NEXT_PLACE, lane)] + by_2 * lanes[at(second + NEXT_PLACE, lane)]
-        end += by_speed * next_speed + (by_ground * next_ground + constant)
-        change = by_ground * (next_ground - ground) * rate_of_ground
-        rate = (by_1 + by_2) * speed + by_speed * lanes[at(START_PULL, lane)] + change
-        end_rate = (by_1 + by_2) * next_speed + by_speed * lanes[at(END_PULL, lane)] + change
+        place, speed = lanes[at(START_PLACE, lane)], lanes[at(START_SPEED, lane)]
+        next_place, next_speed = lanes[at(PLACE, lane)], lanes[at(SPEED, lane)]
+        start = by_1 * place + by_2 * lanes[at(second + START_PLACE, lane)] + by_speed * speed
+        start += by_ground * here + lanes[at(FORCE + 4, lane)]
+        end = by_1 * next_place + by_2 * lanes[at(second + PLACE, lane)] + by_speed * next_speed
+        end += by_ground * there + lanes[at(FORCE + 4, lane)]
+        change = by_ground * (there - here) * rate_of_ground
+        rate = (by_1 + by_2) * speed + by_speed * _pull(lanes, lane, place, speed, here) + change
+        end_rate = (by_1 + by_2) * next_speed + by_speed * _pull(lanes, lane, next_place, next_speed, there) + change
         least = min(end, start + third * rate, end - third * end_rate)
-        flags[lane] |= EVENT if least < -lanes[at(FORCE_FLOOR, lane)] * lanes[at(LARGEST_PLACE, lane)] else 0
+        flags[lane] |= EVENT if least < -lanes[at(FORCE_FLOOR, lane)] * lanes[at(HIGHEST_PLACE, lane)] else 0
 
 
 @kernel
-def count_flags(own, flags):
-    """Return the sum of the flags, those of lanes at rest left out."""
-    for lane in range(LANES):
-        flags[lane] = flags[lane] if own[at(ACTIVE, lane)] > 0.0 else 0
-    count = 0
-    for lane in range(LANES):
-        count += flags[lane]
-    return count
-
-
-@kernel
-def step_lanes(block, flags, duration, bilinear, touching):
+def step_lanes(block, flags, ground, duration, bilinear, touching):
     """
     Step every lane as if nothing happened, flag those where something may, and return the sum of the flags.
 
-    ``block`` is all lanes' array, its half of the first structures, and the rest from the second structures on.
+    ``block`` is all lanes' array, its half of the first structures, and the rest from the second structures on;
+    ``ground`` is the acceleration: north, east, next north, next east.
     """
     lanes, left, right = block
     for lane in range(LANES):
         flags[lane] = 0
-    move(left, flags, LEFT_PEAK, duration)
-    move(right, flags, RIGHT_PEAK, duration)
+    move(left, flags, 1, ground, duration)
+    move(right, flags, SECOND, ground, duration)
     flag_hits(lanes, flags, duration)
     if bilinear:
-        flag_yielding(left, flags, duration)
-        flag_yielding(right, flags, duration)
+        flag_yielding(left, flags, ground, duration)
+        flag_yielding(right, flags, ground, duration)
     if touching:
-        flag_releases(lanes, flags, duration)
-    return count_flags(left, flags)
-
-
-@kernel
-def accept_step(lanes):
-    """Make the ends of the step the starts of the next."""
+        flag_releases(lanes, flags, ground, duration)
+    total = 0
     for lane in range(LANES):
-        lanes[at(PLACE, lane)] = lanes[at(NEXT_PLACE, lane)]
-        lanes[at(SPEED, lane)] = lanes[at(NEXT_SPEED, lane)]
-        lanes[at(STRUCTURE_ROWS + PLACE, lane)] = lanes[at(STRUCTURE_ROWS + NEXT_PLACE, lane)]
-        lanes[at(STRUCTURE_ROWS + SPEED, lane)] = lanes[at(STRUCTURE_ROWS + NEXT_SPEED, lane)]
+        total += flags[lane]
+    return total

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as columns
-from per_obspy.kernels.pounding_block import run_block
+from per_obspy.kernels.pounding_block import SETTLING_STEPS, run_block
 from per_obspy.kernels.pounding_contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes import LANES, LARGEST_PLACE, LARGEST_RADIUS, ROWS, STRUCTURE_ROWS
+from per_obspy.kernels.pounding_lanes import LANES, ROWS
 from per_obspy.pounding.history import FREE_PERIODS, SPEED_SHARE
 from per_obspy.pounding.rows import closed_record, largest_ground_velocity, refinement, row_at_rest
 
@@ -186,20 +186,19 @@ def _maxima(
     rows[:, 0, columns.DELAY] = 0.5 * SHORTEST_BOUNCE * dt / refinements
     rows[:, 0, columns.MOST_BOUNCES] = MOST_BOUNCES
     longest = np.maximum(fields["period_1"], fields["period_2"])
-    free_steps = np.ceil(FREE_PERIODS * longest / dt).astype(np.int64) * free_vibration
+    free_steps = (
+        SETTLING_STEPS * np.ceil(FREE_PERIODS * longest / dt / SETTLING_STEPS).astype(np.int64) * free_vibration
+    )
     azimuth = np.radians(fields["azimuth"])
 
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
         own, parts = rows[filled], int(refinements[block[0]])
-        arrays = np.zeros(ROWS * LANES), np.zeros(LANES, np.int64), own, np.zeros((0, LOG_COLUMNS))
+        arrays = np.zeros(ROWS * LANES), np.zeros(LANES + 1, np.int64), own, np.zeros((0, LOG_COLUMNS))
         pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
         bilinear = bool(np.isfinite(table[block, :, 3]).any())
         if not run_block(components, dt, parts, *arrays, *pairs, bilinear):
             raise RuntimeError(f"no end of contacts among the pairs {block.tolist()}")
-        lanes = arrays[0].reshape(ROWS, LANES)
-        own[:, :, columns.WIDEST] = lanes[[LARGEST_RADIUS, STRUCTURE_ROWS + LARGEST_RADIUS]].T
-        own[:, :, columns.HIGHEST] = lanes[[LARGEST_PLACE, STRUCTURE_ROWS + LARGEST_PLACE]].T
         rows[block] = own[: block.size]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -100,16 +100,17 @@ class TestSmallHistories:
 
 def test_a_step_of_the_lanes_flags_what_it_must():
     # catches: a bound that leaves a contact inside the step unseen
-    table, flags = np.zeros(lanes.ROWS * lanes.LANES), np.zeros(lanes.LANES, np.int64)
+    table, flags = np.zeros(lanes.ROWS * lanes.LANES), np.zeros(lanes.LANES + 1, np.int64)
     half = lanes.STRUCTURE_ROWS * lanes.LANES
     rows = table.reshape(lanes.ROWS, lanes.LANES)
     for first in (0, lanes.STRUCTURE_ROWS):
-        rows[first + lanes.ACTIVE] = rows[first + lanes.STEP_PLACE] = rows[first + lanes.STEP_SPEED + 1] = 1.0
+        rows[first + lanes.STEP_PLACE] = rows[first + lanes.STEP_SPEED + 1] = 1.0
         rows[first + lanes.STEP_PLACE + 1] = 0.01  # free flight over a step of 0.01 s
-        rows[first + lanes.LARGEST_PLACE] = rows[first + lanes.LARGEST_RADIUS] = 9.0
+        rows[first + lanes.HIGHEST_PLACE] = rows[first + lanes.WIDEST_RADIUS] = 9.0
     rows[lanes.CLEAR], rows[lanes.FORCE + 4] = 1.0, 1.0
     rows[lanes.SPEED, 3] = 101.0  # closes 1.01 m in the step
     rows[lanes.SPEED, 4] = 99.0
-    total = lanes.step_lanes((table, table[:half], table[half:]), flags, 0.01, False, True)
+    rest = (0.0, 0.0, 0.0, 0.0)
+    total = lanes.step_lanes((table, table[:half], table[half:]), flags, rest, 0.01, False, True)
     assert total == lanes.EVENT
     assert flags[3] == lanes.EVENT
