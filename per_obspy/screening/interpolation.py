@@ -17,10 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
-from per_obspy.screening.assignment import EARTH_RADIUS
-
-#: The longest period for which the correlation was published, s; longer ones take its value.
-LONGEST = 10.0
+from per_obspy.screening.spatial import great_circle, residual_correlation
 
 #: A slope of the trend (of ln distance, of ln Vs30) is fitted where so many stations differ by so much; our choice.
 STATIONS_PER_SLOPE, SPREAD = 6, 0.1
@@ -93,57 +90,6 @@ def sites(
     north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0))
     numbers = (np.broadcast_to(np.asarray(values, dtype=np.float64), east.shape) for values in (source_distance, vs30))
     return Sites(east, north, np.broadcast_to(np.asarray(site_class, dtype=object), east.shape), *numbers)
-
-
-def great_circle(
-    longitude_1: ArrayLike, latitude_1: ArrayLike, longitude_2: ArrayLike, latitude_2: ArrayLike
-) -> FloatArray:
-    """Return distances on the sphere, m, of places in degrees; exactly 0 between a place and itself."""
-    east_1, north_1, east_2, north_2 = map(np.radians, (longitude_1, latitude_1, longitude_2, latitude_2))
-    across = np.cos(north_1) * np.cos(north_2) * np.sin((east_2 - east_1) / 2.0) ** 2
-    half_chord = np.sqrt(np.sin((north_2 - north_1) / 2.0) ** 2 + across)
-    distance: FloatArray = 2.0 * EARTH_RADIUS * np.arcsin(np.minimum(half_chord, 1.0))
-    return distance
-
-
-def spatial_correlation(distance: ArrayLike, period: float, vs30_clustered: bool = False) -> FloatArray:
-    """
-    Correlation of within-event residuals of ln SA at two places.
-
-    Parameters
-    ----------
-    distance : array_like
-        Between the places, m.
-    period : float
-        s; above 10 s that of 10 s.
-    vs30_clustered : bool
-        Whether Vs30 varies smoothly over the region (case 2), which makes short periods agree over longer distances.
-
-    Returns
-    -------
-    correlation : ndarray
-        Dimensionless, 1 at distance 0.
-
-    References
-    ----------
-    Jayaram & Baker (2009), Earthquake Engineering and Structural Dynamics 38, 1687-1708, equations (17) to (20).
-
-    Examples
-    --------
-    >>> print(spatial_correlation([0.0, 25_700.0], 1.0).round(4))
-    [1.     0.0498]
-    """
-    period = checks.number("period", period, checks.not_negative)
-    return _correlation(checks.not_negative("distance", distance), period, vs30_clustered)
-
-
-def _correlation(distance: FloatArray, period: float, vs30_clustered: bool) -> FloatArray:
-    if period >= 1.0:
-        reach = 22.0 + 3.7 * min(period, LONGEST)
-    else:
-        reach = 40.7 - 15.0 * period if vs30_clustered else 8.5 + 17.2 * period
-    correlation: FloatArray = np.exp(distance * (-3.0 / (1000.0 * reach)))
-    return correlation
 
 
 def interpolated_motion(
@@ -278,7 +224,7 @@ def _distances(some: Sites, others: Sites) -> FloatArray:
 def _kriged(field: _Field, values: FloatArray, period: float, settings: Interpolation) -> tuple[FloatArray, FloatArray]:
     """Return median and deviation at the places, of one period and from stations that all know it."""
     trend, trend_there = _trends(field.stations, field.places)
-    between, across = (_correlation(d, period, settings.vs30_clustered) for d in (field.between, field.across))
+    between, across = (residual_correlation(d, period, settings.vs30_clustered) for d in (field.between, field.across))
     factor = cho_factor(between, lower=True)
     weighted = cho_solve(factor, trend)
     normal = cho_factor(trend.T @ weighted, lower=True)
