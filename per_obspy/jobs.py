@@ -21,7 +21,7 @@ import numpy as np
 
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import PerError, Rejection
-from per_obspy.files import written_whole
+from per_obspy.files import file_hash, written_whole
 from per_obspy.processing.chain import process_station
 from per_obspy.records.archives import open_file
 from per_obspy.records.events import read_event
@@ -32,6 +32,22 @@ from per_obspy.spectra.storage import write_spectra
 
 if TYPE_CHECKING:
     from obspy import Inventory, Stream
+    from obspy.core.event import Event
+
+#: What the note of a shard tells of it beside its origin.
+Facts = dict[str, object]
+
+
+def spectra_shard(job: "Job", stream: "Stream", event: "Event | None") -> tuple[tuple[Rejection, ...], Facts]:
+    """Write the spectra of a station as its shard if any record is usable; return what was left out."""
+    clean, unfit = process_station(stream, job.processing, event)
+    if clean:
+        grid = job.spectra
+        periods = np.geomspace(grid.shortest, grid.longest, grid.count)
+        dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
+        dataset.attrs["simulated"] = str(job.simulated).lower()
+        write_spectra(dataset, job.shard)
+    return unfit, {}
 
 
 class Job(NamedTuple):
@@ -56,6 +72,8 @@ class Job(NamedTuple):
         Whether the motion was made by a scenario.
     reader : partial
         How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
+    product : callable
+        What is made of the records that were read: see :func:`spectra_shard`.
     """
 
     station: str
@@ -67,6 +85,7 @@ class Job(NamedTuple):
     shard: Path
     simulated: bool
     reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
+    product: "Callable[[Job, Stream, Event | None], tuple[tuple[Rejection, ...], Facts]]" = spectra_shard
 
 
 class Done(NamedTuple):
@@ -92,43 +111,34 @@ class Done(NamedTuple):
 
 
 def do_station(job: Job) -> Done:
-    """Return the finished station, from disk if an earlier run did the same."""
-    key, note = _key(job), job.shard.with_suffix(".json")
-    if earlier := _earlier(job, key, note):
-        return earlier
+    """Return the finished station, its shard and the note that tells what it was made from on disk."""
     job.shard.unlink(missing_ok=True)
-    rejected = _make_shard(job)
-    with written_whole(note) as part:
-        part.write_text(json.dumps({"key": key, "rejected": rejected}), encoding="utf-8")
-    return Done(job.station, job.shard if job.shard.exists() else None, rejected, resumed=False)
+    rejected, facts = _make_shard(job)
+    shard = job.shard if job.shard.exists() else None
+    note = {"key": _key(job), "shard": shard and file_hash(shard), "rejected": rejected, **facts}
+    with written_whole(job.shard.with_suffix(".json")) as part:
+        part.write_text(json.dumps(note), encoding="utf-8")
+    return Done(job.station, shard, rejected, resumed=False)
 
 
-def _make_shard(job: Job) -> tuple[Rejection, ...]:
-    """Write the shard if anything usable is left; return what was left out."""
+def _make_shard(job: Job) -> tuple[tuple[Rejection, ...], Facts]:
+    """Write the shard if anything usable is left; return what was left out, and what its note is to tell."""
     source = ", ".join(path.name for path in job.source)
     try:
         stream, unread = job.reader(job.source, job.inventory, job.station)
         event = read_event(job.event) if job.event else None
-        clean, unfit = process_station(stream, job.processing, event)
-        rejected = (*unread, *(one._replace(source=one.source or source) for one in unfit))
-        if not clean:
-            return rejected
-        grid = job.spectra
-        periods = np.geomspace(grid.shortest, grid.longest, grid.count)
-        dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
+        unfit, facts = job.product(job, stream, event)
     except PerError as error:
         reasons = getattr(error, "reasons", None) or (str(error),)
-        return (Rejection("station", job.station, source, None, tuple(reasons)),)
-    dataset.attrs["simulated"] = str(job.simulated).lower()
-    write_spectra(dataset, job.shard)
-    return rejected
+        return (Rejection("station", job.station, source, None, tuple(reasons)),), {}
+    return (*unread, *(one._replace(source=one.source or source) for one in unfit)), facts
 
 
 def _key(job: Job) -> str:
     """Return the hash of everything the shard depends on."""
     parts = [version("per_obspy"), job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
     parts += [f"{path.name} {_content_hash(path)}" for path in (*job.source, *([job.event] if job.event else []))]
-    parts += [job.reader.func.__name__, job.reader.keywords]
+    parts += [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
     parts += [metadata_text(job.inventory)] if job.inventory else []
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
 
@@ -139,25 +149,23 @@ def _content_hash(path: Path) -> str:
         return hashlib.sha256(file.read()).hexdigest()
 
 
-def _earlier(job: Job, key: str, note: Path) -> Done | None:
-    """Return the station as an earlier run left it, if it was made from the same."""
+def _earlier(job: Job) -> Done | None:
+    """Return the station as an earlier run left it, if it was made from the same and is undamaged."""
     try:
-        known = json.loads(note.read_text(encoding="utf-8"))
-        if known["key"] != key:
+        note = json.loads(job.shard.with_suffix(".json").read_text(encoding="utf-8"))
+        if note["key"] != _key(job) or note["shard"] != (job.shard.exists() and file_hash(job.shard) or None):
             return None
-        rejected = tuple(
-            Rejection(kind, name, source, row, tuple(reasons)) for kind, name, source, row, reasons in known["rejected"]
-        )
-    except (OSError, ValueError, KeyError):
+        rejected = tuple(Rejection(*row[:-1], reasons=tuple(row[-1])) for row in note["rejected"])
+    except (OSError, ValueError, KeyError, TypeError):
         return None
-    return Done(job.station, job.shard if job.shard.exists() else None, rejected, resumed=True)
+    return Done(job.station, job.shard if note["shard"] else None, rejected, resumed=True)
 
 
 def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
     """
-    Give every station as it is finished, in parallel processes.
+    Give every station as it is finished, in parallel processes; what an earlier run did is not done again.
 
-    A worker that dies takes the whole pool with it. What was not finished then is done again, each station in a
+    The first is waited for, so that one worker compiles and the others load. A worker that dies takes the whole pool with it. What was not finished then is done again, each station in a
     process of its own, so that only the guilty one is lost, and its loss is a rejection.
 
     Parameters
@@ -167,14 +175,15 @@ def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
     workers : int
         Number of processes; a single job is done in this one.
     """
-    if len(jobs) == 1:
-        yield _caught(jobs[0], partial(do_station, jobs[0]))
-        return
     unfinished = {job.station: job for job in jobs}
+    if len(jobs) == 1:
+        yield _earlier(jobs[0]) or _caught(jobs[0], partial(do_station, jobs[0]))
+        return
     with _pool(workers) as pool, suppress(BrokenProcessPool):
-        for done in do_stations_on(pool, jobs):
-            del unfinished[done.station]
-            yield done
+        for some in (jobs[:1], jobs[1:]):
+            for done in do_stations_on(pool, some):
+                del unfinished[done.station]
+                yield done
     for job in unfinished.values():
         try:
             with _pool(1) as pool:
@@ -185,7 +194,9 @@ def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
 
 def do_stations_on(executor: Executor, jobs: Sequence[Job]) -> Iterator[Done]:
     """Give every station as it is finished, on any executor (a cluster's, for example)."""
-    futures = {executor.submit(do_station, job): job for job in jobs}
+    for done in filter(None, earlier := [_earlier(job) for job in jobs]):
+        yield done
+    futures = {executor.submit(do_station, job): job for job, done in zip(jobs, earlier, strict=True) if not done}
     for future in as_completed(futures):
         yield _caught(futures[future], future.result)
 

@@ -28,9 +28,9 @@ ROUNDS = 4  # of parabolas
 
 
 @kernel
-def estimate(arguments, status, branches, bounds):
+def estimate(arguments, begin, end, status, branches, bounds):
     """
-    Fill ``status`` (n), ``branches`` (2, 13, n) and ``bounds`` (2, n).
+    Fill ``status`` (n), ``branches`` (2, 13, n) and ``bounds`` (2, n) from pair ``begin`` to before pair ``end``.
 
     ``arguments`` (9, n): radii 1 and 2, circular frequencies 1 and 2, (1 + e) m2/M and (1 + e) m1/M (the part of the
     velocity difference that 1 and 2 receive), (1 + e) m1 m2/M, critical gap, gap; M = m1 + m2.
@@ -39,9 +39,8 @@ def estimate(arguments, status, branches, bounds):
     constants = np.zeros((11, PAIRS))
     constants[:2] = constants[10] = 1.0
     times = np.empty(PAIRS)
-    count = status.size
-    for first in range(0, count, PAIRS):
-        pairs = min(PAIRS, count - first)
+    for first in range(begin, end, PAIRS):
+        pairs = min(PAIRS, end - first)
         for pair in range(pairs):
             status[first + pair] = _grazing_state(arguments, first + pair, states, pair)
         for branch in range(2):
@@ -122,8 +121,9 @@ def _first_contact(constants, first_contact):
     Find the smallest time before the grazing state at which the pair is the actual gap apart.
 
     The distance to contact d has |d''| <= K2, so the step 2 d/(d' + sqrt(d'² + 2 K2 d)) never passes the first root.
+    A pair that has arrived stays, however long the others of its block go on.
     """
-    c, times, advances = np.empty((11, PAIRS)), np.zeros(PAIRS), np.empty(PAIRS)
+    c, times, advances = np.empty((11, PAIRS)), np.zeros(PAIRS), np.ones(PAIRS)
     c[:] = constants
     moving = True
     while moving:
@@ -139,7 +139,7 @@ def _first_contact(constants, first_contact):
             root = math.sqrt(closing * closing + 2.0 * c[10, pair] * distance)
             above = 2.0 * distance if closing > 0.0 else root - closing
             below = closing + root if closing > 0.0 else c[10, pair]
-            advance = above / below if distance > 0.0 else 0.0
+            advance = above / below if distance > 0.0 and advances[pair] > 0.0 else 0.0
             times[pair] = time + advance
             advances[pair] = advance - STILL * time
         moving = False

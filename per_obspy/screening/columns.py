@@ -16,9 +16,10 @@ def _both(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
 RESULTS: dict[str, Column] = {
     column.name: column
     for column in (
-        Column("rank", "int64", "", "1 is the worst: by state, impact velocity, ratio, importance, occupants"),
+        Column("rank", "int64", "", "1 is the worst: by state, probability, impact velocity, ratio, importance"),
         Column("risk_class", "str", "", "by demand ratio; names and thresholds are in the configuration"),
-        Column("state", "str", "", "yes: gap < demand; possible: a derived input decides; no"),
+        Column("state", "str", "", "yes: gap < demand; possible: likely enough, or a derived input decides; no"),
+        Column("probability", "float64", "1", "of pounding in this event, with what is uncertain of the pair"),
         Column("demand", "float64", "m", "gap needed at contact height, by the rule in demand_rule"),
         Column("demand_rule", "str", "", "what the demand is: exact, per_white_noise, per_record or srss"),
         Column("demand_ratio", "float64", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
@@ -49,12 +50,14 @@ RESULTS: dict[str, Column] = {
 
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
-    "rank", "pair_id", "risk_class", "state", "gap", "demand", "demand_rule", "demand_ratio", "impact_velocity",
+    "rank", "pair_id", "risk_class", "state", "probability", "gap", "demand", "demand_rule", "demand_ratio",
+    "impact_velocity",
     "impacts", "impact_velocity_exact", "amplification_exact_1", "amplification_exact_2", "single_hit_status",
     "amplification_1", "amplification_2", "flags", "station", "distance", "azimuth_used",
     "azimuth_rule", "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2", "per_1",
     "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per", "critical_gap_record",
-    "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact", "demand_two_sided", "contact_mass_1",
+    "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact", "demand_two_sided",
+    "contact_mass_1",
     "contact_mass_2", "restitution", "derived",
 )  # fmt: skip
 

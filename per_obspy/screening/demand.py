@@ -95,7 +95,7 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
     return Demand(np.take_along_axis(candidates, best[None], axis=0)[0], RULES[best])
 
 
-def pounding_state(gap: FloatArray, demand: FloatArray, derived_decides: NDArray[np.bool_]) -> NDArray[np.object_]:
+def pounding_state(gap: FloatArray, demand: FloatArray, possible: NDArray[np.bool_]) -> NDArray[np.object_]:
     """
     Return yes, possible or no for each pair.
 
@@ -103,10 +103,10 @@ def pounding_state(gap: FloatArray, demand: FloatArray, derived_decides: NDArray
     ----------
     gap, demand : (n_pairs,) ndarray
         m.
-    derived_decides : (n_pairs,) ndarray of bool
-        Whether an input that nobody gave could turn a no into a yes.
+    possible : (n_pairs,) ndarray of bool
+        Whether pounding is likely enough, or an input that nobody gave could turn a no into a yes.
     """
-    states = np.where(gap < demand, "yes", np.where(derived_decides, "possible", "no"))
+    states = np.where(gap < demand, "yes", np.where(possible, "possible", "no"))
     return states.astype(object)
 
 

@@ -35,9 +35,13 @@ from per_obspy.screening.motion import (
     motion_along_every_azimuth,
     motion_of_one_horizontal,
 )
+from per_obspy.screening.probability import pair_probability
 
 #: Defaults of the configuration.
 BUILDING, SCREENING = Building(), Screening()
+
+#: Demand / sum of the radii below which two oscillators move as one: the difference of equal numbers.
+ROUND_OFF = 1e-12
 
 #: Pairs in a block: at 180 azimuths a block of every array stays below 3 MB.
 BLOCK = 2000
@@ -90,7 +94,7 @@ def _assigned(
     """Return the pairs with the index of their station and its distance, and those with none in reach."""
     if not stations:
         lost = (Rejection("pair", name, "", None, ("no station has coordinates",)) for name in pairs["pair_id"])
-        return pairs.iloc[:0], tuple(lost)
+        return pairs.iloc[:0].assign(station_index=0), tuple(lost)
     index, distance = nearest_station(
         pairs["longitude"].to_numpy(),
         pairs["latitude"].to_numpy(),
@@ -121,7 +125,9 @@ def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.
     table = pd.concat(parts)
     gap, demand = table["gap"].to_numpy(np.float64), table["demand"].to_numpy(np.float64)
     table["demand_ratio"] = demand_ratio(gap, demand)
-    table["state"] = pounding_state(gap, demand, period_is_derived(table))
+    table["probability"] = pair_probability(station, table, screening.model_dispersion)
+    possible = period_is_derived(table) | (table["probability"].to_numpy() >= screening.possible_from)
+    table["state"] = pounding_state(gap, demand, possible)
     table["risk_class"] = _risk_class(table["demand_ratio"].to_numpy(), screening.classes)
     table["flags"] = flag_text(table, station, screening)
     return table
@@ -150,6 +156,7 @@ def _judged_rows(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, r
     table = pairs.assign(azimuth_rule=rule, **judged.columns, **hit, **outcome)
     exact = exact_decides(station, pairs)
     table["demand"] = np.where(exact, table["demand_exact"], table["demand"])
+    table["demand"] = table["demand"].where(table["demand"] > ROUND_OFF * table["absolute_gap"], 0.0)
     table["demand_rule"] = np.where(exact, "exact", table["demand_rule"])
     return table
 
@@ -224,10 +231,15 @@ def _risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.obje
 
 
 def _ranked(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table in the order of its columns, worst pair first; ties by importance, occupants, name."""
+    """Return the table in the order of its columns, worst pair first; ties by importance, occupants, name.
+
+    The velocity is that of the exact history where it decides, else the larger of it and of the single hit.
+    """
+    estimated = table["impact_velocity"].fillna(0.0).where(table["demand_rule"] != "exact", 0.0)
     order = {
         "state": table["state"].map({"yes": 0, "possible": 1, "no": 2}),
-        "velocity": -table["impact_velocity"].fillna(0.0),
+        "probability": -table["probability"],
+        "velocity": -np.maximum(table["impact_velocity_exact"], estimated),
         "ratio": table["demand_ratio"].fillna(np.inf),
         "importance": -_largest(table, "importance"),
         "occupants": -_largest(table, "occupants"),

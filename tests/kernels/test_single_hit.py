@@ -21,7 +21,7 @@ def test_equal_pair():
     # twins at rho = 0: x = g/2; contact at zero gap a quarter period earlier with the relative speed w g
     arguments = np.array([[1.0], [1.0], [2.0], [2.0], [1.0], [1.0], [1.0], [math.sqrt(2.0)], [0.0]])
     status, branches, bounds = np.empty(1, np.int8), np.empty((2, 13, 1)), np.empty((2, 1))
-    kernel.estimate(arguments, status, branches, bounds)
+    kernel.estimate(arguments, 0, status.size, status, branches, bounds)
     assert status[0] == kernel.OK
     assert branches[:, 0, 0] == pytest.approx(math.pi / 4)
     assert branches[:, 2, 0] - branches[:, 8, 0] == pytest.approx(2.0 * math.sqrt(2.0))

@@ -1,0 +1,157 @@
+"""
+How likely a pair pounds, given what its record does and what is not known of its buildings.
+
+A period that was derived from a height is resampled, and so is its damping: both buildings independently, at
+quasi-random nodes, with radii from the station's stored spectra scaled to the exact radius at the median period. So
+two buildings of equal height are never certain to move as one. Where both periods are given the exact integral is
+used. An uncertain gap and the error of the estimate widen the comparison.
+"""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.resampling import resampled_probabilities
+from per_obspy.pounding.dispersion import lognormal_dispersion
+from per_obspy.pounding.probability import demand_probability, pounding_probability
+
+#: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
+#: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
+
+#: Dampings are compared on a logarithmic scale; below this one they count as it.
+SMALLEST_DAMPING = 1e-3
+
+
+def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+    """
+    Return the probability of pounding of every pair of a block.
+
+    Parameters
+    ----------
+    station : Dataset
+        The record, with its stored spectra.
+    table : DataFrame
+        Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand.
+    model_dispersion : float
+        Log-standard deviation of the critical gap from PER about the exact one.
+
+    Returns
+    -------
+    probability : (n_pairs,) ndarray
+        From 0 to 1. Where the exact demand decides it is that of the demand; only gap and dampings are uncertain then.
+    """
+    exact = (table["demand_rule"] == "exact").to_numpy()
+    uncertain = (table[["period_log_std_1", "period_log_std_2"]] > 0).any(axis=1).to_numpy()
+    probability = np.empty(len(table))
+    for rows, chance in ((exact, _of_demand), (~exact & ~uncertain, _of_radii), (~exact & uncertain, _resampled)):
+        if rows.any():
+            probability[rows] = chance(station, table[rows], model_dispersion)
+    return probability
+
+
+def _of_demand(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+    """Return the probability that the exact demand of an uncertain damping exceeds an uncertain gap; no model error."""
+    del model_dispersion
+    spread = np.maximum(_damping_dispersion(station, table, 1), _damping_dispersion(station, table, 2))
+    return demand_probability(table["demand_exact"], _median_gap(table), np.hypot(spread, _gap_dispersion(table)))
+
+
+def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+    """Return the exact integral over both radii with the correlation that governs the demand."""
+    correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
+    return pounding_probability(
+        *(table[f"participation_{i}"].to_numpy(np.float64) * table[f"per_{i}"].to_numpy(np.float64) for i in (1, 2)),
+        correlation,
+        _median_gap(table),
+        *(_damping_dispersion(station, table, i) for i in (1, 2)),
+        0.0,
+        model_dispersion,
+        _gap_dispersion(table),
+    )
+
+
+def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+    """Return the mean over quasi-random periods and dampings of both buildings."""
+    columns: list[FloatArray] = [_azimuth_row(station, table).astype(np.float64)]
+    for i in (1, 2):
+        radius = table[f"participation_{i}"].to_numpy(np.float64) * table[f"per_{i}"].to_numpy(np.float64)
+        columns += [
+            *_log_place(table, i),
+            table[f"period_log_std_{i}"].to_numpy(np.float64),
+            table[f"damping_log_std_{i}"].to_numpy(np.float64),
+            np.log(np.maximum(radius, np.finfo(np.float64).tiny)),
+        ]
+    columns += [_median_gap(table), np.hypot(model_dispersion, _gap_dispersion(table))]
+    probability = np.empty(len(table))
+    resampled_probabilities(_log_spectra(station), np.stack(columns, axis=1), NODES, probability)
+    return probability
+
+
+def _log_spectra(station: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return ln period, ln damping, and ln PER by azimuth, damping and period; the only horizontal serves for all."""
+    stored = station["per_azimuthal"].to_numpy() if "per_azimuthal" in station else station["per"].to_numpy()[:1]
+    radii = np.log(np.maximum(stored.astype(np.float64), np.finfo(np.float32).tiny))
+    dampings = np.log(np.maximum(station["damping"].to_numpy(), SMALLEST_DAMPING))
+    return np.log(station["period"].to_numpy()), dampings, np.ascontiguousarray(radii)
+
+
+def _azimuth_row(station: xr.Dataset, table: pd.DataFrame) -> NDArray[np.intp]:
+    """Return the stored azimuth next to that of each pair."""
+    count = station.sizes.get("azimuth", 1)
+    azimuth = np.nan_to_num(table["azimuth_used"].to_numpy(np.float64)) % 180.0
+    return np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+
+
+def _log_place(table: pd.DataFrame, i: int) -> tuple[FloatArray, FloatArray]:
+    """Return ln period and ln damping of building i."""
+    damping = np.maximum(table[f"damping_{i}"].to_numpy(np.float64), SMALLEST_DAMPING)
+    return np.log(table[f"period_{i}"].to_numpy(np.float64)), np.log(damping)
+
+
+def stored_log_per(station: xr.Dataset, row: NDArray[np.intp], period: FloatArray, damping: FloatArray) -> FloatArray:
+    """Return ln PER off the stored grid at (ln period, ln damping), linear between; beyond the grid its edge."""
+    periods, dampings, radii = _log_spectra(station)
+    column, part = _between(periods, period)
+    plane, share = _between(dampings, damping)
+    above, right = np.minimum(plane + 1, dampings.size - 1), np.minimum(column + 1, periods.size - 1)
+    lower = (1 - part) * radii[row, plane, column] + part * radii[row, plane, right]
+    upper = (1 - part) * radii[row, above, column] + part * radii[row, above, right]
+    stored: FloatArray = (1 - share) * lower + share * upper
+    return stored
+
+
+def _between(grid: FloatArray, values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the lower neighbour on the grid and the part of the way to the next, kept on the grid."""
+    if grid.size == 1:
+        return np.zeros(values.shape, dtype=np.intp), np.zeros(values.shape)
+    lower = np.clip(np.searchsorted(grid, values) - 1, 0, grid.size - 2)
+    return lower, np.clip((values - grid[lower]) / (grid[lower + 1] - grid[lower]), 0.0, 1.0)
+
+
+def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> FloatArray:
+    """Return the log-standard deviation of the radius that an uncertain damping causes."""
+    period, damping = _log_place(table, i)
+    spread, row = table[f"damping_log_std_{i}"].to_numpy(np.float64), _azimuth_row(station, table)
+    low, high = (stored_log_per(station, row, period, damping + way * spread) for way in (-1.0, 1.0))
+    dispersion: FloatArray = np.abs(high - low) / 2.0
+    return dispersion
+
+
+def _gap_dispersion(table: pd.DataFrame) -> FloatArray:
+    """Return the log-standard deviation of a gap given by mean and standard deviation; 0 for touching pairs."""
+    gap, deviation = table["gap"].to_numpy(np.float64), table["gap_std"].to_numpy(np.float64)
+    apart = gap > 0
+    dispersion = np.zeros_like(gap)
+    dispersion[apart] = lognormal_dispersion(gap[apart], deviation[apart])
+    return dispersion
+
+
+def _median_gap(table: pd.DataFrame) -> FloatArray:
+    """Return the median of a lognormal gap of given mean, m."""
+    median: FloatArray = table["gap"].to_numpy(np.float64) * np.exp(-(_gap_dispersion(table) ** 2) / 2.0)
+    return median

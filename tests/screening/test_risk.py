@@ -1,0 +1,182 @@
+"""The risk table: nothing lost, every number at contact height, the ladder, the ranking."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+import per_obspy
+from per_obspy.config import Screening
+from per_obspy.screening.columns import ORDER
+
+from .conftest import make_pairs, make_station
+
+
+def _table(station, *rows, **settings):
+    return per_obspy.risk_table(station, make_pairs(rows), screening=Screening(**settings)).set_index("pair_id")
+
+
+def test_columns_come_in_their_order_and_others_are_carried_through(station):
+    table = per_obspy.risk_table(station, make_pairs([{"owner": "city"}]))
+    assert tuple(table.columns[: len(ORDER)]) == ORDER
+    assert table["owner"].tolist() == ["city"]
+
+
+def test_a_given_pair_is_answered_by_the_exact_demand(station):
+    table = _table(station, {"gap": 0.0001}, {"gap": 9.0})
+    assert table["demand_rule"].tolist() == ["exact", "exact"]
+    assert table.loc["P0", "demand"] == table.loc["P1", "demand"]  # the gap does not change what is needed
+    assert table.loc["P0", "state"] == "yes"
+    assert table.loc["P1", "state"] == "no"
+
+
+def test_the_exact_demand_is_the_gap_at_which_impacts_begin(station):
+    # would catch: a participation, azimuth or side that differs between relative displacement and history
+    (demand,) = _table(station, {})["demand"]
+    table = _table(station, {"gap": demand * (1 + 1e-6)}, {"gap": demand * (1 - 1e-6)})
+    assert table.loc["P0", "impacts"] == 0
+    assert table.loc["P1", "impacts"] >= 1
+
+
+def test_radii_are_computed_at_the_pairs_own_period_damping_and_azimuth(station):
+    # would catch: values read off the stored grid, buildings exchanged
+    table = _table(station, {"period_1": 0.777, "damping_1": 0.031, "period_2": 1.234, "damping_2": 0.07})
+    north, east = station["acceleration"].to_numpy()
+    along = north * np.cos(np.radians(30.0)) + east * np.sin(np.radians(30.0))
+    for i, (period, damping) in enumerate(((0.777, 0.031), (1.234, 0.07)), start=1):
+        expected = per_obspy.response_spectra(along, 0.01, [period], damping)
+        assert_allclose(table[f"per_{i}"], expected.per, rtol=1e-9)  # the contract of the spectra
+        assert_allclose(table[f"sd_{i}"], expected.sd, rtol=1e-9)
+
+
+def test_every_gap_grows_with_participation(station):
+    # would catch: an estimate that forgets the contact level
+    names = ["critical_gap_per", "critical_gap_record", "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact"]
+    once, twice = (_table(station, {"participation_1": q, "participation_2": q})[names].to_numpy() for q in (1.0, 2.0))
+    assert_allclose(twice, 2 * once, rtol=1e-8)  # homogeneous of degree one; peaks located to 1e-9
+
+
+def test_twice_the_motion_is_twice_the_demand(station):
+    once = _table(station, {})["demand"]
+    assert_allclose(_table(make_station(scale=2.0), {})["demand"], 2 * once, rtol=1e-8)
+
+
+def test_derived_periods_are_never_a_plain_no(station):
+    # would catch: equal heights give equal periods, a correlation of 1 and a demand of 0
+    unknown = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0, "gap": 0.5}
+    table = _table(station, unknown)
+    assert table.loc["P0", "demand_rule"] == "srss"
+    assert table.loc["P0", "demand"] == table.loc["P0", "srss_gap"] > 0
+    assert table.loc["P0", "state"] in {"yes", "possible"}
+    assert "derived_period" in table.loc["P0", "flags"].split()
+
+
+def test_outside_the_usable_periods_the_estimates_decide_and_a_flag_says_so():
+    table = _table(make_station(longest=0.8), {})
+    assert table.loc["P0", "demand_rule"] in {"per_white_noise", "per_record"}
+    assert table.loc["P0", "demand"] == table[["critical_gap_per", "critical_gap_record"]].loc["P0"].max()
+    assert "outside_usable_periods" in table.loc["P0", "flags"]
+
+
+def test_touching_pairs_are_always_answered(station):
+    table = _table(station, {"gap": 0.0})
+    assert table.loc["P0", "state"] == "yes"
+    assert table.loc["P0", "demand_ratio"] == 0.0
+    assert table.loc["P0", "probability"] == 1.0
+    assert "touching" in table.loc["P0", "flags"].split()
+
+
+def test_equal_given_buildings_need_no_gap_and_have_no_ratio(station):
+    same = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
+    table = _table(station, same)
+    assert table.loc["P0", "demand"] == 0.0
+    assert np.isnan(table.loc["P0", "demand_ratio"])
+    assert table.loc["P0", "state"] == "no"
+    assert "no_demand" in table.loc["P0", "flags"]
+
+
+def test_an_unknown_azimuth_is_the_worst_one(station):
+    # would catch: an azimuth per building, a half circle where the sides differ
+    worst = _table(station, {"azimuth": np.nan})["demand"].iloc[0]
+    every = _table(station, *({"azimuth": float(a)} for a in range(0, 360, 5)))["demand"]
+    # samples choose the direction: up to (omega dt)² / 8 = 0.2 % at 0.6 s below the exact maximum
+    assert worst >= every.max() * (1 - 2e-3)
+
+
+def test_turning_a_pair_round_exchanges_its_buildings(station):
+    names = ["period", "height", "storeys", "longitude", "latitude"]
+    plain = make_pairs([{}]).iloc[0]
+    turned = {f"{n}_{i}": plain[f"{n}_{3 - i}"] for n in names for i in (1, 2)} | {"azimuth": 210.0}
+    table = _table(station, {}, turned)
+    assert_allclose(*table["demand"], rtol=1e-9)
+    assert_allclose(*table["probability"], rtol=1e-9)
+    assert_allclose(table.loc["P0", "amplification_exact_1"], table.loc["P1", "amplification_exact_2"], rtol=1e-6)
+
+
+def test_one_horizontal_serves_with_a_flag_and_without_the_exact_rung():
+    table = _table(make_station(channels=("HNE",)), {}, {"azimuth": np.nan})
+    assert table["azimuth_rule"].tolist() == ["station", "station"]
+    assert table["azimuth_used"].tolist() == [90.0, 90.0]
+    assert not (table["demand_rule"] == "exact").any()
+    assert table["flags"].str.contains("one_horizontal").all()
+
+
+def test_the_nearest_station_is_used_and_far_pairs_are_rejected():
+    stations = [make_station("NEAR", latitude=10.01), make_station("FAR", latitude=11.0, seed=9)]
+    pairs = make_pairs([{}, {"latitude_1": 13.0, "latitude_2": 13.0}])
+    table = per_obspy.risk_table(stations, pairs)
+    assert table["station"].tolist() == ["XX.NEAR"]
+    (lost,) = table.attrs["rejected"]
+    assert lost.name == "P1"
+    assert "XX.FAR is 2223" in lost.reasons[0]  # 2 degrees of latitude: 222.39 km on the sphere
+
+
+def test_a_station_nowhere_serves_no_pair():
+    table = per_obspy.risk_table([make_station(latitude=np.nan)], make_pairs([{}]))
+    assert len(table) == 0
+    assert [lost.kind for lost in table.attrs["rejected"]] == ["station", "pair"]
+
+
+def test_rejections_of_the_reader_are_kept(station):
+    pairs = make_pairs([{}, {"gap": -1.0}])
+    table = per_obspy.risk_table(station, pairs)
+    assert [lost.name for lost in table.attrs["rejected"]] == ["P1"]
+
+
+def test_worst_first(station):
+    table = per_obspy.risk_table(station, make_pairs([{"gap": g} for g in (9.0, 0.0, 0.01, 5.0)]))
+    assert table["state"].tolist() == ["yes", "yes", "no", "no"]
+    assert table["rank"].tolist() == [1, 2, 3, 4]
+    assert table["impact_velocity_exact"].is_monotonic_decreasing
+
+
+def test_ties_go_to_importance_then_occupants_then_name(station):
+    rows = [{}, {"occupants_1": 10.0}, {"importance_2": 1.5}, {}]
+    table = per_obspy.risk_table(station, make_pairs(rows))
+    assert table["pair_id"].tolist() == ["P2", "P1", "P0", "P3"]
+
+
+def test_a_row_does_not_depend_on_the_others(station, monkeypatch):
+    # would catch: lanes or blocks that leak into each other
+    rows = [{"period_1": 0.5 + 0.1 * i, "gap": 0.01 * i, "azimuth": np.nan if i % 3 else 40.0} for i in range(9)]
+    together = _table(station, *rows).sort_index()
+    monkeypatch.setattr("per_obspy.screening.risk.BLOCK", 2)
+    pd.testing.assert_frame_equal(_table(station, *rows).sort_index(), together, check_exact=True)
+
+
+@pytest.mark.parametrize(("ratio", "name"), [(0.4, "severe"), (0.9, "high"), (1.4, "moderate"), (5.0, "low")])
+def test_risk_classes_follow_the_thresholds(station, ratio, name):
+    (demand,) = _table(station, {})["demand"]
+    assert _table(station, {"gap": ratio * demand}).loc["P0", "risk_class"] == name
+
+
+def test_a_radius_far_above_the_displacement_is_flagged():
+    # a velocity step: the long oscillator keeps its velocity, radius v T / 2 pi, and returns through damping
+    pulse = np.zeros(4000)
+    pulse[100:110] = 10.0
+    pulse[110:120] = -9.0
+    station = make_station(longest=99.0)
+    station["acceleration"][:] = np.stack([pulse, 0 * pulse])
+    table = _table(station, {"period_1": 15.0, "damping_1": 0.9, "azimuth": 0.0})
+    assert table.loc["P0", "per_1"] > 1.5 * table.loc["P0", "sd_1"]
+    assert "per_far_above_sd" in table.loc["P0", "flags"].split()
