@@ -1,6 +1,6 @@
 """Parts of a run that can be asked for alone: the spectra of some records, their processing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -47,22 +47,30 @@ def spectra_of(
     CatalogError
         If a source is missing or holds no record.
     """
-    jobs, unread = _jobs(sources, output.with_suffix(".stations"), processing, grid)
-    done = []
-    for one in do_stations(jobs, workers):
-        done.append(one)
-        progress("stations", len(done), len(jobs))
-    done.sort(key=lambda one: one.station)
-    rejected = (*unread, *(row for one in done for row in one.rejected))
+    jobs, unread = jobs_of(sources, output.with_suffix(".stations"), processing, grid)
+    done, rejected = all_done(jobs, unread, workers, progress)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))
     if shards := [one.shard for one in done if one.shard]:
         write_spectra(region(read_spectra(shard) for shard in shards), output)
     return done, rejected
 
 
-def _jobs(
+def all_done(
+    jobs: Sequence[Job], unread: Iterable[Rejection], workers: int, progress: Progress
+) -> tuple[list[Done], tuple[Rejection, ...]]:
+    """Return every station, sorted by name, and everything that was left out."""
+    done = []
+    for one in do_stations(jobs, workers):
+        done.append(one)
+        progress("stations", len(done), len(jobs))
+    done.sort(key=lambda one: one.station)
+    return done, (*unread, *(row for one in done for row in one.rejected))
+
+
+def jobs_of(
     sources: Sequence[Path], shards: Path, processing: Processing, grid: Spectra
 ) -> tuple[list[Job], list[Rejection]]:
+    """Return one job a station, which makes spectra, and what in the sources is no record."""
     found = [find_stations(source) for source in sources]
     files: dict[str, tuple[Path, ...]] = {}
     for contents in found:

@@ -1,4 +1,4 @@
-"""``per-obspy run`` and its parts on records: ``simulate`` and ``spectra``."""
+"""``per-obspy run`` and its parts on records: ``simulate``, ``process`` and ``spectra``."""
 
 import json
 import sys
@@ -104,6 +104,39 @@ def spectra(
             f"{len(shards)} stations, {len(rejected)} rejected", output.with_suffix(".rejected.csv"), *files, sep="\n  "
         )
     if not shards:
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def process(
+    sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")],
+    event: Annotated[Path | None, typer.Option(help="QuakeML file; no event is fine.")] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with keys of the section [processing].")] = None,
+    report: Annotated[bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write processed records as MiniSEED, with a table of their corners and reasons.
+
+    Example: per-obspy process shared/records -o processed --report
+    """
+    import os
+
+    from per_obspy.config import Processing, load
+    from per_obspy.processed import process_records
+
+    chosen = load(settings, Processing) if settings else Processing()
+    with shown_progress() as progress:
+        result = process_records(sources, output, chosen, event, report, (os.cpu_count() or 1, progress))
+    stations = [one for one in result.done if one.shard]
+    files = [str(path) for path in result.files]
+    if as_json:
+        rows = [one._asdict() for one in result.rejected]
+        resumed = sum(one.resumed for one in result.done)
+        print(json.dumps({"stations": len(stations), "resumed": resumed, "rejected": rows, "files": files}))
+    else:
+        print(f"{len(stations)} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
+    if not stations:
         raise typer.Exit(NOTHING_USABLE)
 
 

@@ -89,7 +89,7 @@ def read_event(path: Path) -> Event:
     CatalogError
         If the file cannot be read or does not hold exactly one event with an origin.
     """
-    return read_asdf_event(path) if is_asdf(path) else folder.read_event(path)
+    return read_asdf_event(path) if path.is_file() and is_asdf(path) else folder.read_event(path)
 
 
 def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:

@@ -15,9 +15,10 @@ from ..errors import CatalogError, RecordRejected, Rejection
 from .archives import is_archive, members, open_file
 from .foreign import foreign
 from .metadata import with_metadata
+from .processed import described
 
-#: what StationXML, FDSN station text and QuakeML begin with
-_MARKS = {b"<FDSNStationXML": "inventory", b"#Network": "inventory", b"quakeml": "event"}
+#: what StationXML, FDSN station text, QuakeML and descriptions of processed records begin with
+_MARKS = {b"<FDSNStationXML": "inventory", b"#Network": "inventory", b"quakeml": "event", b'"shard": ': "description"}
 
 
 class FolderContents(NamedTuple):
@@ -174,7 +175,7 @@ def _read(path: Path, **options: Any) -> Stream:
     with open_file(path) as file:
         if not file.read(1):
             raise RecordRejected(str(path), "the file is empty")
-    return foreign(obspy.read, path, **options)
+    return described(foreign(obspy.read, path, **options), path)
 
 
 def _read_inventory(path: Path) -> Inventory:
