@@ -28,7 +28,11 @@ IMPACTS, APPROACH = 20, 21
 STILL, DELAY, MOST_BOUNCES, BOUNCES = 22, 23, 24, 25
 #: Taylor coefficients of the displacement, and of the function whose root is the next event
 CURVE, GUARD = 26, 50
-COLUMNS = 74
+#: Taylor terms needed (first line only), and what one elastic or yielding step makes of speed, force and ramp
+TERMS, ELASTIC, YIELDED = 74, 75, 81
+#: interface: how far it opened at most, beyond its gap
+OPENING = 87
+COLUMNS = 88
 
 #: Largest phase omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1 + xi)).
 LARGEST_PHASE = 0.7

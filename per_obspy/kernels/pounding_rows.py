@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .polynomial_roots import value_and_slope
+from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
 from .pounding_events import find_event, finish_piece, raise_peaks
 from .pounding_motion import (
     BOUNCES,
@@ -17,6 +17,7 @@ from .pounding_motion import (
     HIGHEST,
     MASS,
     MOST_BOUNCES,
+    OPENING,
     PARTICIPATION,
     PHASE,
     PLASTIC,
@@ -82,6 +83,37 @@ def _add_contact_work(row, work, acceleration, slope, span, terms):
 
 
 @kernel
+def raise_openings(row, span, terms):
+    """Raise the largest opening of every interface to that of a piece, exact between its ends."""
+    for j in range(row.shape[0] - 1):
+        start, end = row[j + 1, U] - row[j, U], _opening_at(row, j, terms, span)
+        row[j, OPENING] = max(row[j, OPENING], start, end)
+        for n in range(1, terms):
+            row[j, GUARD + n - 1] = n * (row[j + 1, CURVE + n] - row[j, CURVE + n])
+        size, _ = size_and_curvature(row, j, GUARD, terms - 1, span)
+        if max(start, end) + span * (size + abs(row[j, GUARD])) > row[j, OPENING]:
+            _raise_opening_at_roots(row, j, span, terms)
+
+
+@kernel
+def _opening_at(row, j, terms, time):
+    """Return the opening of an interface at a time of the piece."""
+    left, right = value_and_slope(row, j, CURVE, terms, time), value_and_slope(row, j + 1, CURVE, terms, time)
+    return right[0] - left[0]
+
+
+@kernel
+def _raise_opening_at_roots(row, j, span, terms):
+    """Raise the largest opening where its rate, which the guard holds, falls through zero."""
+    sign = 1.0 if row[j, GUARD] > 0.0 else -1.0
+    time = first_fall(row, j, GUARD, terms - 1, sign, 0.0, span, 0.0)
+    while time >= 0.0:
+        row[j, OPENING] = max(row[j, OPENING], _opening_at(row, j, terms, time))
+        sign = -sign
+        time = first_fall(row, j, GUARD, terms - 1, sign, time, span, 0.0)
+
+
+@kernel
 def advance(row, log, work, segment):
     """Carry the row through one segment, event by event; tell whether it got through."""
     row[0, BOUNCES] = 0.0
@@ -89,6 +121,7 @@ def advance(row, log, work, segment):
     for _ in range(int(2 * row[0, MOST_BOUNCES])):
         span, kind, place = find_event(row, segment, elapsed)
         raise_peaks(row, span, terms)
+        raise_openings(row, span, terms)
         acceleration = segment.acceleration + slope * elapsed
         _add_ground_and_damping(row, work, acceleration, slope, span, terms)
         _add_contact_work(row, work, acceleration, slope, span, terms)

@@ -17,6 +17,7 @@ from per_obspy.kernels.pounding_rows import run_history
 from per_obspy.pounding.energies import Energies, closure_of, energies_of
 from per_obspy.pounding.rows import (
     closed_record,
+    free_samples,
     largest_ground_velocity,
     refinement,
     row_at_rest,
@@ -24,8 +25,6 @@ from per_obspy.pounding.rows import (
 )
 from per_obspy.pounding.structure import Structure
 
-#: Free vibration after the record is followed for this many of the longest period at most.
-FREE_PERIODS = 20.0
 #: Bouncing ends in contact once the separation speed is below this share of the largest ground velocity.
 SPEED_SHARE = 1e-11
 #: Impacts within one sampling interval after which structures that are pressed together stay in contact.
@@ -67,6 +66,8 @@ class PoundingHistory(NamedTuple):
         Largest displacement to either side, exact between samples, m.
     energy_radius : (n_structures,) ndarray
         Largest radius of the recoverable energy, ``sqrt(2 E / (m omega²))``, m; equal to ``per`` if linear.
+    opening_maxima : (n_structures - 1,) ndarray
+        Largest opening of each gap beyond its width at rest, ``max(u_right - u_left)``, exact between samples, m.
     energies : Energies
         Of each structure over time, J.
     closure : float
@@ -81,6 +82,7 @@ class PoundingHistory(NamedTuple):
     per: FloatArray
     displacement_maxima: FloatArray
     energy_radius: FloatArray
+    opening_maxima: FloatArray
     energies: Energies
     closure: float
 
@@ -154,7 +156,7 @@ def pounding_history(
     samples = record.size
     if free_vibration:
         record = closed_record(record)
-        samples = record.size + math.ceil(FREE_PERIODS * max(s.period for s in structures) / step)
+        samples = record.size + free_samples(max(s.period for s in structures), step)
     row, log, motion, work = _run(record, step, table, gap, bounce, samples)
     energies = energies_of(table, motion, work)
     displacement, velocity, plastic = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
@@ -167,6 +169,7 @@ def pounding_history(
         per=np.sqrt(row[:, columns.WIDEST]),
         displacement_maxima=row[:, columns.HIGHEST].copy(),
         energy_radius=np.sqrt(row[:, columns.RICHEST]),
+        opening_maxima=row[:-1, columns.OPENING].copy(),
         energies=energies,
         closure=closure_of(energies),
     )

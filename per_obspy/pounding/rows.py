@@ -7,7 +7,11 @@ import numpy as np
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as motion
+from per_obspy.kernels.pounding_block import SETTLING_STEPS
 from per_obspy.pounding.structure import Structure
+
+#: Free vibration after the record is followed for this many of the longest period at most.
+FREE_PERIODS = 20.0
 
 
 def structure_table(structures: Sequence[Structure]) -> FloatArray:
@@ -77,6 +81,25 @@ def refinement(largest_frequency: float, dt: float) -> int:
     """
     doublings = max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_PHASE)))
     return 1 << doublings
+
+
+def free_samples(longest_period: float, dt: float) -> int:
+    """
+    Return for how many sampling intervals free vibration after the record is followed at most.
+
+    Parameters
+    ----------
+    longest_period : float
+        Of the structures, s.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    int
+        A multiple of the steps between two looks at whether a pair is settled; at least one such round.
+    """
+    return SETTLING_STEPS * max(1, int(FREE_PERIODS * longest_period / (SETTLING_STEPS * dt)))
 
 
 def closed_record(acceleration: FloatArray) -> FloatArray:
