@@ -347,6 +347,13 @@ class Pairs(Section):
         return self
 
 
+class Totals(Section):
+    """How pairs are counted by area."""
+
+    cell: float = Field(1000.0, gt=0, description="m, size of the cells of a grid")
+    area: str | None = Field(None, description="column of the pair table that names the area, instead of cells")
+
+
 class Simulation(Section):
     """A simulated earthquake, its stations, and the pairs of buildings around them."""
 
@@ -367,6 +374,8 @@ class Run(Section):
     spectra: Spectra = Spectra()
     building: Building = Building()
     screening: Screening = Screening()
+    totals: Totals = Totals()
+    geopackage: bool = Field(False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

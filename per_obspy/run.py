@@ -25,7 +25,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 
 from per_obspy.config import Records, Run, Simulation, load
-from per_obspy.errors import CatalogError, Rejection
+from per_obspy.errors import CatalogError, Rejection, require_extra
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import read_pairs
 from per_obspy.inventory.simulated import simulated_pairs
@@ -35,7 +35,7 @@ from per_obspy.records.fdsn import Fetched
 from per_obspy.records.simulated import simulate, write_simulation
 from per_obspy.records.sources import fetched_records, find_sources, input_files
 from per_obspy.report.figures import draw_overview, draw_walk
-from per_obspy.report.tables import write_rejected, write_risk
+from per_obspy.report.tables import write_rejected, write_risk, write_totals
 from per_obspy.screening.risk import risk_table
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
@@ -236,7 +236,8 @@ def _write(
         return outputs
     spectra = region(stations)
     write_spectra(spectra, folder / "spectra.nc")
-    write_risk(table, folder, {"name": settings.name, "simulated": str(settings.simulation is not None).lower()})
+    facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
+    write_risk(table, folder, facts)
     outputs += [folder / name for name in ("spectra.nc", "risk.csv", "risk.parquet", "risk.columns.csv")]
     if len(table):
         worst = table.iloc[0]
@@ -244,7 +245,19 @@ def _write(
         draw_walk(station, worst, folder / "figures" / "worst_pair.png")
         draw_overview(table, spectra, settings.name, folder / "figures" / "overview.png")
         outputs += [folder / "figures" / name for name in ("worst_pair.png", "overview.png")]
+        outputs += write_totals(table, settings.totals.cell, settings.totals.area, folder)
+        if settings.geopackage:
+            outputs.append(_write_geopackage(table, settings, folder / "risk.gpkg", facts))
     return outputs
+
+
+def _write_geopackage(table: pd.DataFrame, settings: Run, path: Path, facts: dict[str, str]) -> Path:
+    """Write the layer for QGIS with the optional libraries."""
+    require_extra("gis", "pyogrio", "shapely")
+    from per_obspy.report.gis import write_pairs_layer
+
+    write_pairs_layer([table], list(settings.screening.classes), path, facts)
+    return path
 
 
 def _counts(done: Sequence[Done], table: pd.DataFrame | None, rejected: Sequence[Rejection]) -> dict[str, int]:

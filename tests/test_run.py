@@ -60,6 +60,7 @@ def test_every_result_is_there(finished):
         "risk.columns.csv",
         "spectra.nc",
         "rejected.csv",
+        "totals.csv",
         "figures/overview.png",
         "figures/worst_pair.png",
     }

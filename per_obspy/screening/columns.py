@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import pandas as pd
 
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
+from per_obspy.screening.codes import rule_columns
 
 
 def _both(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
@@ -79,7 +80,7 @@ FLAGS: dict[str, str] = {
 
 def column_table(names: Iterable[str]) -> pd.DataFrame:
     """Return unit and meaning of each of these columns, then of every flag, as written to ``risk.columns.csv``."""
-    known = COLUMNS | COMPLETED | RESULTS
+    known = COLUMNS | COMPLETED | RESULTS | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
     rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in names]
     flags = [(f"flag_{name}", "", meaning) for name, meaning in FLAGS.items()]

@@ -18,6 +18,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.assignment import nearest_station
+from per_obspy.screening.codes import code_columns
 from per_obspy.screening.columns import ORDER
 from per_obspy.screening.demand import (
     Demand,
@@ -36,6 +37,7 @@ from per_obspy.screening.motion import (
     motion_of_one_horizontal,
 )
 from per_obspy.screening.probability import pair_probability
+from per_obspy.screening.ranking import risk_class, worst_first
 
 #: Defaults of the configuration.
 BUILDING, SCREENING = Building(), Screening()
@@ -128,9 +130,10 @@ def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.
     table["probability"] = pair_probability(station, table, screening.model_dispersion)
     possible = period_is_derived(table) | (table["probability"].to_numpy() >= screening.possible_from)
     table["state"] = pounding_state(gap, demand, possible)
-    table["risk_class"] = _risk_class(table["demand_ratio"].to_numpy(), screening.classes)
+    table["risk_class"] = risk_class(table["demand_ratio"].to_numpy(), screening.classes)
     table["flags"] = flag_text(table, station, screening)
-    return table
+    contact = [table[f"participation_{i}"].to_numpy() * table[f"sd_{i}"].to_numpy() for i in (1, 2)]
+    return pd.concat([table, code_columns(table, *contact, screening.codes)], axis=1)
 
 
 def _motions(station: xr.Dataset, block: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
@@ -223,34 +226,13 @@ def _hits(judged: _Judged, pairs: pd.DataFrame) -> dict[str, NDArray[np.generic]
     }
 
 
-def _risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
-    """Return the first class whose threshold the ratio does not exceed; the last where there is no ratio."""
-    names = np.array(list(classes), dtype=object)
-    index = np.searchsorted(np.array(list(classes.values())), np.nan_to_num(ratio, nan=np.inf), side="left")
-    return names[np.minimum(index, names.size - 1)]
-
-
 def _ranked(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table in the order of its columns, worst pair first; ties by importance, occupants, name.
+    """
+    Return the table worst pair first, leading columns in their order.
 
-    The velocity is that of the exact history where it decides, else the larger of it and of the single hit.
+    The impact velocity is that of the exact history where it decides, else the larger of it and of the single hit.
     """
     estimated = table["impact_velocity"].fillna(0.0).where(table["demand_rule"] != "exact", 0.0)
-    order = {
-        "state": table["state"].map({"yes": 0, "possible": 1, "no": 2}),
-        "probability": -table["probability"],
-        "velocity": -np.maximum(table["impact_velocity_exact"], estimated),
-        "ratio": table["demand_ratio"].fillna(np.inf),
-        "importance": -_largest(table, "importance"),
-        "occupants": -_largest(table, "occupants"),
-        "pair_id": table["pair_id"],
-    }
-    ranked = table.loc[pd.DataFrame(order).sort_values(list(order), kind="stable").index].reset_index(drop=True)
-    ranked["rank"] = np.arange(1, len(ranked) + 1)
+    ranked = worst_first(table, np.maximum(table["impact_velocity_exact"], estimated))
     others = [name for name in ranked if name not in ORDER and name != "station_index"]
     return ranked[[*ORDER, *others]]
-
-
-def _largest(table: pd.DataFrame, name: str) -> pd.Series:
-    """Return the larger value of the two buildings, 0 where the pair table does not know it."""
-    return table.reindex(columns=[f"{name}_1", f"{name}_2"]).max(axis=1).fillna(0.0)
