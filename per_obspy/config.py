@@ -172,6 +172,7 @@ class Checks(Section):
     bandwidth: Check = Check(threshold=4.0, level="reject")  # low-pass over high-pass corner, at least
     final_velocity: Check = Check(threshold=0.1, level="reject")  # over its peak, at most
     final_displacement: Check = Check(threshold=0.2, level="reject")  # over its peak, at most
+    baseline_shift: Check = Check(threshold=0.5, level="warn")  # velocity before the filter that stays, over the peak
 
 
 class Processing(Section):

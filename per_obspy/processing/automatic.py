@@ -31,6 +31,7 @@ from per_obspy.processing.velocity_baseline import (
     boore_segments,
     crossing_time,
     displacement_polynomial,
+    residual_velocity,
     velocity_residual,
 )
 
@@ -59,7 +60,8 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     RecordRejected
         If the signal never clears the noise, or no corner cleans the displacement.
     """
-    level = trend_removed(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
+    plain = _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
+    level = trend_removed(plain)
     outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)
     if spectra is not None:
@@ -104,6 +106,15 @@ def offset_kept(stream: Stream, settings: Processing) -> Stream:
     remembered(out[0], baseline="velocity residual")
     lowest = Corner(lowest_highpass(out[0]).frequency, "not applied: permanent offset kept")
     return _noted(out, lowest, highest_corner(out[0], settings.lowpass or settings.highest_lowpass))
+
+
+def _residual_noted(stream: Stream) -> Stream:
+    """Return a copy that knows the velocity left at the end of the shaking, where there is quiet before and after."""
+    out = stream.copy()
+    _, end, quiet = _shaking_times(out[0])
+    if quiet:
+        remembered(out[0], residual_velocity=residual_velocity(out[0].data, out[0].stats.delta, end))
+    return out
 
 
 def _shaking_times(trace: Trace) -> tuple[float, float, bool]:

@@ -38,7 +38,7 @@ def integrated(stream: Stream) -> Stream:
 
 def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     """
-    Give a finding where velocity or displacement does not come to rest at the end, pads included.
+    Give a finding where velocity or displacement does not come to rest, pads included, or did not before the filter.
 
     Parameters
     ----------
@@ -57,3 +57,11 @@ def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         peak = np.abs(motion).max()
         ratio = float(abs(motion[-1]) / peak) if peak else 0.0
         yield from above(name, getattr(checks, name), ratio, f"{name.replace('_', ' ')} over its peak:")
+    yield from _shift_findings(trace, float(np.abs(velocity[0].data).max()), checks)
+
+
+def _shift_findings(trace: Trace, peak: float, checks: Checks) -> Iterator[Finding]:
+    """Give a finding where the velocity that stayed before the filter, m/s, is large beside the peak now."""
+    stayed = float(trace.stats.get("per_obspy", {}).get("residual_velocity", 0.0))
+    meaning = "the baseline shifted during the shaking: velocity that stayed, over the peak velocity"
+    yield from above("baseline_shift", checks.baseline_shift, stayed / peak if peak else 0.0, meaning)

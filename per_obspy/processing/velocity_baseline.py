@@ -57,6 +57,37 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     return samples - shift
 
 
+def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
+    """
+    Return the velocity that is left when the shaking ends: that of the line through the velocity from then on, m/s.
+
+    The ground has come to rest by then, so that this is the integral of what the baseline did during the shaking.
+
+    Parameters
+    ----------
+    data : (n_samples,) array_like
+        Acceleration without the mean of its quiet beginning, m/s2.
+    dt : float
+        Sampling interval, s.
+    end : float
+        Of the shaking, s from the first sample.
+
+    Returns
+    -------
+    float
+        Not negative.
+
+    Examples
+    --------
+    >>> shifted = np.zeros(1000)
+    >>> shifted[200:300] = 0.05  # m/s2 for 1 s
+    >>> round(residual_velocity(shifted, 0.01, 5.0), 12)
+    0.05
+    """
+    constant, slope = _final_line(*_samples_and_times(data, dt), end)
+    return abs(constant + slope * end)
+
+
 def crossing_time(data: FloatArray, dt: float, first: float, second: float) -> float:
     """
     Return the t2 at which the line through the final velocity crosses zero, if that is between the times, else second.

@@ -31,6 +31,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "clear_from": ("Hz", "lowest frequency at which the signal clears the noise"),
     "clear_to": ("Hz", "highest frequency at which the signal clears the noise"),
     "baseline": ("", "kind of baseline that was removed beside the mean"),
+    "residual_velocity": ("m/s", "left at the end of the shaking before any filter: a baseline that shifted"),
     "highpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
     "highpass_source": ("", "why it is there; shared: the other horizontal needs it"),
     "own_highpass": ("Hz", "what this component alone would have had"),

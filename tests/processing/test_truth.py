@@ -6,6 +6,7 @@ from obspy import Stream, Trace, UTCDateTime, read
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process, process_station
+from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.elastic import per_spectrum
 
 RATE, COUNT = 100.0, 12000
@@ -50,6 +51,38 @@ def test_the_spectrum_is_recovered_inside_the_usable_periods(earthquake, drift):
     assert max(median) < 0.002
     # honest: what lies well beyond the limit is worse
     assert np.mean(outside) > 1.5 * np.mean(inside)
+
+
+def shifted(truth, shift, start, end):
+    """Return the largest error of PER inside the usable periods and the warnings, for a shift between two times."""
+    recorded = truth + 1e-5 * np.random.default_rng(100).normal(size=COUNT)
+    recorded[round(start * RATE) : round(end * RATE)] += shift
+    processed = process(Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})]))[0]
+    usable = processed.stats.per_obspy
+    good = (usable.shortest_period <= PERIODS) & (usable.longest_period >= PERIODS)
+    return error(processed.data, truth)[good].max(), usable.get("warnings", "")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_strong_shifts_during_the_shaking_are_flagged(earthquake, seed):
+    # 15 s of 0.05 m/s2 leave 0.75 m/s: PER inside the usable periods is wrong by 12 to 21 %, which the record must say
+    wrong, warnings = shifted(earthquake(seed), 0.05, 22, 37)
+    assert wrong > 0.06  # else there is nothing to warn of
+    assert "the baseline shifted during the shaking" in warnings
+    # without a shift nothing is said, although this ground itself ends with up to 0.23 of its peak velocity
+    wrong, warnings = shifted(earthquake(seed), 0.0, 22, 37)
+    assert wrong < 0.06
+    assert "baseline" not in warnings
+
+
+@pytest.mark.real_data
+def test_a_real_sensor_that_tilted_is_flagged_and_its_neighbours_are_not(real_data):
+    # SLA HNN: velocity runs away to 14 times its processed peak; another program rejects it for signal to noise
+    folder = real_data / "records" / "ridgecrest2019_mseed"
+    found = find_stations(folder)
+    kept, _ = process_station(read_station(found.stations["CI.SLA"], found.inventory, "CI.SLA")[0], Processing())
+    flagged = {one.stats.channel for one in kept if "baseline shifted" in one.stats.per_obspy.get("warnings", "")}
+    assert flagged == {"HNN"}
 
 
 @pytest.mark.real_data
