@@ -28,7 +28,8 @@ QUANTITIES = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}
 #: what the page says in words, as far as the record has it
 TOLD = (
     "onset", "onset_source", "noise", "signal_to_noise", "baseline", "residual_velocity", "highpass",
-    "highpass_source", "lowpass", "lowpass_source", "shortest_period", "longest_period", "azimuth_source", "warnings", "notes",
+    "highpass_source", "lowpass", "lowpass_source", "shortest_period", "longest_period", "azimuth_source",
+    "warnings", "notes",
 )  # fmt: skip
 
 
