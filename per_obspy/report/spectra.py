@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from per_obspy.checks import FloatArray
 from per_obspy.report.style import MOTION_COLOUR, save
 from per_obspy.spectra.bilinear import bilinear_response
 
@@ -71,13 +73,47 @@ def draw_state_space(acceleration: ArrayLike, dt: float, period: float, damping:
     Valles-Mattox & Reinhorn (1996), 11WCEE, Fig. 2a.
     """
     motion = bilinear_response(acceleration, dt, period, damping, np.inf, 0.0)
-    across, up = motion.displacement, motion.velocity * period / (2.0 * np.pi)
-    radius, angle = float(np.max(np.hypot(across, up))), np.linspace(0.0, 2.0 * np.pi, 361)
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
     axes = figure.subplots()
-    axes.plot(across, up, color=MOTION_COLOUR, linewidth=0.6)
-    axes.plot(radius * np.cos(angle), radius * np.sin(angle), color=COMPONENT_COLOURS[1], label=f"PER = {radius:.3g} m")
-    axes.set_aspect("equal")
-    axes.set(xlabel="displacement (m)", ylabel="velocity / frequency (m)", title=f"T = {period:g} s, ξ = {damping:g}")
+    add_state_space(axes, motion.displacement, motion.velocity, period)
+    axes.set_title(f"T = {period:g} s, ξ = {damping:g}")
     axes.legend(fontsize=9, loc="upper right")
     save(figure, path, simulated=False)
+
+
+def add_state_space(axes: Axes, displacement: FloatArray, velocity: FloatArray, period: float) -> None:
+    """
+    Add the motion of one oscillator in the state space, and its PER circle.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to.
+    displacement, velocity : (n_time,) ndarray
+        Relative to the ground, m and m/s.
+    period : float
+        Undamped, s.
+    """
+    up = velocity * period / (2.0 * np.pi)
+    radius = float(np.max(np.hypot(displacement, up)))
+    axes.plot(displacement, up, color=MOTION_COLOUR, linewidth=0.6)
+    add_circle(axes, radius, COMPONENT_COLOURS[1], f"PER = {radius:.3g} m")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="displacement (m)", ylabel="velocity / frequency (m)")
+
+
+def add_circle(axes: Axes, radius: float, colour: str, label: str, centre: float = 0.0, style: str = "-") -> None:
+    """
+    Add a circle of constant energy to a state space.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to.
+    radius, centre : float
+        Of the circle, the centre along the displacement, m.
+    colour, label, style : str
+        Of its line.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.plot(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, linestyle=style, label=label)

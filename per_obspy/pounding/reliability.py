@@ -1,0 +1,243 @@
+"""How good the estimates are: of the critical gap, and of the single hit, against the exact histories of one record."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.pounding.correlation import ddc_correlation
+from per_obspy.pounding.gap import absolute_gap, critical_gap, srss_gap
+from per_obspy.pounding.histories import pounding_histories
+from per_obspy.pounding.record_correlation import record_correlation
+from per_obspy.pounding.relative import relative_displacement
+from per_obspy.pounding.single_hit import single_hit
+from per_obspy.spectra.elastic import response_spectra
+
+
+class GapComparison(NamedTuple):
+    """
+    Critical gaps of each pair for either order of the structures, each (n_pairs,), m.
+
+    ``exact`` is the largest ``|u1 - u2|`` of the record. The estimates combine peak displacements (``sd``) or radii
+    (``per``) with the correlation (16) (``ddc``) or that of the record (``record``); ``larger_per`` is the larger of
+    the two estimates with radii.
+    """
+
+    exact: FloatArray
+    ddc_sd: FloatArray
+    ddc_per: FloatArray
+    record_per: FloatArray
+    srss_sd: FloatArray
+    absolute_sd: FloatArray
+    larger_per: FloatArray
+
+
+class SingleHitComparison(NamedTuple):
+    """
+    Single hit and exact history of each pair at the same gap.
+
+    ``status`` (n_pairs,) is that of the single hit; ``per`` are the radii without pounding, ``predicted`` and
+    ``actual`` the largest radii with pounding, (2, n_pairs), m, predicted NaN unless the status is ``ok``; ``impacts``
+    (n_pairs,) counts those of the history.
+    """
+
+    status: NDArray[np.str_]
+    per: FloatArray
+    predicted: FloatArray
+    actual: FloatArray
+    impacts: NDArray[np.int64]
+
+
+class Summary(NamedTuple):
+    """Predicted over actual: median, standard deviation of the logarithm, shares below each limit, number of cases."""
+
+    median: float
+    log_std: float
+    below: tuple[float, ...]
+    cases: int
+
+
+def compare_gaps(
+    acceleration: ArrayLike, dt: float, period_1: ArrayLike, period_2: ArrayLike, damping: float = 0.05
+) -> GapComparison:
+    """
+    Estimates of the critical gap beside the exact one.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s².
+    dt : float
+        Sampling interval, s.
+    period_1, period_2 : (n_pairs,) array_like
+        Undamped periods, s.
+    damping : float, optional
+        Of every structure, fraction of critical, dimensionless.
+
+    Returns
+    -------
+    GapComparison
+        One value a pair.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> gaps = compare_gaps(pulse, 0.01, [0.5], [1.5])
+    >>> bool(gaps.exact[0] < gaps.absolute_sd[0])
+    True
+    """
+    period_1, period_2 = _pairs(period_1, period_2)
+    (per_1, per_2), (sd_1, sd_2) = _spectra(acceleration, dt, period_1, period_2, damping)
+    white = ddc_correlation(period_1, damping, period_2, damping)
+    own = record_correlation(acceleration, dt, period_1, damping, period_2, damping)
+    ddc_per, record_per = critical_gap(per_1, per_2, white), critical_gap(per_1, per_2, own)
+    return GapComparison(
+        exact=relative_displacement(acceleration, dt, period_1, damping, period_2, damping).largest,
+        ddc_sd=critical_gap(sd_1, sd_2, white),
+        ddc_per=ddc_per,
+        record_per=record_per,
+        srss_sd=srss_gap(sd_1, sd_2),
+        absolute_sd=absolute_gap(sd_1, sd_2),
+        larger_per=np.maximum(ddc_per, record_per),
+    )
+
+
+def compare_single_hit(
+    acceleration: ArrayLike,
+    dt: float,
+    period_1: ArrayLike,
+    period_2: ArrayLike,
+    gap_ratio: ArrayLike,
+    mass_ratio: ArrayLike = 1.0,
+    restitution: float = 0.65,
+    damping: float = 0.05,
+) -> SingleHitComparison:
+    """
+    Single hit with the exact one-sided critical gap beside the exact pounding history.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, positive from structure 1 to 2, m/s².
+    dt : float
+        Sampling interval, s.
+    period_1, period_2 : (n_pairs,) array_like
+        Undamped periods, s.
+    gap_ratio : (n_pairs,) or float array_like
+        Gap over the critical gap of the record, dimensionless.
+    mass_ratio : (n_pairs,) or float array_like, optional
+        Mass of structure 2 over that of structure 1, dimensionless.
+    restitution, damping : float, optional
+        Of every impact and of every structure, dimensionless.
+
+    Returns
+    -------
+    SingleHitComparison
+        One value a pair.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> compared = compare_single_hit(pulse, 0.01, [0.5], [1.5], 0.9)
+    >>> bool(compared.impacts[0] > 0)
+    True
+    """
+    period_1, period_2 = _pairs(period_1, period_2)
+    (per_1, per_2), _ = _spectra(acceleration, dt, period_1, period_2, damping)
+    critical = relative_displacement(acceleration, dt, period_1, damping, period_2, damping).one_before_two
+    gap = critical * checks.not_negative("gap_ratio", gap_ratio)
+    hit = single_hit(per_1, per_2, period_1, period_2, 1.0, mass_ratio, restitution, critical, gap)
+    exact = pounding_histories(
+        acceleration, dt, period_1, damping, 1.0, period_2, damping, mass_ratio, gap, restitution
+    )
+    return SingleHitComparison(
+        status=hit.status,
+        per=np.stack([per_1, per_2]),
+        predicted=np.stack([per_1 * hit.amplification_1, per_2 * hit.amplification_2]),
+        actual=exact.per,
+        impacts=exact.impacts,
+    )
+
+
+def _pairs(period_1: ArrayLike, period_2: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return checked periods, one of each a pair."""
+    first, second = checks.positive("period_1", period_1), checks.positive("period_2", period_2)
+    if first.ndim != 1 or first.shape != second.shape:
+        raise ValueError(f"period_1 and period_2 must be one row each, got shapes {first.shape} and {second.shape}")
+    return first, second
+
+
+def _spectra(
+    acceleration: ArrayLike, dt: float, period_1: FloatArray, period_2: FloatArray, damping: float
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return radii, then peak displacements, of both structures, each (n_pairs,), m."""
+    periods, place = np.unique(np.stack([period_1, period_2]), return_inverse=True)
+    spectra = response_spectra(acceleration, dt, periods, damping)
+    first, second = place.reshape(2, -1)
+    return (spectra.per[first], spectra.per[second]), (spectra.sd[first], spectra.sd[second])
+
+
+def amplifications(compared: SingleHitComparison) -> tuple[FloatArray, FloatArray]:
+    """
+    Largest amplification of either structure of the pairs with a single hit.
+
+    Parameters
+    ----------
+    compared : SingleHitComparison
+        From :func:`compare_single_hit`.
+
+    Returns
+    -------
+    predicted, actual : (n_ok,) ndarray
+        Radius with pounding over radius without, of the structure that is amplified most, dimensionless.
+    """
+    known = compared.status == "ok"
+    predicted, actual = (
+        (radii[:, known] / compared.per[:, known]).max(axis=0) for radii in (compared.predicted, compared.actual)
+    )
+    return predicted, actual
+
+
+def summary(ratio: ArrayLike, limits: tuple[float, ...]) -> Summary:
+    """
+    Bias and scatter of predicted over actual.
+
+    Parameters
+    ----------
+    ratio : (n_cases,) array_like
+        Predicted over actual, above 0, dimensionless.
+    limits : tuple of float
+        Below which a case counts as under-predicted, dimensionless.
+
+    Returns
+    -------
+    Summary
+        Dimensionless.
+
+    Raises
+    ------
+    ValueError
+        If a ratio is not positive, or there is none.
+
+    Examples
+    --------
+    >>> summary([0.5, 1.0, 2.0], (0.99,)).below
+    (0.3333333333333333,)
+    """
+    ratio = checks.positive("ratio", ratio)
+    if ratio.size == 0:
+        raise ValueError("ratio must hold at least one case")
+    below = tuple(float(np.mean(ratio < limit)) for limit in limits)
+    return Summary(float(np.median(ratio)), float(np.std(np.log(ratio))), below, ratio.size)
