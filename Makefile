@@ -2,11 +2,15 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check wheel benchmark clean
+.PHONY: demo figures test check wheel benchmark clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
 	$(BIN)/per-obspy run workflows/demo.toml
+
+figures: .venv/run
+	@echo "== redraw the paper's figures, on real records if PER_OBSPY_DATA or ../shared/data has them"
+	$(BIN)/python workflows/paper_figures.py
 
 test: .venv/test
 	@echo "== tests, doctests and README"
