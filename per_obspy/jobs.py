@@ -153,20 +153,24 @@ def _earlier(job: Job) -> Done | None:
     """Return the station as an earlier run left it, if it was made from the same and is undamaged."""
     try:
         note = json.loads(job.shard.with_suffix(".json").read_text(encoding="utf-8"))
-        if note["key"] != _key(job) or note["shard"] != (job.shard.exists() and file_hash(job.shard) or None):
+        shard = file_hash(job.shard) if job.shard.exists() else None
+        if note["key"] != _key(job) or note["shard"] != shard:
             return None
-        rejected = tuple(Rejection(*row[:-1], reasons=tuple(row[-1])) for row in note["rejected"])
+        rejected = tuple(
+            Rejection(kind, name, source, row, tuple(reasons)) for kind, name, source, row, reasons in note["rejected"]
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return Done(job.station, job.shard if note["shard"] else None, rejected, resumed=True)
+    return Done(job.station, job.shard if shard else None, rejected, resumed=True)
 
 
 def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
     """
     Give every station as it is finished, in parallel processes; what an earlier run did is not done again.
 
-    The first is waited for, so that one worker compiles and the others load. A worker that dies takes the whole pool with it. What was not finished then is done again, each station in a
-    process of its own, so that only the guilty one is lost, and its loss is a rejection.
+    The first is waited for, so that one worker compiles and the others load. A worker that dies takes the whole pool
+    with it. What was not finished then is done again, each station in a process of its own, so that only the guilty
+    one is lost, and its loss is a rejection.
 
     Parameters
     ----------
@@ -194,8 +198,8 @@ def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
 
 def do_stations_on(executor: Executor, jobs: Sequence[Job]) -> Iterator[Done]:
     """Give every station as it is finished, on any executor (a cluster's, for example)."""
-    for done in filter(None, earlier := [_earlier(job) for job in jobs]):
-        yield done
+    earlier = [_earlier(job) for job in jobs]
+    yield from filter(None, earlier)
     futures = {executor.submit(do_station, job): job for job, done in zip(jobs, earlier, strict=True) if not done}
     for future in as_completed(futures):
         yield _caught(futures[future], future.result)

@@ -211,10 +211,10 @@ def _stations(jobs: Sequence[Job], workers: int, executor: Executor | None, prog
 
 def _simulated_pairs(settings: Run, folder: Path, stations: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Return a simulated pair table, written beside the results first and read back like any other."""
-    if settings.simulation is not None and settings.pairs is None:
+    wanted = settings.pairs and settings.pairs.simulated
+    if wanted is None:
+        assert settings.simulation is not None  # Run demands pairs or a simulation
         wanted = load(settings.simulation, Simulation).pairs
-    else:
-        wanted = settings.pairs.simulated
     longitudes = np.array([station["longitude"].item() for station in stations])
     latitudes = np.array([station["latitude"].item() for station in stations])
     with written_whole(folder / "pairs.csv") as part:
@@ -301,7 +301,7 @@ def _held(folder: Path) -> Iterator[None]:
     holder = folder / ".holder.json"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(folder / ".lock", timeout=0)
+        lock = FileLock(str(folder / ".lock"), timeout=0)
         lock.acquire()
     except Timeout as error:
         raise CatalogError(str(folder), f"another run holds this folder: {_holder(holder)}") from error

@@ -38,7 +38,7 @@ def test_counts_are_numbers():
 
 def test_between_is_closed():
     assert checks.between("correlation", [-1, 1], -1, 1).tolist() == [-1.0, 1.0]
-    with pytest.raises(ValueError, match="correlation must be between -1 and 1, got 1.5"):
+    with pytest.raises(ValueError, match=r"correlation must be between -1 and 1, got 1\.5"):
         checks.between("correlation", 1.5, -1, 1)
 
 

@@ -18,9 +18,14 @@ def test_the_final_name_appears_only_at_the_end(tmp_path):
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     final = tmp_path / "risk.csv"
     final.write_text("old")
-    with pytest.raises(RuntimeError, match="power cut"), written_whole(final) as part:
-        part.write_text("half")
-        raise RuntimeError("power cut")
+
+    def fails():
+        with written_whole(final) as part:
+            part.write_text("half")
+            raise RuntimeError("power cut")
+
+    with pytest.raises(RuntimeError, match="power cut"):
+        fails()
     assert final.read_text() == "old"
     assert list(tmp_path.iterdir()) == [final]
 

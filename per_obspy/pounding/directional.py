@@ -78,7 +78,8 @@ def directional_correlation(
     if np.any((own_1 <= 0) & ~undamped) or np.any((own_2 <= 0) & ~undamped):
         raise ValueError("north and east have no motion along an azimuth: there is no correlation")
     scale = np.sqrt(np.where(undamped, 1.0, own_1)) * np.sqrt(np.where(undamped, 1.0, own_2))
-    return np.where(undamped, equal, np.clip(np.where(equal, scale, both) / scale, -1.0, 1.0))
+    correlation: FloatArray = np.where(undamped, equal, np.clip(np.where(equal, scale, both) / scale, -1.0, 1.0))
+    return correlation
 
 
 def worst_azimuth(
@@ -133,9 +134,11 @@ def worst_azimuth(
         return np.empty(0)
     step = checks.number("dt", dt, checks.positive)
     rest = np.zeros(int(np.ceil(2.0 * float(np.max(2.0 * np.pi / pairs[[0, 3]])) / step)))
-    motion = [np.append(part, rest) for part in _closed(checks.record("north", north), checks.record("east", east))]
+    components = _closed(checks.record("north", north), checks.record("east", east))
     apart = np.empty((2, pairs.shape[1]))
-    furthest_apart(*motion, step, np.ascontiguousarray(pairs), apart)
+    furthest_apart(
+        np.append(components[0], rest), np.append(components[1], rest), step, np.ascontiguousarray(pairs), apart
+    )
     azimuth: FloatArray = np.degrees(np.arctan2(apart[1], apart[0])) % 360.0
     return azimuth
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from per_obspy.checks import FloatArray
 from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, STATE_COLOURS, save
+from per_obspy.screening.values import components
 
 
 def draw_walk(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
@@ -35,10 +36,10 @@ def draw_walk(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
 
 def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
     """Return the acceleration along an azimuth (degrees), or that of the only sensor, m/s²."""
-    acceleration: FloatArray = station["acceleration"].to_numpy()
-    if len(acceleration) == 1:
-        return acceleration[0]
-    return acceleration[0] * np.cos(np.radians(azimuth)) + acceleration[1] * np.sin(np.radians(azimuth))
+    north, east, _ = components(station)
+    angle = np.radians(azimuth) if station.sizes["horizontal"] == 2 else 0.0
+    along: FloatArray = north * np.cos(angle) + east * np.sin(angle)
+    return along
 
 
 def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:

@@ -37,7 +37,7 @@ def nearest_station(
     """
     tree = cKDTree(_on_sphere(station_longitude, station_latitude))
     chord, station = tree.query(_on_sphere(longitude, latitude))
-    return station, 2.0 * EARTH_RADIUS * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
+    return np.asarray(station, dtype=np.intp), 2.0 * EARTH_RADIUS * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
 
 
 def _on_sphere(longitude: FloatArray, latitude: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ RESULTS: dict[str, Column] = {
         Column("demand", "float64", "m", "gap needed at contact height, by the rule in demand_rule"),
         Column("demand_rule", "str", "", "what the demand is: exact, per_white_noise, per_record or srss"),
         Column("demand_ratio", "float64", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
-        Column("impact_velocity", "float64", "m/s", "approach velocity of the single hit, larger of both branches"),
+        Column("impact_velocity", "float64", "m/s", "approach velocity of the single hit with the estimated demand"),
         Column("single_hit_status", "str", "", "ok, no_pounding, no_grazing_state or inconsistent_critical_gap"),
         *_both("amplification", "1", "PER after a single hit / before, at least 1; empty without a grazing state"),
         Column("flags", "str", "", "names separated by spaces, each explained in a row flag_..."),

@@ -112,4 +112,5 @@ def pounding_state(gap: FloatArray, demand: FloatArray, possible: NDArray[np.boo
 
 def demand_ratio(gap: FloatArray, demand: FloatArray) -> FloatArray:
     """Return gap / demand: 0 when touching, NaN (an empty cell) where the demand is 0."""
-    return np.divide(gap, demand, out=np.full(np.shape(demand), np.nan), where=demand > 0)
+    ratio: FloatArray = np.divide(gap, demand, out=np.full(np.shape(demand), np.nan), where=demand > 0)
+    return ratio

@@ -14,6 +14,7 @@ import xarray as xr
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.directional import directional_correlation
+from per_obspy.screening.values import both, components
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
 from per_obspy.spectra.elastic import azimuth_maxima
 
@@ -43,21 +44,18 @@ class PairMotion(NamedTuple):
 
 def motion_along_azimuths(station: xr.Dataset, pairs: pd.DataFrame, azimuth: FloatArray) -> PairMotion:
     """Return the motion along one azimuth a pair, (n_pairs,), degrees."""
-    north, east = station["acceleration"].to_numpy()
-    return _along(north, east, float(station["sampling_interval"]), pairs, azimuth)
+    return _along(*components(station), pairs, azimuth)
 
 
 def motion_of_one_horizontal(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:
     """Return the motion along the only horizontal of a station, whatever the pairs' azimuths."""
-    (along,) = station["acceleration"].to_numpy()
-    motion = _along(along, np.zeros_like(along), float(station["sampling_interval"]), pairs, np.zeros(len(pairs)))
+    motion = _along(*components(station), pairs, np.zeros(len(pairs)))
     return motion._replace(azimuth=np.full((len(pairs), 1), float(station["horizontal_azimuth"][0])))
 
 
 def motion_along_every_azimuth(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:
     """Return the motion along every degree of the half circle, for pairs whose azimuth is unknown."""
-    north, east = station["acceleration"].to_numpy()
-    dt = float(station["sampling_interval"])
+    north, east, dt = components(station)
     radii = [_every_radius(north, east, dt, *oscillator) for oscillator in _oscillators(pairs)]
     return PairMotion(
         azimuth=np.broadcast_to(EVERY_AZIMUTH, (len(pairs), EVERY_AZIMUTH.size)),
@@ -81,7 +79,7 @@ def _along(north: FloatArray, east: FloatArray, dt: float, pairs: pd.DataFrame, 
 
 def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
     """Return period and damping of buildings 1 and of buildings 2."""
-    return [(pairs[f"period_{i}"].to_numpy(np.float64), pairs[f"damping_{i}"].to_numpy(np.float64)) for i in (1, 2)]
+    return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
 
 
 def _correlation(

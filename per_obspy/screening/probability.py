@@ -18,6 +18,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
+from per_obspy.screening.values import at_contact, values
 
 #: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
 #: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
@@ -65,25 +66,25 @@ def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float)
     """Return the exact integral over both radii with the correlation that governs the demand."""
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
     return pounding_probability(
-        *(table[f"participation_{i}"].to_numpy(np.float64) * table[f"per_{i}"].to_numpy(np.float64) for i in (1, 2)),
+        *at_contact(table, "per"),
         correlation,
         _median_gap(table),
-        *(_damping_dispersion(station, table, i) for i in (1, 2)),
-        0.0,
-        model_dispersion,
-        _gap_dispersion(table),
+        _damping_dispersion(station, table, 1),
+        _damping_dispersion(station, table, 2),
+        dispersion_correlation=0.0,
+        model_dispersion=model_dispersion,
+        gap_dispersion=_gap_dispersion(table),
     )
 
 
 def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
     """Return the mean over quasi-random periods and dampings of both buildings."""
     columns: list[FloatArray] = [_azimuth_row(station, table).astype(np.float64)]
-    for i in (1, 2):
-        radius = table[f"participation_{i}"].to_numpy(np.float64) * table[f"per_{i}"].to_numpy(np.float64)
+    for i, radius in enumerate(at_contact(table, "per"), start=1):
         columns += [
             *_log_place(table, i),
-            table[f"period_log_std_{i}"].to_numpy(np.float64),
-            table[f"damping_log_std_{i}"].to_numpy(np.float64),
+            values(table, f"period_log_std_{i}"),
+            values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)),
         ]
     columns += [_median_gap(table), np.hypot(model_dispersion, _gap_dispersion(table))]
@@ -103,14 +104,15 @@ def _log_spectra(station: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArra
 def _azimuth_row(station: xr.Dataset, table: pd.DataFrame) -> NDArray[np.intp]:
     """Return the stored azimuth next to that of each pair."""
     count = station.sizes.get("azimuth", 1)
-    azimuth = np.nan_to_num(table["azimuth_used"].to_numpy(np.float64)) % 180.0
-    return np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+    azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
+    row: NDArray[np.intp] = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
+    return row
 
 
 def _log_place(table: pd.DataFrame, i: int) -> tuple[FloatArray, FloatArray]:
     """Return ln period and ln damping of building i."""
-    damping = np.maximum(table[f"damping_{i}"].to_numpy(np.float64), SMALLEST_DAMPING)
-    return np.log(table[f"period_{i}"].to_numpy(np.float64)), np.log(damping)
+    damping = np.maximum(values(table, f"damping_{i}"), SMALLEST_DAMPING)
+    return np.log(values(table, f"period_{i}")), np.log(damping)
 
 
 def stored_log_per(station: xr.Dataset, row: NDArray[np.intp], period: FloatArray, damping: FloatArray) -> FloatArray:
@@ -136,7 +138,7 @@ def _between(grid: FloatArray, values: FloatArray) -> tuple[NDArray[np.intp], Fl
 def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> FloatArray:
     """Return the log-standard deviation of the radius that an uncertain damping causes."""
     period, damping = _log_place(table, i)
-    spread, row = table[f"damping_log_std_{i}"].to_numpy(np.float64), _azimuth_row(station, table)
+    spread, row = values(table, f"damping_log_std_{i}"), _azimuth_row(station, table)
     low, high = (stored_log_per(station, row, period, damping + way * spread) for way in (-1.0, 1.0))
     dispersion: FloatArray = np.abs(high - low) / 2.0
     return dispersion
@@ -144,7 +146,7 @@ def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> Flo
 
 def _gap_dispersion(table: pd.DataFrame) -> FloatArray:
     """Return the log-standard deviation of a gap given by mean and standard deviation; 0 for touching pairs."""
-    gap, deviation = table["gap"].to_numpy(np.float64), table["gap_std"].to_numpy(np.float64)
+    gap, deviation = values(table, "gap"), values(table, "gap_std")
     apart = gap > 0
     dispersion = np.zeros_like(gap)
     dispersion[apart] = lognormal_dispersion(gap[apart], deviation[apart])
@@ -153,5 +155,5 @@ def _gap_dispersion(table: pd.DataFrame) -> FloatArray:
 
 def _median_gap(table: pd.DataFrame) -> FloatArray:
     """Return the median of a lognormal gap of given mean, m."""
-    median: FloatArray = table["gap"].to_numpy(np.float64) * np.exp(-(_gap_dispersion(table) ** 2) / 2.0)
+    median: FloatArray = values(table, "gap") * np.exp(-(_gap_dispersion(table) ** 2) / 2.0)
     return median

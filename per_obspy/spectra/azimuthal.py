@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..checks import FloatArray
+from ..kernels import azimuth_steps, blocks
 from ..kernels import azimuths as kernels
-from ..kernels import blocks
 from .blocks import Ground, Oscillators, over_blocks, prepare_ground, prepare_oscillators, stretches
 from .elastic import grid_of, row_of, two_components
 
@@ -58,7 +58,7 @@ def azimuthal_per_spectrum(
     >>> azimuthal_per_spectrum([0.0, 3.0, 0.0], [0.0, 4.0, 0.0], 0.01, [1.0], azimuths=[0, 90]).round(4)
     array([[0.0047, 0.0063]])
     """
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0)
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=True)
 
 
 def azimuthal_sd_spectrum(
@@ -70,7 +70,31 @@ def azimuthal_sd_spectrum(
     azimuths: ArrayLike = AZIMUTHS,
 ) -> FloatArray:
     """Return the largest displacement along each azimuth, with free vibration, as `azimuthal_per_spectrum`, m."""
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0)
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=True)
+
+
+def sampled_azimuthal_per_spectrum(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike = 0.05,
+    azimuths: ArrayLike = AZIMUTHS,
+) -> FloatArray:
+    """Return what `azimuthal_per_spectrum` would if only the samples were looked at, m."""
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=False)
+
+
+def sampled_azimuthal_sd_spectrum(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike = 0.05,
+    azimuths: ArrayLike = AZIMUTHS,
+) -> FloatArray:
+    """Return what `azimuthal_sd_spectrum` would if only the samples of the record were looked at, m."""
+    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=False)
 
 
 def _spectrum(
@@ -81,6 +105,7 @@ def _spectrum(
     damping: ArrayLike,
     azimuths: ArrayLike,
     share: float,
+    exact: bool,
 ) -> FloatArray:
     """Return the largest ``sqrt(u² + share z²)`` along each azimuth."""
     ground = prepare_ground(*two_components(north, east))
@@ -90,33 +115,39 @@ def _spectrum(
     ascending = np.argsort(given % 180.0)
     fan = _fan(np.radians(given[ascending] % 180.0))
     oscillators = prepare_oscillators(dt, *grid)
-    squares = over_blocks(lambda block: _block_squares(ground, block, share, fan).T, oscillators, ground)
+    squares = over_blocks(lambda block: _block_squares(ground, block, share, fan, exact).T, oscillators, ground)
     lengths = np.empty((given.size, oscillators.wanted))
-    lengths[ascending] = np.sqrt(squares) / oscillators.omegas**2 * ground.scale
+    lengths[ascending] = np.sqrt(squares[: given.size]) / oscillators.omegas**2 * ground.scale
     return lengths.T.reshape(*shape, given.size)
 
 
 def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return directions and edges of groups of the ascending azimuths (rad) as `list_steps` takes them."""
-    directions = np.stack([np.cos(angles), np.sin(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
-    firsts = np.arange(0, angles.size, kernels.GROUP)
-    lasts = np.minimum(firsts + kernels.GROUP, angles.size) - 1
-    rise = 1.0 - np.cos(angles[lasts] - angles[firsts])
+    """Return directions and edges of groups of the ascending azimuths (rad), the last one repeated, for the kernels."""
+    whole = np.pad(angles, (0, -angles.size % kernels.GROUP), mode="edge")
+    directions = np.stack([np.cos(whole), np.sin(whole), np.cos(2.0 * whole), np.sin(2.0 * whole)])
+    firsts = slice(None, None, kernels.GROUP)
+    lasts = slice(kernels.GROUP - 1, None, kernels.GROUP)
+    rise = 1.0 - np.cos(whole[lasts] - whole[firsts])
     return directions, np.concatenate([directions[2:, firsts], directions[2:, lasts], rise[np.newaxis]])
 
 
-def _block_squares(ground: Ground, block: Oscillators, share: float, fan: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _block_squares(
+    ground: Ground, block: Oscillators, share: float, fan: tuple[FloatArray, FloatArray], exact: bool
+) -> FloatArray:
     """Return the largest squares of one block, (lanes, azimuths), in units of the scaled acceleration / omega²."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
     kept = np.empty((blocks.TILES, 6, blocks.LANES))
-    steps, largest = np.empty((blocks.TILES * blocks.TILE, 12)), np.zeros((blocks.LANES, fan[0].shape[1]))
+    steps = np.empty((blocks.TILES * blocks.TILE, azimuth_steps.COLUMNS))
+    largest = np.zeros((blocks.LANES, fan[0].shape[1]))
     kernels.pack_steps(block.phases, block.dampings, packed)
     for stretch in stretches(ground):
         kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
         for lane in range(block.wanted):
-            oscillator = float(block.phases[lane]), float(block.dampings[lane]), share, *fan
-            count = kernels.list_steps(*stretch[:4], kept, lane, *oscillator, largest[lane], steps)
-            kernels.search_steps(steps[:count], *oscillator, largest[lane])
+            oscillator = kernels.Oscillator(lane, float(block.phases[lane]), float(block.dampings[lane]), share)
+            kernels.raise_azimuths_to_samples(*stretch[:2], kept, oscillator, fan[0], largest[lane])
+            if exact:
+                count = azimuth_steps.list_steps(*stretch[:4], kept, oscillator, largest[lane], steps)
+                azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest[lane])
     if share == 0.0:
         kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
     return largest

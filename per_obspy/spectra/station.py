@@ -53,8 +53,9 @@ def station_spectra(
     -------
     Dataset
         Dimensions ``component`` (their names, horizontal_1, horizontal_2, vertical, as far as there are, stand in
-        ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one
-        horizontal there are no spectra by azimuth: the station serves its own azimuth only.
+        ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and ``time``. Spectra are float32, m;
+        ``acceleration`` is float64, m/s². With one horizontal there are no spectra by azimuth: the station serves its
+        own azimuth only.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def _components(stream: Stream) -> dict[str, Trace]:
 
 
 def _is_vertical(trace: Trace) -> bool:
-    return abs(trace.stats.get("sensor_dip", 0.0)) > 45.0 or trace.stats.channel.endswith("Z")
+    return bool(abs(trace.stats.get("sensor_dip", 0.0)) > 45.0 or trace.stats.channel.endswith("Z"))
 
 
 def _azimuth(trace: Trace) -> float:

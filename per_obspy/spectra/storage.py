@@ -5,7 +5,7 @@ A shard holds everything of a station, its processed motion included. ``spectra.
 all stations along the dimension ``station`` without the motion.
 """
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from pathlib import Path
 
 import xarray as xr
@@ -28,7 +28,7 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     path : Path
         Where to; folders are made.
     """
-    encoding = {name: {"_FillValue": None} for name in dataset.coords}
+    encoding: dict[Hashable, dict[str, object]] = {name: {"_FillValue": None} for name in dataset.coords}
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f":
             encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}

@@ -69,7 +69,8 @@ def test_white_noise_tends_to_equation_16():
 
 def test_equal_oscillators_move_as_one_and_undamped_ones_only_then():
     one, other = np.array([1.0, 1.0]), np.array([1.0, 1.2])
-    assert directional_correlation(NORTH, EAST, DT, one, [0.05, 0.05], one, [0.05, 0.05], [[0.0]]).tolist() == [[1], [1]]
+    damped = [0.05, 0.05]
+    assert directional_correlation(NORTH, EAST, DT, one, damped, one, damped, [[0.0]]).tolist() == [[1], [1]]
     assert directional_correlation(NORTH, EAST, DT, one, [0, 0], other, [0, 0], [[0.0]]).tolist() == [[1], [0]]
 
 

@@ -10,7 +10,7 @@ import per_obspy
 from per_obspy.inventory.checking import checked_pairs
 
 
-def make_station(name="ONE", scale=1.0, channels=("HNN", "HNE"), latitude=10.0, longitude=20.0, longest=9.0, seed=4):
+def make_station(name="ONE", scale=1.0, channels=("HNN", "HNE"), latitude=10.0, longest=9.0, seed=4):
     """Return the Dataset of a station with a burst of noise, 40 s at 0.01 s."""
     motion = np.random.default_rng(seed).normal(size=(len(channels), 4000)) * np.hanning(4000) * scale
     motion = np.cumsum(motion, axis=1)
@@ -24,7 +24,7 @@ def make_station(name="ONE", scale=1.0, channels=("HNN", "HNE"), latitude=10.0, 
                 "channel": channel,
                 "delta": 0.01,
                 "units": "m/s2",
-                "coordinates": AttribDict(latitude=latitude, longitude=longitude, elevation=0.0),
+                "coordinates": AttribDict(latitude=latitude, longitude=20.0, elevation=0.0),
                 "per_obspy": AttribDict(shortest_period=0.05, longest_period=longest),
             },
         )

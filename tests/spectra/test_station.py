@@ -134,7 +134,7 @@ def test_a_stream_that_is_no_station_is_refused_with_the_reason(stream, reason):
 
 
 def test_bad_grids_are_named():
-    with pytest.raises(ValueError, match="periods must be positive, got 0.0"):
+    with pytest.raises(ValueError, match=r"periods must be positive, got 0\.0"):
         per_obspy.station_spectra(_stream(), [0.0])
-    with pytest.raises(ValueError, match="dampings must be at least 0 and below 1, got 5.0"):
+    with pytest.raises(ValueError, match=r"dampings must be at least 0 and below 1, got 5\.0"):
         per_obspy.station_spectra(_stream(), PERIODS, (5.0,))

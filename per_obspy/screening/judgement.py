@@ -1,0 +1,103 @@
+"""What a record says of pairs: every estimate, the single hit, the exact outcome, and which demand decides."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.pounding.single_hit import single_hit
+from per_obspy.screening.demand import gap_estimates, governing_demand
+from per_obspy.screening.exact import exact_decides, exact_outcome
+from per_obspy.screening.flags import period_is_derived
+from per_obspy.screening.motion import PairMotion
+from per_obspy.screening.values import at_contact, both, values
+
+#: Demand / sum of the radii below which two oscillators move as one: the difference of equal numbers.
+ROUND_OFF = 1e-12
+
+Column = NDArray[Any]
+
+
+def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: str) -> pd.DataFrame:
+    """
+    Return the pairs with estimates, single hit, exact outcome and the demand that decides.
+
+    Parameters
+    ----------
+    station : Dataset
+        The record.
+    pairs : DataFrame
+        Completed pairs.
+    motion : PairMotion
+        What the record does to them, along one azimuth or many.
+    rule : str
+        How the azimuth was found: ``given``, ``worst`` or ``station``.
+    """
+    table = pairs.assign(azimuth_rule=rule, **_at_worst(motion, pairs))
+    table = table.assign(**_single_hits(table))
+    azimuth = np.zeros(len(table)) if rule == "station" else values(table, "azimuth_used")
+    table = table.assign(**exact_outcome(station, table, azimuth))
+    exact = exact_decides(station, table)
+    demand = np.where(exact, table["demand_exact"], table["demand"])
+    return table.assign(
+        demand=np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0),
+        demand_rule=np.where(exact, "exact", table["demand_rule"]),
+    )
+
+
+def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
+    """Return all estimates at the azimuth where the estimated demand of a pair is largest."""
+    share = [one[:, None] for one in both(pairs, "participation")]
+    period_1, period_2 = (one[:, None] for one in both(pairs, "period"))
+    damping_1, damping_2 = (one[:, None] for one in both(pairs, "damping"))
+    estimates = gap_estimates(
+        (share[0] * motion.per[0], share[1] * motion.per[1]),
+        (share[0] * motion.sd[0], share[1] * motion.sd[1]),
+        (period_1, period_2),
+        (damping_1, damping_2),
+        motion.correlation,
+    )
+    demand, rule = governing_demand(estimates, period_is_derived(pairs)[:, None])
+    columns: dict[str, Column] = {
+        "azimuth_used": motion.azimuth,
+        "per_1": motion.per[0],
+        "per_2": motion.per[1],
+        "sd_1": motion.sd[0],
+        "sd_2": motion.sd[1],
+        "correlation": estimates.correlation,
+        "correlation_record": motion.correlation,
+        "critical_gap_per": estimates.per,
+        "critical_gap_record": estimates.record,
+        "critical_gap_sd": estimates.sd,
+        "srss_gap": estimates.srss,
+        "absolute_gap": estimates.absolute,
+        "demand": demand,
+        "demand_rule": rule,
+    }
+    worst = np.argmax(demand, axis=1)[:, None]
+    return {name: np.take_along_axis(column, worst, axis=1)[:, 0] for name, column in columns.items()}
+
+
+def _single_hits(table: pd.DataFrame) -> dict[str, Column]:
+    """Return the single hit of every pair; its critical gap is the estimated demand."""
+    per_1, per_2 = at_contact(table, "per")
+    period_1, period_2 = both(table, "period")
+    mass_1, mass_2 = both(table, "contact_mass")
+    restitution, demand, gap = (values(table, name) for name in ("restitution", "demand", "gap"))
+    hit = single_hit(per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, demand, gap)
+    return {
+        "single_hit_status": hit.status,
+        "amplification_1": hit.amplification_1,
+        "amplification_2": hit.amplification_2,
+        "impact_velocity": hit.impact_velocity,
+    }
+
+
+def impact_velocity_that_counts(table: pd.DataFrame) -> FloatArray:
+    """Return that of the exact history where it decides, else the larger of it and of the single hit, m/s."""
+    estimated = np.where(table["demand_rule"] == "exact", 0.0, np.nan_to_num(values(table, "impact_velocity")))
+    larger: FloatArray = np.maximum(values(table, "impact_velocity_exact"), estimated)
+    return larger
