@@ -7,6 +7,7 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import Rejection
+from per_obspy.processing.copying import copied
 from per_obspy.processing.provenance import is_processed, rejection, remembered
 
 PREFERENCE = ("HN", "BN", "HH", "BH")  # accelerometers before velocity sensors, fast before slow
@@ -25,7 +26,7 @@ def oriented(stream: Stream) -> Stream:
     Codes N, E, Z, NS, EW, UD and three digits (azimuth in degrees) tell; 1, 2, X, Y, H1, H2 do not, and such a trace
     without metadata stays without an azimuth. ``stats.per_obspy.azimuth_source`` says which it was.
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         source = "metadata" if "sensor_azimuth" in trace.stats else "unknown"
         direction = _direction(trace.stats.channel)

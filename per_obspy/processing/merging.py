@@ -7,6 +7,7 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
+from per_obspy.processing.copying import copied
 from per_obspy.processing.findings import surviving
 from per_obspy.processing.provenance import is_processed
 from per_obspy.processing.splicing import spliced
@@ -48,7 +49,7 @@ def _joined(name: str, pieces: Stream) -> Stream:
         reasons = ["no samples"]
     if reasons:
         raise RecordRejected(name, *reasons)
-    whole = copies.copy().merge(method=0)  # samples that overlap and disagree are masked
+    whole = copied(copies).merge(method=0)  # samples that overlap and disagree are masked
     reasons = _holes(whole[0])
     if reasons:
         joined = None if any(seconds > 0 for *_, seconds, _ in copies.get_gaps()) else spliced(copies)
@@ -60,7 +61,7 @@ def _joined(name: str, pieces: Stream) -> Stream:
 
 
 def _in_float64(trace: Trace) -> Trace:
-    out = trace.copy()
+    out = copied(Stream([trace]))[0]
     out.data = np.ma.asarray(out.data, dtype=np.float64) if np.ma.isMA(out.data) else out.data.astype(np.float64)
     return out
 

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
+from per_obspy.processing.copying import copied
 from per_obspy.processing.provenance import noted
 
 ACCELERATION_UNITS = ("M/S**2", "M/S^2", "M/S/S", "M/SEC**2", "M/(S**2)")
@@ -55,7 +56,7 @@ def in_acceleration(
     ----------
     Havskov & Alguacil 2016, Instrumentation in Earthquake Seismology, chapter 6.
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         units = trace.stats.get("units", "counts")
         if units not in ("m/s2", "counts"):

@@ -1,0 +1,27 @@
+import numpy as np
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core import AttribDict
+from obspy.core.inventory import Response
+
+from per_obspy.processing.copying import copied
+
+
+def test_a_copy_is_equal_and_shares_nothing_but_the_response():
+    header = {
+        "station": "STA",
+        "delta": 0.02,
+        "starttime": UTCDateTime(2020, 1, 1),
+        "corners": AttribDict(highpass=0.1),
+    }
+    stream = Stream([Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]}), Trace()])
+    before, out = stream.copy(), copied(stream)
+    assert out == stream
+    assert out[0].stats.response is stream[0].stats.response
+    out[0].data[0], out[0].stats.corners.highpass = 7.0, 0.2
+    out[0].stats.processing.append("two")
+    assert stream == before  # would catch a copy of the header that is not deep
+
+
+def test_masked_samples_stay_masked():
+    data = np.ma.masked_equal(np.arange(5.0), 2.0)
+    assert copied(Stream([Trace(data)]))[0].data.mask.tolist() == data.mask.tolist()
