@@ -18,6 +18,7 @@ from .pounding.history import pounding_history as pounding_history
 from .pounding.impact import post_impact_velocities as post_impact_velocities
 from .pounding.impact import transfer_energies as transfer_energies
 from .pounding.linearization import linearized_correlation as linearized_correlation
+from .pounding.links import linked_history as linked_history
 from .pounding.probability import pounding_probability as pounding_probability
 from .pounding.psd_correlation import psd_correlation as psd_correlation
 from .pounding.record_correlation import record_correlation as record_correlation
