@@ -24,7 +24,7 @@ COSINE = tuple((-1.0) ** n / math.factorial(2 * n) for n in range(1, 9))
 FINEST = 2.0**-11
 NODES = np.array([-1.0, -0.6, -0.3, 0.0, 0.2, 0.4, 0.55] + [1.0 - 2.0 ** (-n / 2) for n in range(3, 23)] + [1.0])
 WIDTH = 0.25  # of the first parabola, relative to the distance from the right end
-ROUNDS = 4  # of parabolas
+ROUNDS = 6  # of parabolas
 
 
 @kernel
