@@ -77,3 +77,11 @@ def safe_step(value, closing, curvature):
     if closing > 0.0:
         return 2.0 * value / (closing + root)
     return (root - closing) / curvature if curvature > 0.0 else math.inf
+
+
+@kernel
+def is_last_root(table, line, column, terms, time, end):
+    """Tell whether a polynomial cannot turn between a root and the end of the interval."""
+    _, curvature = size_and_curvature(table, line, column, terms, end)
+    _, slope = value_and_slope(table, line, column, terms, time)
+    return abs(slope) > curvature * (end - time)

@@ -66,16 +66,44 @@ def repair_lanes(lanes, flags, rows, log, ground, duration):
 
 
 @kernel
-def advance_block(block, flags, rows, log, start, end, dt, refinement, bilinear):
-    """Carry all lanes from one sample, (north, east), to the next; tell whether all got through."""
-    duration, through = dt / refinement, True
-    slope_north, slope_east = (end[0] - start[0]) / dt, (end[1] - start[1]) / dt
-    for part in range(refinement):
-        first, last = part * duration, (part + 1) * duration
-        north, east = start[0] + slope_north * first, start[1] + slope_east * first
-        ground = (north, east, start[0] + slope_north * last, start[1] + slope_east * last)
-        if step_lanes(block, flags, ground, duration, bilinear, flags[LANES] > 0):
-            through &= repair_lanes(block[0], flags, rows, log, (north, east, slope_north, slope_east), duration)
+def ground_of(components, dt, refinement, step):
+    """
+    Return the acceleration of both components at the start of a step, then at its end, then their slopes.
+
+    Steps count the parts of all sampling intervals; after the record the ground rests.
+    """
+    k, part = step // refinement, step % refinement
+    if k + 1 >= components.shape[1]:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    north, east = components[0, k], components[1, k]
+    slope_north, slope_east = (components[0, k + 1] - north) / dt, (components[1, k + 1] - east) / dt
+    start, end = part * (dt / refinement), (part + 1) * (dt / refinement)
+    here = north + slope_north * start, east + slope_east * start
+    there = north + slope_north * end, east + slope_east * end
+    return here[0], here[1], there[0], there[1], slope_north, slope_east
+
+
+@kernel
+def step_to_flag(block, flags, components, dt, refinement, step, last, bilinear):
+    """Step all lanes from a step on until one is flagged, or to the last; return the step after that."""
+    touching, duration = flags[LANES] > 0, dt / refinement
+    while step < last:
+        ground = ground_of(components, dt, refinement, step)
+        step += 1
+        if step_lanes(block, flags, ground[:4], duration, bilinear, touching):
+            break
+    return step
+
+
+@kernel
+def advance_block(block, flags, rows, log, components, dt, refinement, step, last, bilinear):
+    """Carry all lanes from a step to the last one; tell whether all got through."""
+    through = True
+    while step < last:
+        step = step_to_flag(block, flags, components, dt, refinement, step, last, bilinear)
+        ground = ground_of(components, dt, refinement, step - 1)
+        starts = (ground[0], ground[1], ground[4], ground[5])
+        through &= repair_lanes(block[0], flags, rows, log, starts, dt / refinement)
     return through
 
 
@@ -103,13 +131,11 @@ def run_block(components, dt, refinement, lanes, flags, rows, log, cosine, sine,
     """
     block = (lanes, lanes[: STRUCTURE_ROWS * LANES], lanes[STRUCTURE_ROWS * LANES :])
     prepare_block(lanes, flags, rows, cosine, sine, dt / refinement)
-    through, rest = True, (0.0, 0.0)
-    for k in range(components.shape[1] - 1):
-        start, end = (components[0, k], components[1, k]), (components[0, k + 1], components[1, k + 1])
-        through &= advance_block(block, flags, rows, log, start, end, dt, refinement, bilinear)
-    step = 0
-    while retire_lanes(lanes, rows, free_steps, step):
-        for _ in range(SETTLING_STEPS):
-            through &= advance_block(block, flags, rows, log, rest, rest, dt, refinement, bilinear)
-        step += SETTLING_STEPS
+    last = (components.shape[1] - 1) * refinement
+    through = advance_block(block, flags, rows, log, components, dt, refinement, 0, last, bilinear)
+    free = 0
+    while retire_lanes(lanes, rows, free_steps, free):
+        step, last = last, last + SETTLING_STEPS * refinement
+        through &= advance_block(block, flags, rows, log, components, dt, refinement, step, last, bilinear)
+        free += SETTLING_STEPS
     return through

@@ -8,7 +8,7 @@ Event by event through a segment of piecewise-linear ground acceleration: hits, 
 import math
 
 from ._jit import kernel
-from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
+from .polynomial_roots import first_fall, is_last_root, size_and_curvature, value_and_slope
 from .pounding_contact import meet
 from .pounding_motion import (
     CURVE,
@@ -67,7 +67,7 @@ def _change_of_stiffness(row, i, span, terms):
     """Return when a bilinear structure starts to yield or to unload within a span (-1: not), and which."""
     side = row[i, PHASE]
     if side != 0.0:
-        _fill_velocity(row, i, terms)
+        fill_velocity(row, i, terms)
         return first_fall(row, i, GUARD, terms - 1, side, 0.0, span, 0.0), REVERSAL
     earliest = -1.0
     for sign in (1, -1):
@@ -112,14 +112,14 @@ def raise_peaks(row, span, terms):
         _raise_at(row, i, 0.0, terms)
         _raise_at(row, i, span, terms)
         if _may_exceed(row, i, span, terms):
-            _fill_velocity(row, i, terms)
+            fill_velocity(row, i, terms)
             _raise_at_roots(row, i, span, terms, terms - 1)
-            _fill_power(row, i, row[i, STIFFNESS], 0.0, terms)
+            fill_power(row, i, row[i, STIFFNESS], 0.0, terms)
             _raise_at_roots(row, i, span, terms, terms - 2)
             if row[i, YIELD] < math.inf:
                 stiffness, constant = restoring(row, i)
                 # while yielding, the elastoplastic part does not store more
-                _fill_power(row, i, stiffness, constant if row[i, PHASE] == 0.0 else 0.0, terms)
+                fill_power(row, i, stiffness, constant if row[i, PHASE] == 0.0 else 0.0, terms)
                 _raise_at_roots(row, i, span, terms, terms - 2)
 
 
@@ -128,7 +128,7 @@ def _may_exceed(row, i, span, terms):
     """Tell whether a bound on displacement and velocity of a piece is above what was reached before."""
     reach, _ = size_and_curvature(row, i, CURVE, terms, span)
     reach += abs(row[i, U])
-    _fill_velocity(row, i, terms)
+    fill_velocity(row, i, terms)
     speed, _ = size_and_curvature(row, i, GUARD, terms - 1, span)
     squared = (speed + abs(row[i, GUARD])) ** 2 / row[i, STIFFNESS]
     stretch = reach + abs(row[i, PLASTIC])
@@ -138,14 +138,14 @@ def _may_exceed(row, i, span, terms):
 
 
 @kernel
-def _fill_velocity(row, i, terms):
+def fill_velocity(row, i, terms):
     """Fill the guard with the velocity of a structure."""
     for n in range(1, terms):
         row[i, GUARD + n - 1] = n * row[i, CURVE + n]
 
 
 @kernel
-def _fill_power(row, i, stiffness, constant, terms):
+def fill_power(row, i, stiffness, constant, terms):
     """Fill the guard with ``u'' + stiffness u - constant``: what makes a squared radius grow, over 2 v / omega²."""
     for n in range(terms - 2):
         row[i, GUARD + n] = (n + 2) * (n + 1) * row[i, CURVE + n + 2] + stiffness * row[i, CURVE + n]
@@ -160,6 +160,8 @@ def _raise_at_roots(row, i, span, terms, guard_terms):
     time = first_fall(row, i, GUARD, guard_terms, sign, 0.0, span, 0.0)
     while time >= 0.0:
         _raise_at(row, i, time, terms)
+        if is_last_root(row, i, GUARD, guard_terms, time, span):
+            return
         sign = -sign
         time = first_fall(row, i, GUARD, guard_terms, sign, time, span, 0.0)
 

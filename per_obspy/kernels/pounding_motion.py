@@ -10,6 +10,8 @@ whatever the sign of ``K - B²``, so elastic, yielding (even without hardening) 
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from ._jit import kernel
 
 # A row of structures is one table, a line for each structure and for the interface to the next one on its right:
@@ -37,6 +39,8 @@ COLUMNS = 88
 #: Largest phase omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1 + xi)).
 LARGEST_PHASE = 0.7
 MOST_TERMS = 24
+#: 1 / (n (n - 1)), from n = 2 on.
+INVERSE = np.array([0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, MOST_TERMS))])
 #: What is dropped of a Taylor series, relative to the motion.
 TRUNCATION = 1e-18
 #: Below this share of its own terms a contact force is rounding, as is a clearance below the other share.
@@ -87,7 +91,7 @@ def fill_taylor(row, i, column, terms, velocity, damping, stiffness, force, forc
     before, last = last, (force_rate - 2.0 * damping * last - stiffness * before) / 6.0
     row[i, column + 3] = last
     for n in range(4, terms):
-        before, last = last, -(damping * (n - 1) * last + stiffness * before) / (n * (n - 1))
+        before, last = last, -(damping * (n - 1) * last + stiffness * before) * INVERSE[n]
         row[i, column + n] = last
 
 

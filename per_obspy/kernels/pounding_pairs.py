@@ -3,7 +3,7 @@
 import math
 
 from ._jit import kernel
-from .polynomial_roots import first_fall, value_and_slope
+from .polynomial_roots import first_fall, is_last_root, value_and_slope
 from .pounding_events import fill_power, fill_velocity, find_event, finish_piece, raise_peaks
 from .pounding_lanes import (
     CENTRE,
@@ -243,6 +243,8 @@ def _raise_lane(lanes, row, lane, first, guard_terms, duration):
         u, v = value_and_slope(row, 0, CURVE, int(row[0, TERMS]), time)
         lanes[highest] = max(lanes[highest], abs(u))
         lanes[widest] = max(lanes[widest], u * u + lanes[at(first + FLEXIBILITY, lane)] * v * v)
+        if is_last_root(row, 0, GUARD, guard_terms, time, duration):
+            return
         sign = -sign
         time = first_fall(row, 0, GUARD, guard_terms, sign, time, duration, 0.0)
 
