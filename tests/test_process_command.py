@@ -21,6 +21,7 @@ from per_obspy.records.metadata import with_metadata
 from per_obspy.records.processed import described, write_description, write_processed
 from per_obspy.records.simulated import simulate, write_simulation
 from per_obspy.report.processed import COLUMNS
+from per_obspy.spectra.station import station_spectra
 
 RATE, COUNT = 50.0, 3000
 ONE = (1, silent)
@@ -112,6 +113,18 @@ def test_every_number_of_a_record_has_a_column(source, tmp_path):
     described = {name for trace in note["traces"] for name in trace["per_obspy"]}
     # the mean and its window, and the order of the trend, are steps of the chain: ``processing`` lists them
     assert described - set(COLUMNS) <= {"mean", "mean_of", "trend_order"}
+
+
+def test_the_spectra_tell_of_the_processing_what_the_table_tells(source, tmp_path):
+    processed(source, tmp_path / "out")
+    _, stream = only_station(tmp_path / "out" / "stations")
+    told = [json.loads(text) for text in station_spectra(stream, [1.0], [0.05])["processing"].to_numpy()]
+    wanted = {"highpass_source", "lowpass_source", "noise", "onset", "signal_to_noise", "baseline", "residual_velocity"}
+    for one in told:  # corners, windows, signal to noise and baseline of every trace; failed checks where there are any
+        assert wanted <= one.keys()
+        assert any("Butterworth" in step for step in one["steps"])
+    table = pd.read_csv(tmp_path / "out" / "processed.csv")
+    assert {one["own_highpass"] for one in told} == set(table["own_highpass"])
 
 
 def test_nothing_is_done_twice_and_what_changed_is_done_again(source, tmp_path):

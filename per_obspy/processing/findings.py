@@ -55,7 +55,8 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     Returns
     -------
     obspy Stream
-        Of one trace, with ``warnings`` and ``notes`` in ``stats.per_obspy``: reasons joined by semicolons.
+        Of one trace, with ``warnings`` and ``notes`` in ``stats.per_obspy``: reasons joined by semicolons; the names of
+        the checks that warn stand in ``failed_checks``, joined by spaces.
 
     Raises
     ------
@@ -70,6 +71,9 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     for name, reasons in (("warnings", warn), ("notes", note)):
         if reasons:
             remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})
+    if warn:
+        names = [one.check for one in found if one.level == "warn"]
+        remembered(out, failed_checks=" ".join([*_earlier(trace, "failed_checks"), *names]))
     return Stream([out])
 
 

@@ -47,6 +47,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "clock_shift": ("s", "by which the samples were moved to those of the other horizontal"),
     "shortest_period": ("s", "shortest usable natural period"),
     "longest_period": ("s", "longest usable natural period"),
+    "failed_checks": ("", "names in the configuration of the checks that warn, separated by spaces"),
     "warnings": ("", "failed checks that do not reject, with figure and threshold"),
     "notes": ("", "the same, without consequence"),
 }

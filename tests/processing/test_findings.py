@@ -18,6 +18,7 @@ def test_levels_decide_what_a_finding_means():
     trace = Trace(np.zeros(3), {"channel": "HNE"})
     kept = judged(trace, [Finding("a", "warn", "one"), Finding("b", "note", "two"), Finding("c", "warn", "three")])[0]
     assert (kept.stats.per_obspy.warnings, kept.stats.per_obspy.notes) == ("one; three", "two")
+    assert kept.stats.per_obspy.failed_checks == "a c"  # not b, which only notes
     with pytest.raises(RecordRejected) as caught:
         judged(kept, [Finding("d", "reject", "four"), Finding("e", "reject", "five"), Finding("f", "warn", "six")])
     assert caught.value.reasons == ("four", "five", "one; three", "six")
