@@ -1,5 +1,5 @@
 r"""
-Largest radius or displacement along many azimuths, exact at each of them, from one pass over both components.
+Largest radius or displacement along many azimuths, from one pass over both components, at the samples.
 
 Along the azimuth ``t`` the state is ``cos t`` times that of the north component plus ``sin t`` times that of the east
 component, so that ``r² = (A + C) / 2 + (A - C) / 2 cos 2t + B sin 2t`` with ``A = un² + zn²``, ``B = un ue + zn ze``,
@@ -7,24 +7,32 @@ component, so that ``r² = (A + C) / 2 + (A - C) / 2 cos 2t + B sin 2t`` with ``
 exceeds the smallest of the maxima found so far are azimuths looked at. Displacements are counted in ``a / omega²``.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import kernel
-from .between import dips, find_wanted, largest_in_step, radius_bound, rate_bounds, workspace
 from .blocks import LANES, SMALLEST_STATE, TILE
 from .oscillator import step, unit_responses
 from .response import first_root
 
 #: ``sqrt(1 + x²) <= 1 + 0.4143 x`` for x from 0 to 1: a bound of the eigenvalue without a square root.
 CHORD = 0.41422
-#: Neighbouring azimuths that are ruled out together.
-GROUP = 12
-#: Tiles whose bound exceeds this part of the largest are visited first, to raise the smallest maximum early.
-EARLY = 0.7
-#: Phase between the samples at which maxima are raised on the way; a peak exceeds them by 1 - cos(0.05) at most.
-STRIDE = 0.1
+#: Neighbouring azimuths that are ruled out together: as many as fit into the widest vectors.
+GROUP = 8
+#: Tiles with the largest bounds that are visited first, to raise the smallest maximum early.
+LEADERS = 6
+#: Other tiles after which the floor is renewed.
+RENEWAL = 4
+
+
+class Oscillator(NamedTuple):
+    """Lane of a block, phase of one step, damping, and share: 1 for the radius, 0 for the displacement."""
+
+    lane: int
+    phase: float
+    damping: float
+    share: float
 
 
 @kernel
@@ -92,208 +100,129 @@ def run_azimuth_tiles(north, east, packed, state, kept):
 
 
 @kernel
-def _form(un, zn, ue, ze, share):
-    """Return half sum, half difference and product of the two components; share is 1 for radii, 0 for displacements."""
-    a, c = un * un + share * zn * zn, ue * ue + share * ze * ze
-    return 0.5 * (a + c), 0.5 * (a - c), un * ue + share * zn * ze
-
-
-@kernel
-def _eigenvalue_bound(form):
-    """Return what a form cannot exceed along any azimuth."""
-    mean, difference, product = form
-    one, other = abs(difference), abs(product)
-    return mean + max(one, other) + CHORD * min(one, other)
-
-
-@kernel
-def _slack(radius, peak, jump, damping, phase, share):
-    """Return by how much the square of radius (share 1) or displacement (0) can exceed two samples between them."""
-    speed, _, square = rate_bounds(radius, peak, jump, damping, phase)
-    if share == 0.0:
-        square = 2.0 * (phase * radius * radius + radius * speed)  # (u²)'' = 2 z² + 2 u z'
-    return 0.125 * phase * square
-
-
-@kernel
-def _may_raise(before, after, slack, edges, floors):
-    """
-    Tell whether a step with these forms at its ends can hold more than the smallest maximum of any group of azimuths.
-
-    Over a group ``cos 2(t - t0)`` exceeds its larger value at the ends by no more than ``1 - cos`` of half its width.
-    """
-    mean_0, difference_0, product_0 = before
-    mean_1, difference_1, product_1 = after
-    size_0, size_1 = math.hypot(difference_0, product_0), math.hypot(difference_1, product_1)
-    count = 0
-    for j in range(floors.size):
-        first = difference_0 * edges[0, j] + product_0 * edges[1, j]
-        last = difference_0 * edges[2, j] + product_0 * edges[3, j]
-        start = mean_0 + max(first, last) + size_0 * edges[4, j]
-        first = difference_1 * edges[0, j] + product_1 * edges[1, j]
-        last = difference_1 * edges[2, j] + product_1 * edges[3, j]
-        end = mean_1 + max(first, last) + size_1 * edges[4, j]
-        count += max(start, end) + slack > floors[j]
-    return count > 0
-
-
-@kernel
-def _lower(best, floors):
-    """Fill the smallest of the largest squares of each group of azimuths."""
-    for j in range(floors.size):
-        floors[j] = best[j * GROUP]
-        for k in range(j * GROUP + 1, min((j + 1) * GROUP, best.size)):
-            floors[j] = min(floors[j], best[k])
-
-
-@kernel
-def list_steps(north, east, peaks, jumps, kept, lane, phase, damping, share, directions, edges, best, steps):
-    """
-    Raise the largest squares along all azimuths to samples of one oscillator; list the steps that may hold more.
-
-    ``directions`` (4, n): cosine and sine of the ascending azimuths and of twice them; ``edges`` (5, groups): cosine
-    and sine of twice the first and the last azimuth of each group, and what may lie between. ``best`` starts with what
-    is known and is raised at so few samples as show most of it. ``steps`` (count, 12) receives the states before (u
-    and z of north, u and z of east), the states after, and both accelerations of both components. Returns how many.
-    """
-    coefficients = step(1.0, damping, phase)
-    row = 4 if share == 1.0 else 5
-    tiles = peaks.shape[1]
-    slacks, waiting, floors = np.empty(tiles), np.ones(tiles), np.empty(edges.shape[1])
-    highest = 0.0
-    for tile in range(tiles):
-        peak, jump = math.hypot(peaks[0, tile], peaks[1, tile]), math.hypot(jumps[0, tile], jumps[1, tile])
-        radius = radius_bound(kept[tile, 4, lane], peak, damping, phase)
-        slacks[tile] = _slack(radius, peak, jump, damping, phase, share)
-        highest = max(highest, kept[tile, row, lane])
-    count = 0
-    _lower(best, floors)
-    for visit in range(2 * tiles):
-        tile = visit % tiles
-        bound = kept[tile, row, lane]
-        early = visit >= tiles or bound > EARLY * highest
-        if early and waiting[tile] > 0.0 and bound + slacks[tile] > _least(floors):
-            waiting[tile] = 0.0
-            slack = slacks[tile]
-            count = _run_tile(
-                north,
-                east,
-                tile,
-                kept,
-                lane,
-                coefficients,
-                phase,
-                share,
-                slack,
-                directions,
-                edges,
-                floors,
-                best,
-                steps,
-                count,
-            )
-            _lower(best, floors)
-    return count
-
-
-@kernel
-def _least(values):
-    """Return the smallest value."""
-    least = values[0]
-    for k in range(1, values.size):
-        least = min(least, values[k])
-    return least
-
-
-@kernel
-def _run_tile(
-    north, east, tile, kept, lane, coefficients, phase, share, slack, directions, edges, floors, best, steps, count
-):
-    """Repeat one tile: raise the largest squares at some samples, list the steps that may hold more."""
+def rerun_tile(north, east, kept, tile, lane, coefficients, states):
+    """Fill the states at the samples of one tile of one oscillator, (4, samples), from those kept before it."""
     a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
     un, zn, ue, ze = kept[tile, 0, lane], kept[tile, 1, lane], kept[tile, 2, lane], kept[tile, 3, lane]
-    floor, stride = _least(floors), max(1, int(STRIDE / phase))
-    after = _form(un, zn, ue, ze, share)
-    for i in range(tile * TILE, tile * TILE + TILE):
-        u, z, v, w, before = un, zn, ue, ze, after
-        n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
-        un = a11 * u + (a12 * z + (b11 * n0 + b12 * n1))
-        zn = a21 * u + (a22 * z + (b21 * n0 + b22 * n1))
-        ue = a11 * v + (a12 * w + (b11 * e0 + b12 * e1))
-        ze = a21 * v + (a22 * w + (b21 * e0 + b22 * e1))
-        after = _form(un, zn, ue, ze, share)
-        if i % stride == 0 and _eigenvalue_bound(after) > floor:
-            mean, difference, product = after
-            for k in range(best.size):
-                value = mean + (difference * directions[2, k] + product * directions[3, k])
-                best[k] = max(best[k], value)
-        highest = max(_eigenvalue_bound(before), _eigenvalue_bound(after))
-        if highest + slack > floor and _may_raise(before, after, slack, edges, floors):
-            steps[count, 0], steps[count, 1], steps[count, 2], steps[count, 3] = u, z, v, w
-            steps[count, 4], steps[count, 5], steps[count, 6], steps[count, 7] = un, zn, ue, ze
-            steps[count, 8], steps[count, 9], steps[count, 10], steps[count, 11] = n0, n1, e0, e1
-            count += 1
-    return count
+    states[0, 0], states[1, 0], states[2, 0], states[3, 0] = un, zn, ue, ze
+    first = tile * TILE
+    for i in range(TILE):
+        n0, n1, e0, e1 = north[first + i], north[first + i + 1], east[first + i], east[first + i + 1]
+        u, v = un, ue
+        un = a11 * u + (a12 * zn + (b11 * n0 + b12 * n1))
+        zn = a21 * u + (a22 * zn + (b21 * n0 + b22 * n1))
+        ue = a11 * v + (a12 * ze + (b11 * e0 + b12 * e1))
+        ze = a21 * v + (a22 * ze + (b21 * e0 + b22 * e1))
+        states[0, i + 1], states[1, i + 1], states[2, i + 1], states[3, i + 1] = un, zn, ue, ze
 
 
 @kernel
-def search_steps(steps, phase, damping, share, directions, edges, best):
-    """Raise the largest squares along all azimuths to those in the listed steps, between their samples too."""
-    work, wanted, here, beyond = workspace(), np.zeros(4, np.bool_), np.full(4, np.inf), np.empty(best.size)
-    quantities, row = (1, 0) if share == 1.0 else (4, 1)
-    floors = np.empty(edges.shape[1])
-    _lower(best, floors)
-    for number in range(steps.shape[0]):
-        one = steps[number]
-        peak = math.hypot(max(abs(one[8]), abs(one[9])), max(abs(one[10]), abs(one[11])))
-        jump = math.hypot(one[9] - one[8], one[11] - one[10])
-        radius = radius_bound(_largest_trace(one), peak, damping, phase)
-        slack = _slack(radius, peak, jump, damping, phase, share)
-        before, after = _form(one[0], one[1], one[2], one[3], share), _form(one[4], one[5], one[6], one[7], share)
-        if not _may_raise(before, after, slack, edges, floors):
-            continue
-        dip = dips(rate_bounds(radius, peak, jump, damping, phase), damping, phase)
-        if _mark_azimuths(one, before, after, slack, dip, damping, share, directions, best, beyond) == 0:
-            continue
-        for k in range(best.size):
-            if beyond[k] > 0.0:
-                c, s = directions[0, k], directions[1, k]
-                u, z, start = c * one[0] + s * one[2], c * one[1] + s * one[3], c * one[8] + s * one[10]
-                u_end, z_end, end = c * one[4] + s * one[6], c * one[5] + s * one[7], c * one[9] + s * one[11]
-                here[row] = best[k] if row == 0 else math.sqrt(best[k])
-                if find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantities, here, wanted):
-                    largest_in_step(u, z, start, end, damping, phase, wanted, work, here)
-                    best[k] = max(best[k], here[0] if row == 0 else here[1] * here[1])
-        _lower(best, floors)
+def fill_forms(states, share, forms):
+    """Fill half sum, half difference and product of the two components' squares at the samples of a tile."""
+    for i in range(TILE + 1):
+        un, zn, ue, ze = states[0, i], states[1, i], states[2, i], states[3, i]
+        a, c = un * un + share * zn * zn, ue * ue + share * ze * ze
+        forms[0, i], forms[1, i], forms[2, i] = 0.5 * (a + c), 0.5 * (a - c), un * ue + share * zn * ze
 
 
 @kernel
-def _mark_azimuths(one, before, after, slack, dip, damping, share, directions, best, beyond):
-    """Mark with a positive number the azimuths along which a step may raise the largest square; return how many."""
-    twice = 2.0 * damping
-    mean_0, difference_0, product_0 = before
-    mean_1, difference_1, product_1 = after
-    zn0, ze0, zn1, ze1 = one[1], one[3], one[5], one[7]
-    bn0, be0, bn1, be1 = twice * zn0 + one[8], twice * ze0 + one[10], twice * zn1 + one[9], twice * ze1 + one[11]
-    far, count = (0.0 if share == 1.0 else np.inf), 0
+def least_above(best, difference, product, cosines, sines):
+    """Return the smallest of a whole number of groups of values minus a form without a mean, side by side."""
+    side = np.full(GROUP, np.inf)
+    for j in range(0, best.size, GROUP):
+        for k in range(GROUP):
+            side[k] = min(side[k], best[j + k] - (difference * cosines[j + k] + product * sines[j + k]))
+    smallest = side[0]
+    for k in range(1, GROUP):
+        smallest = min(smallest, side[k])
+    return smallest
+
+
+@kernel
+def floor_form(best, cosines, sines):
+    """
+    Return a form that the largest squares exceed along every azimuth: what does not exceed it cannot raise any.
+
+    It is their smallest, or their first two Fourier coefficients lowered as far as needed, whichever has the larger
+    mean. Returns it and the smallest.
+    """
+    even, odd = np.zeros(GROUP), np.zeros(GROUP)
+    for j in range(0, best.size, GROUP):
+        for k in range(GROUP):
+            even[k] += best[j + k] * cosines[j + k]
+            odd[k] += best[j + k] * sines[j + k]
+    difference, product = 2.0 * even.sum() / best.size, 2.0 * odd.sum() / best.size
+    least, mean = least_above(best, 0.0, 0.0, cosines, sines), least_above(best, difference, product, cosines, sines)
+    return ((mean, difference, product) if mean > least else (least, 0.0, 0.0)), least
+
+
+@kernel
+def excess(mean, difference, product, floor):
+    """Return a positive number if a form exceeds the floor along any azimuth: if the difference has a positive root."""
+    mean, difference, product = mean - floor[0], difference - floor[1], product - floor[2]
+    return difference * difference + product * product + mean * abs(mean)
+
+
+@kernel
+def _mark_samples(forms, floor, marks, marked):
+    """List the samples of a tile that exceed the floor, the last of them four times; return how many fours there are."""
+    for i in range(TILE + 1):
+        marks[i] = excess(forms[0, i], forms[1, i], forms[2, i], floor)
+    count = 0
+    for i in range(TILE + 1):
+        marked[count] = i
+        count += marks[i] > 0.0
+    marked[count : count + 4] = marked[max(count - 1, 0)]
+    return (count + 3) // 4
+
+
+@kernel
+def _raise_to_four(forms, four, cosines, sines, best):
+    """Raise the largest squares along all azimuths to those of four samples of a tile."""
+    a, b, c, d = four
+    mean_a, difference_a, product_a = forms[0, a], forms[1, a], forms[2, a]
+    mean_b, difference_b, product_b = forms[0, b], forms[1, b], forms[2, b]
+    mean_c, difference_c, product_c = forms[0, c], forms[1, c], forms[2, c]
+    mean_d, difference_d, product_d = forms[0, d], forms[1, d], forms[2, d]
     for k in range(best.size):
-        c, s = directions[0, k], directions[1, k]
-        start = mean_0 + (difference_0 * directions[2, k] + product_0 * directions[3, k])
-        end = mean_1 + (difference_1 * directions[2, k] + product_1 * directions[3, k])
-        z0, z1, b0, b1 = c * zn0 + s * ze0, c * zn1 + s * ze1, c * bn0 + s * be0, c * bn1 + s * be1
-        still = min(z0 * z1, min(abs(z0), abs(z1)) - dip[1])
-        still = min(still, far + min(b0 * b1, min(abs(b0), abs(b1)) - dip[0]))
-        beyond[k] = max(start, end) + slack - best[k] if still <= 0.0 else -1.0
-        count += beyond[k] > 0.0
-    return count
+        cosine, sine = cosines[k], sines[k]
+        early = max(
+            mean_a + (difference_a * cosine + product_a * sine), mean_b + (difference_b * cosine + product_b * sine)
+        )
+        late = max(
+            mean_c + (difference_c * cosine + product_c * sine), mean_d + (difference_d * cosine + product_d * sine)
+        )
+        best[k] = max(best[k], early, late)
 
 
 @kernel
-def _largest_trace(one):
-    """Return the larger sum of the squares of both components' states at the ends of a step."""
-    before = one[0] * one[0] + one[1] * one[1] + one[2] * one[2] + one[3] * one[3]
-    after = one[4] * one[4] + one[5] * one[5] + one[6] * one[6] + one[7] * one[7]
-    return max(before, after)
+def raise_azimuths_to_samples(north, east, kept, oscillator, directions, best):
+    """
+    Raise the largest squares of one oscillator along all azimuths to those at the samples.
+
+    ``directions`` (4, azimuths): cosine and sine of the azimuths and of twice them, a whole number of groups.
+    """
+    lane, phase, damping, share = oscillator
+    coefficients, cosines, sines = step(1.0, damping, phase), directions[2], directions[3]
+    tiles = (north.size - 1) // TILE
+    states, forms, waiting = np.empty((4, TILE + 1)), np.empty((3, TILE + 1)), np.empty(tiles)
+    marks, marked = np.empty(TILE + 1), np.zeros(TILE + 5, np.int64)
+    for tile in range(tiles):
+        waiting[tile] = kept[tile, 4, lane] if share == 1.0 else kept[tile, 5, lane]
+    floor, least = floor_form(best, cosines, sines)
+    visited = 0
+    for visit in range(LEADERS + tiles):
+        tile = np.argmax(waiting) if visit < LEADERS else visit - LEADERS
+        if waiting[tile] > least:
+            waiting[tile] = 0.0
+            rerun_tile(north, east, kept, tile, lane, coefficients, states)
+            fill_forms(states, share, forms)
+            for four in range(0, 4 * _mark_samples(forms, floor, marks, marked), 4):
+                chosen = marked[four], marked[four + 1], marked[four + 2], marked[four + 3]
+                _raise_to_four(forms, chosen, cosines, sines, best)
+            visited += 1
+            if visit < LEADERS or visited % RENEWAL == 0:
+                floor, least = floor_form(best, cosines, sines)
 
 
 @kernel

@@ -128,7 +128,8 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     firsts = slice(None, None, kernels.GROUP)
     lasts = slice(kernels.GROUP - 1, None, kernels.GROUP)
     rise = 1.0 - np.cos(whole[lasts] - whole[firsts])
-    return directions, np.concatenate([directions[2:, firsts], directions[2:, lasts], rise[np.newaxis]])
+    edges = np.concatenate([directions[2:, firsts], directions[2:, lasts], rise[np.newaxis]])
+    return directions, np.pad(edges, ((0, 0), (0, -rise.size % kernels.GROUP)))
 
 
 def _block_squares(
@@ -146,7 +147,7 @@ def _block_squares(
             oscillator = kernels.Oscillator(lane, float(block.phases[lane]), float(block.dampings[lane]), share)
             kernels.raise_azimuths_to_samples(*stretch[:2], kept, oscillator, fan[0], largest[lane])
             if exact:
-                count = azimuth_steps.list_steps(*stretch[:4], kept, oscillator, largest[lane], steps)
+                count = azimuth_steps.list_steps(*stretch[:4], kept, oscillator, fan[0], largest[lane], steps)
                 azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest[lane])
     if share == 0.0:
         kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
