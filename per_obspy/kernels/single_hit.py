@@ -21,10 +21,13 @@ TURNS_PER_RADIAN = 1.0 / TURN
 SINE = tuple((-1.0) ** n / math.factorial(2 * n + 1) for n in range(1, 8))  # up to |y| = pi/4
 COSINE = tuple((-1.0) ** n / math.factorial(2 * n) for n in range(1, 9))
 # phases of the scan for the bound: even on the left; towards the right end, where a narrow peak can stand, ever denser
-FINEST = 2.0**-11
-NODES = np.array([-1.0, -0.6, -0.3, 0.0, 0.2, 0.4, 0.55] + [1.0 - 2.0 ** (-n / 2) for n in range(3, 23)] + [1.0])
-WIDTH = 0.25  # of the first parabola, relative to the distance from the right end
-ROUNDS = 6  # of parabolas
+NODES = np.array(
+    [-1.0, -0.8, -0.6, -0.45, -0.3, -0.15, 0.0, 0.1, 0.2, 0.3, 0.4, 0.55]
+    + [1.0 - 2.0 ** (-n / 2) for n in range(3, 23)]
+    + [1.0]
+)
+GOLDEN = 0.6180339887498949
+SECTIONS = 26  # leave 1e-6 of the bracket, where a smooth peak is flat to 1e-11
 
 
 @kernel
@@ -241,25 +244,34 @@ def _scan(constants, peaks):
 
 @kernel
 def _refine(constants, peaks):
-    """Climb to the vertex of the parabola through three phases, ever closer together."""
-    c, p = np.empty((7, PAIRS)), np.empty((4, PAIRS))
-    c[:], p[:] = constants, peaks
-    closeness = WIDTH
-    for _ in range(ROUNDS):
-        for peak in range(2):
+    """Close in on each peak between the nodes beside it by golden sections."""
+    c, left, right = np.empty((7, PAIRS)), np.empty(PAIRS), np.empty(PAIRS)
+    inner, outer = np.empty((2, PAIRS)), np.empty((2, PAIRS))  # places and heights
+    c[:] = constants
+    for peak in range(2):
+        for pair in range(PAIRS):
+            node = np.searchsorted(NODES, peaks[peak, pair])
+            left[pair], right[pair] = NODES[max(node - 1, 0)], NODES[min(node + 1, NODES.size - 1)]
+            inner[0, pair] = right[pair] - GOLDEN * (right[pair] - left[pair])
+            outer[0, pair] = left[pair] + GOLDEN * (right[pair] - left[pair])
+            inner[1, pair] = _radius_squared(c, pair, inner[0, pair])
+            outer[1, pair] = _radius_squared(c, pair, outer[0, pair])
+        for _ in range(SECTIONS):
             for pair in range(PAIRS):
-                y, here = p[peak, pair], p[2 + peak, pair]
-                width = closeness * min(1.0 - y + FINEST, 1.0)
-                left = _radius_squared(c, pair, max(y - width, -1.0))
-                right = _radius_squared(c, pair, min(y + width, 1.0))
-                bend = min(left - 2.0 * here + right, -1e-300)
-                shift = min(max(0.5 * width * (left - right) / bend, -2.0 * width), 2.0 * width)
-                vertex = min(max(y + shift, -1.0), 1.0)
-                there = _radius_squared(c, pair, vertex)
-                p[peak, pair] = vertex if there > here else y
-                p[2 + peak, pair] = max(here, there)
-        closeness *= 0.125
-    peaks[:] = p
+                keep_left = inner[1, pair] > outer[1, pair]
+                low = left[pair] if keep_left else inner[0, pair]
+                high = outer[0, pair] if keep_left else right[pair]
+                kept_place = inner[0, pair] if keep_left else outer[0, pair]
+                kept_height = inner[1, pair] if keep_left else outer[1, pair]
+                place = high - GOLDEN * (high - low) if keep_left else low + GOLDEN * (high - low)
+                height = _radius_squared(c, pair, place)
+                left[pair], right[pair] = low, high
+                inner[0, pair] = place if keep_left else kept_place
+                inner[1, pair] = height if keep_left else kept_height
+                outer[0, pair] = kept_place if keep_left else place
+                outer[1, pair] = kept_height if keep_left else height
+        for pair in range(PAIRS):
+            peaks[2 + peak, pair] = max(peaks[2 + peak, pair], inner[1, pair], outer[1, pair])
 
 
 @kernel
