@@ -59,9 +59,9 @@ def repair_lanes(lanes, flags, rows, log, ground, duration):
     through = True
     for lane in range(LANES):
         if flags[lane]:
-            touched = rows[lane, 0, STUCK] != 0.0
+            touched = int(rows[lane, 0, STUCK])
             through &= repair_lane(lanes, rows[lane], log, lane, flags[lane], ground, duration)
-            flags[LANES] += (rows[lane, 0, STUCK] != 0.0) - touched
+            flags[LANES] += int(rows[lane, 0, STUCK]) - touched
     return through
 
 

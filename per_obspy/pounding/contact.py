@@ -93,6 +93,24 @@ def hertz_damp_history(
     return _integrate(closed_record(record), step, pair, (width, spring, bounce), record.size)
 
 
+def _force(state: FloatArray, contact: tuple[float, float, float], approach: float) -> float:
+    """Return the contact force, N; an approach speed of 0 means that the structures are apart."""
+    gap, stiffness, restitution = contact
+    overlap, rate = state[0] - state[2] - gap, state[1] - state[3]
+    if approach == 0.0 or overlap <= 0.0:
+        return 0.0
+    return float(stiffness * overlap**1.5 * (1.0 + 0.75 * (1.0 - restitution**2) * rate / approach))
+
+
+def _rates(state: FloatArray, pair: tuple[Structure, Structure], force: float, ground: float) -> list[float]:
+    """Return the rates of change of displacement and velocity of both structures."""
+    rates = []
+    for s, u, v, push in ((pair[0], state[0], state[1], -force), (pair[1], state[2], state[3], force)):
+        own = 2.0 * s.damping * s.frequency * v + s.frequency**2 * u
+        rates += [v, push / s.mass - own - s.participation * ground]
+    return rates
+
+
 def _integrate(
     record: FloatArray,
     dt: float,
@@ -101,43 +119,28 @@ def _integrate(
     samples: int,
 ) -> HertzHistory:
     """Integrate from contact to separation and on to the next contact."""
-    gap, stiffness, restitution = contact
     times = dt * np.arange(record.size, dtype=np.float64)
     states, visited = np.zeros((4, samples)), [0.0]
     start, state, approach, contacts = 0.0, np.zeros(4), 0.0, 0
 
-    def force(y: FloatArray) -> float:
-        overlap, rate = y[0] - y[2] - gap, y[1] - y[3]
-        if approach == 0.0 or overlap <= 0.0:
-            return 0.0
-        return float(stiffness * overlap**1.5 * (1.0 + 0.75 * (1.0 - restitution**2) * rate / approach))
-
-    def rate(t: float, y: FloatArray) -> list[float]:
-        ground, push = float(np.interp(t, times, record)), force(y)
-        return [
-            entry
-            for s, u, v, f in ((pair[0], y[0], y[1], -push), (pair[1], y[2], y[3], push))
-            for entry in (
-                v,
-                f / s.mass - 2 * s.damping * s.frequency * v - s.frequency**2 * u - s.participation * ground,
-            )
-        ]
+    def rates(t: float, y: FloatArray) -> list[float]:
+        return _rates(y, pair, _force(y, contact, approach), float(np.interp(t, times, record)))
 
     def clearance(_: float, y: FloatArray) -> float:
-        return float(gap - y[0] + y[2])
+        return float(contact[0] - y[0] + y[2])
 
     clearance.terminal = True  # type: ignore[attr-defined]  # SciPy reads these attributes of a function
     while start < times[samples - 1]:
         clearance.direction = 1.0 if approach else -1.0  # type: ignore[attr-defined]  # as above
         inside = times[:samples] > start
         end = solve_ivp(
-            rate, (start, times[samples - 1]), state, "DOP853", t_eval=None, dense_output=True, events=clearance,
+            rates, (start, times[samples - 1]), state, "DOP853", dense_output=True, events=clearance,
             rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, max_step=dt,
         )  # fmt: skip
         reached = inside & (times[:samples] <= end.t[-1])
         if reached.any():
             states[:, reached] = end.sol(times[:samples][reached])  # type: ignore[misc]  # dense_output gives it
-        visited += [force(y) for y in end.y.T]
+        visited += [_force(y, contact, approach) for y in end.y.T]
         start, state = float(end.t[-1]), end.y[:, -1]
         meets = end.status == 1 and not approach
         contacts += meets
