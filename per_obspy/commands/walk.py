@@ -111,7 +111,7 @@ def process(
     sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")],
     event: Annotated[Path | None, typer.Option(help="QuakeML file; no event is fine.")] = None,
-    settings: Annotated[Path | None, typer.Option(help="TOML file with keys of the section [processing].")] = None,
+    settings: Annotated[Path | None, typer.Option(help="TOML file with a run's processing section.")] = None,
     report: Annotated[bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")] = False,
     as_json: AsJson = False,
 ) -> None:
