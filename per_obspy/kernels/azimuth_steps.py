@@ -2,9 +2,9 @@ r"""
 Largest radius or displacement along many azimuths between the samples, exact at each azimuth.
 
 Over a step the square ``f`` along an azimuth leaves the cubic with the same values and slopes at both ends by at most
-``h⁴ |f''''| / 384``, like ``s² (1 - s)²``. Cubic and deviation together have the coefficients ``f0, f0 + h f0' / 4,
-(f0 + f1) / 2 + h (f0' - f1') / 6 + h⁴ |f''''| / 144, f1 - h f1' / 4, f1`` of a Bernstein polynomial, which never exceeds
-the largest of them. Each is a form like ``f`` itself, so that steps are ruled out for all azimuths, for groups of
+``h⁴ |f''''| / 384``, like ``s² (1 - s)²``. Cubic and deviation together are a Bernstein polynomial, which never exceeds
+the largest of its coefficients ``f0, f0 + h f0' / 4, (f0 + f1) / 2 + h (f0' - f1') / 6 + h⁴ |f''''| / 144,
+f1 - h f1' / 4, f1``. Each is a form like ``f`` itself, so that steps are ruled out for all azimuths, for groups of
 azimuths, and for single ones, before peaks are looked for.
 """
 
@@ -58,7 +58,7 @@ def _fill_slopes(states, north, east, oscillator, slopes):
 
 @kernel
 def _fill_coefficients(forms, slopes, bulge, coefficients):
-    """Fill the three inner coefficients, (row, form, step), and return nothing else: the outer ones are samples."""
+    """Fill the three inner coefficients of each step, (coefficient, form, step); the outer ones are the samples."""
     for row in range(3):
         extra = bulge if row == 0 else 0.0
         for i in range(TILE):
@@ -106,9 +106,8 @@ def list_steps(north, east, peaks, jumps, kept, oscillator, directions, best, st
         _mark_steps(coefficients, floor, marks)
         for i in range(TILE):
             if marks[i] > 0.0:
-                for number in range(3):
-                    for row in range(3):
-                        steps[count, 3 * number + row] = coefficients[number, row, i]
+                for number in range(9):
+                    steps[count, number] = coefficients[number // 3, number % 3, i]
                 for row in range(4):
                     steps[count, 9 + row] = states[row, i]
                 steps[count, 13], steps[count, 14] = north[first + i], north[first + i + 1]
@@ -120,10 +119,10 @@ def list_steps(north, east, peaks, jumps, kept, oscillator, directions, best, st
 @kernel
 def _mark_groups(one, edges, floors, marks):
     """
-    Mark with a positive number the groups of azimuths along which a step may hold more than their smallest maximum;
-    return how many.
+    Mark with a positive number the groups of azimuths along which a step may hold more than their smallest maximum.
 
-    Over a group ``cos 2(t - t0)`` exceeds its larger value at the ends by no more than ``1 - cos`` of half its width.
+    Returns how many. Over a group ``cos 2(t - t0)`` exceeds its larger value at the ends by no more than ``1 - cos`` of
+    half its width.
     """
     m0, d0, p0, m1, d1, p1 = one[0], one[1], one[2], one[3], one[4], one[5]
     m2, d2, p2 = one[6], one[7], one[8]

@@ -165,7 +165,7 @@ def excess(mean, difference, product, floor):
 
 @kernel
 def _mark_samples(forms, floor, marks, marked):
-    """List the samples of a tile that exceed the floor, the last of them four times; return how many fours there are."""
+    """List the samples of a tile that exceed the floor, filled up to fours with the last; return how many fours."""
     for i in range(TILE + 1):
         marks[i] = excess(forms[0, i], forms[1, i], forms[2, i], floor)
     count = 0

@@ -190,6 +190,39 @@ def slacks(rates, damping, phase):
 
 
 @kernel
+def velocity_slack(highest, rates, jump, damping, phase):
+    """
+    Return by how much ``|z|`` can exceed the highest of its samples between them, from ``z'' = -2 xi z' - z - a'``.
+
+    Tighter than `slacks` where the oscillator is stiff: ``|z|`` is far below the radius there.
+    """
+    speed, change, _ = rates
+    eighth = 0.125 * phase
+    return eighth * min(change, 2.0 * damping * speed + phase * (highest + eighth * change) + jump)
+
+
+@kernel
+def step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase):
+    """
+    Return what ``|z|`` cannot exceed in a step.
+
+    It leaves the cubic with the same values and slopes at both ends by at most ``phase⁴ |z''''| / 384``, like
+    ``s² (1 - s)²``; both together are a Bernstein polynomial, which never exceeds the largest of its coefficients.
+    Each derivative of z, times a power of the phase, is bounded from its values at the ends and from the next one.
+    """
+    lag, jump = 2.0 * damping * phase, phase * (end - start)
+    first, first_end = -lag * z - phase * (u + start), -lag * z_end - phase * (u_end + end)
+    square = phase * phase
+    second, second_end = -lag * first - square * z - jump, -lag * first_end - square * z_end - jump
+    third = max(abs(lag * second + square * first), abs(lag * second_end + square * first_end))
+    widest = phase * rates[1]
+    third += 0.5 * (lag * (lag * widest + square * rates[0]) + square * widest)
+    fourth = lag * third + square * (max(abs(second), abs(second_end)) + 0.5 * third)
+    middle = abs(0.5 * (z + z_end) + (first - first_end) / 6.0) + fourth / 144.0
+    return max(abs(z), abs(z_end), abs(z + 0.25 * first), abs(z_end - 0.25 * first_end), middle)
+
+
+@kernel
 def may_exceed(u, z, start, end, damping, phase, largest):
     """
     Tell whether a step may hold a new largest value.
@@ -248,7 +281,7 @@ def find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantiti
         felt, felt_end = u + twice * z, u_end + twice * z_end
         change, change_end = -felt - start, -felt_end - end
         higher |= max(abs(u), abs(u_end)) + slack[1] > largest[1]
-        if max(abs(z), abs(z_end)) + slack[2] > largest[2]:
+        if step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase) > largest[2]:
             wanted[2] = may_vanish(change, change_end, dip[2])
         if max(abs(felt), abs(felt_end)) + slack[3] > largest[3]:
             wanted[3] = may_vanish(z + twice * change, z_end + twice * change_end, dip[3])

@@ -8,7 +8,16 @@ tiles where a bound exceeds the largest value found are repeated, one oscillator
 import numpy as np
 
 from ._jit import kernel
-from .between import find_wanted, largest_in_step, radius_bound, rate_bounds, slacks, workspace
+from .between import (
+    find_wanted,
+    largest_in_step,
+    radius_bound,
+    rate_bounds,
+    slacks,
+    step_velocity_bound,
+    velocity_slack,
+    workspace,
+)
 from .oscillator import step
 
 #: Oscillators side by side: a constant trip count, which the compiler turns into vectors.
@@ -48,6 +57,9 @@ def _thresholds(peaks, jumps, phases, dampings, weights, largest, threshold):
         slack = slacks(rates, dampings[lane], phases[lane])
         for row in range(largest.shape[0]):
             threshold[row, lane] = largest[row, lane] - slack[row]
+        if largest.shape[0] > 1:
+            more = velocity_slack(largest[2, lane], rates, jump_here, dampings[lane], phases[lane])
+            threshold[2, lane] = largest[2, lane] - more
 
 
 @kernel
@@ -55,7 +67,7 @@ def select(kept, peaks, jumps, phases, dampings, weights, lanes, largest, chosen
     """
     Raise the largest values to those of the tiles and list as (tile, lane) where more may lie between samples.
 
-    ``kept`` (tile, row, lane) holds the values from row 2 on; only the first ``lanes`` count. Returns how many there are.
+    ``kept`` (tile, row, lane) holds the values from row 2 on; only the first ``lanes`` count. Returns their number.
     """
     tiles, quantities = peaks.shape[1], largest.shape[0]
     for tile in range(tiles):
@@ -81,6 +93,7 @@ def repeat(north, east, peaks, jumps, phases, dampings, weights, kept, states, c
     """Raise the largest values by what lies between the samples of the chosen (tile, lane), from the states before."""
     quantities = largest.shape[0]
     work, wanted, here = workspace(), np.empty(4, np.bool_), np.full(4, np.inf)
+    motion, marks = np.empty((3, TILE + 1)), np.empty(TILE)
     for number in range(chosen.shape[0]):
         tile, lane = chosen[number]
         phase, damping = phases[lane], dampings[lane]
@@ -88,30 +101,60 @@ def repeat(north, east, peaks, jumps, phases, dampings, weights, kept, states, c
         peak = abs(along) * peaks[0, tile] + abs(across) * peaks[1, tile]
         jump = abs(along) * jumps[0, tile] + abs(across) * jumps[1, tile]
         radius = radius_bound(kept[tile, 2, lane], peak, damping, phase)
-        slack = slacks(rate_bounds(radius, peak, jump, damping, phase), damping, phase)
-        beyond = False
-        for row in range(quantities):
-            here[row] = largest[row, lane]
-            beyond |= kept[tile, 2 + row, lane] + slack[row] > here[row]
-        if not beyond:
+        rates = rate_bounds(radius, peak, jump, damping, phase)
+        if not _open(kept[tile, 2:, lane], rates, jump, damping, phase, largest[:, lane], here):
             continue
-        a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase)
-        u, z = states[number, 0], states[number, 1]
-        square, twice = u * u + z * z, 2.0 * damping
-        first = tile * TILE
-        end = along * north[first] + across * east[first]
-        for i in range(first, first + TILE):
-            start, end = end, along * north[i + 1] + across * east[i + 1]
-            u_end = a11 * u + a12 * z + (b11 * start + b12 * end)
-            z_end = a21 * u + a22 * z + (b21 * start + b22 * end)
-            square_end = u_end * u_end + z_end * z_end
-            beyond = max(square, square_end) + slack[0] > here[0]
-            if quantities > 1:
-                beyond |= max(abs(u), abs(u_end)) + slack[1] > here[1]
-                beyond |= max(abs(z), abs(z_end)) + slack[2] > here[2]
-                beyond |= max(abs(u + twice * z), abs(u_end + twice * z_end)) + slack[3] > here[3]
-            if beyond and find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantities, here, wanted):
-                largest_in_step(u, z, start, end, damping, phase, wanted, work, here)
-            u, z, square = u_end, z_end, square_end
+        motion[0, 0], motion[1, 0] = states[number, 0], states[number, 1]
+        for i in range(TILE + 1):
+            motion[2, i] = along * north[tile * TILE + i] + across * east[tile * TILE + i]
+        _rerun(step(1.0, damping, phase), motion)
+        _mark(motion, rates, damping, phase, quantities, here, marks)
+        for i in range(TILE):
+            if marks[i] > 0.0:
+                u, z, start = motion[0, i], motion[1, i], motion[2, i]
+                u_end, z_end, end = motion[0, i + 1], motion[1, i + 1], motion[2, i + 1]
+                if find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, quantities, here, wanted):
+                    largest_in_step(u, z, start, end, damping, phase, wanted, work, here)
         for row in range(quantities):
-            largest[row, lane] = here[row]
+            largest[row, lane] = here[row] if here[row] < np.inf else largest[row, lane]
+
+
+@kernel
+def _open(sampled, rates, jump, damping, phase, largest, here):
+    """Copy those largest values that a tile can exceed, infinity instead of the others; tell whether there are any."""
+    slack, beyond = slacks(rates, damping, phase), False
+    for row in range(largest.size):
+        more = velocity_slack(sampled[2], rates, jump, damping, phase) if row == 2 else slack[row]
+        exceeds = sampled[row] + more > largest[row]
+        here[row] = largest[row] if exceeds else np.inf
+        beyond |= exceeds
+    return beyond
+
+
+@kernel
+def _rerun(coefficients, motion):
+    """Fill displacement and velocity at the samples of a tile from those in the first column."""
+    a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
+    u, z = motion[0, 0], motion[1, 0]
+    for i in range(TILE):
+        start, end = motion[2, i], motion[2, i + 1]
+        u, z = a11 * u + (a12 * z + (b11 * start + b12 * end)), a21 * u + (a22 * z + (b21 * start + b22 * end))
+        motion[0, i + 1], motion[1, i + 1] = u, z
+
+
+@kernel
+def _mark(motion, rates, damping, phase, quantities, here, marks):
+    """Mark with a positive number the steps of a tile that may hold more than the largest values."""
+    slack, twice = slacks(rates, damping, phase), 2.0 * damping
+    radius, displacement, velocity, felt = here[0] - slack[0], here[1] - slack[1], here[2], here[3] - slack[3]
+    for i in range(TILE):
+        u, z, u_end, z_end = motion[0, i], motion[1, i], motion[0, i + 1], motion[1, i + 1]
+        marks[i] = max(u * u + z * z, u_end * u_end + z_end * z_end) - radius
+    if quantities > 1:
+        for i in range(TILE):
+            u, z, start = motion[0, i], motion[1, i], motion[2, i]
+            u_end, z_end, end = motion[0, i + 1], motion[1, i + 1], motion[2, i + 1]
+            marks[i] = max(marks[i], max(abs(u), abs(u_end)) - displacement)
+            marks[i] = max(marks[i], max(abs(u + twice * z), abs(u_end + twice * z_end)) - felt)
+            bound = step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase)
+            marks[i] = max(marks[i], bound - velocity)

@@ -84,6 +84,9 @@ def test_what_is_not_wanted_cannot_matter(seed):
     rates = between.rate_bounds(radius, max(abs(start), abs(end)), abs(end - start), damping, phase)
     ends = np.array([(x * x + w * w, abs(x), abs(w), abs(x + 2 * damping * w)) for x, w in ((u, z), (u_end, z_end))])
     assert np.all(ends.max(axis=0) + between.slacks(rates, damping, phase) >= dense)
+    slack = between.velocity_slack(ends[:, 2].max(), rates, abs(end - start), damping, phase)
+    assert ends[:, 2].max() + slack >= dense[2]
+    assert between.step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase) >= dense[2]
     known = np.full(4, np.inf)
     for row in range(4):
         known[row] = dense[row] * (1 - 1e-6)

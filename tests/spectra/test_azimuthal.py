@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum, rotd
-from per_obspy.spectra.elastic import response_spectra
+from per_obspy.spectra.azimuthal import (
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+    rotd,
+    sampled_azimuthal_per_spectrum,
+    sampled_azimuthal_sd_spectrum,
+)
+from per_obspy.spectra.elastic import response_spectra, sampled_response_spectra
 
 DT = 0.01
 PERIODS = np.array([0.004, 0.03, 0.1, 0.4, 2.0, 9.0])
@@ -28,6 +34,20 @@ def test_every_azimuth_is_the_spectrum_of_its_own_motion(pair, damping):
         motion = pair[0] * np.cos(azimuth) + pair[1] * np.sin(azimuth)
         along = response_spectra(motion, DT, PERIODS, damping)
         # the same physics in another order of sums
+        assert_allclose(per[:, k], along.per, rtol=1e-11)
+        assert_allclose(sd[:, k], along.sd, rtol=1e-11)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.7])
+def test_sampled_peaks_are_those_of_each_rotated_motion(pair, damping):
+    # catches samples that are ruled out wrongly, and peaks between the samples that slip in
+    azimuths = np.array([0.0, 7.0, 90.0, 133.3, 180.0, 271.0, -20.0])
+    per = sampled_azimuthal_per_spectrum(*pair, DT, PERIODS, damping, azimuths)
+    sd = sampled_azimuthal_sd_spectrum(*pair, DT, PERIODS, damping, azimuths)
+    for k, azimuth in enumerate(np.radians(azimuths)):
+        motion = pair[0] * np.cos(azimuth) + pair[1] * np.sin(azimuth)
+        along = sampled_response_spectra(motion, DT, PERIODS, damping)
+        # the same sums in another order
         assert_allclose(per[:, k], along.per, rtol=1e-11)
         assert_allclose(sd[:, k], along.sd, rtol=1e-11)
 
