@@ -33,7 +33,7 @@ wheel: .venv/check
 	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
 
 benchmark: .venv/benchmark
-	$(BIN)/python tests/benchmarks/spectra.py
+	for script in tests/benchmarks/*.py; do OPENBLAS_NUM_THREADS=1 $(BIN)/python $$script || exit 1; done
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -44,6 +44,8 @@ benchmark: .venv/benchmark
 .venv/run: .venv/bin/python pyproject.toml
 	@echo "== install per_obspy and what it needs (a minute or two)"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@echo "== compile the kernels on a small run (once, about a minute)"
+	$(BIN)/per-obspy run workflows/smoke.toml -o .venv/smoke >/dev/null
 	@touch $@
 
 .venv/%: .venv/run

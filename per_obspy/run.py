@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from threading import Thread
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ from per_obspy.records.sources import fetched_records, find_sources, input_files
 from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.tables import write_rejected, write_risk, write_totals
 from per_obspy.screening.risk import risk_table
+from per_obspy.screening.warmup import compile_screening
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 #: Written last.
@@ -129,7 +131,7 @@ def _work(
     with _timed(seconds, "records"):
         pairs = read_pairs(settings.pairs.file) if settings.pairs and settings.pairs.file else None
         jobs, rejected = _jobs(settings, folder, fetched, progress)
-    with _timed(seconds, "stations"):
+    with _timed(seconds, "stations"), _compiling(progress):
         done = _stations(jobs, settings.workers or os.cpu_count() or 1, executor, progress)
     rejected += [one for station in done for one in station.rejected]
     stations = [read_spectra(station.shard) for station in done if station.shard]
@@ -326,6 +328,17 @@ def _holder(path: Path) -> str:
     except (OSError, ValueError):
         return "it does not say which"
     return f"process {said['process']} on {said['host']} since {said['since']}"
+
+
+@contextmanager
+def _compiling(progress: Progress) -> Iterator[None]:
+    """Compile the kernels of screening beside the stations, which work in other processes; later runs load them."""
+    thread = Thread(target=compile_screening)
+    thread.start()
+    yield
+    progress("loading kernels (the first run compiles them for a minute)", 0, 1)
+    thread.join()
+    progress("loading kernels (the first run compiles them for a minute)", 1, 1)
 
 
 @contextmanager

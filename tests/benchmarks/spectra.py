@@ -3,7 +3,8 @@ Speed and agreement of the spectra, beside other programs, in one process on one
 
     OPENBLAS_NUM_THREADS=1 python tests/benchmarks/spectra.py
 
-Every time is the best of several. Peers that are not installed are named and left out
+Every time is the best of several: processor time, on which ratios rest, and time by the clock. "exact" finds peaks
+between the samples too, "at samples" takes them at samples only, as all peers do. Peers that are not installed are named and left out
 (``pip install per_obspy[benchmark]`` brings them).
 """
 
@@ -11,13 +12,20 @@ import importlib
 import os
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from obspy.signal.freqattributes import peak_ground_motion
 from scipy.signal import lsim
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum, rotd
+from per_obspy.spectra.azimuthal import (
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+    rotd,
+    sampled_azimuthal_per_spectrum,
+    sampled_azimuthal_sd_spectrum,
+)
 from per_obspy.spectra.bilinear import bilinear_response
 from per_obspy.spectra.elastic import (
     per_spectrum,
@@ -53,20 +61,34 @@ def multiply_add(rounds):
     return values.sum()
 
 
-def best(work: Callable[[], Any], seconds: float = 1.0) -> tuple[float, Any]:
-    """Return the shortest time of a call, and its result; at least 2 calls after a first one."""
-    result, shortest, begun, calls = work(), np.inf, time.perf_counter(), 0
+class Seconds(NamedTuple):
+    """Processor time of all threads, and time by the clock."""
+
+    processor: float
+    clock: float
+
+
+def best(work: Callable[[], Any], seconds: float = 1.0) -> tuple[Seconds, Any]:
+    """Return the shortest times of a call, and its result; at least 2 calls after a first one."""
+    result, shortest, begun, calls = work(), Seconds(np.inf, np.inf), time.perf_counter(), 0
     while calls < 2 or time.perf_counter() - begun < seconds:
-        start = time.perf_counter()
+        processor, clock = time.process_time(), time.perf_counter()
         result = work()
-        shortest = min(shortest, time.perf_counter() - start)
+        processor, clock = time.process_time() - processor, time.perf_counter() - clock
+        shortest = Seconds(min(shortest.processor, processor), min(shortest.clock, clock))
         calls += 1
     return shortest, result
 
 
-def row(what: str, seconds: float, *others: str) -> None:
+def row(what: str, seconds: Seconds, *others: str) -> None:
     """Print one line of a table."""
-    print(f"{what:<58}{1e3 * seconds:>12.3f} ms  {'  '.join(others)}", flush=True)
+    times = f"{1e3 * seconds.processor:>11.3f} ms {1e3 * seconds.clock:>11.3f} ms"
+    print(f"{what:<56}{times}  {'  '.join(others)}", flush=True)
+
+
+def ratio(seconds: Seconds, ours: Seconds) -> str:
+    """Return how many times ours, by processor time."""
+    return f"{seconds.processor / ours.processor:.3g} times ours"
 
 
 def error(ours: np.ndarray, theirs: np.ndarray) -> str:
@@ -118,72 +140,83 @@ def lsim_per(motion: np.ndarray) -> np.ndarray:
     return np.array(per)
 
 
+def obspy_psa(motion: np.ndarray) -> np.ndarray:
+    """PSA from ObsPy, which wants the ground displacement and simulates a seismometer of each frequency."""
+    displacement = DT**2 * np.cumsum(np.cumsum(motion))
+    return np.array([peak_ground_motion(displacement, DT, 1 / period, DAMPING)[0] for period in PERIODS])
+
+
 def one_component() -> None:
     """One record, 100 periods."""
     motion = ground_motion(SAMPLES)
     print(f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, damping {DAMPING}")
-    share_of_peak()
+    print(f"{'':<56}{'processor':>14} {'clock':>14}")
+    for count in (SAMPLES, 4 * SAMPLES):
+        share_of_peak(count)
     sampled, sampled_per = best(lambda: sampled_per_spectrum(motion, DT, PERIODS))
     row("PER at samples", sampled)
-    exact, _ = best(lambda: per_spectrum(motion, DT, PERIODS))
-    row("PER exact between samples", exact, f"{exact / sampled:.2f} times the sampled")
-    seconds, at_samples = best(lambda: sampled_response_spectra(motion, DT, PERIODS))
-    row("PER, SD, SV, SA at samples", seconds)
-    seconds, spectra = best(lambda: response_spectra(motion, DT, PERIODS))
-    row("PER, SD, SV, SA exact, with free vibration", seconds)
-    peers_of_one_component(motion, sampled, sampled_per, at_samples, spectra.per)
+    seconds, exact_per = best(lambda: per_spectrum(motion, DT, PERIODS))
+    row("PER exact", seconds, ratio(seconds, sampled), f"samples alone: {error(exact_per, sampled_per)}")
+    several, at_samples = best(lambda: sampled_response_spectra(motion, DT, PERIODS))
+    row("PER, SD, SV, SA at samples", several)
+    seconds, _ = best(lambda: response_spectra(motion, DT, PERIODS))
+    row("PER, SD, SV, SA exact, with free vibration", seconds, f"{seconds.processor / several.processor:.3g} times")
+    peers_of_one_component(motion, sampled, sampled_per, at_samples)
 
 
-def share_of_peak() -> None:
+def share_of_peak(samples: int) -> None:
     """What the core can do, and what the PER of whole blocks of oscillators makes of it."""
-    periods, long = np.geomspace(0.05, 10.0, 128), 4 * SAMPLES
-    motion = ground_motion(long)
-    rounds = best(lambda: multiply_add(PEAK_ROUNDS))[0]
+    periods, motion = np.geomspace(0.05, 10.0, 128), ground_motion(samples)
+    rounds = best(lambda: multiply_add(PEAK_ROUNDS))[0].processor
     seconds, _ = best(lambda: sampled_per_spectrum(motion, DT, periods))
-    rounds = min(rounds, best(lambda: multiply_add(PEAK_ROUNDS))[0])
-    peak, rate = PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds, long * periods.size / seconds
-    print(f"multiply-adds of this core: {peak / 1e9:.1f} billion/s")
-    share = f"{rate / 1e9:.2f} billion steps/s = {100 * PER_STEP * rate / peak:.0f} % of the multiply-adds"
-    row(f"PER at samples, {long} samples, 128 periods", seconds, share)
+    rounds = min(rounds, best(lambda: multiply_add(PEAK_ROUNDS))[0].processor)
+    peak, rate = PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds, samples * periods.size / seconds.processor
+    share = f"{rate / 1e9:.2f} billion steps/s, {100 * PER_STEP * rate / peak:.0f} % of {peak / 1e9:.0f} billion FMA/s"
+    row(f"PER at samples, {samples} samples, 128 periods", seconds, share)
 
 
-def peers_of_one_component(motion, sampled, sampled_per, at_samples, exact_per) -> None:
+def peers_of_one_component(motion, sampled, sampled_per, at_samples) -> None:
     """Compare with whoever is installed; ratios are to our sampled PER, which does the same job."""
     if pyrotd := module("pyrotd", "pyrotd"):
         pyrotd.processes = 1
         seconds, (sd, sv) = best(lambda: pyrotd_sd_sv(pyrotd, motion))
-        row("pyrotd: SD and SV", seconds, f"{seconds / sampled:.0f} times ours", error(at_samples.sd, sd))
-        row("", seconds, " " * 14, f"SV {error(at_samples.sv, sv)}")
+        row("pyrotd: SD and SV", seconds, ratio(seconds, sampled), error(at_samples.sd, sd))
+        print(f"{'':>12}SV {error(at_samples.sv, sv)}")
         seconds = best(
             lambda: [pyrotd.calc_spec_accels(DT, motion, 1 / PERIODS, DAMPING, osc_type=kind) for kind in ("sd", "sv")]
         )[0]
-        row("pyrotd: SD and SV, not padded", seconds, f"{seconds / sampled:.0f} times ours")
+        row("pyrotd: SD and SV, not padded", seconds, ratio(seconds, sampled))
     if oscillators := module("esi_core.gmprocess.metrics.oscillators", "esi-core"):
         seconds, per = best(lambda: esi_per(oscillators, motion))
-        row("esi-core (C of gmprocess): PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
+        row("esi-core (C of gmprocess): PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
     if eqsig := module("eqsig.sdof", "eqsig"):
         seconds, per = best(lambda: eqsig_per(eqsig, motion))
-        row("eqsig: PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
+        row("eqsig: PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
     seconds, per = best(lambda: lsim_per(motion))
-    row("SciPy lsim: PER", seconds, f"{seconds / sampled:.0f} times ours", error(sampled_per, per))
-    row("(what samples alone miss of the exact PER)", 0.0, error(exact_per, sampled_per))
+    row("SciPy lsim: PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
+    seconds, psa = best(lambda: obspy_psa(motion))
+    row("ObsPy peak_ground_motion: PSA", seconds, ratio(seconds, sampled), error(at_samples.psa, psa))
 
 
 def azimuths() -> None:
     """180 azimuths of two components."""
     north, east = ground_motion(SAMPLES, 1), ground_motion(SAMPLES, 2)
     print(f"\n180 azimuths, {SAMPLES} samples, {PERIODS.size} periods")
-    ours, per = best(lambda: azimuthal_per_spectrum(north, east, DT, PERIODS))
-    row("PER along every azimuth, exact between samples", ours)
-    seconds, sd = best(lambda: azimuthal_sd_spectrum(north, east, DT, PERIODS))
-    row("SD along every azimuth, exact, with free vibration", seconds)
+    seconds, per = best(lambda: azimuthal_per_spectrum(north, east, DT, PERIODS))
+    row("PER along every azimuth, exact", seconds)
+    seconds, _ = best(lambda: sampled_azimuthal_per_spectrum(north, east, DT, PERIODS))
+    row("PER along every azimuth, at samples", seconds)
+    exact, _ = best(lambda: azimuthal_sd_spectrum(north, east, DT, PERIODS))
+    row("SD along every azimuth, exact, with free vibration", exact)
+    ours, sd = best(lambda: sampled_azimuthal_sd_spectrum(north, east, DT, PERIODS))
+    row("SD along every azimuth, at samples", ours)
     seconds, plain = best(
         lambda: [
             per_spectrum(north * np.cos(angle) + east * np.sin(angle), DT, PERIODS)
             for angle in np.radians(np.arange(180))
         ]
     )
-    row("PER of 180 rotated records, one by one", seconds, error(per, np.transpose(plain)))
+    row("PER of 180 rotated records, exact, one by one", seconds, error(per, np.transpose(plain)))
     if pyrotd := module("pyrotd", "pyrotd"):
         pyrotd.processes = 1
         padded = [np.concatenate([motion, np.zeros(SAMPLES)]) for motion in (north, east)]
@@ -195,11 +228,12 @@ def azimuths() -> None:
             )
             table = np.sort(found, order=["osc_freq", "percentile"])["spec_accel"].reshape(-1, 2)[::-1]
             pseudo = (2 * np.pi / PERIODS) ** 2
-            row(f"pyrotd {method}: RotD50, RotD100", seconds, f"{seconds / ours:.0f} times ours")
+            others = f"{seconds.processor / exact.processor:.3g} times our exact SD"
+            row(f"pyrotd {method}: RotD50, RotD100 of SD", seconds, ratio(seconds, ours), others)
             for column, percentile in enumerate((50, 100)):
                 print(f"{'':>12}RotD{percentile} {error(rotd(sd, percentile) * pseudo, table[:, column])}")
         seconds, _ = best(lambda: pyrotd.calc_rotated_spec_accels(DT, north, east, 1 / PERIODS, DAMPING, [50, 100]))
-        row("pyrotd optimized, not padded", seconds, f"{seconds / ours:.0f} times ours")
+        row("pyrotd optimized, not padded", seconds, ratio(seconds, ours))
 
 
 def scaling() -> None:
@@ -208,19 +242,27 @@ def scaling() -> None:
     for samples in (3_000, 12_000, 48_000, 192_000):
         motion = ground_motion(samples)
         seconds, _ = best(lambda motion=motion: per_spectrum(motion, DT, PERIODS), 0.5)
-        row(f"{samples} samples, 100 periods", seconds, f"{1e9 * seconds / samples / 100:.3f} ns a sample and period")
+        row(
+            f"{samples} samples, 100 periods",
+            seconds,
+            f"{1e9 * seconds.processor / samples / 100:.3f} ns a sample and period",
+        )
     motion = ground_motion(SAMPLES)
     for count in (1, 64, 256, 1024):
         periods = np.geomspace(0.05, 10, count)
         seconds, _ = best(lambda periods=periods: per_spectrum(motion, DT, periods), 0.5)
-        row(f"{count} periods, 12000 samples", seconds, f"{1e9 * seconds / SAMPLES / count:.3f} ns a sample and period")
+        row(
+            f"{count} periods, 12000 samples",
+            seconds,
+            f"{1e9 * seconds.processor / SAMPLES / count:.3f} ns a sample and period",
+        )
     east = ground_motion(SAMPLES, 1)
     for count in (4, 36, 180, 720):
         angles = np.arange(count) * 180 / count
         seconds, _ = best(lambda angles=angles: azimuthal_per_spectrum(motion, east, DT, PERIODS, azimuths=angles), 0.5)
         row(f"{count} azimuths, 100 periods, 12000 samples", seconds)
     seconds, _ = best(lambda: bilinear_response(motion, DT, 1.0, DAMPING, 0.01, 0.05), 0.5)
-    row("bilinear_response, 12000 samples", seconds, f"{1e9 * seconds / SAMPLES:.0f} ns a sample")
+    row("bilinear_response, 12000 samples", seconds, f"{1e9 * seconds.processor / SAMPLES:.0f} ns a sample")
 
 
 def threads() -> None:
@@ -234,16 +276,17 @@ def threads() -> None:
     print("\nThreads: 200000 samples, 640 periods, PER exact")
     row("1 core", one)
     same = "same bits" if np.array_equal(spectra, alone) else "DIFFERENT"
-    row(f"{len(cores)} cores", every, f"{one / every:.2f} times faster, {same}")
+    row(f"{len(cores)} cores", every, f"{one.clock / every.clock:.2f} times faster by the clock, {same}")
 
 
 def long_record() -> None:
     """A day at 200 Hz."""
     motion = ground_motion(17_280_000)
-    start = time.perf_counter()
+    processor, clock = time.process_time(), time.perf_counter()
     per_spectrum(motion, DT, PERIODS)
+    seconds = Seconds(time.process_time() - processor, time.perf_counter() - clock)
     print("\nA day at 200 Hz, 17.28 million samples, 100 periods")
-    row("PER exact, all cores", time.perf_counter() - start)
+    row("PER exact, all cores", seconds)
 
 
 if __name__ == "__main__":

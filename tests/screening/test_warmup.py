@@ -1,0 +1,12 @@
+"""Warming up reaches the kernels: it would be pointless if its pairs were rejected."""
+
+import per_obspy.screening.warmup as warmup
+
+
+def test_both_pairs_are_judged(monkeypatch):
+    tables = []
+    real = warmup.risk_table
+    monkeypatch.setattr(warmup, "risk_table", lambda *arguments: tables.append(real(*arguments)))
+    warmup.compile_screening()
+    assert tables[0]["demand_rule"].tolist() == ["exact", "srss"]
+    assert tables[0]["impacts"].min() >= 1
