@@ -1,0 +1,62 @@
+"""A whole run, and a screening without records."""
+
+from typing import Self
+
+from pydantic import (
+    Field,
+    model_validator,
+)
+
+from per_obspy.config.processing import Processing, Spectra
+from per_obspy.config.records import Records
+from per_obspy.config.screening import Building, Screening, Totals
+from per_obspy.config.section import RelativePath, Section
+from per_obspy.config.simulation import SimulatedPairs
+
+
+class Pairs(Section):
+    """Where the pairs of buildings come from: a stored table, or a simulated one around the stations."""
+
+    file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
+    simulated: SimulatedPairs | None = Field(None, description="simulated inventory around the stations")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.file is None) == (self.simulated is None):
+            raise ValueError("give either file or simulated")
+        return self
+
+
+class Run(Section):
+    """Everything one run needs."""
+
+    name: str = Field(min_length=1, description="title of tables and figures")
+    output: RelativePath = Field(description="folder of the results")
+    workers: int = Field(0, ge=0, description="processes; 0: one a processor")
+    simulation: RelativePath | None = Field(None, description="TOML file of an event to simulate instead of records")
+    records: Records | None = Field(None, description="where the records are")
+    pairs: Pairs | None = Field(None, description="where the pairs come from, if not from the simulation")
+    processing: Processing = Processing()
+    spectra: Spectra = Spectra()
+    building: Building = Building()
+    screening: Screening = Screening()
+    totals: Totals = Totals()
+    geopackage: bool = Field(False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.simulation is None) == (self.records is None):
+            raise ValueError("give either simulation or records")
+        if self.records is not None and self.pairs is None:
+            raise ValueError("give pairs: a file, or how to simulate them")
+        return self
+
+
+class Design(Section):
+    """A screening by a design or user spectrum instead of records."""
+
+    spectrum: RelativePath = Field(description="CSV: period (s), damping, and sd (m) or psa (m/s2)")
+    pairs: RelativePath = Field(description="pair table, CSV or Parquet")
+    output: RelativePath = Field(description="folder of the results")
+    building: Building = Building()
+    screening: Screening = Screening()
