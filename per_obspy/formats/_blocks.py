@@ -2,8 +2,8 @@
 
 import re
 
-from ..checks import FloatArray
-from ._text import DECIMAL, Text, block_lines, count, fixed_block, interval, line_at, refuse
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import DECIMAL, Text, block_lines, count, fixed_block, interval, line_at, refuse
 
 _POINTS = re.compile(rf"\s*(\d+)\s+(?:ACCELEROGRAM )?POINTS\b.*?\bAT\s+{DECIMAL}\s*(PTS/SEC|SEC)\b")
 _WIDTHS = re.compile(r"\((\d+)F(\d+)\.\d+\)")

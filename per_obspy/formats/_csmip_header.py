@@ -5,9 +5,17 @@ from typing import Any, NamedTuple
 
 from obspy import UTCDateTime
 
-from ..checks import FloatArray
-from ._text import DECIMAL, Text, block_lines, fixed_block, line_at, refuse
-from .vocabulary import STANDARD_GRAVITY, channel_code, coordinates, full_year, hemisphere, orientation, utc
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import DECIMAL, Text, block_lines, fixed_block, line_at, refuse
+from per_obspy.formats.vocabulary import (
+    STANDARD_GRAVITY,
+    channel_code,
+    coordinates,
+    full_year,
+    hemisphere,
+    orientation,
+    utc,
+)
 
 _HEADER_LINES = 13
 _INTEGER_LINES = 7  # 100 integers, 16 a line; everything in them is said elsewhere too

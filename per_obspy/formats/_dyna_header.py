@@ -5,9 +5,9 @@ from typing import Any
 
 from obspy import Stream, UTCDateTime
 
-from ._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
-from ._text import DECIMAL, Text, free_block, refuse
-from .vocabulary import coordinates, trace, utc
+from per_obspy.formats._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
+from per_obspy.formats._text import DECIMAL, Text, free_block, refuse
+from per_obspy.formats.vocabulary import coordinates, trace, utc
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_/^]*:")
 _TIME = re.compile(rf"(\d{{4}})/?(\d\d)/?(\d\d)[ _]?(\d\d):?(\d\d):?{DECIMAL}")

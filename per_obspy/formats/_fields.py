@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ._text import Text, count, interval, number, refuse
+from per_obspy.formats._text import Text, count, interval, number, refuse
 
 
 class Field(NamedTuple):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..checks import FloatArray
-from ._text import Text, block_lines, fixed_block, interval, refuse
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import Text, block_lines, fixed_block, interval, refuse
 
 _WIDTH, _PAIRS_PER_LINE = 7, 5
 

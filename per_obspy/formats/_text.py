@@ -7,8 +7,8 @@ from typing import BinaryIO, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FloatArray
-from ..errors import RecordRejected
+from per_obspy.checks import FloatArray
+from per_obspy.errors import RecordRejected
 
 WaveformFile = str | Path | BinaryIO
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
-from ._text import (
+from per_obspy.formats._text import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -19,7 +19,7 @@ from ._text import (
     read_text,
     refuse,
 )
-from .vocabulary import STANDARD_GRAVITY, coordinates, hemisphere, horizontal, trace, utc
+from per_obspy.formats.vocabulary import STANDARD_GRAVITY, coordinates, hemisphere, horizontal, trace, utc
 
 _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _RATE_LINE = 27, 21

@@ -5,9 +5,20 @@ from typing import Any, NamedTuple
 
 from obspy import Stream, Trace, UTCDateTime
 
-from ..checks import FloatArray
-from ._text import DECIMAL, Text, WaveformFile, block_lines, count, fixed_block, head_lines, line_at, read_text, refuse
-from .vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    block_lines,
+    count,
+    fixed_block,
+    head_lines,
+    line_at,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
 
 _TITLE = re.compile(
     r"(Raw|Uncorrected|Corrected) (acceleration|velocity|displacement)\b.*\(Format v0?1\.\d+ with (\d+) text lines\)"

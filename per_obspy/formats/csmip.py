@@ -7,12 +7,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from obspy import Stream, Trace
 
-from ..checks import FloatArray
-from ._blocks import is_title, titled_block
-from ._csmip_header import Header, channel_name, known, read_header
-from ._pairs import pair_lines, read_pairs
-from ._text import Text, WaveformFile, block_lines, count, fixed_block, head, head_lines, line_at, read_text, refuse
-from .vocabulary import GAL, STANDARD_GRAVITY, trace
+from per_obspy.checks import FloatArray
+from per_obspy.formats._blocks import is_title, titled_block
+from per_obspy.formats._csmip_header import Header, channel_name, known, read_header
+from per_obspy.formats._pairs import pair_lines, read_pairs
+from per_obspy.formats._text import (
+    Text,
+    WaveformFile,
+    block_lines,
+    count,
+    fixed_block,
+    head,
+    head_lines,
+    line_at,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, trace
 
 _INCH = 0.0254  # m
 _UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s+(G/10|G)\b")

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from ._fields import Fields, field, interval_field, number_field, read_fields, word_field
-from ._text import DECIMAL, Text, WaveformFile, count, free_block, head, read_text, refuse
-from .vocabulary import GAL, coordinates, orientation, trace, utc
+from per_obspy.formats._fields import Fields, field, interval_field, number_field, read_fields, word_field
+from per_obspy.formats._text import DECIMAL, Text, WaveformFile, count, free_block, head, read_text, refuse
+from per_obspy.formats.vocabulary import GAL, coordinates, orientation, trace, utc
 
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s+(\w)\(\+\);?\s*(\w)\(\+\);?\s*(\w)\(\+\)")

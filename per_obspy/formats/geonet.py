@@ -5,8 +5,8 @@ from typing import Any
 
 from obspy import Stream, Trace
 
-from ..checks import FloatArray
-from ._text import (
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -19,7 +19,7 @@ from ._text import (
     read_text,
     refuse,
 )
-from .vocabulary import channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats.vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
 _WIDTH, _PER_LINE = 8, 10

@@ -5,9 +5,20 @@ from typing import Any
 
 from obspy import Stream, UTCDateTime
 
-from ._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
-from ._text import DECIMAL, Text, WaveformFile, block_lines, fixed_block, head, line_at, no_more, read_text, refuse
-from .vocabulary import orientation, trace, utc
+from per_obspy.formats._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
+from per_obspy.formats._text import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    block_lines,
+    fixed_block,
+    head,
+    line_at,
+    no_more,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.vocabulary import orientation, trace, utc
 
 _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5

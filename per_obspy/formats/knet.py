@@ -2,8 +2,8 @@
 
 from obspy import Trace
 
-from ..errors import RecordRejected
-from .vocabulary import coordinates, orientation
+from per_obspy.errors import RecordRejected
+from per_obspy.formats.vocabulary import coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
 _SENSORS = "12"

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from ._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
-from ._text import DECIMAL, Text, WaveformFile, free_block, head, line_at, read_text, refuse
-from .vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
+from per_obspy.formats._text import DECIMAL, Text, WaveformFile, free_block, head, line_at, read_text, refuse
+from per_obspy.formats.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18

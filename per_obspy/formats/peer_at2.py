@@ -8,8 +8,18 @@ import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.trace import Stats
 
-from ._text import Text, WaveformFile, count, free_block, head_lines, interval, line_at, read_text, refuse
-from .vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
+from per_obspy.formats._text import (
+    Text,
+    WaveformFile,
+    count,
+    free_block,
+    head_lines,
+    interval,
+    line_at,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
 
 _QUANTITY = re.compile(r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b")
 _NUMBER = r"([-+\d.Ee*]+)"

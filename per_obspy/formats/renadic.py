@@ -4,8 +4,8 @@ from typing import Any
 
 from obspy import Stream
 
-from . import csmip
-from ._text import WaveformFile, head
+from per_obspy.formats import csmip
+from per_obspy.formats._text import WaveformFile, head
 
 
 def is_renadic(file: WaveformFile) -> bool:

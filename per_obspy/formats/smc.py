@@ -6,8 +6,8 @@ from typing import Any
 
 from obspy import Stream, UTCDateTime
 
-from ..checks import FloatArray
-from ._text import (
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import (
     Text,
     WaveformFile,
     block_lines,
@@ -20,7 +20,7 @@ from ._text import (
     read_text,
     refuse,
 )
-from .vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.vocabulary import coordinates, horizontal, trace
 
 _TEXT_LINES = 11
 _INTEGERS, _REALS = 48, 50

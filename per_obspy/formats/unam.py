@@ -6,9 +6,21 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from ._fields import Field, Fields, count_field, field, number_field, word_field
-from ._text import DECIMAL, Text, WaveformFile, count, fixed_block, head, interval, no_more, number, read_text, refuse
-from .vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats._fields import Field, Fields, count_field, field, number_field, word_field
+from per_obspy.formats._text import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    count,
+    fixed_block,
+    head,
+    interval,
+    no_more,
+    number,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 
 _MARK = b"ARCHIVO ESTANDAR DE ACELERACION"
 _WIDTH = 10

@@ -5,10 +5,10 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
-from ._blocks import titled_block
-from ._pairs import pair_lines, read_pairs
-from ._text import DECIMAL, Text, WaveformFile, count, head_lines, line_at, read_text, refuse
-from .vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats._blocks import titled_block
+from per_obspy.formats._pairs import pair_lines, read_pairs
+from per_obspy.formats._text import DECIMAL, Text, WaveformFile, count, head_lines, line_at, read_text, refuse
+from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
 
 _VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
 _VOLUME_1_LINES, _VOLUME_2_LINES = 27, 45

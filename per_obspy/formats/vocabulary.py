@@ -34,8 +34,8 @@ from typing import Any
 from obspy import Trace, UTCDateTime
 from obspy.core import AttribDict
 
-from ..checks import FloatArray
-from ._text import Text, refuse
+from per_obspy.checks import FloatArray
+from per_obspy.formats._text import Text, refuse
 
 STANDARD_GRAVITY = 9.80665  # m/s2
 GAL = 0.01  # m/s2

@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from .. import config
-from ..errors import CatalogError, Rejection
-from ..files import file_hash, written_whole
-from .reading import read_pairs
+from per_obspy import config
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import file_hash, written_whole
+from per_obspy.inventory.reading import read_pairs
 
 CRS = "OGC:CRS84"
 HEADER = """\

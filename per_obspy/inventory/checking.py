@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import FloatArray
-from ..errors import CatalogError, Rejection
-from .schema import COLUMNS, ONE_OF, Column
+from per_obspy.checks import FloatArray
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
 
 #: What people write into an empty cell.
 EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .. import config
-from ..checks import FloatArray
-from .contact import contact_mass, contact_participation, floor_offset, floors_misaligned
-from .periods import asce7_period, ec8_period, period_log_std
+from per_obspy import config
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.contact import contact_mass, contact_participation, floor_offset, floors_misaligned
+from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
 
 #: Standard acceleration of gravity, m/s2.
 GRAVITY = 9.80665

@@ -8,8 +8,8 @@ own use ``shear_building.equivalent_sdof``.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import checks
-from ..checks import FloatArray
+from per_obspy import checks
+from per_obspy.checks import FloatArray
 
 
 def _ratio(contact_height: ArrayLike, height: ArrayLike) -> FloatArray:

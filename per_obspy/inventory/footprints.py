@@ -7,14 +7,14 @@ import pandas as pd
 import pyproj
 import shapely
 
-from .. import checks
-from ..errors import CatalogError, Rejection
-from .checking import Rejections, checked_pairs
-from .contact import floor_offset
-from .importers import imported
-from .layers import Geometries, Layer, read_layer
-from .neighbours import Neighbours, neighbours
-from .schema import COLUMNS, POSITIONS
+from per_obspy import checks
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.checking import Rejections, checked_pairs
+from per_obspy.inventory.contact import floor_offset
+from per_obspy.inventory.importers import imported
+from per_obspy.inventory.layers import Geometries, Layer, read_layer
+from per_obspy.inventory.neighbours import Neighbours, neighbours
+from per_obspy.inventory.schema import COLUMNS, POSITIONS
 
 #: Share of the smaller footprint that may be covered by both: digitised party walls cross by centimetres.
 OVERLAP = 0.02

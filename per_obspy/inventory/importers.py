@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..errors import CatalogError
+from per_obspy.errors import CatalogError
 
 
 class Importer(NamedTuple):

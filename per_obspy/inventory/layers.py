@@ -13,7 +13,7 @@ import pyproj
 import shapely
 from numpy.typing import NDArray
 
-from ..errors import CatalogError, Rejection
+from per_obspy.errors import CatalogError, Rejection
 
 #: Files that GDAL reads for us; GeoParquet is read by pyarrow.
 GDAL_SUFFIXES = (".gpkg", ".geojson", ".json", ".shp", ".fgb")

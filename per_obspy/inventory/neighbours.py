@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..checks import FloatArray
-from .layers import Geometries
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.layers import Geometries
 
 IntArray = NDArray[np.int64]
 

@@ -9,9 +9,9 @@ where the literature has them, and each value carries a logarithmic standard dev
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import checks
-from ..checks import FloatArray
-from .schema import SYSTEMS
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.schema import SYSTEMS
 
 #: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent); ASCE 7, table 12.8-2,
 #: metric. The two ratios are those of Goel & Chopra (1997). No best fit is known to us for the other two systems:

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from .schema import COLUMNS
+from per_obspy.inventory.schema import COLUMNS
 
 
 def inventory_profile(pairs: pd.DataFrame) -> pd.DataFrame:

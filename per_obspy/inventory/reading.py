@@ -11,9 +11,9 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from ..errors import CatalogError, Rejection
-from .checking import Rejections, checked_pairs
-from .schema import COLUMNS
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.checking import Rejections, checked_pairs
+from per_obspy.inventory.schema import COLUMNS
 
 #: A table as read, the line of each of its rows, and lines that are no rows with their reasons.
 RawTable = tuple[pd.DataFrame, NDArray[np.int64], tuple[Rejection, ...]]

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigh_tridiagonal
 
-from .. import checks
-from ..checks import FloatArray
+from per_obspy import checks
+from per_obspy.checks import FloatArray
 
 
 class ShearBuilding(NamedTuple):

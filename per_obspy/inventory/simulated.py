@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from .. import checks
-from ..checks import FloatArray
-from .checking import METRES_PER_DEGREE
-from .periods import asce7_period
-from .schema import COLUMNS, POSITIONS, SYSTEMS
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.checking import METRES_PER_DEGREE
+from per_obspy.inventory.periods import asce7_period
+from per_obspy.inventory.schema import COLUMNS, POSITIONS, SYSTEMS
 
 #: Columns of the table under work, each (count,); numbers or text.
 Columns = dict[str, Any]

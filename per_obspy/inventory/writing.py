@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from ..errors import CatalogError
-from ..files import written_whole
+from per_obspy.errors import CatalogError
+from per_obspy.files import written_whole
 
 
 def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:

@@ -24,6 +24,8 @@ from .oscillator import step
 LANES = 64
 #: Steps after which the state is kept.
 TILE = 64
+#: Accumulators side by side of a reduction, as many as fit into the widest vectors.
+SIDE = 8
 #: Tiles kept at a time: memory stays the same however long the record is.
 TILES = 256
 #: States below this are set to zero (records are scaled to a peak of order one): denormal numbers are slow.
@@ -33,12 +35,27 @@ SMALLEST_STATE = 1e-140
 @kernel
 def tile_extremes(acceleration, peaks, jumps):
     """Fill the largest acceleration and the largest change over a step of each tile."""
+    peak, jump = np.empty(SIDE), np.empty(SIDE)
     for tile in range((acceleration.size - 1) // TILE):
-        peak, jump = abs(acceleration[tile * TILE]), 0.0
-        for i in range(tile * TILE, tile * TILE + TILE):
-            peak = max(peak, abs(acceleration[i + 1]))
-            jump = max(jump, abs(acceleration[i + 1] - acceleration[i]))
-        peaks[tile], jumps[tile] = peak, jump
+        first = tile * TILE
+        for k in range(SIDE):
+            peak[k], jump[k] = abs(acceleration[first]), 0.0
+        for i in range(first, first + TILE, SIDE):
+            for k in range(SIDE):
+                start, end = acceleration[i + k], acceleration[i + k + 1]
+                peak[k], jump[k] = max(peak[k], abs(end)), max(jump[k], abs(end - start))
+        peaks[tile], jumps[tile] = peak[0], jump[0]
+        for k in range(1, SIDE):
+            peaks[tile], jumps[tile] = max(peaks[tile], peak[k]), max(jumps[tile], jump[k])
+
+
+@kernel
+def raise_to_tiles(kept, tiles, largest):
+    """Raise the largest values to those of the tiles: the rows of ``kept`` (tile, row, lane) from 2 on."""
+    for tile in range(tiles):
+        for row in range(largest.shape[0]):
+            for lane in range(LANES):
+                largest[row, lane] = max(largest[row, lane], kept[tile, 2 + row, lane])
 
 
 @kernel
@@ -70,10 +87,7 @@ def select(kept, peaks, jumps, phases, dampings, weights, lanes, largest, chosen
     ``kept`` (tile, row, lane) holds the values from row 2 on; only the first ``lanes`` count. Returns their number.
     """
     tiles, quantities = peaks.shape[1], largest.shape[0]
-    for tile in range(tiles):
-        for row in range(quantities):
-            for lane in range(LANES):
-                largest[row, lane] = max(largest[row, lane], kept[tile, 2 + row, lane])
+    raise_to_tiles(kept, tiles, largest)
     threshold = np.empty((quantities, LANES))
     _thresholds(peaks, jumps, phases, dampings, weights, largest, threshold)
     count = 0

@@ -21,10 +21,10 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.event import Event
 
-from ..errors import CatalogError, RecordRejected, Rejection
-from .folder import FolderContents
-from .foreign import foreign_bytes
-from .metadata import with_metadata
+from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.records.folder import FolderContents
+from per_obspy.records.foreign import foreign_bytes
+from per_obspy.records.metadata import with_metadata
 
 #: unit that the provenance says the samples have -> m/s2
 _UNITS = {"cm/s^2": 0.01, "m/s^2": 1.0, "g": 9.80665}

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from .. import checks
-from ..checks import FloatArray
-from ..errors import CatalogError, RecordRejected
-from ..formats.vocabulary import GAL, STANDARD_GRAVITY, coordinates, horizontal, trace
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
 UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}

@@ -10,13 +10,13 @@ import obspy
 from obspy import UTCDateTime
 from obspy.core.event import Event
 
-from ..errors import CatalogError, PerError, RecordRejected, ServiceError
-from ..files import written_whole
-from . import folder
-from .asdf import is_asdf, read_asdf_event
-from .foreign import foreign
-from .providers import base_url
-from .web import NotFound, answer, web_pool
+from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
+from per_obspy.files import written_whole
+from per_obspy.records import folder
+from per_obspy.records.asdf import is_asdf, read_asdf_event
+from per_obspy.records.foreign import foreign
+from per_obspy.records.providers import base_url
+from per_obspy.records.web import NotFound, answer, web_pool
 
 #: how patiently a list of events is asked for: s, retries, s
 _PATIENCE = (60.0, 3, 1.0)

@@ -17,17 +17,17 @@ import obspy
 import urllib3
 from obspy import Inventory, UTCDateTime
 
-from .. import config
-from ..errors import RecordRejected, Rejection, ServiceError
-from ..files import written_whole
-from ..progress import Progress, silent
-from .events import fetched_event, read_event
-from .fdsn_station import Offer, Outcome, fetch_station
-from .folder import FolderContents, find_stations
-from .foreign import foreign_bytes
-from .providers import base_urls
-from .wanted import Wanted, digest, folder_name, station_parameters, stations_inside, wanted_around
-from .web import answer, host, web_pool
+from per_obspy import config
+from per_obspy.errors import RecordRejected, Rejection, ServiceError
+from per_obspy.files import written_whole
+from per_obspy.progress import Progress, silent
+from per_obspy.records.events import fetched_event, read_event
+from per_obspy.records.fdsn_station import Offer, Outcome, fetch_station
+from per_obspy.records.folder import FolderContents, find_stations
+from per_obspy.records.foreign import foreign_bytes
+from per_obspy.records.providers import base_urls
+from per_obspy.records.wanted import Wanted, digest, folder_name, station_parameters, stations_inside, wanted_around
+from per_obspy.records.web import answer, host, web_pool
 
 
 class Fetched(NamedTuple):

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import obspy
 import urllib3
 
-from ..errors import RecordRejected, ServiceError
-from ..files import written_whole
-from .foreign import foreign_bytes
-from .wanted import Wanted, channel_parameters
-from .web import RequestTooLarge, answer, host
+from per_obspy.errors import RecordRejected, ServiceError
+from per_obspy.files import written_whole
+from per_obspy.records.foreign import foreign_bytes
+from per_obspy.records.wanted import Wanted, channel_parameters
+from per_obspy.records.web import RequestTooLarge, answer, host
 
 
 class Offer(NamedTuple):

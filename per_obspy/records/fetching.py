@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from ..config import Run, load
-from ..errors import CatalogError, Rejection
-from ..progress import Progress, silent
-from .fdsn import fetch, fetched_stations
+from per_obspy.config import Run, load
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.progress import Progress, silent
+from per_obspy.records.fdsn import fetch, fetched_stations
 
 
 class FetchResult(NamedTuple):

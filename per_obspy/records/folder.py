@@ -11,11 +11,11 @@ import obspy
 from obspy import Inventory, Stream, UTCDateTime
 from obspy.core.event import Event
 
-from ..errors import CatalogError, RecordRejected, Rejection
-from .archives import is_archive, members, open_file
-from .foreign import foreign
-from .metadata import with_metadata
-from .processed import described
+from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.records.archives import is_archive, members, open_file
+from per_obspy.records.foreign import foreign
+from per_obspy.records.metadata import with_metadata
+from per_obspy.records.processed import described
 
 #: what StationXML, FDSN station text, QuakeML and descriptions of processed records begin with
 _MARKS = {b"<FDSNStationXML": "inventory", b"#Network": "inventory", b"quakeml": "event", b'"shard": ': "description"}

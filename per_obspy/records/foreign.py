@@ -6,8 +6,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ..errors import PerError, RecordRejected
-from .archives import open_file
+from per_obspy.errors import PerError, RecordRejected
+from per_obspy.records.archives import open_file
 
 
 def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from obspy import Trace
 
-from ..errors import Rejection
-from .asdf import find_asdf_stations, is_asdf, read_asdf_station
-from .folder import find_stations, read_station
+from per_obspy.errors import Rejection
+from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
+from per_obspy.records.folder import find_stations, read_station
 
 _UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}
 

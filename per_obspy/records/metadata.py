@@ -10,10 +10,10 @@ from obspy import Inventory, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Channel, Response, Station
 
-from ..checks import FloatArray
-from ..errors import RecordRejected
-from ..formats.knet import with_knet_words
-from ..formats.vocabulary import horizontal
+from per_obspy.checks import FloatArray
+from per_obspy.errors import RecordRejected
+from per_obspy.formats.knet import with_knet_words
+from per_obspy.formats.vocabulary import horizontal
 
 #: input unit of a response -> what the samples measure
 _QUANTITIES = {

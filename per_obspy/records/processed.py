@@ -15,8 +15,8 @@ import numpy as np
 from obspy import Stream, Trace
 from obspy.core import AttribDict
 
-from ..errors import RecordRejected
-from ..files import file_hash, written_whole
+from per_obspy.errors import RecordRejected
+from per_obspy.files import file_hash, written_whole
 
 #: words of ``trace.stats`` that are kept where a trace has them
 WORDS = (

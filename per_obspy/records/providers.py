@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 import urllib3
 from obspy.clients.fdsn.header import URL_MAPPINGS
 
-from ..errors import CatalogError, Rejection, ServiceError
-from .web import answer
+from per_obspy.errors import CatalogError, Rejection, ServiceError
+from per_obspy.records.web import answer
 
 #: routers -> query URL and what selects an answer of which the base URLs can be read
 ROUTERS = {

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from obspy import Inventory, Stream, UTCDateTime
 
-from ..errors import CatalogError, Rejection
-from .folder import FolderContents, merged_inventory, read_inventories, read_station
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.records.folder import FolderContents, merged_inventory, read_inventories, read_station
 
 _DAY = 86400.0  # s
 

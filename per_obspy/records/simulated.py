@@ -17,12 +17,12 @@ from obspy.core.event import Catalog, Event, ResourceIdentifier
 from obspy.geodetics import gps2dist_azimuth
 from scipy import fft
 
-from .. import config
-from ..checks import FloatArray
-from ..files import written_whole
-from . import stochastic
-from .metadata import with_metadata
-from .simulated_metadata import CHANNELS, GAIN, NETWORK, Place, scenario_event, scenario_inventory
+from per_obspy import config
+from per_obspy.checks import FloatArray
+from per_obspy.files import written_whole
+from per_obspy.records import stochastic
+from per_obspy.records.metadata import with_metadata
+from per_obspy.records.simulated_metadata import CHANNELS, GAIN, NETWORK, Place, scenario_event, scenario_inventory
 
 #: P wave: faster than S by this factor, weaker by that one.
 P_VELOCITY, P_AMPLITUDE = np.sqrt(3.0), 0.2

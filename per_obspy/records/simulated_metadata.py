@@ -7,7 +7,7 @@ from obspy.core.event import Comment, CreationInfo, Event, EventDescription, Mag
 from obspy.core.inventory import Channel, Inventory, Network, Response, Site, Station
 from obspy.core.inventory import Comment as StationComment
 
-from .. import config
+from per_obspy import config
 
 NETWORK = "XX"
 NOTICE = "SIMULATED by per_obspy with the stochastic method (Boore 2003): not an observation"

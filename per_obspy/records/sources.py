@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 from obspy import Inventory, Stream
 
-from .. import config
-from ..errors import Rejection
-from ..progress import Progress, silent
-from .asdf import find_asdf_stations, has_event, read_asdf_station
-from .columns import read_columns
-from .events import read_event
-from .fdsn import Fetched, fetch, fetched_stations
-from .folder import FolderContents, find_stations, read_station
-from .sds import find_sds_stations, read_sds_station
-from .wanted import window
+from per_obspy import config
+from per_obspy.errors import Rejection
+from per_obspy.progress import Progress, silent
+from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
+from per_obspy.records.columns import read_columns
+from per_obspy.records.events import read_event
+from per_obspy.records.fdsn import Fetched, fetch, fetched_stations
+from per_obspy.records.folder import FolderContents, find_stations, read_station
+from per_obspy.records.sds import find_sds_stations, read_sds_station
+from per_obspy.records.wanted import window
 
 #: reads a station from its files, metadata and name, as ``records.folder.read_station`` does
 Reader = partial[tuple[Stream, tuple[Rejection, ...]]]

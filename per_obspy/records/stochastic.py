@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from ..checks import FloatArray
+from per_obspy.checks import FloatArray
 
 #: Mean radiation pattern of S waves, free surface, partition onto two horizontals (Boore 2003, after eq. 6).
 RADIATION, FREE_SURFACE, PARTITION = 0.55, 2.0, 1.0 / np.sqrt(2.0)

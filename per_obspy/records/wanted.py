@@ -10,8 +10,8 @@ from obspy.core.event import Event, Origin
 from obspy.core.inventory import Station
 from obspy.geodetics import kilometers2degrees, locations2degrees
 
-from .. import config
-from ..errors import CatalogError
+from per_obspy import config
+from per_obspy.errors import CatalogError
 
 
 class Wanted(NamedTuple):

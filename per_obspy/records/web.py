@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 import urllib3
 
-from ..errors import ServiceError
+from per_obspy.errors import ServiceError
 
 #: faults that may pass: too many requests, and whatever is wrong on the side of the service
 PASSING_FAULTS = (429, 500, 502, 503, 504)

@@ -104,7 +104,7 @@ def raise_between(
 
 def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> None:
     """Raise the largest values to those at the samples of a stretch."""
-    np.maximum(largest, kept[: stretch.peaks.shape[1], 2:].max(axis=0), out=largest)
+    blocks.raise_to_tiles(kept, stretch.peaks.shape[1], largest)
 
 
 def over_blocks(work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, ground: Ground) -> FloatArray:

@@ -4,14 +4,15 @@ Speed and agreement of the spectra, beside other programs, in one process on one
     OPENBLAS_NUM_THREADS=1 python tests/benchmarks/spectra.py
 
 Every time is the best of several: processor time, on which ratios rest, and time by the clock. "exact" finds peaks
-between the samples too, "at samples" takes them at samples only, as all peers do. Peers that are not installed are named and left out
-(``pip install per_obspy[benchmark]`` brings them).
+between the samples too, "at samples" takes them at samples only, as all peers do. Peers that are not installed are
+named and left out (``pip install per_obspy[benchmark]`` brings them).
 """
 
 import importlib
 import os
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,17 +267,21 @@ def scaling() -> None:
 
 
 def threads() -> None:
-    """The same job on one core and on all."""
+    """The same job on one core and on all; beside it what the machine grants to one multiply-add loop a core."""
     cores = os.sched_getaffinity(0)
     motion, periods = ground_motion(200_000), np.geomspace(0.05, 10, 640)
-    every, spectra = best(lambda: per_spectrum(motion, DT, periods), 2.0)
-    os.sched_setaffinity(0, {min(cores)})
-    one, alone = best(lambda: per_spectrum(motion, DT, periods), 2.0)
-    os.sched_setaffinity(0, cores)
     print("\nThreads: 200000 samples, 640 periods, PER exact")
+    with ThreadPoolExecutor(len(cores)) as pool:
+        loops, _ = best(lambda: list(pool.map(multiply_add, [10 * PEAK_ROUNDS] * len(cores))))
+    loop, _ = best(lambda: multiply_add(10 * PEAK_ROUNDS))
+    every, spectra = best(lambda: per_spectrum(motion, DT, periods), 3.0)
+    os.sched_setaffinity(0, {min(cores)})
+    one, alone = best(lambda: per_spectrum(motion, DT, periods), 3.0)
+    os.sched_setaffinity(0, cores)
     row("1 core", one)
     same = "same bits" if np.array_equal(spectra, alone) else "DIFFERENT"
     row(f"{len(cores)} cores", every, f"{one.clock / every.clock:.2f} times faster by the clock, {same}")
+    print(f"{'':>12}the machine grants {len(cores) * loop.clock / loops.clock:.2f} times one core to multiply-adds")
 
 
 def long_record() -> None:
