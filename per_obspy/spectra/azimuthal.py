@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
-from ..checks import FloatArray
-from ..kernels import azimuth_steps, blocks
-from ..kernels import azimuths as kernels
-from .blocks import Ground, Oscillators, over_blocks, prepare_ground, prepare_oscillators, stretches
-from .elastic import grid_of, row_of, two_components
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels import azimuth_steps, blocks
+from per_obspy.kernels import azimuths as kernels
+from per_obspy.spectra.blocks import Ground, Oscillators, over_blocks, prepare_ground, prepare_oscillators, stretches
+from per_obspy.spectra.elastic import grid_of, row_of, two_components
 
 #: Every whole degree of a half turn; the other half repeats it.
 AZIMUTHS = np.arange(0, 180)

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from .. import checks
-from ..checks import FloatArray
-from ..kernels import bilinear as kernels
-from .elastic import row_of
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels import bilinear as kernels
+from per_obspy.spectra.elastic import row_of
 
 #: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.
 GRAVITY = 9.80665

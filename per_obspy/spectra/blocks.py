@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FloatArray
-from ..kernels import blocks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels import blocks
 
 #: Steps of all oscillators together below which starting threads costs more than it saves.
 STEPS_WORTH_THREADS = 20_000_000

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import checks
-from ..checks import FloatArray
-from ..kernels import blocks, radius, response
-from .blocks import (
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels import blocks, radius, response
+from per_obspy.spectra.blocks import (
     Ground,
     Oscillators,
     choose,

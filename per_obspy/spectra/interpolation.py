@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.fft import irfft, next_fast_len, rfft
 
-from .. import checks
-from ..checks import FloatArray
+from per_obspy import checks
+from per_obspy.checks import FloatArray
 
 
 class Interpolated(NamedTuple):
