@@ -61,11 +61,11 @@ def _sample_products(north, east):
 @kernel
 def _state_products(north, east, dt, omega, damping, sums):
     """Fill the sums over all steps of the products of state and samples, a column an oscillator."""
-    coefficients = np.zeros((8, LANES))
+    c = np.zeros((8, LANES))
     for lane in range(omega.size):
         values = step(omega[lane], damping[lane], dt)
         for row in range(8):
-            coefficients[row, lane] = values[row]
+            c[row, lane] = values[row]
     state = np.zeros((4, LANES))
     sums[:] = 0.0
     for i in range(north.size - 1):
@@ -88,22 +88,10 @@ def _state_products(north, east, dt, omega, damping, sums):
             sums[13, lane] += ze * n1
             sums[14, lane] += ze * e0
             sums[15, lane] += ze * e1
-            a11, a12, a21, a22 = (
-                coefficients[0, lane],
-                coefficients[1, lane],
-                coefficients[2, lane],
-                coefficients[3, lane],
-            )
-            b11, b12, b21, b22 = (
-                coefficients[4, lane],
-                coefficients[5, lane],
-                coefficients[6, lane],
-                coefficients[7, lane],
-            )
-            state[0, lane] = a11 * un + a12 * zn + b11 * n0 + b12 * n1
-            state[1, lane] = a21 * un + a22 * zn + b21 * n0 + b22 * n1
-            state[2, lane] = a11 * ue + a12 * ze + b11 * e0 + b12 * e1
-            state[3, lane] = a21 * ue + a22 * ze + b21 * e0 + b22 * e1
+            state[0, lane] = c[0, lane] * un + c[1, lane] * zn + (c[4, lane] * n0 + c[5, lane] * n1)
+            state[1, lane] = c[2, lane] * un + c[3, lane] * zn + (c[6, lane] * n0 + c[7, lane] * n1)
+            state[2, lane] = c[0, lane] * ue + c[1, lane] * ze + (c[4, lane] * e0 + c[5, lane] * e1)
+            state[3, lane] = c[2, lane] * ue + c[3, lane] * ze + (c[6, lane] * e0 + c[7, lane] * e1)
 
 
 @kernel

@@ -43,7 +43,7 @@ def write_risk(table: pd.DataFrame, folder: Path, facts: Mapping[str, str]) -> N
 
 def write_rejected(rejected: Iterable[Rejection], path: Path) -> None:
     """Write what was left out, one row a thing, its reasons separated by semicolons."""
-    rows = [one._replace(reasons="; ".join(one.reasons)) for one in rejected]  # type: ignore[arg-type]
+    rows = [(*one[:-1], "; ".join(one.reasons)) for one in rejected]
     table = pd.DataFrame(rows, columns=Rejection._fields).astype({"row": "Int64"})
     with written_whole(path) as part:
         table.to_csv(part, index=False)

@@ -1,5 +1,7 @@
 """Floors by modes, against the coupled equations by SciPy, and against the oscillator that stands for the building."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
@@ -23,7 +25,7 @@ def test_against_the_coupled_equations():
     system[:3, 3:6], system[6, 7] = np.eye(3), 1.0
     system[3:6, :3], system[3:6, 3:6], system[3:6, 6] = -stiffness / MASSES[:, None], -viscous, -1.0
     step, state, floors = expm(system * DT), np.zeros(6), [np.zeros(3)]
-    for before, after in zip(MOTION[:-1], MOTION[1:], strict=True):  # noqa: RUF007 - two arrays read as one
+    for before, after in pairwise(MOTION):
         state = (step @ np.concatenate([state, [before, (after - before) / DT]]))[:6]
         floors.append(state[:3])
     scale = np.abs(floors).max()
