@@ -72,3 +72,37 @@ def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share):
     for i in range(samples):
         if not np.any(np.all(np.abs(steps[:count, 9:13] - states[20 * i].ravel()) < 1e-9, axis=1)):
             assert np.all(squares[20 * i : 20 * i + 21].max(axis=0) <= best * (1 + 1e-12))
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("phase", [0.3, 1.0, 2.0, 3.0])
+def test_coefficients_of_a_step_are_never_exceeded(phase, share):
+    # catches a deviation from the cubic that is left out or too small, and slopes with the wrong sign or factor
+    damping, parts = 0.1, 50
+    random = np.random.default_rng(7)
+    states = random.normal(size=(4, blocks.TILE + 1))
+    ground = random.normal(size=(2, blocks.TILE + 1))
+    forms, slopes = np.empty((3, blocks.TILE + 1)), np.empty((3, blocks.TILE + 1))
+    inner, oscillator = np.empty((3, 3, blocks.TILE)), azimuths.Oscillator(0, phase, damping, share)
+    dense = np.empty((parts + 1, 4, blocks.TILE))
+    for part in range(parts + 1):
+        a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, max(part, 1e-3) / parts * phase)
+        stop = ground[:, :-1] + (ground[:, 1:] - ground[:, :-1]) * part / parts
+        for row in (0, 2):
+            u, z, start, end = states[row, :-1], states[row + 1, :-1], ground[row // 2, :-1], stop[row // 2]
+            dense[part, row] = a11 * u + a12 * z + b11 * start + b12 * end
+            dense[part, row + 1] = a21 * u + a22 * z + b21 * start + b22 * end
+    for i in range(blocks.TILE):  # each step on its own: its end belongs to no other
+        ends = np.stack([states[:, i], dense[-1, :, i]], axis=1)
+        pair = np.concatenate([ends, np.zeros((4, blocks.TILE - 1))], axis=1)
+        motion = np.concatenate([ground[:, i : i + 2], np.zeros((2, blocks.TILE - 1))], axis=1)
+        azimuths.fill_forms(pair, share, forms)
+        azimuth_steps._fill_slopes(pair, *motion, oscillator, slopes)
+        peak, jump = np.hypot(*np.abs(motion).max(axis=1)), np.hypot(*(motion[:, 1] - motion[:, 0]))
+        radius = between.radius_bound((ends**2).sum(axis=0).max(), peak, damping, phase)
+        azimuth_steps._fill_coefficients(forms, slopes, azimuth_steps._bounds(radius, peak, jump, oscillator)[1], inner)
+        for angle in np.linspace(0.0, np.pi, 7):
+            turned = np.array([1.0, np.cos(2 * angle), np.sin(2 * angle)])
+            bound = max((inner[:, :, 0] @ turned).max(), (forms[:, :2].T @ turned).max())
+            u, z = (np.cos(angle) * dense[:, row, i] + np.sin(angle) * dense[:, row + 2, i] for row in (0, 1))
+            assert (u**2 + share * z**2).max() <= bound * (1 + 1e-12)
