@@ -177,11 +177,11 @@ def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
     jobs : sequence of Job
         What to do.
     workers : int
-        Number of processes; a single job is done in this one.
+        Number of processes; one, or a single job, needs none but this.
     """
     unfinished = {job.station: job for job in jobs}
-    if len(jobs) == 1:
-        yield _earlier(jobs[0]) or _caught(jobs[0], partial(do_station, jobs[0]))
+    if min(workers, len(jobs)) <= 1:
+        yield from (_earlier(job) or _caught(job, partial(do_station, job)) for job in jobs)
         return
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         for some in (jobs[:1], jobs[1:]):

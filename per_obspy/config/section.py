@@ -43,7 +43,7 @@ RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to
 class Section(BaseModel):
     """A frozen group of settings; an unknown key is an error."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
 SectionType = TypeVar("SectionType", bound=Section)
