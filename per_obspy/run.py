@@ -106,7 +106,7 @@ def run(
     with _held(folder):
         fetched = fetched_records(settings.records, progress)
         inputs = _input_hashes(settings, fetched, configuration)
-        said = settings.model_dump(mode="json", context={"folder": configuration.parent})
+        said = json.loads(settings.model_dump_json(context={"folder": configuration.parent}))
         key = _hash({"version": version("per_obspy"), "configuration": {**said, "workers": 0}, "inputs": inputs})
         if earlier := _earlier(folder, key):
             return Result(folder, earlier, did_nothing=True)
