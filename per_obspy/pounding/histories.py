@@ -20,6 +20,8 @@ from per_obspy.pounding.rows import closed_record, free_samples, largest_ground_
 #: A bounce that lasts less than this share of a sampling interval ends in contact, and so does the 25th within one.
 SHORTEST_BOUNCE = 1e-3
 MOST_BOUNCES = 25
+#: Bytes of a line of the processor's cache.
+CACHE_LINE = 64
 
 
 class PoundingMaxima(NamedTuple):
@@ -192,7 +194,8 @@ def _maxima(
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
         own, parts = rows[filled], int(refinements[block[0]])
-        arrays = np.zeros(ROWS * LANES), np.zeros(LANES + 1, np.int64), own, np.zeros((0, LOG_COLUMNS))
+        lanes, flags = _aligned(ROWS * LANES), _aligned(LANES + 1).view(np.int64)
+        arrays = lanes, flags, own, np.zeros((0, LOG_COLUMNS))
         pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
         bilinear = bool(np.isfinite(table[block, :, 3]).any())
         if not run_block(components, dt, parts, *arrays, *pairs, bilinear):
@@ -207,6 +210,13 @@ def _maxima(
         impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
         impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
     )
+
+
+def _aligned(size: int) -> FloatArray:
+    """Return zeros that begin at a cache line: a step of vectors that straddle two lines takes a third longer."""
+    numbers = np.zeros(size + CACHE_LINE // 8)
+    first = -numbers.ctypes.data % CACHE_LINE // 8
+    return numbers[first : first + size]
 
 
 def _blocks(refinements: NDArray[np.int64]) -> list[NDArray[np.int64]]:
