@@ -1,4 +1,4 @@
-"""Compile what screening needs before it is needed: on one small pair of each kind, while stations are still at work."""
+"""Compile what screening needs before it is needed: on two small pairs, while stations are still at work."""
 
 import numpy as np
 import pandas as pd
