@@ -128,7 +128,7 @@ def _spectrum(
         ground = prepare_ground(*(_with_steps_cut(component, count) for component in components))
         oscillators = prepare_oscillators(dt / count, periods[some], dampings[some])
         work = partial(_block_squares, ground, share=share, fan=fan, exact=exact)
-        squares = over_blocks(lambda block, work=work: work(block).T, oscillators, ground)
+        squares = over_blocks(work, oscillators, ground)
         lengths[np.ix_(ascending, some)] = np.sqrt(squares[: given.size]) / oscillators.omegas**2 * ground.scale
     return lengths.T.reshape(*shape, given.size)
 
@@ -144,7 +144,8 @@ def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:
     if count == 1:
         return acceleration
     closed = np.append(acceleration, 0.0)
-    return np.interp(np.arange(count * acceleration.size + 1) / count, np.arange(closed.size), closed)
+    cut: FloatArray = np.interp(np.arange(count * acceleration.size + 1) / count, np.arange(closed.size), closed)
+    return cut
 
 
 def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -161,7 +162,7 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _block_squares(
     ground: Ground, block: Oscillators, *, share: float, fan: tuple[FloatArray, FloatArray], exact: bool
 ) -> FloatArray:
-    """Return the largest squares of one block, (lanes, azimuths), in units of the scaled acceleration / omega²."""
+    """Return the largest squares of one block, (azimuths, lanes), in units of the scaled acceleration / omega²."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
     kept = np.empty((blocks.TILES, 6, blocks.LANES))
     steps = np.empty((blocks.TILES * blocks.TILE, azimuth_steps.COLUMNS))
@@ -177,7 +178,7 @@ def _block_squares(
                 azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest[lane])
     if share == 0.0:
         kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
-    return largest
+    return largest.T
 
 
 def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:
