@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# the first example of a test may compile a kernel, which takes seconds
-settings.register_profile("compiling", deadline=None)
+# The first example of a test may compile a kernel, which takes seconds. In CI every run tries the same examples, so
+# that a change is judged by itself; elsewhere each run tries new ones.
+settings.register_profile("compiling", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("compiling")
 
 CHECKOUT = Path(__file__).parents[1]

@@ -87,7 +87,8 @@ def _convert(
 
 
 def _multiply_calibration(trace: Trace) -> None:
-    if trace.stats.get("quantity") != "acceleration" or trace.stats.calib == 1.0:
+    vouched = trace.stats.get("quantity") == "acceleration" or "knet" in trace.stats  # ObsPy's K-NET reader: m/s2
+    if not vouched or trace.stats.calib == 1.0:
         raise RecordRejected(trace.id, "counts without a response or a calibration factor")
     trace.data = trace.data * trace.stats.calib
     noted(trace, f"multiplied by calib {trace.stats.calib:g} m/s2", conversion="calibration factor")

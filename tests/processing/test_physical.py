@@ -1,4 +1,5 @@
 import numpy as np
+import obspy
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from obspy import Stream, Trace
@@ -102,3 +103,11 @@ def test_inputs_stay_unchanged():
     before = stream.copy()
     in_acceleration(stream)
     assert stream == before
+
+
+def test_knet_records_that_obspy_read_are_converted_by_their_factor():
+    # mutation: the factor of a reader that says nothing else refused, or taken twice
+    record = obspy.read("/path/to/test.knet")  # comes with ObsPy
+    out = in_acceleration(record)
+    assert abs(out[0].data).max() == pytest.approx(abs(record[0].data).max() * record[0].stats.calib, rel=1e-12)
+    assert out[0].stats.units == "m/s2"
