@@ -58,6 +58,11 @@ class FdsnServer(ThreadingHTTPServer):
         """Return the number of requests to a service."""
         return sum(one.service == service and subject in (None, one.subject) for one in self.requests)
 
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Say nothing of clients that hung up, as the tests make them do; everything else is still an error."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
     def next_fault(self, request: Request) -> Fault | None:
         with self.lock:
             self.requests.append(request)
@@ -78,11 +83,6 @@ def serving(simulation: Simulation) -> Iterator[FdsnServer]:
         yield server
         server.shutdown()
         thread.join()
-
-    def handle_error(self, request: object, client_address: object) -> None:
-        """Say nothing of clients that hung up, as the tests make them do; everything else is still an error."""
-        if not isinstance(sys.exc_info()[1], ConnectionError):
-            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):
