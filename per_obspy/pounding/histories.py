@@ -15,13 +15,12 @@ from per_obspy.kernels.pounding_block import run_block
 from per_obspy.kernels.pounding_contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes import LANES, ROWS
 from per_obspy.pounding.history import SPEED_SHARE
+from per_obspy.pounding.pair_blocks import aligned, pair_blocks, pair_table
 from per_obspy.pounding.rows import closed_record, free_samples, largest_ground_velocity, refinement, row_at_rest
 
 #: A bounce that lasts less than this share of a sampling interval ends in contact, and so does the 25th within one.
 SHORTEST_BOUNCE = 1e-3
 MOST_BOUNCES = 25
-#: Bytes of a line of the processor's cache.
-CACHE_LINE = 64
 
 
 class PoundingMaxima(NamedTuple):
@@ -158,28 +157,11 @@ def _components(acceleration: ArrayLike, has_azimuth: bool) -> FloatArray:
     return np.stack([single, np.zeros_like(single)])
 
 
-def _structures(fields: dict[str, FloatArray]) -> FloatArray:
-    """Return the kernels' table of structures, (n_pairs, 2, 6)."""
-    table = np.empty((fields["gap"].size, 2, 6))
-    for i, name in enumerate(("1", "2")):
-        frequency = 2.0 * np.pi / fields[f"period_{name}"]
-        table[:, i, 0] = fields[f"damping_{name}"] * frequency
-        table[:, i, 1] = frequency**2
-        table[:, i, 2] = fields[f"hardening_{name}"]
-        table[:, i, 3] = fields[f"yield_displacement_{name}"]
-        table[:, i, 4] = fields[f"participation_{name}"]
-        table[:, i, 5] = fields[f"mass_{name}"]
-    walls = np.flatnonzero(np.isinf(table[:, :, 5]).all(axis=1))
-    if walls.size:
-        raise ValueError(f"mass_1 and mass_2 must not both be infinite, got inf at index {walls[0]}")
-    return table
-
-
 def _maxima(
     components: FloatArray, dt: float, fields: dict[str, FloatArray], free_vibration: bool, shape: tuple[int, ...]
 ) -> PoundingMaxima:
     """Run the pairs in blocks of equal refinement, on all processors."""
-    table = _structures(fields)
+    table = pair_table(fields)
     frequencies = np.sqrt(table[:, :, 1].max(axis=1))
     refinements = np.array([refinement(frequency, dt) for frequency in frequencies], dtype=np.int64)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
@@ -194,7 +176,7 @@ def _maxima(
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
         own, parts = rows[filled], int(refinements[block[0]])
-        lanes, flags = _aligned(ROWS * LANES), _aligned(LANES + 1).view(np.int64)
+        lanes, flags = aligned(ROWS * LANES), aligned(LANES + 1).view(np.int64)
         arrays = lanes, flags, own, np.zeros((0, LOG_COLUMNS))
         pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
         bilinear = bool(np.isfinite(table[block, :, 3]).any())
@@ -203,26 +185,10 @@ def _maxima(
         rows[block] = own[: block.size]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, _blocks(refinements)))
+        list(pool.map(run, pair_blocks(refinements)))
     return PoundingMaxima(
         per=np.sqrt(rows[:, :, columns.WIDEST]).T.reshape(2, *shape),
         displacement_maxima=rows[:, :, columns.HIGHEST].T.reshape(2, *shape),
         impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
         impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
     )
-
-
-def _aligned(size: int) -> FloatArray:
-    """Return zeros that begin at a cache line: a step of vectors that straddle two lines takes a third longer."""
-    numbers = np.zeros(size + CACHE_LINE // 8)
-    first = -numbers.ctypes.data % CACHE_LINE // 8
-    return numbers[first : first + size]
-
-
-def _blocks(refinements: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the pairs of each block: at most 32, of equal refinement."""
-    blocks = []
-    for parts in np.unique(refinements):
-        same = np.flatnonzero(refinements == parts)
-        blocks += [same[start : start + LANES] for start in range(0, same.size, LANES)]
-    return blocks
