@@ -5,7 +5,7 @@ A row with a fault becomes a :class:`~per_obspy.errors.Rejection`; the others go
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Self
 
 import numpy as np
@@ -14,10 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.schema import COLUMNS, ONE_OF, Column
-
-#: What people write into an empty cell.
-EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
+from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
 #: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or storeys.
 STOREY_HEIGHTS = (2.0, 12.0)
@@ -45,7 +42,12 @@ class Rejections(tuple[Rejection, ...]):
         return self
 
 
-def checked_pairs(table: pd.DataFrame, source: str, lines: NDArray[np.int64] | None = None) -> pd.DataFrame:
+def checked_pairs(
+    table: pd.DataFrame,
+    source: str,
+    lines: NDArray[np.int64] | None = None,
+    repeated: NDArray[np.bool_] | None = None,
+) -> pd.DataFrame:
     """
     Return the good rows of a pair table in the types and order of the schema.
 
@@ -57,6 +59,8 @@ def checked_pairs(table: pd.DataFrame, source: str, lines: NDArray[np.int64] | N
         The file, for messages.
     lines : (n_rows,) ndarray of int, optional
         Line of each row in its file; if not given, rows follow a header in line 1.
+    repeated : (n_rows,) ndarray of bool, optional
+        Whether the row's ``pair_id`` stands in an earlier row of the inventory; if not given, the table is all of it.
 
     Returns
     -------
@@ -68,10 +72,13 @@ def checked_pairs(table: pd.DataFrame, source: str, lines: NDArray[np.int64] | N
     CatalogError
         If a required column is missing, a column stands twice, or there is no row.
     """
-    _check_columns(table, source)
+    check_columns([str(name) for name in table.columns], source)
+    if table.empty and lines is None:
+        raise CatalogError(source, "the table has no rows")
     if lines is None:
         lines = np.arange(2, len(table) + 2)
     pairs, faults = _converted(table)
+    faults += _duplicates(pairs["pair_id"], pairs["pair_id"].duplicated() if repeated is None else repeated)
     faults += [fault for check in _CHECKS for fault in check(pairs)]
     rejected = _rejections(pairs["pair_id"], faults, source, lines)
     bad = np.zeros(len(pairs), dtype=bool)
@@ -81,18 +88,23 @@ def checked_pairs(table: pd.DataFrame, source: str, lines: NDArray[np.int64] | N
     return accepted
 
 
-def _check_columns(table: pd.DataFrame, source: str) -> None:
-    names = list(table.columns)
-    twice = sorted({str(name) for name in names if names.count(name) > 1})
+def check_columns(names: Sequence[str], source: str) -> None:
+    """
+    Check that a table has the columns it needs, each once.
+
+    Raises
+    ------
+    CatalogError
+        If a required column is missing or a column stands twice.
+    """
+    twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise CatalogError(source, f"column {twice[0]} stands more than once")
     missing = [column.name for column in COLUMNS.values() if column.required and column.name not in names]
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
-        found = ", ".join(map(str, names))
+        found = ", ".join(names)
         raise CatalogError(source, f"missing column {', '.join(missing)} (columns found: {found:.200})")
-    if table.empty:
-        raise CatalogError(source, "the table has no rows")
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -161,9 +173,8 @@ def _column(pairs: pd.DataFrame, name: str) -> FloatArray:
     return pairs[name].to_numpy() if name in pairs.columns else np.full(len(pairs), np.nan)
 
 
-def _duplicates(pairs: pd.DataFrame) -> Iterator[Fault]:
-    identifiers = pairs["pair_id"]
-    for i in _rows(identifiers.duplicated() & (identifiers != "")):
+def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
+    for i in _rows(np.asarray(repeated) & (identifiers != "").to_numpy()):
         yield i, f"pair_id = {identifiers.iloc[i]!r} stands in an earlier row already"
 
 
@@ -232,7 +243,7 @@ def _observations(pairs: pd.DataFrame) -> Iterator[Fault]:
         yield i, f"observed = {observed[i]:g} is neither 0 nor 1"
 
 
-_CHECKS = (_duplicates, _sizes, _storey_heights, _contact_heights, _positions, _same_building, _observations)
+_CHECKS = (_sizes, _storey_heights, _contact_heights, _positions, _same_building, _observations)
 
 
 def _rejections(names: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]) -> tuple[Rejection, ...]:

@@ -1,22 +1,37 @@
-"""Read a table of building pairs, CSV or Parquet, into accepted rows and reasons for the others."""
+"""Read tables of building pairs, CSV or Parquet, into accepted rows and reasons for the others: whole or in chunks."""
 
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.csv
-import pyarrow.parquet
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.checking import Rejections, checked_pairs
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
+from per_obspy.inventory.raw_rows import IDENTIFIER, PairFile, RawRows, name_hashes, pair_file, repeated_hashes
 
-#: A table as read, the line of each of its rows, and lines that are no rows with their reasons.
-RawTable = tuple[pd.DataFrame, NDArray[np.int64], tuple[Rejection, ...]]
+#: As many rows as any table has.
+ALL = 1 << 40
+
+
+class PairChunk(NamedTuple):
+    """
+    Consecutive rows of an inventory, not checked yet.
+
+    Attributes
+    ----------
+    rows : RawRows
+        As they stand in their file.
+    repeated : (n_rows,) ndarray of bool
+        Whether the row's ``pair_id`` stands in an earlier row of the inventory.
+    """
+
+    rows: RawRows
+    repeated: NDArray[np.bool_]
 
 
 def read_pairs(path: str | Path) -> pd.DataFrame:
@@ -41,85 +56,74 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     CatalogError
         If the file cannot be read, is of an unknown kind, is not UTF-8, is empty or lacks a required column.
     """
-    file = Path(path)
-    if file.suffix.lower() not in _READERS:
-        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected {' or '.join(_READERS)}")
-    if not file.is_file():
-        raise CatalogError(str(file), "no such file")
-    table, lines, broken = _READERS[file.suffix.lower()](file)
-    pairs = checked_pairs(table, str(file), lines)
-    rejected = (*pairs.attrs["rejected"], *broken)
+    file = pair_file(Path(path))
+    check_columns(file.names, str(path))
+    blocks = list(file.rows(ALL))
+    if not sum(len(block.table) for block in blocks):
+        raise CatalogError(str(path), "the table has no rows")
+    rows = RawRows(
+        str(path),
+        pa.concat_tables([block.table for block in blocks]),
+        np.concatenate([block.lines for block in blocks]),
+        tuple(one for block in blocks for one in block.broken),
+    )
+    return _checked(rows, None)
+
+
+def pair_chunks(paths: Sequence[Path], size: int) -> Iterator[PairChunk]:
+    """
+    Give the rows of an inventory in chunks, its files one after the other.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        CSV or Parquet. No chunk holds rows of two files.
+    size : int
+        Largest number of rows in a chunk. Apart from it, memory holds 8 bytes a row, to know which names are repeated.
+
+    Raises
+    ------
+    CatalogError
+        As :func:`read_pairs`, before the first chunk.
+    """
+    files = [pair_file(path) for path in paths]
+    for path, file in zip(paths, files, strict=True):
+        check_columns(file.names, str(path))
+    hashes, seen = repeated_hashes(files), set[str]()
+    for path, file in zip(paths, files, strict=True):
+        yield from _chunks_of(path, file, size, hashes, seen)
+
+
+def _chunks_of(
+    path: Path, file: PairFile, size: int, hashes: NDArray[np.uint64], seen: set[str]
+) -> Iterator[PairChunk]:
+    empty = True
+    for rows in file.rows(size):
+        empty &= not (len(rows.table) or rows.broken)
+        yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], hashes, seen))
+    if empty:
+        raise CatalogError(str(path), "the table has no rows")
+
+
+def _repeated(identifiers: pa.ChunkedArray, hashes: NDArray[np.uint64], seen: set[str]) -> NDArray[np.bool_]:
+    """Return which names were seen before; only names whose hash is repeated are remembered."""
+    text = pc.utf8_trim_whitespace(pc.fill_null(identifiers.cast(pa.string()), "")).combine_chunks()
+    repeated = np.isin(name_hashes(text), hashes)
+    for row in np.flatnonzero(repeated).tolist():
+        name = text[row].as_py()
+        repeated[row] = name in seen
+        seen.add(name)
+    return repeated
+
+
+def checked_chunk(chunk: PairChunk) -> pd.DataFrame:
+    """Return the accepted rows of a chunk, as :func:`read_pairs` gives those of a table."""
+    return _checked(chunk.rows, chunk.repeated)
+
+
+def _checked(rows: RawRows, repeated: NDArray[np.bool_] | None) -> pd.DataFrame:
+    table: pd.DataFrame = rows.table.to_pandas()
+    pairs = checked_pairs(table, rows.source, rows.lines, repeated)
+    rejected: tuple[Rejection, ...] = (*pairs.attrs["rejected"], *rows.broken)
     pairs.attrs["rejected"] = Rejections(sorted(rejected, key=lambda rejection: rejection.row or 0))
     return pairs
-
-
-def _read_csv(file: Path) -> RawTable:
-    broken: list[Rejection] = []
-
-    def skip(row: pa.csv.InvalidRow) -> str:
-        reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
-        broken.append(Rejection("pair", row.text.split(",")[0], str(file), row.number, (reason,)))
-        return "skip"
-
-    read = _arrow_csv(file, skip)
-    data = {name.strip(): _numbers_if_all(read[name]) if _is_number(name) else read[name] for name in read.column_names}
-    table = pa.table(data).to_pandas()
-    lines = np.setdiff1d(np.arange(2, len(table) + len(broken) + 2), [rejection.row for rejection in broken])
-    blank = np.asarray((table.isna() | (table == "")).all(axis=1))
-    return table[~blank], lines[~blank], tuple(broken)
-
-
-def _arrow_csv(file: Path, skip: Callable[[pa.csv.InvalidRow], str]) -> pa.Table:
-    """Return a table whose known columns are text, so that each bad value can be named."""
-    try:
-        table = pa.csv.read_csv(
-            file,
-            read_options=pa.csv.ReadOptions(use_threads=False),  # with threads, rows have no numbers
-            parse_options=pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=skip),
-            convert_options=pa.csv.ConvertOptions(column_types=dict.fromkeys(COLUMNS, pa.string())),
-        )
-        names = [name.strip() for name in table.column_names]
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), _undecodable(file) or f"not a CSV table: {error}") from error
-    if any(pa.types.is_binary(column.type) for column in table.columns):
-        raise CatalogError(str(file), _undecodable(file) or "a column holds binary data")
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise CatalogError(str(file), f"column {twice} stands more than once")
-    return table
-
-
-def _undecodable(file: Path) -> str | None:
-    """Return where the file is not UTF-8, or None."""
-    with file.open("rb") as text:
-        for number, line in enumerate(text, start=1):
-            try:
-                line.decode("utf-8")
-            except UnicodeDecodeError as error:
-                return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} at position {error.start + 1})"
-    return None
-
-
-def _is_number(name: str) -> bool:
-    column = COLUMNS.get(name.strip())
-    return column is not None and column.dtype == "float64"
-
-
-def _numbers_if_all(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Return text as numbers if every cell is one or is empty; otherwise the text, whose faults are named later."""
-    text = pc.utf8_trim_whitespace(pc.cast(column, pa.string()))
-    try:
-        return pc.cast(pc.if_else(pc.equal(text, ""), None, text), pa.float64())
-    except pa.ArrowInvalid:
-        return text
-
-
-def _read_parquet(file: Path) -> RawTable:
-    try:
-        table = pa.parquet.read_table(file).to_pandas()
-    except pa.ArrowInvalid as error:
-        raise CatalogError(str(file), f"not a Parquet table: {error}") from error
-    return table, np.arange(2, len(table) + 2), ()
-
-
-_READERS = {".csv": _read_csv, ".parquet": _read_parquet}

@@ -11,6 +11,9 @@ from typing import NamedTuple
 #: Structural systems for which period formulas exist; masonry and anything unknown is ``other``.
 SYSTEMS = ("steel_mrf", "concrete_mrf", "ebf_brbf", "other")
 
+#: What people write into an empty cell.
+EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
+
 #: Where in its row of houses the pair stands: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 

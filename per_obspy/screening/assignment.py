@@ -1,13 +1,81 @@
 """Which station's record a pair of buildings is given: the nearest one."""
 
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from per_obspy.checks import FloatArray
+from per_obspy.errors import Rejection
+from per_obspy.screening.values import number, values
 
 #: Mean radius of the earth (IUGG), m. On the sphere distances are within 0.6 % of the ellipsoid's.
 EARTH_RADIUS = 6_371_008.8
+
+
+class Stations(NamedTuple):
+    """
+    Stations that can serve pairs.
+
+    Attributes
+    ----------
+    names : (n_stations,) ndarray of str
+        ``NETWORK.STATION``.
+    longitude, latitude : (n_stations,) ndarray
+        Degrees east and north.
+    read : callable
+        Return the Dataset of a station, given its index.
+    """
+
+    names: NDArray[np.object_]
+    longitude: FloatArray
+    latitude: FloatArray
+    read: Callable[[int], xr.Dataset]
+
+
+def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejection, ...]]:
+    """Return the stations that have coordinates, and those that have none."""
+    located = [one for one in datasets if np.isfinite(one["latitude"].item())]
+    nowhere = tuple(
+        Rejection("station", one["station"].item(), "", None, ("its coordinates are unknown: it serves no pair",))
+        for one in datasets
+        if not np.isfinite(one["latitude"].item())
+    )
+    names = np.array([one["station"].item() for one in located], dtype=object)
+    longitude, latitude = ([number(one, name) for one in located] for name in ("longitude", "latitude"))
+    return Stations(names, np.array(longitude), np.array(latitude), located.__getitem__), nowhere
+
+
+def assigned(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """
+    Return the pairs with the nearest station, its index and its distance, and those that have none in reach.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        With ``pair_id, longitude, latitude``.
+    stations : Stations
+        Which there are.
+    reach : float
+        Largest distance, m.
+    """
+    if not stations.names.size:
+        lost = (Rejection("pair", name, "", None, ("no station has coordinates",)) for name in pairs["pair_id"])
+        return pairs.iloc[:0].assign(station="", station_index=0, distance=0.0), tuple(lost)
+    index, distance = nearest_station(
+        values(pairs, "longitude"), values(pairs, "latitude"), stations.longitude, stations.latitude
+    )
+    placed = pairs.assign(station=stations.names[index], station_index=index, distance=distance)
+    far = placed[distance > reach]
+    rejected = tuple(
+        Rejection("pair", name, "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
+        for name, station, metres in far[["pair_id", "station", "distance"]].itertuples(index=False)
+    )
+    return placed[distance <= reach], rejected
 
 
 def nearest_station(
@@ -35,12 +103,12 @@ def nearest_station(
     >>> nearest_station(np.array([0.1]), np.array([0.0]), np.array([180.0, 0.0]), np.array([0.0, 0.0]))[1].round()
     array([11120.])
     """
-    tree = cKDTree(_on_sphere(station_longitude, station_latitude))
-    chord, station = tree.query(_on_sphere(longitude, latitude))
+    tree = cKDTree(on_sphere(station_longitude, station_latitude))
+    chord, station = tree.query(on_sphere(longitude, latitude))
     return np.asarray(station, dtype=np.intp), 2.0 * EARTH_RADIUS * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
 
 
-def _on_sphere(longitude: FloatArray, latitude: FloatArray) -> FloatArray:
+def on_sphere(longitude: FloatArray, latitude: FloatArray) -> FloatArray:
     """Return points on the unit sphere, (n, 3)."""
     east, north = np.radians(longitude), np.radians(latitude)
     return np.stack([np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=-1)

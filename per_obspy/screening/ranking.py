@@ -9,6 +9,9 @@ from per_obspy.checks import FloatArray
 #: Rank of a state, worst first.
 STATES = {"yes": 0, "possible": 1, "no": 2}
 
+#: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
+KEYS = ("order_state", "order_probability", "order_velocity", "order_ratio", "order_importance", "order_occupants")
+
 
 def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
     """
@@ -25,32 +28,36 @@ def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.objec
     return chosen
 
 
-def worst_first(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
+def order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray]:
     """
-    Return the rows with the worst pair first and a column ``rank`` from 1.
+    Return the columns ``KEYS`` by which the worst pair comes first.
 
     Parameters
     ----------
     table : DataFrame
-        Pairs with ``state``, ``demand_ratio``, ``pair_id``, and ``probability`` where it is known.
+        Pairs with ``state``, ``demand_ratio``, and ``probability`` where it is known.
     velocity : (n_pairs,) array_like
         Impact velocity that counts, m/s; NaN counts as 0.
 
     Notes
     -----
     The order is by state, probability, impact velocity and ratio gap / demand; ties are broken by importance,
-    occupants and name, so that it does not depend on the order in which pairs were computed.
+    occupants and at last the name, so that it does not depend on the order in which pairs were computed.
     """
-    worst = np.stack(
-        [
-            np.asarray(table["state"].map(STATES), dtype=np.float64),
-            -_largest(table, "probability"),
-            -np.nan_to_num(np.asarray(velocity, dtype=np.float64)),
-            np.nan_to_num(table["demand_ratio"].to_numpy(np.float64), nan=np.inf),
-            -_largest(table, "importance_1", "importance_2"),
-            -_largest(table, "occupants_1", "occupants_2"),
-        ]
+    keys = (
+        np.asarray(table["state"].map(STATES), dtype=np.float64),
+        -_largest(table, "probability"),
+        -np.nan_to_num(np.asarray(velocity, dtype=np.float64)),
+        np.nan_to_num(table["demand_ratio"].to_numpy(np.float64), nan=np.inf),
+        -_largest(table, "importance_1", "importance_2"),
+        -_largest(table, "occupants_1", "occupants_2"),
     )
+    return dict(zip(KEYS, keys, strict=True))
+
+
+def worst_first(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
+    """Return the rows in the order of :func:`order_keys`, with a column ``rank`` from 1."""
+    worst = np.stack(list(order_keys(table, velocity).values()))
     order = np.lexsort(worst[::-1])
     order = _ties_by_name(order, worst[:, order], table["pair_id"].to_numpy(object))
     return table.iloc[order].reset_index(drop=True).assign(rank=np.arange(1, len(table) + 1))

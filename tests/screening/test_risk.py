@@ -160,7 +160,7 @@ def test_a_row_does_not_depend_on_the_others(station, monkeypatch):
     # would catch: lanes or blocks that leak into each other
     rows = [{"period_1": 0.5 + 0.1 * i, "gap": 0.01 * i, "azimuth": np.nan if i % 3 else 40.0} for i in range(9)]
     together = _table(station, *rows).sort_index()
-    monkeypatch.setattr("per_obspy.screening.risk.BLOCK", 2)
+    monkeypatch.setattr("per_obspy.screening.rows.BLOCK", 2)
     pd.testing.assert_frame_equal(_table(station, *rows).sort_index(), together, check_exact=True)
 
 

@@ -1,0 +1,263 @@
+"""
+Files of pairs as blocks of raw rows, so that no inventory needs to fit in memory.
+
+A file is gone through twice: once for what must be known of it as a whole (its columns, and which names of pairs may
+stand twice), then block by block.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.schema import COLUMNS, EMPTY
+
+IDENTIFIER = "pair_id"
+
+
+class RawRows(NamedTuple):
+    """
+    Consecutive rows of a file as they stand there.
+
+    Attributes
+    ----------
+    source : str
+        The file.
+    table : Table
+        Numbers that could not all be read are still text.
+    lines : (n_rows,) ndarray of int
+        Line of each row in its file; the header is line 1.
+    broken : tuple of Rejection
+        Lines between them that are no rows.
+    """
+
+    source: str
+    table: pa.Table
+    lines: NDArray[np.int64]
+    broken: tuple[Rejection, ...]
+
+
+class PairFile(Protocol):
+    """A file of pairs of some kind: its columns, the names of its pairs, its rows."""
+
+    names: Sequence[str]
+
+    def identifiers(self) -> Iterator[pa.Array]:
+        """Give the names of the pairs, block by block."""
+
+    def rows(self, size: int) -> Iterator[RawRows]:
+        """Give the rows, so many at a time."""
+
+
+class ParquetFile:
+    """Pairs in a Parquet file."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        with self._readable():
+            self.names: Sequence[str] = pa.parquet.read_schema(file).names
+
+    def identifiers(self) -> Iterator[pa.Array]:
+        """Give the names of the pairs, block by block."""
+        with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
+            for batch in stored.iter_batches(columns=[IDENTIFIER]):
+                yield batch.column(0).cast(pa.string())
+
+    def rows(self, size: int) -> Iterator[RawRows]:
+        """Give the rows, so many at a time."""
+        line = 2
+        with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
+            for batch in stored.iter_batches(batch_size=size):
+                lines = np.arange(line, line + batch.num_rows)
+                yield RawRows(str(self.file), pa.Table.from_batches([batch]), lines, ())
+                line += batch.num_rows
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            yield
+        except (pa.ArrowInvalid, OSError) as error:
+            raise CatalogError(str(self.file), f"not a Parquet table: {error}") from error
+
+
+class CsvFile:
+    """Pairs in a CSV file: every cell is read as text, so that each bad value can be named."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        with self._readable():
+            self._raw_names = list(pa.csv.open_csv(file, _ORDERED, _skipping(lambda _: "skip")).schema.names)
+        self.names: Sequence[str] = [name.strip() for name in self._raw_names]
+        if len(set(self.names)) < len(self.names):
+            twice = next(name for name in self.names if self.names.count(name) > 1)
+            raise CatalogError(str(file), f"column {twice} stands more than once")
+        self._kinds = self._kinds_of_carried()
+
+    def identifiers(self) -> Iterator[pa.Array]:
+        """Give the names of the pairs, block by block."""
+        for batch in self._batches([], IDENTIFIER):
+            yield batch.column(0)
+
+    def rows(self, size: int) -> Iterator[RawRows]:
+        """Give the rows, so many at a time; lines without any content are left out."""
+        broken: list[Rejection] = []
+        line = 2
+        for table in _regrouped(self._batches(broken, *self.names), size):
+            lines = _lines(line, len(table), broken)
+            line = int(lines[-1]) + 1
+            full = _has_content(table)
+            cells = pa.table({name: self._as_kind(name, table[name]) for name in self.names})
+            yield RawRows(str(self.file), cells.filter(pa.array(full)), lines[full], _taken(broken, line))
+        if broken:
+            nothing = pa.table({name: pa.array([], pa.string()) for name in self.names})
+            yield RawRows(str(self.file), nothing, np.zeros(0, np.int64), tuple(broken))
+
+    def _as_kind(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
+        """Return cells as numbers where all are; otherwise the text, whose faults are named later."""
+        if name in COLUMNS:
+            return cells if COLUMNS[name].dtype == "str" else _as_numbers(cells, pa.float64()) or cells
+        return cells if self._kinds[name] is None else _as_numbers(cells, self._kinds[name])
+
+    def _kinds_of_carried(self) -> dict[str, pa.DataType | None]:
+        """Return what kind of number each column is that the schema does not know; None for text."""
+        kinds: dict[str, list[pa.DataType]] = {n: [pa.int64(), pa.float64()] for n in self.names if n not in COLUMNS}
+        for batch in self._batches([], *kinds) if kinds else ():
+            for name, cells in zip(kinds, batch.columns, strict=True):
+                kinds[name] = [kind for kind in kinds[name] if _as_numbers(cells, kind) is not None]
+        return {name: possible[0] if possible else None for name, possible in kinds.items()}
+
+    def _batches(self, broken: list[Rejection], *names: str) -> Iterator[pa.RecordBatch]:
+        """Give some columns as text, and add lines that are no rows to a list as they are met."""
+
+        def skip(row: pa.csv.InvalidRow) -> str:
+            reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
+            broken.append(Rejection("pair", row.text.split(",")[0], str(self.file), row.number, (reason,)))
+            return "skip"
+
+        raw = [self._raw_names[self.names.index(name)] for name in names]
+        with self._readable():
+            reader = pa.csv.open_csv(
+                self.file,
+                read_options=_ORDERED,
+                parse_options=_skipping(skip),
+                convert_options=pa.csv.ConvertOptions(
+                    column_types=dict.fromkeys(raw, pa.string()), include_columns=raw
+                ),
+            )
+            for batch in reader:
+                yield batch.rename_columns(list(names))
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            yield
+        except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+            raise CatalogError(str(self.file), _undecodable(self.file) or f"not a CSV table: {error}") from error
+
+
+#: With threads, rows have no numbers.
+_ORDERED = pa.csv.ReadOptions(use_threads=False)
+
+_KINDS: dict[str, type[CsvFile] | type[ParquetFile]] = {".csv": CsvFile, ".parquet": ParquetFile}
+
+
+def pair_file(path: Path) -> PairFile:
+    """
+    Open a file of pairs.
+
+    Raises
+    ------
+    CatalogError
+        If it does not exist, is of an unknown kind, or cannot be read.
+    """
+    if path.suffix.lower() not in _KINDS:
+        raise CatalogError(str(path), f"unknown suffix {path.suffix!r}, expected {' or '.join(_KINDS)}")
+    if not path.is_file():
+        raise CatalogError(str(path), "no such file")
+    return _KINDS[path.suffix.lower()](path)
+
+
+def _skipping(handler: Callable[[pa.csv.InvalidRow], str]) -> pa.csv.ParseOptions:
+    return pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=handler)
+
+
+def _regrouped(batches: Iterable[pa.RecordBatch], size: int) -> Iterator[pa.Table]:
+    """Give the same rows, so many at a time."""
+    waiting: list[pa.RecordBatch] = []
+    for batch in batches:
+        waiting.append(batch)
+        while sum(map(len, waiting)) >= size:
+            table = pa.Table.from_batches(waiting)
+            waiting = table.slice(size).to_batches()
+            yield table.slice(0, size)
+    if sum(map(len, waiting)):
+        yield pa.Table.from_batches(waiting)
+
+
+def _lines(first: int, count: int, broken: list[Rejection]) -> NDArray[np.int64]:
+    """Return the lines of so many rows, leaving out those that are no rows."""
+    gone = [one.row for one in broken if one.row is not None]
+    lines: NDArray[np.int64] = np.setdiff1d(np.arange(first, first + count + len(gone)), gone)[:count]
+    return lines
+
+
+def _taken(broken: list[Rejection], line: int) -> tuple[Rejection, ...]:
+    """Return the broken lines before a line, and take them off the list."""
+    before = tuple(one for one in broken if one.row is not None and one.row < line)
+    del broken[: len(before)]
+    return before
+
+
+def _has_content(table: pa.Table) -> NDArray[np.bool_]:
+    full = np.zeros(len(table), dtype=bool)
+    for column in table.columns:
+        full |= np.asarray(pc.not_equal(column, ""))
+    return full
+
+
+def _as_numbers(cells: pa.ChunkedArray | pa.Array, kind: pa.DataType) -> pa.ChunkedArray | None:
+    """Return text as numbers if every cell is one or is empty."""
+    text = pc.utf8_trim_whitespace(cells)
+    empty = pc.is_in(pc.utf8_lower(text), value_set=_NOTHING)
+    try:
+        return pc.cast(pc.if_else(empty, None, text), kind)
+    except pa.ArrowInvalid:
+        return None
+
+
+_NOTHING = pa.array(sorted(EMPTY))
+
+
+def _undecodable(file: Path) -> str | None:
+    """Return where the file is not UTF-8, or None."""
+    with file.open("rb") as text:
+        for number, line in enumerate(text, start=1):
+            try:
+                line.decode("utf-8")
+            except UnicodeDecodeError as error:
+                return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} at position {error.start + 1})"
+    return None
+
+
+def repeated_hashes(files: Sequence[PairFile]) -> NDArray[np.uint64]:
+    """Return the hashes of names that may stand more than once in some files, sorted; 8 bytes a row are needed."""
+    hashes = [name_hashes(block) for file in files for block in file.identifiers()]
+    every, counts = np.unique(np.concatenate(hashes) if hashes else np.zeros(0, np.uint64), return_counts=True)
+    repeated: NDArray[np.uint64] = every[counts > 1]
+    return repeated
+
+
+def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
+    """Return a hash of each name, blanks around it not counted."""
+    text = pc.fill_null(pc.utf8_trim_whitespace(names), "").to_numpy(zero_copy_only=False)
+    hashes: NDArray[np.uint64] = pd.util.hash_array(np.asarray(text, dtype=object), categorize=False)
+    return hashes
