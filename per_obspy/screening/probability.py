@@ -10,7 +10,6 @@ used. An uncertain gap and the error of the estimate widen the comparison.
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
@@ -18,14 +17,12 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
+from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
 from per_obspy.screening.values import at_contact, values
 
 #: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
 #: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
 NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
-
-#: Dampings are compared on a logarithmic scale; below this one they count as it.
-SMALLEST_DAMPING = 1e-3
 
 
 def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
@@ -79,67 +76,25 @@ def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float)
 
 def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
     """Return the mean over quasi-random periods and dampings of both buildings."""
-    columns: list[FloatArray] = [_azimuth_row(station, table).astype(np.float64)]
+    columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
     for i, radius in enumerate(at_contact(table, "per"), start=1):
         columns += [
-            *_log_place(table, i),
+            *log_place(table, i),
             values(table, f"period_log_std_{i}"),
             values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)),
         ]
     columns += [_median_gap(table), np.hypot(model_dispersion, _gap_dispersion(table))]
     probability = np.empty(len(table))
-    resampled_probabilities(_log_spectra(station), np.stack(columns, axis=1), NODES, probability)
+    resampled_probabilities(tuple(log_spectra(station)), np.stack(columns, axis=1), NODES, probability)
     return probability
-
-
-def _log_spectra(station: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return ln period, ln damping, and ln PER by azimuth, damping and period; the only horizontal serves for all."""
-    stored = station["per_azimuthal"].to_numpy() if "per_azimuthal" in station else station["per"].to_numpy()[:1]
-    radii = np.log(np.maximum(stored.astype(np.float64), np.finfo(np.float32).tiny))
-    dampings = np.log(np.maximum(station["damping"].to_numpy(), SMALLEST_DAMPING))
-    return np.log(station["period"].to_numpy()), dampings, np.ascontiguousarray(radii)
-
-
-def _azimuth_row(station: xr.Dataset, table: pd.DataFrame) -> NDArray[np.intp]:
-    """Return the stored azimuth next to that of each pair."""
-    count = station.sizes.get("azimuth", 1)
-    azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
-    row: NDArray[np.intp] = np.rint(azimuth / (180.0 / count)).astype(np.intp) % count
-    return row
-
-
-def _log_place(table: pd.DataFrame, i: int) -> tuple[FloatArray, FloatArray]:
-    """Return ln period and ln damping of building i."""
-    damping = np.maximum(values(table, f"damping_{i}"), SMALLEST_DAMPING)
-    return np.log(values(table, f"period_{i}")), np.log(damping)
-
-
-def stored_log_per(station: xr.Dataset, row: NDArray[np.intp], period: FloatArray, damping: FloatArray) -> FloatArray:
-    """Return ln PER off the stored grid at (ln period, ln damping), linear between; beyond the grid its edge."""
-    periods, dampings, radii = _log_spectra(station)
-    column, part = _between(periods, period)
-    plane, share = _between(dampings, damping)
-    above, right = np.minimum(plane + 1, dampings.size - 1), np.minimum(column + 1, periods.size - 1)
-    lower = (1 - part) * radii[row, plane, column] + part * radii[row, plane, right]
-    upper = (1 - part) * radii[row, above, column] + part * radii[row, above, right]
-    stored: FloatArray = (1 - share) * lower + share * upper
-    return stored
-
-
-def _between(grid: FloatArray, values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the lower neighbour on the grid and the part of the way to the next, kept on the grid."""
-    if grid.size == 1:
-        return np.zeros(values.shape, dtype=np.intp), np.zeros(values.shape)
-    lower = np.clip(np.searchsorted(grid, values) - 1, 0, grid.size - 2)
-    return lower, np.clip((values - grid[lower]) / (grid[lower + 1] - grid[lower]), 0.0, 1.0)
 
 
 def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> FloatArray:
     """Return the log-standard deviation of the radius that an uncertain damping causes."""
-    period, damping = _log_place(table, i)
-    spread, row = values(table, f"damping_log_std_{i}"), _azimuth_row(station, table)
-    low, high = (stored_log_per(station, row, period, damping + way * spread) for way in (-1.0, 1.0))
+    spectra, (period, damping) = log_spectra(station), log_place(table, i)
+    spread, row = values(table, f"damping_log_std_{i}"), azimuth_row(station, table)
+    low, high = (stored_log(spectra, row, period, damping + way * spread) for way in (-1.0, 1.0))
     dispersion: FloatArray = np.abs(high - low) / 2.0
     return dispersion
 

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 import per_obspy
-from per_obspy.screening.probability import NODES, stored_log_per
+from per_obspy.screening.probability import NODES
+from per_obspy.screening.stored import log_spectra, stored_log
 
 from .conftest import make_pairs
 
@@ -21,7 +22,7 @@ def test_nodes_are_those_of_independent_standard_normal_variables():
 
 def test_stored_spectra_are_met_at_their_grid_points(station):
     periods = np.log(station["period"].to_numpy()[[3, 20, 59]])
-    stored = stored_log_per(station, np.full(3, 4), periods, np.full(3, np.log(0.05)))
+    stored = stored_log(log_spectra(station), np.full(3, 4), periods, np.full(3, np.log(0.05)))
     expected = np.log(station["per_azimuthal"].sel(azimuth=40.0, damping=0.05).to_numpy()[[3, 20, 59]])
     assert_allclose(stored, expected, rtol=1e-6)  # float32
 
@@ -62,8 +63,8 @@ def test_equal_derived_buildings_against_monte_carlo(station):
     for i in (1, 2):
         period = np.log(row[f"period_{i}"]) + random.normal(size=n) * row[f"period_log_std_{i}"]
         damping = np.log(0.05) + random.normal(size=n) * 0.3
-        median = stored_log_per(station, azimuth[:1], np.log([row[f"period_{i}"]]), np.log([0.05]))
-        change = stored_log_per(station, azimuth, period, damping) - median
+        median = stored_log(log_spectra(station), azimuth[:1], np.log([row[f"period_{i}"]]), np.log([0.05]))
+        change = stored_log(log_spectra(station), azimuth, period, damping) - median
         radii.append(row[f"participation_{i}"] * row[f"per_{i}"] * np.exp(change))
         periods.append(np.exp(period))
         dampings.append(np.exp(damping))
