@@ -4,7 +4,8 @@ Ground motion between stations: an attenuation trend, and how far the motion aro
 Within each site class and at each period, ln PER is a trend fitted by generalised least squares plus a residual whose
 spatial correlation is that of Jayaram & Baker (2009), published for spectral acceleration and used here for PER.
 Median and log-standard deviation are those of universal kriging: at a station its own value and no deviation, far from
-every station the trend, the whole deviation and what is unknown of the trend.
+every station the trend, the whole deviation and what is unknown of the trend. The trend knows every station; the
+residual of a place is told by its nearest ones. Numbers of a place depend on no other place.
 """
 
 from collections.abc import Iterator
@@ -17,13 +18,20 @@ from scipy.linalg import cho_factor, cho_solve
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
-from per_obspy.screening.spatial import great_circle, residual_correlation
+from per_obspy.kernels.kriging import kriged
+from per_obspy.screening.assignment import EARTH_RADIUS, on_sphere
+from per_obspy.screening.spatial import decay_length, great_circle, residual_correlation
 
 #: A slope of the trend (of ln distance, of ln Vs30) is fitted where so many stations differ by so much; our choice.
 STATIONS_PER_SLOPE, SPREAD = 6, 0.1
 
 #: Stations whose coordinates agree to so many decimals of a degree (1 m) are one place: their mean ln PER counts.
 DECIMALS = 5
+
+#: Stations that tell the residual of a place, the nearest ones: they screen the others. Of 300 stations within 60 km
+#: whose motion has the assumed correlation, the nearest 20 give deviations within 0.7 % of those of all of them, and
+#: medians within 0.1 deviations at 99 places of 100.
+NEIGHBOURS = 20
 
 
 class Sites(NamedTuple):
@@ -59,15 +67,41 @@ class Sites(NamedTuple):
         )
 
 
-class InterpolatedMotion(NamedTuple):
+class _Group(NamedTuple):
+    """Stations that serve places together, and their trend: what the kernel takes (see ``kernels/kriging.py``)."""
+
+    stations: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+    trend: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+class Field(NamedTuple):
     """
-    Motion at places without a station.
+    Everything that the motion at any place is told from; small, and the same for every worker.
 
     Attributes
     ----------
-    ln_median : (n_places, n_periods) ndarray
+    periods : (n_periods,) ndarray
+        Grid, s, rising.
+    groups : dict
+        Site class to the stations on it with their trend; under ``None`` all stations.
+    vs30_clustered : bool
+        The case of the correlation.
+    """
+
+    periods: FloatArray
+    groups: dict[str | None, _Group]
+    vs30_clustered: bool
+
+
+class InterpolatedMotion(NamedTuple):
+    """
+    Motion at places without a station, each at its own period.
+
+    Attributes
+    ----------
+    ln_median : (n_places,) ndarray
         Of PER in m; NaN at a period that no station supports.
-    log_std : (n_places, n_periods) ndarray
+    log_std : (n_places,) ndarray
         Log-standard deviation; NaN as well.
     fallback : (n_places,) ndarray of bool
         Whether no station stands on the place's site class, so that stations of other classes were used.
@@ -86,34 +120,34 @@ def sites(
     vs30: ArrayLike = np.nan,
 ) -> Sites:
     """Return places with what is known of them; one value may stand for all (see :class:`Sites`)."""
-    east = np.atleast_1d(checks.between("longitude", longitude, -180.0, 180.0))
-    north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0))
-    numbers = (np.broadcast_to(np.asarray(values, dtype=np.float64), east.shape) for values in (source_distance, vs30))
+    # contiguous: functions of NumPy may differ in the last bit between strides
+    east = np.ascontiguousarray(checks.between("longitude", longitude, -180.0, 180.0))
+    north = np.ascontiguousarray(checks.between("latitude", latitude, -90.0, 90.0))
+    numbers = (
+        np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=np.float64), east.shape))
+        for values in (source_distance, vs30)
+    )
     return Sites(east, north, np.broadcast_to(np.asarray(site_class, dtype=object), east.shape), *numbers)
 
 
-def interpolated_motion(
-    stations: Sites, ln_per: ArrayLike, periods: ArrayLike, places: Sites, settings: Interpolation
-) -> InterpolatedMotion:
+def fitted_field(
+    stations: Sites, ln_per: ArrayLike, usable: ArrayLike, periods: ArrayLike, settings: Interpolation
+) -> Field:
     """
-    Estimate the motion at places from the stations around them.
+    Fit the trend of each site class, and of all stations for places that no class of its own serves.
 
     Parameters
     ----------
     stations : Sites
         Where there are records.
     ln_per : (n_stations, n_periods) array_like
-        Natural logarithm of PER in m; NaN at periods that a record does not support.
+        Natural logarithm of PER in m.
+    usable : (n_stations, 2) array_like
+        Shortest and longest period that the record supports, s.
     periods : (n_periods,) array_like
-        s.
-    places : Sites
-        Where the motion is wanted.
+        s, rising; at least two.
     settings : Interpolation
         What is assumed of the deviation, and the case of the correlation.
-
-    Returns
-    -------
-    InterpolatedMotion
 
     Raises
     ------
@@ -122,131 +156,166 @@ def interpolated_motion(
 
     Notes
     -----
-    Stations of a place's own site class serve it; where there is none, or the class of the place is unknown while that
-    of a station is known, all stations do and ``fallback`` says so. The trend is a mean, with a slope in the logarithm
-    of the distance to the source and one in that of Vs30 where enough stations differ enough in it; a place whose
-    value is unknown is given the stations' mean. The deviation joins the stations' own with the assumed one
-    ``s0``, which counts as ``w`` stations: ``s² = (w s0² + e' C^-1 e) / (w + n - p)``.
+    The trend is a mean, with a slope in the logarithm of the distance to the source and one in that of Vs30 where
+    enough stations differ enough in it; a place whose value is unknown is given the stations' mean. The deviation
+    joins the stations' own with the assumed one ``s0``, which counts as ``w`` stations:
+    ``s² = (w s0² + e' C^-1 e) / (w + n - p)``.
 
     References
     ----------
     Cressie (1993), Statistics for Spatial Data, section 3.4 (universal kriging); Jayaram & Baker (2009).
     """
-    values = checks.numbers("ln_per", ln_per)
-    grid = np.atleast_1d(checks.positive("periods", periods))
+    values, grid = checks.finite("ln_per", ln_per), np.atleast_1d(checks.positive("periods", periods))
     if values.shape != (stations.longitude.size, grid.size) or not values.size:
         raise ValueError(f"ln_per must be ({stations.longitude.size}, {grid.size}) and not empty, got {values.shape}")
-    median, deviation = np.full((2, places.longitude.size, grid.size), np.nan)
-    fallback = np.zeros(places.longitude.size, dtype=bool)
-    for rows, serving, is_fallback in _served(stations, places):
-        fallback[rows] = is_fallback
-        near, mean = _one_a_place(stations.at(serving), values[serving])
-        field = _Field(near, places.at(rows), _distances(near, near), _distances(near, places.at(rows)))
-        for column in np.flatnonzero(np.isfinite(mean).any(axis=0)):
-            known = np.isfinite(mean[:, column])
-            one = _kriged(field.knowing(known), mean[known, column], float(grid[column]), settings)
-            median[rows, column], deviation[rows, column] = one
-    return InterpolatedMotion(median, deviation, fallback)
+    if grid.size < 2 or (np.diff(grid) <= 0).any():
+        raise ValueError(f"periods must be at least two and rising, got {grid}")
+    limits = checks.numbers("usable", usable)
+    names = np.unique(stations.site_class.astype(str)).tolist()
+    chosen = {name: np.flatnonzero(stations.site_class == name) for name in names if name or len(names) == 1}
+    groups: dict[str | None, _Group] = {
+        name: _group(stations.at(some), values[some], limits[some], grid, settings) for name, some in chosen.items()
+    }
+    groups[None] = groups[names[0]] if len(names) == 1 else _group(stations, values, limits, grid, settings)
+    return Field(grid, groups, settings.vs30_clustered)
 
 
-def at_period(motion: InterpolatedMotion, periods: ArrayLike, period: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def motion_at(field: Field, places: Sites, period: ArrayLike) -> InterpolatedMotion:
     """
-    Return the logarithm of the median (PER in m) and the log-standard deviation at each place's own period.
+    Estimate the motion at places from the stations around them.
 
     Parameters
     ----------
-    motion : InterpolatedMotion
-        At the places, on a grid of periods.
-    periods : (n_periods,) array_like
-        The grid, s, rising; at least two.
+    field : Field
+        From :func:`fitted_field`.
+    places : Sites
+        Where the motion is wanted.
     period : (n_places,) array_like
-        One for each place, s. Between the grid's periods both are linear in the logarithm of the period.
+        One for each place, s. Between the grid's periods ln PER is linear in the logarithm of the period.
 
-    Returns
-    -------
-    ln_median, log_std : (n_places,) ndarray
-        NaN outside the grid, and beside a period that no station supports.
+    Notes
+    -----
+    Stations of a place's own site class serve it. Where there is none that supports the period, or the class of the
+    place is unknown while that of a station is known, all stations do and ``fallback`` says so.
     """
-    grid, wanted = np.log(checks.positive("periods", periods)), np.log(checks.positive("period", period))
-    lower = np.clip(np.searchsorted(grid, wanted, side="right") - 1, 0, grid.size - 2)
-    share = (wanted - grid[lower]) / (grid[lower + 1] - grid[lower])
-    share = np.where((wanted < grid[0]) | (wanted > grid[-1]), np.nan, share)
-    row = np.arange(wanted.size)
-    median, deviation = (
-        (1.0 - share) * values[row, lower] + share * values[row, lower + 1]
-        for values in (motion.ln_median, motion.log_std)
+    # functions of NumPy may differ in the last bit between strides
+    wanted = np.ascontiguousarray(np.broadcast_to(checks.positive("period", period), places.longitude.shape))
+    out, fallback = np.full((wanted.size, 2), np.nan), np.zeros(wanted.size, dtype=bool)
+    for rows, group in _served(field, places):
+        out[rows] = _kriged(field, group, places.at(rows), wanted[rows])
+    inside = (wanted >= field.periods[0]) & (wanted <= field.periods[-1])
+    left = np.flatnonzero(np.isnan(out[:, 0]) & inside)
+    out[left] = _kriged(field, field.groups[None], places.at(left), wanted[left])
+    fallback[left] = ~np.isnan(out[left, 0])
+    return InterpolatedMotion(out[:, 0].copy(), out[:, 1].copy(), fallback)
+
+
+def _served(field: Field, places: Sites) -> Iterator[tuple[NDArray[np.intp], _Group]]:
+    """Give places with the stations on their site class."""
+    for name in np.unique(places.site_class.astype(str)).tolist():
+        if name in field.groups:
+            yield np.flatnonzero(places.site_class == name), field.groups[name]
+
+
+def _kriged(field: Field, group: _Group, places: Sites, period: FloatArray) -> FloatArray:
+    """Return median and deviation, (n_places, 2), NaN where no station of the group knows."""
+    out = np.full((period.size, 2), np.nan)
+    lower, share = on_grid(field.periods, period)
+    arrays = (
+        on_sphere(places.longitude, places.latitude),
+        _features(places),
+        period,
+        lower,
+        share,
+        decay_length(period, field.vs30_clustered),
     )
-    return median, deviation
+    kriged(*group, arrays, 2.0 * EARTH_RADIUS, NEIGHBOURS, out)
+    out[(period < field.periods[0]) | (period > field.periods[-1])] = np.nan
+    return out
 
 
-def _served(stations: Sites, places: Sites) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], bool]]:
-    """Give places with the stations that serve them, and whether these are of other site classes."""
-    nobody_knows = bool((stations.site_class == "").all())
-    for name in np.unique(places.site_class.astype(str)):
-        rows = np.flatnonzero(places.site_class == name)
-        same = np.flatnonzero(stations.site_class == name) if name or nobody_knows else np.array([], dtype=np.intp)
-        yield rows, (same if same.size else np.arange(stations.longitude.size)), not same.size
+def on_grid(periods: FloatArray, period: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return the lower neighbour on a grid of periods, and the part of the way to the next in ln period; kept on it."""
+    lower = np.clip(np.searchsorted(periods, period, side="right") - 1, 0, periods.size - 2)
+    grid = np.log(periods)
+    share = (np.log(period) - grid[lower]) / (grid[lower + 1] - grid[lower])
+    return lower.astype(np.int64), np.clip(share, 0.0, 1.0)
 
 
-def _one_a_place(stations: Sites, values: FloatArray) -> tuple[Sites, FloatArray]:
-    """Return one row for each place that has stations, with the mean of what they know."""
+def _features(places: Sites) -> FloatArray:
+    """Return what the trend depends on, NaN where it is not known."""
+    return np.log(np.stack([places.source_distance, places.vs30], axis=1))
+
+
+def _group(
+    stations: Sites, values: FloatArray, usable: FloatArray, periods: FloatArray, settings: Interpolation
+) -> _Group:
+    """Return stations with their trend at every period."""
+    near, mean, limits = _one_a_place(stations, values, usable)
+    between = great_circle(
+        near.longitude[:, None], near.latitude[:, None], near.longitude[None, :], near.latitude[None, :]
+    )
+    features = _features(near)
+    reach = np.concatenate([periods[:1], periods, periods[-1:]])
+    fits = [
+        _fitted(
+            between, features, mean[:, k], (limits[:, 0] <= reach[k + 2]) & (limits[:, 1] >= reach[k]), period, settings
+        )
+        for k, period in enumerate(periods.tolist())
+    ]
+    coefficients, covariance, middles, deviation = (np.array(part) for part in zip(*fits, strict=True))
+    about = np.nan_to_num(features[None, :, :] - middles[:, None, :])
+    trend = coefficients[:, :1] + np.einsum("kf,knf->kn", coefficients[:, 1:], about)
+    position = on_sphere(near.longitude, near.latitude)
+    arrays = (position, between, limits, features, np.ascontiguousarray(mean - trend.T))
+    return _Group(arrays, (coefficients, covariance, middles, deviation))
+
+
+def _one_a_place(stations: Sites, values: FloatArray, usable: FloatArray) -> tuple[Sites, FloatArray, FloatArray]:
+    """Return one row for each place that has stations: their mean, and the periods that all of them support."""
     position = np.round(np.stack([stations.longitude, stations.latitude], axis=1), DECIMALS)
     _, first, place = np.unique(position, axis=0, return_index=True, return_inverse=True)
-    known = np.isfinite(values)
-    total, count = np.zeros((2, first.size, values.shape[1]))
-    np.add.at(total, place, np.where(known, values, 0.0))
-    np.add.at(count, place, known)
-    mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
-    return stations.at(first), mean
+    total, limits = np.zeros((first.size, values.shape[1])), usable[first].copy()
+    np.add.at(total, place, values)
+    np.maximum.at(limits[:, 0], place, usable[:, 0])
+    np.minimum.at(limits[:, 1], place, usable[:, 1])
+    return stations.at(first), total / np.bincount(place)[:, None], limits
 
 
-class _Field(NamedTuple):
-    """Stations, places that they serve, and the distances between them, m."""
-
-    stations: Sites
-    places: Sites
-    between: FloatArray
-    across: FloatArray
-
-    def knowing(self, known: NDArray[np.bool_]) -> "_Field":
-        """Return the field with some of the stations."""
-        if known.all():
-            return self
-        return _Field(self.stations.at(known), self.places, self.between[np.ix_(known, known)], self.across[known])
-
-
-def _distances(some: Sites, others: Sites) -> FloatArray:
-    return great_circle(
-        some.longitude[:, None], some.latitude[:, None], others.longitude[None, :], others.latitude[None, :]
+def _fitted(
+    between: FloatArray,
+    features: FloatArray,
+    values: FloatArray,
+    known: NDArray[np.bool_],
+    period: float,
+    settings: Interpolation,
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return coefficients, their covariance for a deviation of 1, middles of the features, and the deviation."""
+    size = 1 + features.shape[1]
+    coefficients, covariance, middles = np.zeros(size), np.zeros((size, size)), np.full(size - 1, np.nan)
+    if not known.any():
+        return coefficients, covariance, middles, np.nan
+    used = _slopes(features[known])
+    middles[used] = features[known][:, used].mean(axis=0)
+    columns = np.concatenate([[0], 1 + used])
+    trend = np.column_stack([np.ones(known.sum()), features[known][:, used] - middles[used]])
+    factor = cho_factor(
+        residual_correlation(between[np.ix_(known, known)], period, settings.vs30_clustered), lower=True
     )
+    normal = cho_factor(trend.T @ cho_solve(factor, trend), lower=True)
+    coefficients[columns] = cho_solve(normal, trend.T @ cho_solve(factor, values[known]))
+    covariance[np.ix_(columns, columns)] = cho_solve(normal, np.eye(columns.size))
+    residual = values[known] - trend @ coefficients[columns]
+    freedom = settings.log_std_weight + residual.size - columns.size
+    variance = (settings.log_std_weight * settings.log_std**2 + residual @ cho_solve(factor, residual)) / freedom
+    return coefficients, covariance, middles, float(np.sqrt(variance))
 
 
-def _kriged(field: _Field, values: FloatArray, period: float, settings: Interpolation) -> tuple[FloatArray, FloatArray]:
-    """Return median and deviation at the places, of one period and from stations that all know it."""
-    trend, trend_there = _trends(field.stations, field.places)
-    between, across = (residual_correlation(d, period, settings.vs30_clustered) for d in (field.between, field.across))
-    factor = cho_factor(between, lower=True)
-    weighted = cho_solve(factor, trend)
-    normal = cho_factor(trend.T @ weighted, lower=True)
-    coefficients = cho_solve(normal, weighted.T @ values)
-    residual = values - trend @ coefficients
-    told = cho_solve(factor, residual)
-    freedom = settings.log_std_weight + values.size - trend.shape[1]
-    variance = (settings.log_std_weight * settings.log_std**2 + residual @ told) / freedom
-    unknown = trend_there.T - weighted.T @ across
-    left = 1.0 - np.einsum("ij,ij->j", across, cho_solve(factor, across))
-    of_trend = np.einsum("ij,ij->j", unknown, cho_solve(normal, unknown))
-    deviation = np.sqrt(variance * np.maximum(left + of_trend, 0.0))
-    return trend_there @ coefficients + told @ across, deviation
-
-
-def _trends(stations: Sites, places: Sites) -> tuple[FloatArray, FloatArray]:
-    """Return what the trend depends on, at the stations and at the places: a mean, and slopes that can be told."""
-    here, there = [np.ones(stations.longitude.size)], [np.ones(places.longitude.size)]
-    for known, wanted in ((stations.source_distance, places.source_distance), (stations.vs30, places.vs30)):
-        enough = known.size >= STATIONS_PER_SLOPE * len(here) and bool(np.isfinite(known).all())
-        if enough and float(np.log(known).std()) > SPREAD:
-            middle = np.log(known).mean()
-            here.append(np.log(known) - middle)
-            there.append(np.nan_to_num(np.log(wanted) - middle))
-    return np.stack(here, axis=1), np.stack(there, axis=1)
+def _slopes(features: FloatArray) -> NDArray[np.intp]:
+    """Return the features whose slope these stations can tell."""
+    used: list[int] = []
+    for one, values in enumerate(features.T):
+        enough = values.size >= STATIONS_PER_SLOPE * (1 + len(used)) and bool(np.isfinite(values).all())
+        if enough and float(values.std()) > SPREAD:
+            used.append(one)
+    return np.array(used, dtype=np.intp)

@@ -55,9 +55,13 @@ def spatial_correlation(distance: ArrayLike, period: float, vs30_clustered: bool
 
 def residual_correlation(distance: FloatArray, period: float, vs30_clustered: bool) -> FloatArray:
     """Return :func:`spatial_correlation` of arguments that need no check."""
-    if period >= 1.0:
-        reach = 22.0 + 3.7 * min(period, LONGEST)
-    else:
-        reach = 40.7 - 15.0 * period if vs30_clustered else 8.5 + 17.2 * period
-    correlation: FloatArray = np.exp(distance * (-3.0 / (1000.0 * reach)))
+    correlation: FloatArray = np.exp(-distance / decay_length(np.asarray(period), vs30_clustered))
     return correlation
+
+
+def decay_length(period: FloatArray, vs30_clustered: bool) -> FloatArray:
+    """Return the distance at which the correlation is 1/e, m: a third of the published range."""
+    short = 40.7 - 15.0 * period if vs30_clustered else 8.5 + 17.2 * period
+    kilometres = np.where(period >= 1.0, 22.0 + 3.7 * np.minimum(period, LONGEST), short)
+    length: FloatArray = 1000.0 / 3.0 * kilometres
+    return length
