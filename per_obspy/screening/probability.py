@@ -5,6 +5,9 @@ A period that was derived from a height is resampled, and so is its damping: bot
 quasi-random nodes, with radii from the station's stored spectra scaled to the exact radius at the median period. So
 two buildings of equal height are never certain to move as one. Where both periods are given the exact integral is
 used. An uncertain gap and the error of the estimate widen the comparison.
+
+Where the table tells the motion at the site relative to the record (``ln_per_ratio_i``, ``ln_per_std_i``), the radii
+are those at the site and as uncertain as their motion; an exact demand is scaled with the pair's (``pair_motion.py``).
 """
 
 import numpy as np
@@ -15,14 +18,18 @@ from scipy.stats import qmc
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.resampling import resampled_probabilities
-from per_obspy.pounding.dispersion import lognormal_dispersion
+from per_obspy.pounding.dispersion import combined_dispersion, combined_dispersion_correlation, lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
+from per_obspy.screening.pair_motion import pair_motion, period_correlation
 from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
-from per_obspy.screening.values import at_contact, values
+from per_obspy.screening.values import at_contact, both, values
 
 #: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
 #: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
 NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
+
+#: Of building 1 and building 2.
+Both = tuple[FloatArray, FloatArray]
 
 
 def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
@@ -34,14 +41,16 @@ def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion:
     station : Dataset
         The record, with its stored spectra.
     table : DataFrame
-        Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand.
+        Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand;
+        the motion at the site, where the table has it, of :func:`~per_obspy.screening.site_motion.motion_at_pairs`.
     model_dispersion : float
         Log-standard deviation of the critical gap from PER about the exact one.
 
     Returns
     -------
     probability : (n_pairs,) ndarray
-        From 0 to 1. Where the exact demand decides it is that of the demand; only gap and dampings are uncertain then.
+        From 0 to 1. Where the exact demand decides it is that of the demand; only the motion at the site, gap and
+        dampings are uncertain then.
     """
     exact = (table["demand_rule"] == "exact").to_numpy()
     uncertain = (table[["period_log_std_1", "period_log_std_2"]] > 0).any(axis=1).to_numpy()
@@ -56,19 +65,29 @@ def _of_demand(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float
     """Return the probability that the exact demand of an uncertain damping exceeds an uncertain gap; no model error."""
     del model_dispersion
     spread = np.maximum(_damping_dispersion(station, table, 1), _damping_dispersion(station, table, 2))
-    return demand_probability(table["demand_exact"], _median_gap(table), np.hypot(spread, _gap_dispersion(table)))
+    ratio, unknown = _pair_motion(table)
+    dispersion = np.hypot(np.hypot(spread, _gap_dispersion(table)), unknown)
+    return demand_probability(values(table, "demand_exact") * np.exp(ratio), _median_gap(table), dispersion)
 
 
 def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
     """Return the exact integral over both radii with the correlation that governs the demand."""
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
+    (ratio_1, ratio_2), unknown = _site_motion(table)
+    source_1, source_2 = (
+        np.stack([doubt, _damping_dispersion(station, table, i)], axis=-1) for i, doubt in enumerate(unknown, start=1)
+    )
+    # one motion moves both radii, each has a damping of its own
+    shared = np.stack([period_correlation(*both(table, "period")), np.zeros(len(table))], axis=-1)
+    radius_1, radius_2 = at_contact(table, "per")
     return pounding_probability(
-        *at_contact(table, "per"),
+        radius_1 * np.exp(ratio_1),
+        radius_2 * np.exp(ratio_2),
         correlation,
         _median_gap(table),
-        _damping_dispersion(station, table, 1),
-        _damping_dispersion(station, table, 2),
-        dispersion_correlation=0.0,
+        combined_dispersion(source_1),
+        combined_dispersion(source_2),
+        dispersion_correlation=combined_dispersion_correlation(source_1, source_2, shared),
         model_dispersion=model_dispersion,
         gap_dispersion=_gap_dispersion(table),
     )
@@ -77,17 +96,34 @@ def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float)
 def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
     """Return the mean over quasi-random periods and dampings of both buildings."""
     columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
+    ratios, _ = _site_motion(table)
+    _, unknown = _pair_motion(table)
     for i, radius in enumerate(at_contact(table, "per"), start=1):
         columns += [
             *log_place(table, i),
             values(table, f"period_log_std_{i}"),
             values(table, f"damping_log_std_{i}"),
-            np.log(np.maximum(radius, np.finfo(np.float64).tiny)),
+            np.log(np.maximum(radius, np.finfo(np.float64).tiny)) + ratios[i - 1],
         ]
-    columns += [_median_gap(table), np.hypot(model_dispersion, _gap_dispersion(table))]
+    columns += [_median_gap(table), np.hypot(np.hypot(model_dispersion, _gap_dispersion(table)), unknown)]
     probability = np.empty(len(table))
     resampled_probabilities(tuple(log_spectra(station)), np.stack(columns, axis=1), NODES, probability)
     return probability
+
+
+def _site_motion(table: pd.DataFrame) -> tuple[Both, Both]:
+    """Return ln of the radii at the site over those of the record, and their deviations; 0 where nothing is told."""
+    if "ln_per_ratio_1" not in table:
+        nothing = np.zeros(len(table))
+        return (nothing, nothing), (nothing, nothing)
+    ratio_1, ratio_2 = map(np.nan_to_num, both(table, "ln_per_ratio"))
+    std_1, std_2 = map(np.nan_to_num, both(table, "ln_per_std"))
+    return (ratio_1, ratio_2), (std_1, std_2)
+
+
+def _pair_motion(table: pd.DataFrame) -> Both:
+    """Return ln of the pair's demand at the site over that of the record, and its deviation."""
+    return pair_motion(at_contact(table, "per"), *_site_motion(table), both(table, "period"))
 
 
 def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> FloatArray:

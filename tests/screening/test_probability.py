@@ -4,10 +4,11 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 import per_obspy
-from per_obspy.screening.probability import NODES
+from per_obspy.screening.pair_motion import period_correlation
+from per_obspy.screening.probability import NODES, pair_probability
 from per_obspy.screening.stored import log_spectra, stored_log
 
-from .conftest import make_pairs
+from .conftest import make_pairs, make_station
 
 
 def _one(station, **row):
@@ -72,3 +73,71 @@ def test_equal_derived_buildings_against_monte_carlo(station):
     critical = per_obspy.critical_gap(*radii, rho) * np.exp(0.35 * random.normal(size=n))
     # 128 quasi-random nodes in four dimensions against 40 000 samples (standard error 0.0025)
     assert_allclose(row["probability"], np.mean(critical > gap), atol=0.02)
+
+
+def _with_motion(station, rows, ratio_1=0.0, ratio_2=0.0, std_1=0.0, std_2=0.0):
+    """Return the probabilities of rows without and with a motion at the site."""
+    table = per_obspy.risk_table(station, make_pairs(rows))
+    table = table.drop(columns=[name for name in table if name.startswith("ln_per_")])
+    columns = {"ln_per_ratio_1": ratio_1, "ln_per_ratio_2": ratio_2, "ln_per_std_1": std_1, "ln_per_std_2": std_2}
+    return table, pair_probability(station, table, 0.35), pair_probability(station, table.assign(**columns), 0.35)
+
+
+#: Every way to a probability: exact demand, radii of a yielding pair outside the usable periods, derived periods.
+EVERY_WAY = ({}, {"period_1": 9.5}, {"period_1": np.nan, "period_2": np.nan})
+
+
+def test_a_site_at_the_station_changes_nothing(station):
+    # to the bit: runs without a field of stations give the same
+    _, without, at_station = _with_motion(station, [{**way, "gap": 0.1, "gap_std": 0.03} for way in EVERY_WAY])
+    assert np.array_equal(without, at_station)
+    _, without, unknown = _with_motion(station, list(EVERY_WAY), np.nan, np.nan, np.nan, np.nan)
+    assert np.array_equal(without, unknown)
+
+
+def test_motion_times_two_is_a_gap_of_half(station):
+    # the certain motion at the site against a gap that is narrower by as much, in every way to a probability; would
+    # catch a ratio upside down or one that moves a single building
+    for way in EVERY_WAY:
+        plain, _, twice = _with_motion(station, [{**way, "gap": 0.2, "gap_std": 0.04}], np.log(2.0), np.log(2.0))
+        narrow, _, _ = _with_motion(station, [{**way, "gap": 0.1, "gap_std": 0.02}])
+        assert_allclose(twice, narrow["probability"], rtol=1e-6)
+        assert twice[0] > plain["probability"][0] or twice[0] == 1.0
+
+
+def test_a_site_whose_motion_nobody_knows_is_even_at_the_demand(station):
+    # a gap that equals the exact demand is closed or not with even chances whatever the deviation; wider gaps are less
+    # safe and narrower ones less certain the less is known
+    given = {"damping_1": 0.05, "damping_2": 0.05}
+    demand = _one(station, **given)["demand"]
+    rows = [{**given, "gap": share * demand} for share in (0.7, 1.0, 1.3)]
+    chances = np.array([_with_motion(station, rows, 0.0, 0.0, std, std)[2] for std in (0.1, 0.4, 0.8)])
+    table = per_obspy.risk_table(station, make_pairs(rows))
+    order = np.argsort(table["gap"].to_numpy())
+    narrow, even, wide = chances[:, order].T
+    assert_allclose(even, 0.5, atol=1e-9)
+    assert np.all(np.diff(narrow) < 0)
+    assert np.all(np.diff(wide) > 0)
+
+
+def test_radii_at_the_site_against_monte_carlo():
+    # one motion moves both radii, with the correlation of their periods; would catch deviations taken as independent
+    # (0.03 away) or lost
+    # of one horizontal no demand is exact
+    station = make_station(channels=("HNN",))
+    row = {"damping_1": 0.05, "damping_2": 0.05}
+    gap = 1.5 * _one(station, **row)["demand"]
+    table, _, got = _with_motion(station, [{**row, "gap": gap}], 0.3, 0.1, 0.5, 0.6)
+    one = table.iloc[0]
+    assert one["demand_rule"] != "exact"
+    random = np.random.default_rng(5)
+    shared = float(period_correlation(1.0, 0.6))
+    normal = random.multivariate_normal([0.0, 0.0], [[1.0, shared], [shared, 1.0]], 200_000)
+    radii = [
+        one[f"participation_{i}"] * one[f"per_{i}"] * np.exp(ratio + std * normal[:, i - 1])
+        for i, ratio, std in ((1, 0.3, 0.5), (2, 0.1, 0.6))
+    ]
+    name = "correlation_record" if one["demand_rule"] == "per_record" else "correlation"
+    critical = per_obspy.critical_gap(*radii, one[name]) * np.exp(0.35 * random.normal(size=200_000))
+    # standard error of 200 000 samples: 0.0011
+    assert_allclose(got[0], np.mean(critical > gap), atol=0.005)
