@@ -106,6 +106,18 @@ def test_twins_never_approach_each_other_but_unequal_participation_parts_them():
     assert wide.largest == pytest.approx(2 * alone.largest, rel=1e-12)
 
 
+@given(periods, dampings, st.floats(-9.0, -5.0))
+@settings(max_examples=25)
+def test_nearly_equal_structures_part_in_proportion_to_their_difference(period, damping, logarithm):
+    # mutation: an absolute margin; a peak left out because it is small beside the radii. The difference of two motions
+    # that agree to a part d carries rounding of 1e-16 / d of itself, some hundred times over
+    ground, difference = noise(), 10.0**logarithm
+    reference = relative_displacement(ground, DT, period, damping, period * (1 + 1e-5), damping).largest / 1e-5
+    found = relative_displacement(ground, DT, period, damping, period * (1 + difference), damping).largest / difference
+    assert found == pytest.approx(reference, rel=1e-2 + 1e-12 / difference)
+    assert relative_displacement(ground, DT, period, damping, period * (1 + 1e-15), damping).largest < 1e-13
+
+
 @given(st.floats(0.0, 360.0))
 @settings(max_examples=20)
 def test_azimuth(azimuth):
