@@ -13,7 +13,7 @@ Wrong arguments of a function are plain ``ValueError``. Each class below is also
 """
 
 from importlib.util import find_spec
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 
 class PerError(Exception):
@@ -114,3 +114,9 @@ class Rejection(NamedTuple):
     source: str
     row: int | None
     reasons: tuple[str, ...]
+
+    @classmethod
+    def stored(cls, values: list[Any]) -> Self:
+        """Return a row as JSON keeps it."""
+        kind, name, source, row, reasons = values
+        return cls(kind, name, source, row, tuple(reasons))

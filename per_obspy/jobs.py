@@ -8,20 +8,18 @@ Where that still holds, nothing is done again.
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from concurrent.futures import Executor
 from functools import partial
 from importlib.metadata import version
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from per_obspy.config import Processing, Spectra
-from per_obspy.errors import PerError, Rejection
+from per_obspy.errors import CatalogError, PerError, Rejection
 from per_obspy.files import file_hash, written_whole
+from per_obspy.parallel import results
 from per_obspy.processing.chain import process_station
 from per_obspy.records.archives import open_file
 from per_obspy.records.events import read_event
@@ -156,21 +154,36 @@ def _earlier(job: Job) -> Done | None:
         shard = file_hash(job.shard) if job.shard.exists() else None
         if note["key"] != _key(job) or note["shard"] != shard:
             return None
-        rejected = tuple(
-            Rejection(kind, name, source, row, tuple(reasons)) for kind, name, source, row, reasons in note["rejected"]
-        )
+        rejected = tuple(Rejection.stored(one) for one in note["rejected"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return Done(job.station, job.shard if shard else None, rejected, resumed=True)
 
 
-def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
+def earlier_done(note: Path) -> Done:
     """
-    Give every station as it is finished, in parallel processes; what an earlier run did is not done again.
+    Return a station as an earlier run left it, given its note; whether its source has changed is not asked.
 
-    The first is waited for, so that one worker compiles and the others load. A worker that dies takes the whole pool
-    with it. What was not finished then is done again, each station in a process of its own, so that only the guilty
-    one is lost, and its loss is a rejection.
+    Raises
+    ------
+    CatalogError
+        If the note cannot be read or its shard is not as it was left.
+    """
+    try:
+        known = json.loads(note.read_text(encoding="utf-8"))
+        rejected = tuple(Rejection.stored(one) for one in known["rejected"])
+        shard = note.with_suffix(".nc") if known["shard"] else None
+        intact = shard is None or file_hash(shard) == known["shard"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise CatalogError(str(note), f"not the note of a station: {error}") from error
+    if not intact:
+        raise CatalogError(str(shard), "damaged: not as the run left it")
+    return Done(note.stem, shard, rejected, resumed=True)
+
+
+def do_stations(jobs: Sequence[Job], workers: int, executor: Executor | None = None) -> Iterator[Done]:
+    """
+    Give every station as it is finished, in parallel; what an earlier run did is not done again.
 
     Parameters
     ----------
@@ -178,46 +191,13 @@ def do_stations(jobs: Sequence[Job], workers: int) -> Iterator[Done]:
         What to do.
     workers : int
         Number of processes; one, or a single job, needs none but this.
+    executor : Executor, optional
+        Where to work instead, a cluster for example.
     """
-    unfinished = {job.station: job for job in jobs}
-    if min(workers, len(jobs)) <= 1:
-        yield from (_earlier(job) or _caught(job, partial(do_station, job)) for job in jobs)
-        return
-    with _pool(workers) as pool, suppress(BrokenProcessPool):
-        for some in (jobs[:1], jobs[1:]):
-            for done in do_stations_on(pool, some):
-                del unfinished[done.station]
-                yield done
-    for job in unfinished.values():
-        try:
-            with _pool(1) as pool:
-                yield from do_stations_on(pool, [job])
-        except BrokenProcessPool:
-            yield _lost(job, "its worker process died")
-
-
-def do_stations_on(executor: Executor, jobs: Sequence[Job]) -> Iterator[Done]:
-    """Give every station as it is finished, on any executor (a cluster's, for example)."""
     earlier = [_earlier(job) for job in jobs]
     yield from filter(None, earlier)
-    futures = {executor.submit(do_station, job): job for job, done in zip(jobs, earlier, strict=True) if not done}
-    for future in as_completed(futures):
-        yield _caught(futures[future], future.result)
-
-
-def _pool(workers: int) -> ProcessPoolExecutor:
-    """Return fresh processes: a fork of a process that has threads can hang."""
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-
-
-def _caught(job: Job, work: Callable[[], Done]) -> Done:
-    """Return what the work returns; whatever it raises becomes a reason, so that no station stops the others."""
-    try:
-        return work()
-    except BrokenProcessPool:
-        raise
-    except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
-        return _lost(job, f"{type(error).__name__}: {error}")
+    new = [job for job, done in zip(jobs, earlier, strict=True) if not done]
+    yield from results(new, do_station, _lost, workers, executor)
 
 
 def _lost(job: Job, reason: str) -> Done:

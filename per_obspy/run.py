@@ -1,15 +1,14 @@
 """
-One run, from records to report.
+One run, from records to report, or one of its stages alone.
 
-Stations are jobs of their own (``jobs.py``): a killed run goes on where it stopped. ``run.json`` is removed first and
-written last: where it stands, the results beside it are complete, and a run of the same inputs does nothing.
+Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped. ``run.json`` is
+removed first and written last: where it stands, the results beside it are complete, and a run of the same inputs does
+nothing.
 """
 
-import hashlib
 import json
 import os
 import platform
-import shutil
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
@@ -20,32 +19,26 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, NamedTuple
 
-import numpy as np
-import pandas as pd
-import xarray as xr
 from filelock import FileLock, Timeout
 
-from per_obspy.config import Records, Run, Simulation, load
-from per_obspy.errors import CatalogError, Rejection, require_extra
+from per_obspy.config import Run, load
+from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
-from per_obspy.inventory.reading import read_pairs
-from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.jobs import Done, Job, do_stations, do_stations_on
+from per_obspy.inventory.catalogue import stored_inventories
+from per_obspy.jobs import Done
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn import Fetched
-from per_obspy.records.simulated import simulate, write_simulation
-from per_obspy.records.sources import fetched_records, find_sources, input_files
-from per_obspy.report.figures import draw_overview, draw_walk
-from per_obspy.report.tables import write_rejected, write_risk, write_totals
-from per_obspy.screening.risk import risk_table
+from per_obspy.records.sources import fetched_records, input_files
 from per_obspy.screening.warmup import compile_screening
-from per_obspy.spectra.storage import read_spectra, region, write_spectra
+from per_obspy.stages.report import reported
+from per_obspy.stages.screening import screened
+from per_obspy.stages.stations import content_hash, finished_stations, station_jobs, stations_of_earlier_run
 
 #: Written last.
 RECORD = "run.json"
 
 #: Libraries whose versions a result may depend on.
-LIBRARIES = ("per_obspy", "numpy", "scipy", "numba", "obspy", "pandas", "xarray", "netCDF4", "pyarrow")
+LIBRARIES = ("per_obspy", "numpy", "scipy", "numba", "obspy", "pandas", "xarray", "netCDF4", "pyarrow", "duckdb")
 
 
 class Result(NamedTuple):
@@ -103,188 +96,156 @@ def run(
     configuration = configuration.resolve()
     settings = load(configuration, Run)
     folder = (output or settings.output).resolve()
+    configuration = configuration.resolve()
+    settings = load(configuration, Run)
+    folder = (output or settings.output).resolve()
     with _held(folder):
         fetched = fetched_records(settings.records, progress)
-        inputs = _input_hashes(settings, fetched, configuration)
-        said = json.loads(settings.model_dump_json(context={"folder": configuration.parent}))
-        key = _hash({"version": version("per_obspy"), "configuration": {**said, "workers": 0}, "inputs": inputs})
-        if earlier := _earlier(folder, key):
+        head = _head(settings, configuration, fetched)
+        if earlier := _earlier(folder, head["key"]):
             return Result(folder, earlier, did_nothing=True)
         (folder / RECORD).unlink(missing_ok=True)
-        head = {"key": key, "configuration": said, "inputs": inputs}
-        record = _work(settings, folder, fetched, head, executor, progress)
-        with written_whole(folder / RECORD) as part:
-            part.write_text(json.dumps(record, indent=1), encoding="utf-8")
-        return Result(folder, record, did_nothing=False)
+        seconds, started = dict[str, float](), datetime.now(UTC)
+        with _timed(seconds, "records"):
+            jobs, rejected = station_jobs(settings, folder, fetched, progress)
+        with _timed(seconds, "stations"), _compiling(progress):
+            done = finished_stations(jobs, settings.workers, executor, progress)
+        found = _screened_and_reported(settings, folder, _after_stations(done, rejected), executor, progress)
+        found["seconds"] = seconds | found["seconds"]
+        return _recorded(folder, {**found, "started": _said(started), **head})
 
 
-def _work(
-    settings: Run,
-    folder: Path,
-    fetched: Fetched | None,
-    head: dict[str, Any],
-    executor: Executor | None,
-    progress: Progress,
+def screen(
+    configuration: Path,
+    output: Path | None = None,
+    executor: Executor | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """
+    Screen the inventory again with the stations that an earlier run has left, and report.
+
+    Only chunks of the inventory that have changed are computed. Parameters and errors are those of :func:`run`; it is
+    an error as well if there are no stations.
+    """
+    configuration = configuration.resolve()
+    settings = load(configuration, Run)
+    folder = (output or settings.output).resolve()
+    with _held(folder):
+        done = stations_of_earlier_run(folder)
+        (folder / RECORD).unlink(missing_ok=True)
+        started = datetime.now(UTC)
+        head = _head(settings, configuration, None) | {"key": f"screening of stations as they were at {_said(started)}"}
+        with _compiling(progress):
+            found = _screened_and_reported(settings, folder, _after_stations(done, []), executor, progress)
+        return _recorded(folder, {**found, "started": _said(started), **head})
+
+
+def report(configuration: Path, output: Path | None = None, progress: Progress = silent) -> Result:
+    """
+    Write totals, figures and layers again from the risk table of a finished run.
+
+    Raises
+    ------
+    CatalogError
+        If there is no finished run, or what it left has changed.
+    """
+    settings = load(configuration.resolve(), Run)
+    folder = (output or settings.output).resolve()
+    with _held(folder):
+        record = _finished(folder)
+        needed = [name for name in record["outputs"] if name in ("risk.parquet", "spectra.nc")]
+        for name in needed:
+            if not (folder / name).is_file() or file_hash(folder / name) != record["outputs"][name]:
+                raise CatalogError(str(folder / name), "not as the run left it: run again")
+        shards = [one.shard for one in stations_of_earlier_run(folder) if one.shard]
+        outputs = reported(settings, folder, shards, progress)
+        return _recorded(folder, {**record, "outputs": record["outputs"] | _hashes(folder, outputs)})
+
+
+def _head(settings: Run, configuration: Path, fetched: Fetched | None) -> dict[str, Any]:
+    """Return what a run stands on, and the key that tells whether the same was done before."""
+    inputs = _input_hashes(settings, fetched, configuration)
+    said = json.loads(settings.model_dump_json(context={"folder": configuration.parent}))
+    key = content_hash({"version": version("per_obspy"), "configuration": {**said, "workers": 0}, "inputs": inputs})
+    return {"key": key, "configuration": said, "inputs": inputs}
+
+
+class _Stations(NamedTuple):
+    """What the first stage has left: shards, everything that was left out so far, stations that were done before."""
+
+    shards: list[Path]
+    rejected: list[Rejection]
+    resumed: int
+
+
+def _after_stations(done: Sequence[Done], rejected: Sequence[Rejection]) -> _Stations:
+    left_out = [*rejected, *(row for one in done for row in one.rejected)]
+    return _Stations([one.shard for one in done if one.shard], left_out, sum(one.resumed for one in done))
+
+
+def _screened_and_reported(
+    settings: Run, folder: Path, stations: _Stations, executor: Executor | None, progress: Progress
 ) -> dict[str, Any]:
-    """Do the stages in their order and return what ``run.json`` will say."""
-    started, seconds = datetime.now(UTC), dict[str, float]()
-    with _timed(seconds, "records"):
-        pairs = read_pairs(settings.pairs.file) if settings.pairs and settings.pairs.file else None
-        jobs, rejected = _jobs(settings, folder, fetched, progress)
-    with _timed(seconds, "stations"), _compiling(progress):
-        done = _stations(jobs, settings.workers or os.cpu_count() or 1, executor, progress)
-    rejected += [one for station in done for one in station.rejected]
-    stations = [read_spectra(station.shard) for station in done if station.shard]
-    table = None
+    """Do the stages after the stations and return what ``run.json`` will say of them."""
+    seconds = dict[str, float]()
+    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
+        (folder / name).unlink(missing_ok=True)
     with _timed(seconds, "screening"):
-        progress("screening", 0, 1)
-        if stations:
-            pairs = _simulated_pairs(settings, folder, stations) if pairs is None else pairs
-            table = risk_table(stations, pairs, settings.building, settings.screening)
-            rejected += table.attrs["rejected"]
-        progress("screening", 1, 1)
+        found = screened(settings, folder, stations.shards, stations.rejected, executor, progress)
     with _timed(seconds, "report"):
-        outputs = _write(settings, folder, stations, table, rejected)
+        outputs = [*found.outputs, *reported(settings, folder, stations.shards, progress)]
     return {
         "name": settings.name,
-        "state": "complete" if table is not None and len(table) else "nothing_usable",
-        "partial": bool(rejected),
+        "state": "complete" if found.counts["pairs"] else "nothing_usable",
+        "partial": any(count for name, count in found.counts.items() if name.startswith("rejected_")),
         "simulated": settings.simulation is not None,
-        "counts": _counts(done, table, rejected),
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": seconds,
-        "outputs": {str(path.relative_to(folder)): file_hash(path) for path in outputs},
+        "counts": {"stations": len(stations.shards), "stations_resumed": stations.resumed, **found.counts},
+        "outputs": _hashes(folder, outputs),
         "versions": {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()},
-        **head,
+        "seconds": seconds,
     }
 
 
-def _jobs(
-    settings: Run, folder: Path, fetched: Fetched | None, progress: Progress
-) -> tuple[list[Job], list[Rejection]]:
-    """Return one job a station, and what cannot be used of the sources."""
-    records = settings.records or _simulated_records(settings, folder, progress)
-    progress("finding records", 0, 1)
-    found = find_sources(records, fetched)
-    progress("finding records", 1, 1)
-    jobs = [
-        Job(
-            station=name,
-            source=source.files,
-            inventory=source.inventory,
-            event=found.event,
-            processing=settings.processing,
-            spectra=settings.spectra,
-            shard=folder / "stations" / f"{name.strip('.')}.nc",
-            simulated=settings.simulation is not None,
-            reader=source.reader,
-        )
-        for name, source in sorted(found.stations.items())
-    ]
-    return jobs, list(found.rejected)
+def _recorded(folder: Path, record: dict[str, Any]) -> Result:
+    """Write the record, after everything else."""
+    with written_whole(folder / RECORD) as part:
+        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
+    return Result(folder, record, did_nothing=False)
 
 
-def _simulated_records(settings: Run, folder: Path, progress: Progress) -> Records:
-    """Write the records of the scenario, unless they stand there, and return where they are."""
-    assert settings.simulation is not None  # Run demands records or a simulation
-    target = folder / "simulated"
-    scenario = load(settings.simulation, Simulation).scenario
-    key = _hash({"version": version("per_obspy"), "scenario": scenario.model_dump(mode="json")})
-    mark = folder / "simulated.json"
-    if not mark.is_file() or json.loads(mark.read_text(encoding="utf-8"))["key"] != key:
-        progress("simulating records", 0, 1)
-        shutil.rmtree(target, ignore_errors=True)
-        write_simulation(simulate(scenario), target)
-        with written_whole(mark) as part:
-            part.write_text(json.dumps({"key": key}), encoding="utf-8")
-        progress("simulating records", 1, 1)
-    return Records(folder=target, event=target / "event.xml")
+def _hashes(folder: Path, files: Sequence[Path]) -> dict[str, str]:
+    return {str(path.relative_to(folder)): file_hash(path) for path in files}
 
 
-def _stations(jobs: Sequence[Job], workers: int, executor: Executor | None, progress: Progress) -> list[Done]:
-    """Return every station as it was finished, sorted by name."""
-    progress("stations", 0, len(jobs))
-    finished = []
-    for done in do_stations_on(executor, jobs) if executor else do_stations(jobs, workers):
-        finished.append(done)
-        progress("stations", len(finished), len(jobs))
-    return sorted(finished, key=lambda one: one.station)
-
-
-def _simulated_pairs(settings: Run, folder: Path, stations: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """Return a simulated pair table, written beside the results first and read back like any other."""
-    wanted = settings.pairs and settings.pairs.simulated
-    if wanted is None:
-        assert settings.simulation is not None  # Run demands pairs or a simulation
-        wanted = load(settings.simulation, Simulation).pairs
-    longitudes = np.array([station["longitude"].item() for station in stations])
-    latitudes = np.array([station["latitude"].item() for station in stations])
-    with written_whole(folder / "pairs.csv") as part:
-        simulated_pairs(longitudes, latitudes, **wanted.model_dump()).to_csv(part, index=False)
-    return read_pairs(folder / "pairs.csv")
-
-
-def _write(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[xr.Dataset],
-    table: pd.DataFrame | None,
-    rejected: Sequence[Rejection],
-) -> list[Path]:
-    """Write the results and return their paths."""
-    write_rejected(rejected, folder / "rejected.csv")
-    outputs = [folder / "rejected.csv"]
-    if not stations or table is None:
-        return outputs
-    spectra = region(stations)
-    write_spectra(spectra, folder / "spectra.nc")
-    facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
-    write_risk(table, folder, facts)
-    outputs += [folder / name for name in ("spectra.nc", "risk.csv", "risk.parquet", "risk.columns.csv")]
-    if len(table):
-        worst = table.iloc[0]
-        (station,) = (one for one in stations if one["station"].item() == worst["station"])
-        draw_walk(station, worst, folder / "figures" / "worst_pair.png")
-        draw_overview(table, spectra, settings.name, folder / "figures" / "overview.png")
-        outputs += [folder / "figures" / name for name in ("worst_pair.png", "overview.png")]
-        outputs += write_totals(table, settings.totals.cell, settings.totals.area, folder)
-        if settings.geopackage:
-            outputs.append(_write_geopackage(table, settings, folder / "risk.gpkg", facts))
-    return outputs
-
-
-def _write_geopackage(table: pd.DataFrame, settings: Run, path: Path, facts: dict[str, str]) -> Path:
-    """Write the layer for QGIS with the optional libraries."""
-    require_extra("gis", "pyogrio", "shapely")
-    from per_obspy.report.gis import write_pairs_layer
-
-    write_pairs_layer([table], list(settings.screening.classes), path, facts)
-    return path
-
-
-def _counts(done: Sequence[Done], table: pd.DataFrame | None, rejected: Sequence[Rejection]) -> dict[str, int]:
-    states = [] if table is None else table["state"].tolist()
-    return {
-        "stations": sum(one.shard is not None for one in done),
-        "stations_resumed": sum(one.resumed for one in done),
-        "pairs": len(states),
-        **{state: states.count(state) for state in ("yes", "possible", "no")},
-        **{
-            f"rejected_{kind}": sum(one.kind == kind for one in rejected)
-            for kind in ("file", "record", "station", "service", "pair")
-        },
-    }
+def _said(time: datetime) -> str:
+    return time.isoformat(timespec="seconds")
 
 
 def _input_hashes(settings: Run, fetched: Fetched | None, configuration: Path) -> dict[str, str]:
     """Return the hash of every input file by its path relative to the configuration."""
-    given = [settings.simulation, settings.pairs and settings.pairs.file]
+    given = [settings.simulation, *_inventory_files(settings)]
     files = [*input_files(settings.records, fetched), *(path for path in given if path and path.is_file())]
     return {os.path.relpath(path, configuration.parent): file_hash(path) for path in files}
 
 
-def _hash(content: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+def _inventory_files(settings: Run) -> list[Path]:
+    """Return every file from which pairs may be taken, and the index that names them."""
+    pairs = settings.pairs
+    if pairs is None or pairs.simulated is not None:
+        return []
+    if pairs.catalog is None:
+        return [pairs.file] if pairs.file else []
+    stored = [one for one in stored_inventories(pairs.catalog) if not pairs.names or one.name in pairs.names]
+    return [pairs.catalog, *(one.file for one in stored)]
+
+
+def _finished(folder: Path) -> dict[str, Any]:
+    """Return the record of the run that left its results here."""
+    try:
+        record: dict[str, Any] = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        return record | {"outputs": dict(record["outputs"])}
+    except (OSError, ValueError, KeyError) as error:
+        raise CatalogError(str(folder / RECORD), "no finished run here: a whole run comes first") from error
 
 
 def _earlier(folder: Path, key: str) -> dict[str, Any] | None:

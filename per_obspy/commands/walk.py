@@ -42,12 +42,51 @@ def run(
 
     with shown_progress() as progress:
         result = whole_run(configuration, output, progress=progress)
+    _tell(result.folder, result.record, result.did_nothing, as_json)
+
+
+def screen(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Screen pairs again with the stations of an earlier run; only what has changed is computed.
+
+    Example: per-obspy screen workflows/demo.toml
+    """
+    from per_obspy.run import screen as screen_again
+
+    with shown_progress() as progress:
+        result = screen_again(configuration, output, progress=progress)
+    _tell(result.folder, result.record, result.did_nothing, as_json)
+
+
+def report(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write totals, figures and map layers again from the risk table of an earlier run.
+
+    Example: per-obspy report workflows/demo.toml
+    """
+    from per_obspy.run import report as report_again
+
+    with shown_progress() as progress:
+        result = report_again(configuration, output, progress=progress)
+    _tell(result.folder, result.record, result.did_nothing, as_json)
+
+
+def _tell(folder: Path, record: dict[str, Any], did_nothing: bool, as_json: bool) -> None:
+    """Print the result of a run, and stop where nothing usable was left."""
     if as_json:
-        print(json.dumps({"folder": str(result.folder), "did_nothing": result.did_nothing, **result.record}))
+        print(json.dumps({"folder": str(folder), "did_nothing": did_nothing, **record}))
     else:
-        _print_result(result.folder, result.record, result.did_nothing)
-    if result.record["state"] == "nothing_usable":
-        print(f"nothing usable was left: see {result.folder / 'rejected.csv'}", file=sys.stderr)
+        _print_result(folder, record, did_nothing)
+    if record["state"] == "nothing_usable":
+        print(f"nothing usable was left: see {folder / 'rejected.csv'}", file=sys.stderr)
         raise typer.Exit(NOTHING_USABLE)
 
 
@@ -151,8 +190,8 @@ def _print_result(folder: Path, record: dict[str, Any], did_nothing: bool) -> No
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
         f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
     )
-    if (folder / "risk.csv").exists():
-        _print_worst(folder / "risk.parquet", 10)
+    if "risk.csv" in record["outputs"]:
+        _print_worst(folder / "risk.csv", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
 
@@ -161,5 +200,5 @@ def _print_worst(path: Path, count: int) -> None:
     """Print the worst pairs as a table."""
     import pandas as pd
 
-    worst = pd.read_parquet(path).head(count)
+    worst = pd.read_csv(path, nrows=count, dtype={"pair_id": str, "station": str})
     print_table(f"The {len(worst)} worst pairs", list(SHOWN.values()), worst[list(SHOWN)].itertuples(index=False))

@@ -15,15 +15,19 @@ from per_obspy.config.simulation import SimulatedPairs
 
 
 class Pairs(Section):
-    """Where the pairs of buildings come from: a stored table, or a simulated one around the stations."""
+    """Where the pairs of buildings come from: a table, stored inventories, or simulated ones around the stations."""
 
     file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
+    catalog: RelativePath | None = Field(None, description="index of stored inventories, catalog.toml")
+    names: tuple[str, ...] = Field((), description="of stored inventories; none: all that the stations' region touches")
     simulated: SimulatedPairs | None = Field(None, description="simulated inventory around the stations")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if (self.file is None) == (self.simulated is None):
-            raise ValueError("give either file or simulated")
+        if sum(source is not None for source in (self.file, self.catalog, self.simulated)) != 1:
+            raise ValueError("give one of file, catalog and simulated")
+        if self.names and self.catalog is None:
+            raise ValueError("names are of stored inventories: give their catalog")
         return self
 
 
@@ -41,6 +45,7 @@ class Run(Section):
     building: Building = Building()
     screening: Screening = Screening()
     totals: Totals = Totals()
+    csv_rows: int = Field(100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all")
     geopackage: bool = Field(False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]")
 
     @model_validator(mode="after")

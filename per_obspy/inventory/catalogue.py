@@ -7,6 +7,7 @@ noticed before any number is made of it. Positions are longitude and latitude (W
 
 import datetime
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,9 +18,11 @@ from pydantic import Field
 from per_obspy import config
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
+from per_obspy.inventory.checking import METRES_PER_DEGREE
 from per_obspy.inventory.reading import read_pairs
 
 CRS = "OGC:CRS84"
+
 HEADER = """\
 # Index of stored inventories of building pairs. `per-obspy catalog add` writes it, `per-obspy catalog check` compares
 # every file with its hash. Bounding boxes are west, south, east, north in degrees.
@@ -143,6 +146,20 @@ def bounding_box(pairs: pd.DataFrame) -> Box:
         float(longitude[(widest + 1) % longitude.size]), float(latitude.min()),
         float(longitude[widest]), float(latitude.max()),
     )  # fmt: skip
+
+
+def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach: float) -> Box:
+    """Return the box around some places, widened by a distance in m; the whole earth's width near a pole."""
+    places = pd.DataFrame(
+        {f"{name}_{i}": column for name, column in (("longitude", longitudes), ("latitude", latitudes)) for i in (1, 2)}
+    )
+    box, degrees = bounding_box(places), reach / METRES_PER_DEGREE
+    south, north = max(box.south - degrees, -90.0), min(box.north + degrees, 90.0)
+    widened = degrees / max(float(np.cos(np.radians(max(abs(south), abs(north))))), 1e-6)
+    if _width(box) + 2.0 * widened >= 360.0:
+        return Box(-180.0, south, 180.0, north)
+    west, east = ((edge + 540.0) % 360.0 - 180.0 for edge in (box.west - widened, box.east + widened))
+    return Box(west, south, east, north)
 
 
 def touch(one: Box, other: Box) -> bool:

@@ -248,14 +248,6 @@ def _undecodable(file: Path) -> str | None:
     return None
 
 
-def repeated_hashes(files: Sequence[PairFile]) -> NDArray[np.uint64]:
-    """Return the hashes of names that may stand more than once in some files, sorted; 8 bytes a row are needed."""
-    hashes = [name_hashes(block) for file in files for block in file.identifiers()]
-    every, counts = np.unique(np.concatenate(hashes) if hashes else np.zeros(0, np.uint64), return_counts=True)
-    repeated: NDArray[np.uint64] = every[counts > 1]
-    return repeated
-
-
 def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
     """Return a hash of each name, blanks around it not counted."""
     text = pc.fill_null(pc.utf8_trim_whitespace(names), "").to_numpy(zero_copy_only=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
-from per_obspy.inventory.raw_rows import IDENTIFIER, PairFile, RawRows, name_hashes, pair_file, repeated_hashes
+from per_obspy.inventory.raw_rows import IDENTIFIER, RawRows, name_hashes, pair_file
 
 #: As many rows as any table has.
 ALL = 1 << 40
@@ -70,39 +70,48 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     return _checked(rows, None)
 
 
-def pair_chunks(paths: Sequence[Path], size: int) -> Iterator[PairChunk]:
+class PairInventory:
     """
-    Give the rows of an inventory in chunks, its files one after the other.
+    An inventory in one file or several, read in chunks, its files one after the other.
 
     Parameters
     ----------
     paths : sequence of Path
-        CSV or Parquet. No chunk holds rows of two files.
-    size : int
-        Largest number of rows in a chunk. Apart from it, memory holds 8 bytes a row, to know which names are repeated.
+        CSV or Parquet. Apart from a chunk, memory holds 8 bytes a row, to know which names are repeated.
+
+    Attributes
+    ----------
+    count : int
+        Number of rows.
+    names : set of str
+        Columns that all files have.
 
     Raises
     ------
     CatalogError
-        As :func:`read_pairs`, before the first chunk.
+        As :func:`read_pairs`.
     """
-    files = [pair_file(path) for path in paths]
-    for path, file in zip(paths, files, strict=True):
-        check_columns(file.names, str(path))
-    hashes, seen = repeated_hashes(files), set[str]()
-    for path, file in zip(paths, files, strict=True):
-        yield from _chunks_of(path, file, size, hashes, seen)
 
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._files = {path: pair_file(path) for path in paths}
+        for path, file in self._files.items():
+            check_columns(file.names, str(path))
+        self.names = set.intersection(*(set(file.names) for file in self._files.values()))
+        counts = {path: [name_hashes(block) for block in file.identifiers()] for path, file in self._files.items()}
+        for path, blocks in counts.items():
+            if not sum(map(len, blocks)):
+                raise CatalogError(str(path), "the table has no rows")
+        hashes = np.concatenate([block for blocks in counts.values() for block in blocks])
+        self.count = len(hashes)
+        names, times = np.unique(hashes, return_counts=True)
+        self._repeated: NDArray[np.uint64] = names[times > 1]
 
-def _chunks_of(
-    path: Path, file: PairFile, size: int, hashes: NDArray[np.uint64], seen: set[str]
-) -> Iterator[PairChunk]:
-    empty = True
-    for rows in file.rows(size):
-        empty &= not (len(rows.table) or rows.broken)
-        yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], hashes, seen))
-    if empty:
-        raise CatalogError(str(path), "the table has no rows")
+    def chunks(self, size: int) -> Iterator[PairChunk]:
+        """Give so many rows at a time; no chunk holds rows of two files."""
+        seen: set[str] = set()
+        for file in self._files.values():
+            for rows in file.rows(size):
+                yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], self._repeated, seen))
 
 
 def _repeated(identifiers: pa.ChunkedArray, hashes: NDArray[np.uint64], seen: set[str]) -> NDArray[np.bool_]:

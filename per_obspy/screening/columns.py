@@ -1,6 +1,7 @@
 """The columns of the risk table in their order; units and meanings stand here or in the schema of the pair table."""
 
 from collections.abc import Iterable
+from functools import cache
 
 import pandas as pd
 
@@ -78,10 +79,20 @@ FLAGS: dict[str, str] = {
 }
 
 
+@cache
+def _known() -> dict[str, Column]:
+    return COLUMNS | COMPLETED | RESULTS | rule_columns()
+
+
+def known_column(name: str) -> Column | None:
+    """Return what is known of a column of the risk table; None if it is carried through."""
+    return _known().get(name)
+
+
 def column_table(names: Iterable[str]) -> pd.DataFrame:
     """Return unit and meaning of each of these columns, then of every flag, as written to ``risk.columns.csv``."""
-    known = COLUMNS | COMPLETED | RESULTS | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
-    rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in names]
+    columns = [(name, known_column(name) or carried) for name in names]
+    rows = [(name, column.unit, column.meaning) for name, column in columns]
     flags = [(f"flag_{name}", "", meaning) for name, meaning in FLAGS.items()]
     return pd.DataFrame(rows + flags, columns=["name", "unit", "meaning"])

@@ -1,10 +1,12 @@
 """Totals of a risk table by administrative area or by cell of a grid."""
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from pandas.api.types import union_categoricals
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
@@ -114,29 +116,72 @@ def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
     DataFrame
         One row an area, in the order of their names: the columns of ``TOTALS`` and ``class_...`` for every risk class.
     """
-    rows = table.assign(area=np.asarray(area, dtype=object)).sort_values("rank", kind="stable")
-    groups = rows.groupby("area", sort=True)
-    counted = pd.DataFrame({"pairs": groups.size()})
-    for state in STATES:
-        counted[state] = (rows["state"] == state).groupby(rows["area"]).sum()
-    for name in rows["risk_class"].unique():
-        counted[f"class_{name}"] = (rows["risk_class"] == name).groupby(rows["area"]).sum()
-    if "probability" in rows:
-        expected = [expected_count(values.dropna()) for _, values in groups["probability"]]
-        names = [f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common")]
-        counted[names] = np.array(expected).reshape(-1, 3)
-    worst = rows.drop_duplicates("area").set_index("area")[["pair_id", "state", "demand_ratio"]]
-    counted = counted.join(worst.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1))
-    return counted.join(_middles(rows)).rename_axis("area").reset_index()
+    return joined_totals([partial_totals(table, area)])
 
 
-def _middles(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the middle of each area's pairs, across the date line too."""
+class PartialTotals(NamedTuple):
+    """
+    What a piece of a risk table adds to the totals.
+
+    Attributes
+    ----------
+    sums : DataFrame
+        What is summed up, by area.
+    worst : DataFrame
+        The worst pair of each area with its ``rank``.
+    chance : DataFrame or None
+        Area and probability of each pair; 12 bytes a pair.
+    """
+
+    sums: pd.DataFrame
+    worst: pd.DataFrame
+    chance: pd.DataFrame | None
+
+
+def partial_totals(table: pd.DataFrame, area: ArrayLike) -> PartialTotals:
+    """Count a piece of a risk table, as :func:`totals` does; :func:`joined_totals` joins what pieces add."""
+    rows = table.assign(area=np.asarray(area, dtype=object))
     east, north = np.radians(rows["longitude"]), np.radians(rows["latitude"])
-    parts = {"x": np.cos(north) * np.cos(east), "y": np.cos(north) * np.sin(east), "z": np.sin(north)}
-    mean = pd.DataFrame(parts).groupby(rows["area"]).mean()
-    latitude = np.degrees(np.arctan2(mean["z"], np.hypot(mean["x"], mean["y"])))
-    return pd.DataFrame({"longitude": np.degrees(np.arctan2(mean["y"], mean["x"])), "latitude": latitude})
+    added = {
+        "pairs": 1,
+        **{state: rows["state"] == state for state in STATES},
+        **{f"class_{name}": rows["risk_class"] == name for name in rows["risk_class"].unique()},
+        "x": np.cos(north) * np.cos(east),
+        "y": np.cos(north) * np.sin(east),
+        "z": np.sin(north),
+    }
+    sums = pd.DataFrame(added).groupby(rows["area"]).sum()
+    worst = rows.sort_values("rank").drop_duplicates("area")[["area", "rank", "pair_id", "state", "demand_ratio"]]
+    if "probability" not in rows:
+        return PartialTotals(sums, worst, None)
+    return PartialTotals(sums, worst, rows[["area", "probability"]].dropna().astype({"area": "category"}))
+
+
+def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
+    """Return the totals of a table from those of its pieces."""
+    sums, worst, chances = zip(*parts, strict=True)
+    counted = pd.concat(sums).fillna(0.0).groupby(level=0, sort=True).sum()
+    x, y, z = (counted.pop(name) for name in "xyz")
+    counted = counted.astype(np.int64)
+    known = [one for one in chances if one is not None]
+    if known:
+        counted = counted.join(_expected(known)).fillna(dict.fromkeys(EXPECTED, 0.0))
+    first = pd.concat(worst).sort_values("rank").drop_duplicates("area").set_index("area").drop(columns="rank")
+    counted = counted.join(first.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1))
+    latitude = np.degrees(np.arctan2(z, np.hypot(x, y)))  # across the date line too
+    table: pd.DataFrame = counted.assign(longitude=np.degrees(np.arctan2(y, x)), latitude=latitude)
+    return table.rename_axis("area").reset_index()
+
+
+EXPECTED = tuple(f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common"))
+
+
+def _expected(chances: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return the expected number of pounding pairs of every area that has a probability."""
+    areas = union_categoricals([one["area"] for one in chances])
+    table = pd.DataFrame({"area": areas, "probability": np.concatenate([one["probability"] for one in chances])})
+    groups = table.groupby("area", observed=True)["probability"]
+    return pd.DataFrame({area: expected_count(some) for area, some in groups}, index=list(EXPECTED)).T
 
 
 def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCells:

@@ -1,0 +1,242 @@
+"""
+The work of one chunk of the inventory, from raw rows to its part of the risk table; chunks do not know of each other.
+
+A part is a Parquet file beside a small JSON file that tells what it was made from and what was left out on the way, as
+the shards of stations are. Where that still holds, nothing is done again.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import xarray as xr
+
+from per_obspy.config import Building, Screening
+from per_obspy.errors import Rejection
+from per_obspy.files import file_hash, written_whole
+from per_obspy.inventory.reading import PairChunk, checked_chunk
+from per_obspy.parallel import results
+from per_obspy.report.tables import as_arrow
+from per_obspy.screening.assignment import Stations
+from per_obspy.screening.judgement import impact_velocity_that_counts
+from per_obspy.screening.ranking import order_keys
+from per_obspy.screening.rows import risk_rows
+from per_obspy.spectra.storage import read_spectra
+
+#: Rows of a chunk: a worker needs about 1 kB for each.
+CHUNK = 50_000
+
+#: Stations that a worker keeps in memory, each of about 2 MB.
+STATIONS_KEPT = 200
+
+
+class StationFile(NamedTuple):
+    """
+    A station that can serve pairs.
+
+    Attributes
+    ----------
+    name : str
+        ``NETWORK.STATION``.
+    longitude, latitude : float
+        Degrees east and north.
+    shard : Path
+        Its Dataset.
+    hash : str
+        Of the shard.
+    """
+
+    name: str
+    longitude: float
+    latitude: float
+    shard: Path
+    hash: str
+
+
+class ChunkJob(NamedTuple):
+    """
+    One chunk to do.
+
+    Attributes
+    ----------
+    chunk : PairChunk
+        Raw rows.
+    stations : tuple of StationFile
+        Which there are.
+    building, screening : Building, Screening
+        Settings.
+    part : Path
+        Where its rows go.
+    """
+
+    chunk: PairChunk
+    stations: tuple[StationFile, ...]
+    building: Building
+    screening: Screening
+    part: Path
+
+
+class Part(NamedTuple):
+    """
+    What became of a chunk.
+
+    Attributes
+    ----------
+    number : int
+        Its place in the inventory.
+    rows : int
+        Number of rows of the inventory that it held.
+    path : Path or None
+        Rows of the risk table, and the keys of their order; None if no pair was left.
+    note : Path
+        What was left out, see :func:`rejections`.
+    resumed : bool
+        Whether an earlier run had done it.
+    """
+
+    number: int
+    rows: int
+    path: Path | None
+    note: Path
+    resumed: bool
+
+
+def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
+    """Give what was left out of some parts; they are read one by one."""
+    for part in parts:
+        for one in json.loads(part.note.read_text(encoding="utf-8"))["rejected"]:
+            yield Rejection.stored(one)
+
+
+def station_files(shards: Iterable[Path]) -> tuple[tuple[StationFile, ...], tuple[Rejection, ...]]:
+    """Return the stations that can serve pairs, and those that have no coordinates."""
+    files, nowhere = list[StationFile](), list[Rejection]()
+    for shard in shards:
+        station = read_spectra(shard)
+        name, longitude, latitude = (station[key].item() for key in ("station", "longitude", "latitude"))
+        if np.isfinite(longitude):
+            files.append(StationFile(name, longitude, latitude, shard, file_hash(shard)))
+        else:
+            reason = "its coordinates are unknown: it serves no pair"
+            nowhere.append(Rejection("station", name, "", None, (reason,)))
+    return tuple(files), tuple(nowhere)
+
+
+def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
+    """Give every part as it is finished, in parallel; what an earlier run did is not done again."""
+    waiting = list[Part]()
+
+    def new() -> Iterator[ChunkJob]:
+        for job in jobs:
+            if earlier := _earlier(job):
+                waiting.append(earlier)
+            else:
+                yield job
+
+    for part in results(new(), do_chunk, _lost, workers, executor):
+        yield from waiting
+        waiting.clear()
+        yield part
+    yield from waiting
+
+
+def do_chunk(job: ChunkJob) -> Part:
+    """Return the finished part, its rows and the note that tells what they were made from on disk."""
+    job.part.unlink(missing_ok=True)
+    pairs = checked_chunk(job.chunk)
+    rows, rejected = _surviving(pairs, _stations(job.stations), job)
+    rejected = (*pairs.attrs["rejected"], *(one._replace(source=job.chunk.rows.source) for one in rejected))
+    if len(rows):
+        with written_whole(job.part) as part:
+            keys = order_keys(rows, impact_velocity_that_counts(rows))
+            pq.write_table(as_arrow(rows.assign(**keys)), part)
+    return _noted(job, _key(job), job.part if len(rows) else None, rejected)
+
+
+def _noted(job: ChunkJob, key: str, part: Path | None, rejected: Sequence[Rejection]) -> Part:
+    """Write the note of a part."""
+    content = {"key": key, "part": part and file_hash(part), "rejected": rejected}
+    with written_whole(_note(job)) as note:
+        note.write_text(json.dumps(content), encoding="utf-8")
+    return Part(_number(job), len(job.chunk.repeated), part, _note(job), resumed=False)
+
+
+def _note(job: ChunkJob) -> Path:
+    return job.part.with_suffix(".json")
+
+
+def _surviving(pairs: pd.DataFrame, stations: Stations, job: ChunkJob) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """Return the rows of all pairs but those that cannot be computed, which are found by halving."""
+    try:
+        return risk_rows(pairs, stations, job.building, job.screening)
+    except (ValueError, ArithmeticError) as error:
+        if len(pairs) == 1:
+            return pairs.iloc[:0], (Rejection("pair", pairs["pair_id"].iloc[0], "", None, (str(error),)),)
+        middle = len(pairs) // 2
+        halves = [_surviving(some, stations, job) for some in (pairs.iloc[:middle], pairs.iloc[middle:])]
+        kept = [rows for rows, _ in halves if len(rows)]
+        return pd.concat(kept) if kept else pairs.iloc[:0], tuple(one for _, lost in halves for one in lost)
+
+
+def _stations(files: Sequence[StationFile]) -> Stations:
+    longitude, latitude = np.array([(one.longitude, one.latitude) for one in files]).reshape(-1, 2).T
+    names = np.array([one.name for one in files], dtype=object)
+    return Stations(names, longitude, latitude, lambda index: _station(files[index].shard, files[index].hash))
+
+
+@lru_cache(STATIONS_KEPT)
+def _station(shard: Path, content: str) -> xr.Dataset:
+    """Return a station's Dataset; its hash tells a changed one from what is kept."""
+    del content
+    return read_spectra(shard)
+
+
+def _key(job: ChunkJob) -> str:
+    """Return the hash of everything that the part depends on."""
+    rows, digest = job.chunk.rows, hashlib.sha256()
+    settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
+    stations = [f"{one.name} {one.hash}" for one in job.stations]
+    digest.update("\n".join([version("per_obspy"), rows.source, *settings, *stations]).encode())
+    digest.update(repr(rows.broken).encode())
+    content = pa.BufferOutputStream()
+    with pa.ipc.new_stream(content, rows.table.schema) as stream:
+        stream.write_table(rows.table.combine_chunks())
+    digest.update(content.getvalue())
+    digest.update(rows.lines.tobytes() + job.chunk.repeated.tobytes())
+    return digest.hexdigest()
+
+
+def _number(job: ChunkJob) -> int:
+    return int(job.part.stem)
+
+
+def _earlier(job: ChunkJob) -> Part | None:
+    """Return the part as an earlier run left it, if it was made from the same and is undamaged."""
+    try:
+        note = json.loads(_note(job).read_text(encoding="utf-8"))
+        part = file_hash(job.part) if job.part.exists() else None
+        if note["key"] != _key(job) or note["part"] != part:
+            return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Part(_number(job), len(job.chunk.repeated), job.part if part else None, _note(job), resumed=True)
+
+
+def _lost(job: ChunkJob, reason: str) -> Part:
+    """Return a part of nothing but rejections; the next run does it again."""
+    rows = job.chunk.rows
+    names = rows.table["pair_id"].cast(pa.string()).to_pylist()
+    lost = [
+        Rejection("pair", name or "", rows.source, line, (reason,))
+        for name, line in zip(names, rows.lines.tolist(), strict=True)
+    ]
+    return _noted(job, "", None, [*rows.broken, *lost])

@@ -1,0 +1,71 @@
+"""The last stage: the risk table and the spectra become totals, figures and layers for a map."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet as pq
+
+from per_obspy.config import Run
+from per_obspy.errors import require_extra
+from per_obspy.progress import Progress
+from per_obspy.report.figures import draw_overview, draw_walk
+from per_obspy.report.ranked import ranked
+from per_obspy.report.totals import write_totals
+from per_obspy.spectra.storage import read_spectra, region, write_spectra
+
+#: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
+SHOWN = 20_000
+
+
+def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Progress) -> list[Path]:
+    """
+    Write the report of what stands in the output folder, and return its files.
+
+    Parameters
+    ----------
+    settings : Run
+        What to do.
+    folder : Path
+        Of the results; without a risk table nothing but the spectra can be reported.
+    shards : sequence of Path
+        Stations.
+    progress : callable
+        Told when it begins and ends.
+    """
+    if not shards:
+        return []
+    progress("report", 0, 1)
+    spectra = region(read_spectra(shard) for shard in shards)
+    write_spectra(spectra, folder / "spectra.nc")
+    outputs, risk = [folder / "spectra.nc"], folder / "risk.parquet"
+    if risk.exists():
+        worst = next(ranked(risk)).iloc[0]
+        (shard,) = (one for one in shards if one.stem == worst["station"].strip("."))
+        draw_walk(read_spectra(shard), worst, folder / "figures" / "worst_pair.png")
+        draw_overview(_shown(risk), spectra, settings.name, folder / "figures" / "overview.png")
+        outputs += [folder / "figures" / name for name in ("worst_pair.png", "overview.png")]
+        outputs += write_totals(risk, settings.totals, folder)
+        if settings.geopackage:
+            outputs.append(_write_geopackage(settings, risk, folder / "risk.gpkg"))
+    progress("report", 1, 1)
+    return outputs
+
+
+def _shown(risk: Path) -> pd.DataFrame:
+    """Return the pairs that a figure shows: every one of a small table, every tenth or so of a large one."""
+    step = -(-pq.read_metadata(risk).num_rows // SHOWN)
+    columns = ["rank", "state", "longitude", "latitude", "demand", "gap"]
+    pieces = [piece[piece["rank"].to_numpy() % step == 1 % step] for piece in ranked(risk, columns)]
+    shown: pd.DataFrame = pd.concat(pieces, ignore_index=True)
+    return shown
+
+
+def _write_geopackage(settings: Run, risk: Path, path: Path) -> Path:
+    """Write the layer for QGIS with the optional libraries."""
+    require_extra("gis", "pyogrio", "shapely")
+    from per_obspy.report.gis import write_pairs_layer
+
+    facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
+    write_pairs_layer(ranked(risk), list(settings.screening.classes), path, facts)
+    return path

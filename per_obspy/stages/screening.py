@@ -1,0 +1,148 @@
+"""The second stage: pairs and the shards of stations become the risk table, chunk by chunk."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from per_obspy.chunks import CHUNK, ChunkJob, Part, StationFile, do_chunks, rejections, station_files
+from per_obspy.config import Run, Simulation, load
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import written_whole
+from per_obspy.inventory.catalogue import find_inventories, region_around, stored_inventories, verified_file
+from per_obspy.inventory.reading import PairInventory
+from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.progress import Progress
+from per_obspy.report.ranked import ranked, write_risk
+from per_obspy.report.tables import write_rejected
+
+KINDS = ("file", "record", "station", "service", "pair")
+STATES = ("yes", "possible", "no")
+
+
+class Screened(NamedTuple):
+    """
+    What screening has left.
+
+    Attributes
+    ----------
+    outputs : list of Path
+        The files.
+    counts : dict
+        Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
+    """
+
+    outputs: list[Path]
+    counts: dict[str, int]
+
+
+def screened(
+    settings: Run,
+    folder: Path,
+    shards: Sequence[Path],
+    rejected: Sequence[Rejection],
+    executor: Executor | None,
+    progress: Progress,
+) -> Screened:
+    """
+    Write the risk table and what was left out, whatever the size of the inventory.
+
+    Parameters
+    ----------
+    settings : Run
+        What to do.
+    folder : Path
+        Of the results.
+    shards : sequence of Path
+        Stations; if there is none, only ``rejected.csv`` is written.
+    rejected : sequence of Rejection
+        What was left out before.
+    executor : Executor, optional
+        Where to work instead of processes of this machine.
+    progress : callable
+        Told of every chunk.
+
+    Raises
+    ------
+    CatalogError
+        If the inventory is wrong as a whole.
+    """
+    stations, nowhere = station_files(shards)
+    parts = _parts(settings, folder, stations, executor, progress) if shards else []
+    kinds = write_rejected(chain(rejected, nowhere, rejections(parts)), folder / "rejected.csv")
+    outputs, states = [folder / "rejected.csv"], Counter[str]()
+    if tables := [part.path for part in parts if part.path]:
+        progress("ranking", 0, 1)
+        facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
+        outputs += write_risk(tables, folder, facts, settings.csv_rows)
+        for piece in ranked(folder / "risk.parquet", ["state"]):
+            states.update(piece["state"])
+        progress("ranking", 1, 1)
+    counts = {"pairs": states.total(), **{state: states[state] for state in STATES}}
+    counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
+    return Screened(outputs, counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)})
+
+
+def _parts(
+    settings: Run, folder: Path, stations: tuple[StationFile, ...], executor: Executor | None, progress: Progress
+) -> list[Part]:
+    """Return the part of every chunk, in the order of the inventory; parts of a longer one before are removed."""
+    inventory = PairInventory(_pair_files(settings, folder, stations))
+    if settings.totals.area and settings.totals.area not in inventory.names:
+        raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
+    progress("screening", 0, inventory.count)
+    parts, rows = list[Part](), 0
+    for part in do_chunks(
+        _jobs(settings, folder, stations, inventory), settings.workers or os.cpu_count() or 1, executor
+    ):
+        parts.append(part)
+        rows += part.rows
+        progress("screening", min(rows, inventory.count), inventory.count)
+    for number in sorted(
+        {int(note.stem) for note in _chunk_folder(folder).glob("*.json")} - {one.number for one in parts}
+    ):
+        for suffix in (".json", ".parquet"):
+            (_chunk_folder(folder) / f"{number:06}{suffix}").unlink(missing_ok=True)
+    return sorted(parts, key=lambda part: part.number)
+
+
+def _jobs(
+    settings: Run, folder: Path, stations: tuple[StationFile, ...], inventory: PairInventory
+) -> Iterator[ChunkJob]:
+    for number, chunk in enumerate(inventory.chunks(CHUNK)):
+        part = _chunk_folder(folder) / f"{number:06}.parquet"
+        yield ChunkJob(chunk, stations, settings.building, settings.screening, part)
+
+
+def _chunk_folder(folder: Path) -> Path:
+    return folder / "chunks"
+
+
+def _pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> list[Path]:
+    """Return the files of the inventory; a simulated one is written first, stored ones are compared with their hash."""
+    pairs = settings.pairs
+    if pairs and pairs.file:
+        return [pairs.file]
+    longitudes, latitudes = ([getattr(one, name) for one in stations] for name in ("longitude", "latitude"))
+    if pairs and pairs.catalog:
+        named = [one for one in stored_inventories(pairs.catalog) if one.name in pairs.names]
+        if unknown := sorted(set(pairs.names) - {one.name for one in named}):
+            raise CatalogError(str(pairs.catalog), f"names: {unknown[0]!r} is not stored here")
+        region = region_around(longitudes, latitudes, settings.screening.largest_distance)
+        entries = named if pairs.names else find_inventories(pairs.catalog, region)
+        if not entries:
+            raise CatalogError(str(pairs.catalog), "no stored inventory touches the region of the stations")
+        return [verified_file(one) for one in entries]
+    wanted = pairs and pairs.simulated
+    if wanted is None:
+        assert settings.simulation is not None  # Run demands pairs or a simulation
+        wanted = load(settings.simulation, Simulation).pairs
+    with written_whole(folder / "pairs.csv") as part:
+        table = simulated_pairs(np.array(longitudes), np.array(latitudes), **wanted.model_dump())
+        table.to_csv(part, index=False)
+    return [folder / "pairs.csv"]
