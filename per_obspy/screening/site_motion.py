@@ -7,7 +7,7 @@ how well that is known. The measure of a station's motion is PER at 5 % damping,
 spatial correlation was published for spectral acceleration.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -54,16 +54,16 @@ class StationField(NamedTuple):
 
 
 def prepared_field(
-    stations: Sequence[xr.Dataset], settings: Interpolation, source: Source | None = None
+    stations: Iterable[xr.Dataset], settings: Interpolation, source: Source | None = None
 ) -> StationField:
     """
     Prepare what the motion at every site is told from.
 
     Parameters
     ----------
-    stations : sequence of Dataset
-        From :func:`per_obspy.station_spectra`, with coordinates; a scalar ``site_class`` (text) or ``vs30`` (m/s) is
-        used where a station has it.
+    stations : iterable of Dataset
+        From :func:`per_obspy.station_spectra`, with coordinates, one after the other; a scalar ``site_class`` (text)
+        or ``vs30`` (m/s) is used where a station has it.
     settings : Interpolation
         What is assumed of the deviation, and the case of the correlation.
     source : Source, optional
@@ -74,24 +74,22 @@ def prepared_field(
     ValueError
         If there is no station, or one without coordinates.
     """
-    if not stations:
+    told = [_told(station) for station in stations]
+    if not told:
         raise ValueError("stations must be one at least, got none")
-    periods = np.asarray(stations[0]["period"], dtype=np.float64)
-    ln_per = np.array([_ln_per(station, periods) for station in stations])
-    usable = np.array(
-        [[number(station, f"{end}_usable_period") for end in ("shortest", "longest")] for station in stations]
-    )
+    periods = told[0].periods
+    ln_per = np.array([np.interp(np.log(periods), np.log(one.periods), one.ln_per) for one in told])
+    usable = np.array([one.usable for one in told])
     still = ~np.isfinite(ln_per).all(axis=1)
     ln_per[still], usable[still] = np.nan, (np.inf, -np.inf)  # a station that did not move knows nothing
-    longitude, latitude = (np.array([number(station, name) for station in stations]) for name in _PLACE)
-    site_class = np.array([_known(station, "site_class", "") for station in stations], dtype=object)
-    vs30 = np.array([_known(station, "vs30", np.nan) for station in stations], dtype=np.float64)
-    places = sites(longitude, latitude, site_class, np.nan, vs30)
+    places = sites(
+        [one.longitude for one in told],
+        [one.latitude for one in told],
+        np.array([one.site_class for one in told], dtype=object),
+        vs30=[one.vs30 for one in told],
+    )
     field = fitted_field(_seen_from(source, places), np.nan_to_num(ln_per), usable, periods, settings)
     return StationField(field, ln_per, source)
-
-
-_PLACE = ("longitude", "latitude")
 
 
 def motion_at_pairs(prepared: StationField, pairs: pd.DataFrame, station: ArrayLike) -> dict[str, NDArray[np.generic]]:
@@ -121,7 +119,7 @@ def motion_at_pairs(prepared: StationField, pairs: pd.DataFrame, station: ArrayL
     ValueError
         If a station's index is out of range.
     """
-    longitude, latitude = (values(pairs, name) for name in _PLACE)
+    longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
     count = len(pairs)
     index = np.broadcast_to(checks.between("station", station, 0, len(prepared.ln_per) - 1), count).astype(np.intp)
     vs30 = values(pairs, "vs30") if "vs30" in pairs else np.nan
@@ -153,19 +151,35 @@ def _seen_from(source: Source | None, places: Sites) -> Sites:
     return places._replace(source_distance=np.maximum(np.hypot(along, source.depth), 1000.0))
 
 
-def _known(station: xr.Dataset, name: str, otherwise: str | float) -> str | float:
-    """Return a scalar of a station, or what stands for an unknown one."""
-    return station[name].item() if name in station else otherwise
+class _Told(NamedTuple):
+    """What the field takes of a station."""
+
+    longitude: float
+    latitude: float
+    site_class: str
+    vs30: float
+    usable: tuple[float, float]
+    periods: FloatArray
+    ln_per: FloatArray
 
 
-def _ln_per(station: xr.Dataset, periods: FloatArray) -> FloatArray:
-    """Return ln PER at 5 % damping on a grid of periods, minus infinity where there was no motion."""
+def _told(station: xr.Dataset) -> _Told:
+    return _Told(
+        number(station, "longitude"),
+        number(station, "latitude"),
+        str(station["site_class"].item()) if "site_class" in station else "",
+        number(station, "vs30") if "vs30" in station else np.nan,
+        (number(station, "shortest_usable_period"), number(station, "longest_usable_period")),
+        np.asarray(station["period"], dtype=np.float64),
+        _ln_per(station),
+    )
+
+
+def _ln_per(station: xr.Dataset) -> FloatArray:
+    """Return ln PER at 5 % damping, minus infinity where there was no motion."""
     stored = station["per_rotd50"] if "per_rotd50" in station else station["per"][0]
     dampings = np.asarray(station["damping"], dtype=np.float64)
     with np.errstate(divide="ignore"):
         radii = np.log(np.asarray(stored, dtype=np.float64))
-        own = np.log(np.asarray(station["period"], dtype=np.float64))
     order = np.argsort(dampings)
-    at_damping = np.array([np.interp(DAMPING, dampings[order], column) for column in radii[order].T])
-    on_periods: FloatArray = np.interp(np.log(periods), own, at_damping)
-    return on_periods
+    return np.array([np.interp(DAMPING, dampings[order], column) for column in radii[order].T])
