@@ -2,19 +2,23 @@
 Time integrals of an oscillator's response times the ground acceleration, exact for a piecewise-linear record.
 
 Over one step the response is a linear function of the state and the two samples at its ends, so an integral over the
-whole record is a weighted sum of products ``state * sample``; the weights are integrals over one step.
+whole record is a weighted sum of products ``state * sample``; the weights are integrals over one step. Only the
+products of the state before each step with the sample at its end are summed: one step relates them to the others.
 """
 
 import numpy as np
 
-from ._jit import kernel
-from .oscillator import step, unit_responses
+from per_obspy.kernels._jit import kernel
+from per_obspy.kernels.oscillator import step, unit_responses
+from per_obspy.kernels.shifted import shifted_rest, shifted_step, unshifted
 
-#: Oscillators side by side.
+#: Oscillators side by side: a constant trip count, which the compiler turns into vectors.
 LANES = 32
 
-#: Products that are summed: (u north, z north, u east, z east) times (a0 north, a1 north, a0 east, a1 east).
-PRODUCTS = 16
+#: Rows of a block's table, one column an oscillator: the step matrix; the shifted states under north and under east;
+#: the sums of both parts of the state times the sample at the step's end, for north-north, north-east plus east-north,
+#: and east-east.
+STATE, SUMS, ROWS = 4, 8, 14
 
 #: Gauss-Legendre nodes and weights on [0, 1]; 24 integrate a step of up to one radian of phase to round-off.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -24,34 +28,35 @@ NODES, WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 @kernel
 def input_moments(north, east, dt, omega, damping, moments):
     """
-    Fill ``moments`` (n, 2, 3) with the integrals of u times a and of v times a, over the record.
+    Fill ``moments`` (n, 2, 3) with the integrals of u times a and of v times a, over a record that ends at zero.
 
     The last axis is north-north, north-east plus east-north, east-east: along an azimuth with cosine c and sine s the
     integral is ``c² m0 + c s m1 + s² m2``.
     """
     squares = _sample_products(north, east)
-    sums = np.empty((PRODUCTS, LANES))
+    sums = np.empty((6, LANES))
     for first in range(0, omega.size, LANES):
         count = min(LANES, omega.size - first)
         _state_products(north, east, dt, omega[first : first + count], damping[first : first + count], sums)
         for lane in range(count):
+            ahead, here = _both_products(omega[first + lane], damping[first + lane], dt, sums[:, lane], squares)
             weights = _step_weights(omega[first + lane], damping[first + lane], dt)
             for row in range(2):
-                _combine(weights[row], sums[:, lane], squares, moments[first + lane, row])
+                _combine(weights[row], here, ahead, squares, moments[first + lane, row])
 
 
 @kernel
 def _sample_products(north, east):
-    """Return the sums of a0 a0, (a0 b1 + a1 b0) / 2 and a1 a1 for north-north, north-east and east-east, (3, 3)."""
+    """Return the sums of a0 a0, a0 a1 and a1 a1 for north-north, north-east plus east-north and east-east, (3, 3)."""
     out = np.zeros((3, 3))
     for i in range(north.size - 1):
         n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
         out[0, 0] += n0 * n0
         out[0, 1] += n0 * n1
         out[0, 2] += n1 * n1
-        out[1, 0] += n0 * e0
-        out[1, 1] += 0.5 * (n0 * e1 + n1 * e0)
-        out[1, 2] += n1 * e1
+        out[1, 0] += 2.0 * n0 * e0
+        out[1, 1] += n0 * e1 + n1 * e0
+        out[1, 2] += 2.0 * n1 * e1
         out[2, 0] += e0 * e0
         out[2, 1] += e0 * e1
         out[2, 2] += e1 * e1
@@ -60,38 +65,57 @@ def _sample_products(north, east):
 
 @kernel
 def _state_products(north, east, dt, omega, damping, sums):
-    """Fill the sums over all steps of the products of state and samples, a column an oscillator."""
-    c = np.zeros((8, LANES))
+    """Fill the sums (6, lane) over all steps of the shifted states times the samples at the ends of the steps."""
+    table = np.zeros((ROWS, LANES))
     for lane in range(omega.size):
-        values = step(omega[lane], damping[lane], dt)
-        for row in range(8):
-            c[row, lane] = values[row]
-    state = np.zeros((4, LANES))
-    sums[:] = 0.0
-    for i in range(north.size - 1):
-        n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
+        matrix, frame = shifted_step(omega[lane], damping[lane], dt)
+        for row in range(4):
+            table[row, lane] = matrix[row]
+        table[STATE, lane], table[STATE + 1, lane] = shifted_rest(frame, north[0])
+        table[STATE + 2, lane], table[STATE + 3, lane] = shifted_rest(frame, east[0])
+    last = north.size - 1
+    for i in range(0, last - 1, 2):
+        n0, n1, n2, e0, e1, e2 = north[i], north[i + 1], north[i + 2], east[i], east[i + 1], east[i + 2]
         for lane in range(LANES):
-            un, zn, ue, ze = state[0, lane], state[1, lane], state[2, lane], state[3, lane]
-            sums[0, lane] += un * n0
-            sums[1, lane] += un * n1
-            sums[2, lane] += un * e0
-            sums[3, lane] += un * e1
-            sums[4, lane] += zn * n0
-            sums[5, lane] += zn * n1
-            sums[6, lane] += zn * e0
-            sums[7, lane] += zn * e1
-            sums[8, lane] += ue * n0
-            sums[9, lane] += ue * n1
-            sums[10, lane] += ue * e0
-            sums[11, lane] += ue * e1
-            sums[12, lane] += ze * n0
-            sums[13, lane] += ze * n1
-            sums[14, lane] += ze * e0
-            sums[15, lane] += ze * e1
-            state[0, lane] = c[0, lane] * un + c[1, lane] * zn + (c[4, lane] * n0 + c[5, lane] * n1)
-            state[1, lane] = c[2, lane] * un + c[3, lane] * zn + (c[6, lane] * n0 + c[7, lane] * n1)
-            state[2, lane] = c[0, lane] * ue + c[1, lane] * ze + (c[4, lane] * e0 + c[5, lane] * e1)
-            state[3, lane] = c[2, lane] * ue + c[3, lane] * ze + (c[6, lane] * e0 + c[7, lane] * e1)
+            _sum_and_step(table, lane, n0, n1, e0, e1)
+            _sum_and_step(table, lane, n1, n2, e1, e2)
+    if last % 2:
+        for lane in range(LANES):
+            _sum_and_step(table, lane, north[last - 1], north[last], east[last - 1], east[last])
+    sums[:] = table[SUMS:]
+
+
+@kernel
+def _sum_and_step(t, lane, north, next_north, east, next_east):
+    """Add the products of a step to the sums, and advance the states."""
+    u, z, w, y = t[4, lane], t[5, lane], t[6, lane], t[7, lane]
+    t[8, lane] += u * next_north
+    t[9, lane] += z * next_north
+    t[10, lane] += u * next_east + w * next_north
+    t[11, lane] += z * next_east + y * next_north
+    t[12, lane] += w * next_east
+    t[13, lane] += y * next_east
+    t[4, lane], t[5, lane] = t[0, lane] * u + (t[1, lane] * z + north), t[2, lane] * u + t[3, lane] * z
+    t[6, lane], t[7, lane] = t[0, lane] * w + (t[1, lane] * y + east), t[2, lane] * w + t[3, lane] * y
+
+
+@kernel
+def _both_products(omega, damping, dt, sums, squares):
+    """
+    Return the sums of ``u, z`` before each step times the sample at its end, and times that at its start, (3, 2) each.
+
+    The sample at a step's end is that at the next one's start, where the state is ``A x + b0 a + b1 a'``.
+    """
+    _, frame = shifted_step(omega, damping, dt)
+    a11, a12, a21, a22, b11, b12, b21, b22 = step(omega, damping, dt)
+    ahead, here = np.empty((3, 2)), np.empty((3, 2))
+    for row in range(3):
+        before, end = squares[row, 1], squares[row, 2]
+        u, z = unshifted(frame, sums[2 * row], sums[2 * row + 1], before)
+        ahead[row, 0], ahead[row, 1] = u, z
+        here[row, 0] = a11 * u + a12 * z + (b11 * before + b12 * end)
+        here[row, 1] = a21 * u + a22 * z + (b21 * before + b22 * end)
+    return ahead, here
 
 
 @kernel
@@ -130,15 +154,9 @@ def _add(weights, weight, part, by_u, by_z, by_start, by_end):
 
 
 @kernel
-def _combine(weights, sums, squares, out):
+def _combine(weights, here, ahead, squares, out):
     """Fill one row of moments from the weights of a step and the sums over all steps."""
-    for column in range(3):
-        out[column] = (
-            weights[4] * squares[column, 0] + weights[5] * squares[column, 1] + weights[6] * squares[column, 2]
-        )
-    out[1] *= 2.0
-    for product in range(4):
-        displacement = 4 * (product // 2) + product % 2  # u or z with a0 or a1 of the same component
-        out[0] += weights[product] * sums[displacement]
-        out[1] += weights[product] * (sums[displacement + 2] + sums[displacement + 8])
-        out[2] += weights[product] * sums[displacement + 10]
+    for row in range(3):
+        out[row] = weights[4] * squares[row, 0] + weights[5] * squares[row, 1] + weights[6] * squares[row, 2]
+        out[row] += weights[0] * here[row, 0] + weights[1] * ahead[row, 0]
+        out[row] += weights[2] * here[row, 1] + weights[3] * ahead[row, 1]

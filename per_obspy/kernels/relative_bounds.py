@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.relative_samples import REACH, ROTATION, SHIFT, TILE
+from per_obspy.kernels.relative_samples import REACH, TILE, frame_of
 
 
 @kernel
@@ -67,8 +67,8 @@ def differences(pair):
 @kernel
 def _radius(body, table, lane, peak):
     """Return the largest radius of a structure before a tile."""
-    shift = math.hypot(table[SHIFT + 2 * body, lane], table[SHIFT + 2 * body + 1, lane])
-    return table[ROTATION + 3 * body, lane] * math.sqrt(table[REACH + body, lane]) + shift * peak
+    scale, _, _, shift_u, shift_z = frame_of(body, table, lane)
+    return scale * math.sqrt(table[REACH + body, lane]) + math.hypot(shift_u, shift_z) * peak
 
 
 @kernel

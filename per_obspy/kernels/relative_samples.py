@@ -1,19 +1,14 @@
 r"""
 Relative displacement of a block of pairs at the samples: seventeen multiply-adds and comparisons a step of a pair.
 
-Time runs outside, pairs inside, four steps at a time. The state of each structure is shifted by its part that follows
-the acceleration at the end of a step, rotated so that the acceleration at the start enters one axis only, and scaled so
-that it enters with factor 1. The relative displacement is a linear form of both states and the acceleration::
-
-    s1' = a11 s1 + (a12 s2 + a);  s2' = a21 s1 + a22 s2;  q1 u1 - q2 u2 = w s(1) + w s(2) + e a
+Time runs outside, pairs inside, four steps at a time. The relative displacement is a linear form of the shifted states
+of both structures and the acceleration.
 """
-
-import math
 
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.oscillator import step
+from per_obspy.kernels.shifted import shifted_rest, shifted_step, unshifted
 
 #: Pairs side by side: a constant trip count, which the compiler turns into vectors.
 LANES = 32
@@ -21,16 +16,14 @@ LANES = 32
 TILE = 64
 #: States below this are set to zero: denormal numbers are slow.
 SMALLEST_STATE = 1e-140
-#: The scaled input vanishes for undamped periods dt / k. A floor far below rounding avoids the division by zero.
-SMALLEST_INPUT = 1e-30
 
 #: Rows of a block's table, one column a pair: two step matrices; the direction; the forms of the relative displacement,
 #: and of the relative velocity over the frequency of structure 1; both states and the acceleration; the largest and
 #: smallest relative displacement of a tile; the squares of the largest states, and of relative displacement and
-#: velocity, before tiles; scale and rotation, and the shift, of each structure. One table, because the compiler would
-#: have to prove of several arrays that they do not overlap.
-DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, REACH, ROTATION, SHIFT, ROWS = 8, 10, 15, 20, 25, 27, 30, 36, 40
-LOCAL = ROTATION  # rows that a step uses
+#: velocity, before tiles; the frame of each structure. One table, because the compiler would have to prove of several
+#: arrays that they do not overlap.
+DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, REACH, FRAME, ROWS = 8, 10, 15, 20, 25, 27, 30, 40
+LOCAL = FRAME  # rows that a step uses
 #: Rows of what is kept of a tile: the states before it, the largest and the smallest relative displacement.
 KEPT, HIGHEST, LOWEST = 6, 4, 5
 
@@ -41,23 +34,25 @@ def pack_pair(pair, dt, table, lane):
     table[DIRECTION, lane], table[DIRECTION + 1, lane] = pair[6], pair[7]
     table[DISTANCE + 4, lane] = table[SLOPE + 4, lane] = 0.0
     for body in range(2):
-        a11, a12, a21, a22, b11, b12, b21, b22 = step(pair[3 * body], pair[3 * body + 1], dt)
-        along, across = a11 * b12 + a12 * b22 + b11, a21 * b12 + a22 * b22 + b21
-        scale = max(math.hypot(along, across), SMALLEST_INPUT * math.hypot(b12, b22))
-        c, s = (along / scale, across / scale) if abs(along) + abs(across) >= scale else (1.0, 0.0)
-        table[4 * body, lane] = c * (a11 * c + a12 * s) + s * (a21 * c + a22 * s)
-        table[4 * body + 1, lane] = c * (a12 * c - a11 * s) + s * (a22 * c - a21 * s)
-        table[4 * body + 2, lane] = c * (a21 * c + a22 * s) - s * (a11 * c + a12 * s)
-        table[4 * body + 3, lane] = c * (a22 * c - a21 * s) - s * (a12 * c - a11 * s)
+        matrix, frame = shifted_step(pair[3 * body], pair[3 * body + 1], dt)
+        scale, c, s, shift_u, shift_z = frame
+        for row in range(4):
+            table[4 * body + row, lane] = matrix[row]
+        for row in range(5):
+            table[FRAME + 5 * body + row, lane] = frame[row]
         weight = pair[3 * body + 2] * (1.0 - 2.0 * body)
         slope = weight * pair[3 * body] / pair[0]
         table[DISTANCE + 2 * body, lane], table[DISTANCE + 2 * body + 1, lane] = weight * scale * c, -weight * scale * s
         table[SLOPE + 2 * body, lane], table[SLOPE + 2 * body + 1, lane] = slope * scale * s, slope * scale * c
-        table[DISTANCE + 4, lane] += weight * b12
-        table[SLOPE + 4, lane] += slope * b22
-        table[ROTATION + 3 * body, lane] = scale
-        table[ROTATION + 3 * body + 1, lane], table[ROTATION + 3 * body + 2, lane] = c, s
-        table[SHIFT + 2 * body, lane], table[SHIFT + 2 * body + 1, lane] = b12, b22
+        table[DISTANCE + 4, lane] += weight * shift_u
+        table[SLOPE + 4, lane] += slope * shift_z
+
+
+@kernel
+def frame_of(body, table, lane):
+    """Return scale, rotation and shift of a structure."""
+    row = FRAME + 5 * body
+    return table[row, lane], table[row + 1, lane], table[row + 2, lane], table[row + 3, lane], table[row + 4, lane]
 
 
 @kernel
@@ -67,18 +62,14 @@ def start_at_rest(north, east, table):
     for lane in range(LANES):
         acceleration = table[DIRECTION, lane] * north + table[DIRECTION + 1, lane] * east
         for body in range(2):
-            scale, c, s = table[ROTATION + 3 * body : ROTATION + 3 * body + 3, lane]
-            u, z = table[SHIFT + 2 * body : SHIFT + 2 * body + 2, lane]
-            table[STATE + 2 * body, lane] = -(c * u + s * z) / scale * acceleration
-            table[STATE + 2 * body + 1, lane] = -(c * z - s * u) / scale * acceleration
+            along, across = shifted_rest(frame_of(body, table, lane), acceleration)
+            table[STATE + 2 * body, lane], table[STATE + 2 * body + 1, lane] = along, across
 
 
 @kernel
 def state_of(body, table, lane, along, across, acceleration):
-    """Return displacement and velocity over frequency from a shifted, scaled and rotated state."""
-    scale, c, s = table[ROTATION + 3 * body : ROTATION + 3 * body + 3, lane]
-    u, z = table[SHIFT + 2 * body : SHIFT + 2 * body + 2, lane]
-    return scale * (c * along - s * across) + u * acceleration, scale * (s * along + c * across) + z * acceleration
+    """Return displacement and velocity over frequency of a structure from its shifted state."""
+    return unshifted(frame_of(body, table, lane), along, across, acceleration)
 
 
 @kernel

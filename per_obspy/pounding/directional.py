@@ -64,10 +64,8 @@ def directional_correlation(
     angle = np.radians(checks.finite("azimuths", azimuths))
     motion = _closed(checks.record("north", north), checks.record("east", east))
     dt = checks.number("dt", dt, checks.positive)
-    first, second = (
-        _along(_moments(*motion, dt, period, damping), angle)
-        for period, damping in ((period_1, damping_1), (period_2, damping_2))
-    )
+    oscillators = np.concatenate([period_1, period_2]), np.concatenate([damping_1, damping_2])
+    first, second = (_along(moments, angle) for moments in np.split(_moments(*motion, dt, *oscillators), 2))
     stiffness_1, stiffness_2 = ((2.0 * np.pi / period[:, None]) ** 2 for period in (period_1, period_2))
     viscosity_1, viscosity_2 = 2.0 * damping_1[:, None] * stiffness_1**0.5, 2.0 * damping_2[:, None] * stiffness_2**0.5
     own_1 = _covariance(first, first, stiffness_1, stiffness_1, viscosity_1, viscosity_1)
