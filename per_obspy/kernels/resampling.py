@@ -32,7 +32,7 @@ def resampled_probabilities(grid, pairs, nodes, probability):
             radius_2 = math.exp(
                 pair[10] + _interpolated(log_periods, log_dampings, spectrum, period_2, damping_2) - median_2
             )
-            rho = _correlation(period_1 - period_2, math.exp(damping_1), math.exp(damping_2))
+            rho = white_noise_correlation(period_1 - period_2, math.exp(damping_1), math.exp(damping_2))
             squared = radius_1 * radius_1 + radius_2 * radius_2 - 2.0 * rho * radius_1 * radius_2
             total += _chance(math.sqrt(max(squared, 0.0)), pair[11], pair[12])
         probability[index] = total / nodes.shape[0]
@@ -47,7 +47,7 @@ def _chance(critical_gap, gap, dispersion):
 
 
 @kernel
-def _correlation(log_ratio, damping_1, damping_2):
+def white_noise_correlation(log_ratio, damping_1, damping_2):
     """Return eq. (16) for oscillators whose periods differ by a factor exp(log_ratio); 1 at 0 / 0."""
     ratio = math.exp(log_ratio)
     detuning = ratio - 1.0 / ratio

@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from per_obspy import checks
+from per_obspy.checks import FloatArray
+
+Ductility = TypeVar("Ductility", float, FloatArray)
 
 
 class EquivalentLinear(NamedTuple):
@@ -39,7 +42,8 @@ def _gulkan_sozen(ductility: float, hardening: float) -> tuple[float, float]:
     return _secant(ductility, hardening), 0.2 * (1.0 - 1.0 / math.sqrt(ductility))
 
 
-def _iwan(ductility: float, hardening: float) -> tuple[float, float]:
+def iwan(ductility: Ductility, hardening: float) -> tuple[Ductility, Ductility]:
+    """Return the factor of the period and the damping to add (Iwan 1980), also of an array of ductilities from 1."""
     del hardening  # fitted for one hardening
     return 1.0 + 0.121 * (ductility - 1.0) ** 0.939, 0.0587 * (ductility - 1.0) ** 0.371
 
@@ -74,7 +78,7 @@ def _kasai(ductility: float, hardening: float) -> tuple[float, float]:
 METHODS: dict[str, Formula] = {
     "rosenblueth_herrera": _rosenblueth_herrera,
     "gulkan_sozen": _gulkan_sozen,
-    "iwan": _iwan,
+    "iwan": iwan,
     "kowalsky": _kowalsky,
     "fema_440": _fema_440,
     "jeng_unverified": _jeng,

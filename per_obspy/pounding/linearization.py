@@ -8,8 +8,10 @@ which follow from the joint covariance of both structures and the ground.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from per_obspy import checks
+from per_obspy.checks import FloatArray
 from per_obspy.pounding.ground import Ground
 from per_obspy.pounding.linearization_estimate import LinearizedEstimate
 from per_obspy.pounding.linearization_gauss import gauss_3
@@ -180,12 +182,45 @@ def bandwidth(ground: Ground) -> float:
         ``sqrt(1 - λ1²/(λ0 λ2))`` of the spectral moments over the band with 95 % of the power below 25 Hz.
     """
     frequency = np.linspace(0.0, LARGEST_FREQUENCY, 20001)
-    density = ground.psd(frequency)
+    return _bandwidth(frequency, ground.psd(frequency))
+
+
+def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
+    """
+    Vanmarcke bandwidth of a record: that of its power at each frequency, both components together.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) array_like
+        Ground acceleration, m/s²; the sum of their powers is that of any two directions at right angles.
+    dt : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    bandwidth : float
+        As :func:`bandwidth`; 1 without motion.
+
+    Raises
+    ------
+    ValueError
+        If a component is no record or the interval is not positive.
+    """
+    motion = np.stack([checks.record("north", north), checks.record("east", east)])
+    power: FloatArray = (np.abs(np.fft.rfft(motion)) ** 2).sum(axis=0)
+    step = checks.number("dt", dt, checks.positive)
+    frequency: FloatArray = 2.0 * np.pi * np.fft.rfftfreq(motion.shape[1], step).astype(np.float64)
+    felt = frequency <= LARGEST_FREQUENCY
+    return _bandwidth(frequency[felt], power[felt]) if power.any() else 1.0
+
+
+def _bandwidth(frequency: FloatArray, density: FloatArray) -> float:
+    """Return the bandwidth of a density at equally spaced frequencies."""
     power = np.cumsum(density)
-    inside = power <= POWER * power[-1]
+    inside = power - density <= POWER * power[-1]  # the frequency at which the share is reached belongs to it
     frequency, density = frequency[inside], density[inside]
     moments = [float(np.sum(density * frequency**order)) for order in range(3)]
-    return float(np.sqrt(1.0 - moments[1] ** 2 / (moments[0] * moments[2])))
+    return float(np.sqrt(max(1.0 - moments[1] ** 2 / (moments[0] * moments[2]), 0.0)))
 
 
 def _damped(structure: Structure) -> Structure:

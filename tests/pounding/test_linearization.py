@@ -15,6 +15,7 @@ from per_obspy.pounding.linearization import (
     davenport_peak_factor,
     ductility_correlation,
     linearized_correlation,
+    record_bandwidth,
 )
 from per_obspy.pounding.linearization_gauss import slip
 from per_obspy.pounding.linearization_krylov import equivalent_stiffness, equivalent_viscosity
@@ -239,3 +240,23 @@ def test_davenport_peak_factor():
 def test_bad_arguments_are_named(name, call):
     with pytest.raises(ValueError, match=name):
         call()
+
+
+class TestBandwidthOfARecord:
+    def test_white_noise_has_that_of_a_flat_spectrum(self):
+        # moments of a flat spectrum from 0 on: sqrt(1 - (1/2)² / (1/3)) = 1/2; 20 000 samples scatter by a hundredth
+        north, east = np.random.default_rng(1).normal(size=(2, 20_000))
+        assert record_bandwidth(north, east, 0.02) == pytest.approx(0.5, abs=0.01)
+
+    def test_a_sine_has_none_along_any_azimuth(self):
+        # catches: one component alone; leakage of 200 cycles stays below a few hundredths
+        sine = np.sin(2 * np.pi * np.arange(20_000) * 0.01)
+        for angle in (0.0, 1.0):
+            assert record_bandwidth(np.cos(angle) * sine, np.sin(angle) * sine, 0.01) < 0.05
+
+    def test_size_does_not_matter_and_no_motion_is_broad(self):
+        north, east = np.random.default_rng(1).normal(size=(2, 500))
+        assert record_bandwidth(7 * north, 7 * east, 0.02) == pytest.approx(
+            record_bandwidth(north, east, 0.02), rel=1e-9
+        )
+        assert record_bandwidth(np.zeros(9), np.zeros(9), 0.02) == 1.0

@@ -1,0 +1,191 @@
+"""
+The estimated demand of pairs in which a building yields.
+
+A building whose displacement exceeds its yield displacement is replaced by an equivalent linear one (Iwan 1980) at its
+own ductility. This is the first ductility, from 1 up, at which the equivalent building's displacement is that many
+yield displacements; it is found on the station's stored spectra, scaled to the building's own SD, interpolated in
+period and damping. PER at the equivalent period and damping, from the stored spectra too, and eq. (16) at the
+equivalent properties give the critical gap. Yielding raises the correlation under broad ground motion; under narrow
+one eq. (16) then makes too much of it, so that the smaller of the elastic and the equivalent correlation is used.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.schema import Column
+from per_obspy.pounding.correlation import ddc_correlation
+from per_obspy.pounding.equivalent_linear import iwan
+from per_obspy.pounding.gap import critical_gap
+from per_obspy.pounding.linearization import NARROW, record_bandwidth
+from per_obspy.screening.stored import LogSpectra, azimuth_row, log_period_and_damping, log_spectra, stored_log
+from per_obspy.screening.values import both, components, values
+
+#: Ductilities that are tried; between two of them so many more.
+DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
+PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
+
+#: What an equivalent building has of its own.
+EQUIVALENT = ("period", "damping", "per")
+
+
+def _of_each(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
+    first, second = (Column(f"{name}_{i}", "float64", unit, f"building {i}: {meaning}") for i in (1, 2))
+    return first, second
+
+
+#: What :func:`linearized_columns` adds to the risk table.
+LINEARIZED = (
+    Column("critical_gap_linearized", "float64", "m", "eq. (15) of equivalent linear buildings, at contact height"),
+    Column("correlation_linearized", "float64", "1", "eq. (16) of them; in narrow motion not above correlation"),
+    *_of_each("ductility", "1", "estimated displacement / yield displacement; up to 1 it stays elastic"),
+    *_of_each("equivalent_period", "s", "of the equivalent linear building (Iwan 1980)"),
+    *_of_each("equivalent_damping", "1", "of the equivalent linear building, fraction of critical"),
+    *_of_each("equivalent_per", "m", "PER of the equivalent linear oscillator"),
+    Column("linearized_converged", "bool", "", "no: a ductility is above 40, the estimate is that of 40"),
+)  # fmt: skip
+
+
+class Equivalent(NamedTuple):
+    """
+    Equivalent linear buildings, each (n_pairs,).
+
+    Attributes
+    ----------
+    ductility : ndarray
+        Displacement over yield displacement, dimensionless; 0 for a building that cannot yield.
+    period, damping, per : ndarray
+        s; fraction of critical; pseudo energy radius of the oscillator, m.
+    converged : ndarray of bool
+        Whether a ductility was found.
+    """
+
+    ductility: FloatArray
+    period: FloatArray
+    damping: FloatArray
+    per: FloatArray
+    converged: NDArray[np.bool_]
+
+
+def linearized_columns(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+    """
+    Return the estimated demand of equivalent linear buildings, as columns of the risk table.
+
+    Parameters
+    ----------
+    station : Dataset
+        The record, with its stored spectra.
+    table : DataFrame
+        Completed pairs with ``azimuth_used``, radii and correlation along it, and ``critical_gap_per``.
+
+    Returns
+    -------
+    dict of (n_pairs,) ndarray
+        The columns of ``LINEARIZED``. Where no building is taken beyond its yield displacement they equal the elastic
+        ones.
+
+    References
+    ----------
+    Iwan (1980), Earthquake Engineering and Structural Dynamics 8; Valles-Mattox & Reinhorn (1996), 11WCEE, eq. (15),
+    (16).
+    """
+    ductility = [_elastic_ductility(table, i) for i in (1, 2)]
+    columns: dict[str, NDArray[Any]] = {
+        "critical_gap_linearized": values(table, "critical_gap_per").copy(),
+        "correlation_linearized": values(table, "correlation").copy(),
+        **{f"ductility_{i}": ductility[i - 1] for i in (1, 2)},
+        **{f"equivalent_{name}_{i}": values(table, f"{name}_{i}").copy() for name in EQUIVALENT for i in (1, 2)},
+        "linearized_converged": np.ones(len(table), dtype=bool),
+    }
+    yields = (np.maximum(*ductility) > 1.0) & (values(table, "absolute_gap") > 0)
+    if yields.any():
+        for name, found in _of_yielding(station, table[yields]).items():
+            columns[name][yields] = found
+    return columns
+
+
+def _elastic_ductility(table: pd.DataFrame, i: int) -> FloatArray:
+    return values(table, f"sd_{i}") / values(table, f"yield_displacement_{i}")
+
+
+def _of_yielding(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+    """Return the columns of pairs in which a building yields."""
+    spectra = log_spectra(station, "sd"), log_spectra(station, "per")
+    row = azimuth_row(station, table)
+    first, second = (_equivalent(*spectra, row, table, i) for i in (1, 2))
+    correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
+    if record_bandwidth(*components(station)) < NARROW:
+        correlation = np.minimum(correlation, values(table, "correlation"))
+    share_1, share_2 = both(table, "participation")
+    columns: dict[str, NDArray[Any]] = {
+        "critical_gap_linearized": critical_gap(share_1 * first.per, share_2 * second.per, correlation),
+        "correlation_linearized": correlation,
+        "linearized_converged": first.converged & second.converged,
+    }
+    for i, building in enumerate((first, second), start=1):
+        columns[f"ductility_{i}"] = building.ductility
+        columns[f"equivalent_period_{i}"] = building.period
+        columns[f"equivalent_damping_{i}"] = building.damping
+        columns[f"equivalent_per_{i}"] = building.per
+    return columns
+
+
+def _equivalent(sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: pd.DataFrame, i: int) -> Equivalent:
+    """Return the equivalent linear buildings i; those that stay elastic as they are."""
+    elastic, period, damping = _elastic_ductility(table, i), values(table, f"period_{i}"), values(table, f"damping_{i}")
+    yields = elastic > 1.0
+    own = _Building(row[yields], period[yields], damping[yields])
+    ductility, converged = elastic.copy(), np.ones(len(table), dtype=bool)
+    ductility[yields], converged[yields] = _first_ductility(sd, own, elastic[yields])
+    longer, more = iwan(np.maximum(ductility, 1.0), 0.0)
+    radius = values(table, f"per_{i}").copy()
+    radius[yields] *= _change(per, own, ductility[yields, None])[:, 0]
+    return Equivalent(ductility, period * longer, damping + more, radius, converged)
+
+
+class _Building(NamedTuple):
+    """Buildings of the same side: row of the stored azimuth, period (s), damping (fraction of critical)."""
+
+    row: NDArray[np.intp]
+    period: FloatArray
+    damping: FloatArray
+
+
+def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> FloatArray:
+    """Return the radius of the equivalent building over that of the elastic one at ductilities (n_pairs, n)."""
+    row, period, damping = building.row[:, None], building.period[:, None], building.damping[:, None]
+    longer, more = iwan(ductility, 0.0)
+    equivalent = stored_log(spectra, row, *log_period_and_damping(period * longer, damping + more))
+    elastic = stored_log(spectra, row, *log_period_and_damping(period, damping))
+    return np.asarray(np.exp(equivalent - elastic))
+
+
+def _first_ductility(sd: LogSpectra, building: _Building, elastic: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the first ductility that the displacement does not exceed, and where there is one up to the largest."""
+
+    def excess(ductility: FloatArray) -> FloatArray:
+        return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
+
+    tried = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
+    over = excess(tried)
+    (low, high), _ = _around(tried, over)
+    finer = low + PARTS * (high - low)
+    (low, high), (before, beyond) = _around(finer, excess(finer))
+    part = np.divide(before, before - beyond, out=np.zeros_like(before), where=before > np.maximum(beyond, 0.0))
+    converged = np.asarray((over <= 0.0).any(axis=1))
+    return np.where(converged, (low + part * (high - low))[:, 0], DUCTILITIES[-1]), converged
+
+
+def _around(tried: FloatArray, excess: FloatArray) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+    """Return the ductilities before and at the first end of an excess, else the last two, and the excess there."""
+    ends = excess <= 0.0
+    ends[:, 0], ends[:, -1] = False, True
+    after = ends.argmax(axis=1)[:, None]
+    places = after - 1, after
+    return tuple(np.take_along_axis(tried, place, axis=1) for place in places), tuple(
+        np.take_along_axis(excess, place, axis=1) for place in places
+    )

@@ -1,0 +1,167 @@
+"""What would have prevented pounding: limits, monotony, scaling, and the same by the record itself."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.interpolate import RegularGridInterpolator
+
+import per_obspy
+from per_obspy.screening.flags import period_is_derived
+from per_obspy.screening.mitigation import MITIGATION, mitigation_columns
+from per_obspy.screening.values import at_contact, both, components, values
+from per_obspy.screening.yielding import linearized_columns
+
+from .conftest import make_station
+from .test_yielding import table_of
+
+TARGET = 1.25
+
+
+def with_demand(station, rows, share=0.7):
+    """Return pairs whose demand is that of PER and eq. (16), and whose gap is a share of it."""
+    table = table_of(station, rows)
+    table = table.assign(demand=table["critical_gap_per"], demand_rule="per_white_noise")
+    table = table.assign(gap=share * table["demand"])
+    return table.assign(**linearized_columns(station, table))
+
+
+@pytest.fixture(scope="module")
+def table(station):
+    periods = [(0.5, 0.8), (1.0, 0.6), (1.3, 1.5), (2.0, 0.9)]
+    return with_demand(station, [{"period_1": a, "period_2": b, "azimuth": 40.0} for a, b in periods])
+
+
+def test_every_column_is_described(station, table):
+    assert set(mitigation_columns(station, table, TARGET)) == {column.name for column in MITIGATION}
+
+
+def test_nothing_is_asked_of_a_pair_whose_gap_is_enough(station, table):
+    # catches: the estimate alone decides, although the exact demand is below the gap
+    for enough in (table.assign(gap=table["demand"]), table.assign(demand=0.9 * table["gap"], demand_rule="exact")):
+        found = mitigation_columns(station, enough, TARGET)
+        assert_array_equal(found["missing_gap"], 0.0)
+        assert_array_equal(found["supplemental_damping"], 0.0)
+        assert_array_equal(found["bumper_restitution"], 1.0)
+
+
+def test_touching_pairs_lack_their_whole_demand_and_no_damping_helps(station, table):
+    found = mitigation_columns(station, table.assign(gap=0.0), TARGET)
+    assert_array_equal(found["missing_gap"], table["demand"])
+    assert np.isnan(found["supplemental_damping"]).all()
+
+
+def test_a_wider_gap_needs_less(station, table):
+    shares = np.linspace(0.3, 1.0, 15)
+    found = [mitigation_columns(station, table.assign(gap=share * table["demand"]), TARGET) for share in shares]
+    damping = np.nan_to_num([one["supplemental_damping"] for one in found], nan=1.0)  # not enough: more than any
+    assert np.all(np.diff(damping, axis=0) <= 0.0)
+    assert np.all(damping[0] > 0.1)
+    assert np.all(np.diff([one["missing_gap"] for one in found], axis=0) < 0.0)
+
+
+def test_the_added_damping_brings_the_critical_gap_to_the_gap(station, table):
+    # catches: damping added to one building only, the correlation of the dampings before, a radius not at contact
+    table = table.assign(gap=0.95 * table["demand"])
+    added = mitigation_columns(station, table, TARGET)["supplemental_damping"]
+    axes = np.log(station["damping"].to_numpy()), np.log(station["period"].to_numpy())
+    stored = RegularGridInterpolator(axes, np.log(station["per_azimuthal"].sel(azimuth=40.0).to_numpy().astype(float)))
+    assert np.all(0.05 + added < 0.1)  # within the stored dampings
+    radii = []
+    for i, radius in enumerate(at_contact(table, "per"), start=1):
+        period = np.log(values(table, f"period_{i}"))
+        change = stored((np.log(0.05 + added), period)) - stored((np.full(4, np.log(0.05)), period))
+        radii.append(radius * np.exp(change))
+    (period_1, period_2), damping = both(table, "period"), 0.05 + added
+    rho = per_obspy.ddc_correlation(period_1, damping, period_2, damping)
+    # halved until the step is 0.02 / 2**20
+    assert_allclose(per_obspy.critical_gap(*radii, rho), table["gap"], rtol=1e-5)
+
+
+def test_against_the_record_itself(station, table):
+    # catches: the spectrum of another azimuth or building
+    added = mitigation_columns(station, table.assign(gap=0.85 * table["demand"]), TARGET)["supplemental_damping"]
+    north, east, dt = components(station)
+    along = north * np.cos(np.radians(40.0)) + east * np.sin(np.radians(40.0))
+    for index, row in enumerate(table.to_dict("records")):
+        shares = row["participation_1"], row["participation_2"]
+        gaps = np.array([0.85 * row["demand"]])
+        # the record drives each building with its participation
+        per = [
+            share * per_obspy.per_spectrum(along, dt, [row[f"period_{i}"]], 0.05 + added[index])[0]
+            for i, share in enumerate(shares, start=1)
+        ]
+        damping = 0.05 + added[index]
+        rho = per_obspy.ddc_correlation(row["period_1"], damping, row["period_2"], damping)
+        # three dampings and 60 periods are stored, interpolated linearly on logarithmic axes
+        assert_allclose(per_obspy.critical_gap(*per, rho), gaps, rtol=0.08)
+
+
+def test_scaling_ground_and_gap_changes_no_ratio():
+    rows = [{"period_1": 0.6, "period_2": 1.5}, {"period_1": 1.0, "period_2": 1.2}]
+    one, other = make_station(), make_station(scale=2.0)
+    found = mitigation_columns(one, with_demand(one, rows), TARGET)
+    scaled = mitigation_columns(other, with_demand(other, rows), TARGET)
+    assert_allclose(scaled["missing_gap"], 2.0 * found["missing_gap"], rtol=1e-9)
+    assert_allclose(scaled["supplemental_damping"], found["supplemental_damping"], rtol=1e-4)  # stored as float32
+    assert_allclose(scaled["bumper_restitution"], found["bumper_restitution"], rtol=1e-6)
+
+
+def test_an_exact_demand_is_followed_in_proportion(station, table):
+    # catches: the estimate compared with the gap, whatever the demand that decides
+    usual = mitigation_columns(station, table, TARGET)["supplemental_damping"]
+    smaller = table.assign(demand=0.5 * table["demand"], gap=0.5 * table["gap"], demand_rule="exact")
+    assert_allclose(mitigation_columns(station, smaller, TARGET)["supplemental_damping"], usual, rtol=1e-9)
+
+
+def test_equal_derived_buildings_are_uncorrelated(station):
+    derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
+    pair = table_of(station, [derived])
+    assert period_is_derived(pair).all()
+    assert (pair["demand_rule"] == "srss").all()
+    pair = pair.assign(gap=0.95 * pair["demand"])
+    pair = pair.assign(**linearized_columns(station, pair))
+    found = mitigation_columns(station, pair, TARGET)["supplemental_damping"]
+    assert 0.0 < found[0] < 0.4
+
+
+def test_a_yielding_pair_is_followed_as_its_equivalent_one(station, table):
+    # catches: elastic periods and dampings of buildings that yield
+    weak = table.assign(yield_displacement_1=table["sd_1"] / 1.5, hardening_1=0.05)
+    weak = weak.assign(**linearized_columns(station, weak))
+    weak = weak.assign(demand=weak["critical_gap_linearized"], gap=0.8 * weak["critical_gap_linearized"])
+    found = mitigation_columns(station, weak, TARGET)["supplemental_damping"]
+    elastic = weak.drop(columns=["yield_displacement_1"]).assign(yield_displacement_1=np.inf)
+    elastic = elastic.assign(**linearized_columns(station, elastic))
+    other = mitigation_columns(station, elastic, TARGET)["supplemental_damping"]
+    assert np.all(found != other)
+
+
+def test_the_bumper_keeps_the_single_hit_within_the_target(station, table):
+    # catches: a restitution for one of the buildings only, plain periods with radii of another demand
+    table = table.assign(gap=0.9 * table["demand"])
+    found = mitigation_columns(station, table, 1.5)["bumper_restitution"]
+    critical = np.maximum(table["critical_gap_per"], table["critical_gap_record"])
+    within = np.isfinite(found) & (found < 0.98)
+    assert within.any()
+
+    def amplification(restitution):
+        pair = (*at_contact(table, "per"), *both(table, "period"), *both(table, "contact_mass"))
+        hit = per_obspy.single_hit(*pair, restitution, critical, table["gap"])
+        return np.maximum(hit.amplification_1, hit.amplification_2)
+
+    usual = np.where(within, found, 0.5)
+    assert_allclose(amplification(usual)[within], 1.5, rtol=1e-9)
+    assert np.all(amplification(np.minimum(usual + 0.01, 1.0))[within] > 1.5)
+
+
+def test_a_row_does_not_depend_on_the_others(station, table):
+    whole = mitigation_columns(station, table, TARGET)
+    for index in range(len(table)):
+        alone = mitigation_columns(station, table.iloc[index : index + 1], TARGET)
+        for name, column in whole.items():
+            assert_array_equal(alone[name], column[index : index + 1], err_msg=name)
+
+
+def test_a_target_below_one_is_refused(station, table):
+    with pytest.raises(ValueError, match="target must be at least 1"):
+        mitigation_columns(station, table, 0.9)
