@@ -28,7 +28,10 @@ class Here(Executor):
 
     def submit(self, function, /, *arguments):
         future = Future()
-        future.set_result(function(*arguments))
+        try:
+            future.set_result(function(*arguments))
+        except Exception as error:  # noqa: BLE001 - whatever it is, its result raises it
+            future.set_exception(error)
         return future
 
 

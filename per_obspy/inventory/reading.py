@@ -63,7 +63,7 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
         raise CatalogError(str(path), "the table has no rows")
     rows = RawRows(
         str(path),
-        pa.concat_tables([block.table for block in blocks]),
+        pa.concat_tables([block.table for block in blocks if len(block.table)]),
         np.concatenate([block.lines for block in blocks]),
         tuple(one for block in blocks for one in block.broken),
     )

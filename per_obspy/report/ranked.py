@@ -56,6 +56,8 @@ def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], cs
     with TemporaryDirectory(dir=folder) as room:
         settings: dict[str, str | bool | int | float | list[str]] = {"memory_limit": MEMORY, "temp_directory": room}
         with duckdb.connect(config=settings) as database, written_whole(table) as part:
+            # else columns without empty cells are marked so when there is one part, and not when there are two
+            database.execute("SET disabled_optimizers = 'statistics_propagation'")
             database.execute(_ORDERED, {"parts": [str(one) for one in parts], "path": str(part), "said": said})
         with duckdb.connect(config=settings) as database, written_whole(text) as part:
             database.execute(_WORST, {"table": str(table), "rows": csv_rows, "path": str(part)})
