@@ -23,7 +23,7 @@ RESULTS: dict[str, Column] = {
         Column("state", "str", "", "yes: gap < demand; possible: likely enough, or a derived input decides; no"),
         Column("probability", "float64", "1", "of pounding in this event, with what is uncertain of the pair"),
         Column("demand", "float64", "m", "gap needed at contact height, by the rule in demand_rule"),
-        Column("demand_rule", "str", "", "what the demand is: exact, per_white_noise, per_record or srss"),
+        Column("demand_rule", "str", "", "exact, per_white_noise, per_record, linearized, srss or shakemap"),
         Column("demand_ratio", "float64", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
         Column("impact_velocity", "float64", "m/s", "approach velocity of the single hit with the estimated demand"),
         Column("single_hit_status", "str", "", "ok, no_pounding, no_grazing_state or inconsistent_critical_gap"),
@@ -41,12 +41,22 @@ RESULTS: dict[str, Column] = {
         Column("critical_gap_record", "float64", "m", "eq. (15) from PER and correlation_record, at contact height"),
         Column("critical_gap_sd", "float64", "m", "eq. (15) from SD and eq. (16), at contact height"),
         Column("srss_gap", "float64", "m", "root of the sum of the squared PER, at contact height"),
-        Column("demand_exact", "float64", "m", "exact largest relative displacement of 1 towards 2, linear"),
+        Column("demand_exact", "float64", "m", "exact largest relative displacement of 1 towards 2"),
         Column("demand_two_sided", "float64", "m", "the same in either order of the buildings, for design"),
         Column("impacts", "int64", "1", "in the exact history with this record and gap"),
         Column("impact_velocity_exact", "float64", "m/s", "largest approach velocity in that history"),
         *_both("amplification_exact", "1", "largest radius with pounding / without, in that history"),
         Column("absolute_gap", "float64", "m", "sum of the PER, at contact height"),
+        *_both("ln_per_ratio", "1", "ln(PER at the site / PER of the record), at 5 % damping, RotD50"),
+        *_both("ln_per_std", "1", "log-standard deviation of that; its spatial correlation was published for SA"),
+        Column("critical_gap_linearized", "float64", "m", "eq. (15) of equivalent linear buildings, at contact height"),
+        Column("correlation_linearized", "float64", "1", "eq. (16) of them; in narrow motion not above correlation"),
+        *_both("ductility", "1", "estimated displacement / yield displacement; up to 1 it stays elastic"),
+        Column("missing_gap", "float64", "m", "by which the gap is below the demand; 0 where it is enough"),
+        Column("supplemental_damping", "float64", "1", "estimate: least to add to both; empty: up to 0.4 is too little"),
+        Column("bumper_restitution", "float64", "1", "estimate: largest for target_amplification; empty: none helps"),
+        Column("srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"),
+        Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
     )
 }  # fmt: skip
 
@@ -58,9 +68,9 @@ ORDER = (
     "amplification_1", "amplification_2", "flags", "station", "distance", "azimuth_used",
     "azimuth_rule", "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2", "per_1",
     "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per", "critical_gap_record",
-    "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact", "demand_two_sided",
-    "contact_mass_1",
-    "contact_mass_2", "restitution", "derived",
+    "critical_gap_linearized", "correlation_linearized", "ductility_1", "ductility_2", "critical_gap_sd", "srss_gap",
+    "absolute_gap", "demand_exact", "demand_two_sided", "missing_gap", "supplemental_damping", "bumper_restitution",
+    "ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2", "contact_mass_1", "contact_mass_2", "restitution", "derived",
 )  # fmt: skip
 
 #: Flags of a pair and what each means.
@@ -73,8 +83,14 @@ FLAGS: dict[str, str] = {
     "one_horizontal": "the station has one horizontal: its azimuth is used whatever the pair's",
     "derived_inputs": "the row has derived inputs, named in the column derived",
     "derived_period": "a period was derived: the demand is at least SRSS and the state is never a plain no",
+    "linearized_not_converged": "no ductility up to 40 was found: the linearized demand is that of 40, often too large",
+    "no_damping_suffices": "it pounds, and no damping added up to 0.4 of critical keeps the buildings apart",
+    "no_bumper_suffices": "it pounds, and no restitution keeps the single hit within target_amplification",
     "no_demand": "the demand is 0 (the oscillators move as one or not at all): there is no demand ratio",
     "floor_to_column": "floors do not meet floors: outside the method",
+    "motion_from_other_site_class": "no station on the site's class told its motion: those of other classes served",
+    "shakemap_demand": "no station in reach: demand from the SD of a ShakeMap, without PER, record and exact history",
+    "shakemap_assumed_deviation": "the ShakeMap tells no deviation: the configured one is assumed",
     "simulated": "the ground motion is simulated",
 }
 

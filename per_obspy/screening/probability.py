@@ -17,6 +17,7 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from per_obspy.checks import FloatArray
+from per_obspy.config import Screening
 from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import combined_dispersion, combined_dispersion_correlation, lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
@@ -32,7 +33,7 @@ NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
 Both = tuple[FloatArray, FloatArray]
 
 
-def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+def pair_probability(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
     """
     Return the probability of pounding of every pair of a block.
 
@@ -43,8 +44,8 @@ def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion:
     table : DataFrame
         Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand;
         the motion at the site, where the table has it, of :func:`~per_obspy.screening.site_motion.motion_at_pairs`.
-    model_dispersion : float
-        Log-standard deviation of the critical gap from PER about the exact one.
+    screening : Screening
+        Log-standard deviations of the critical gap from PER, and of the linearized one, about the exact one.
 
     Returns
     -------
@@ -57,43 +58,46 @@ def pair_probability(station: xr.Dataset, table: pd.DataFrame, model_dispersion:
     probability = np.empty(len(table))
     for rows, chance in ((exact, _of_demand), (~exact & ~uncertain, _of_radii), (~exact & uncertain, _resampled)):
         if rows.any():
-            probability[rows] = chance(station, table[rows], model_dispersion)
+            probability[rows] = chance(station, table[rows], screening)
     return probability
 
 
-def _of_demand(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+def _of_demand(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
     """Return the probability that the exact demand of an uncertain damping exceeds an uncertain gap; no model error."""
-    del model_dispersion
+    del screening
     spread = np.maximum(_damping_dispersion(station, table, 1), _damping_dispersion(station, table, 2))
     ratio, unknown = _pair_motion(table)
-    dispersion = np.hypot(np.hypot(spread, _gap_dispersion(table)), unknown)
-    return demand_probability(values(table, "demand_exact") * np.exp(ratio), _median_gap(table), dispersion)
+    dispersion = np.hypot(np.hypot(spread, gap_dispersion(table)), unknown)
+    return demand_probability(values(table, "demand_exact") * np.exp(ratio), median_gap(table), dispersion)
 
 
-def _of_radii(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+def _of_radii(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
     """Return the exact integral over both radii with the correlation that governs the demand."""
+    yields = (table["demand_rule"] == "linearized").to_numpy()
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
+    correlation = np.where(yields, table["correlation_linearized"], correlation)
+    radii = zip(at_contact(table, "per"), at_contact(table, "equivalent_per"), strict=True)
     (ratio_1, ratio_2), unknown = _site_motion(table)
     source_1, source_2 = (
         np.stack([doubt, _damping_dispersion(station, table, i)], axis=-1) for i, doubt in enumerate(unknown, start=1)
     )
     # one motion moves both radii, each has a damping of its own
     shared = np.stack([period_correlation(*both(table, "period")), np.zeros(len(table))], axis=-1)
-    radius_1, radius_2 = at_contact(table, "per")
+    radius_1, radius_2 = (np.where(yields, equivalent, elastic) for elastic, equivalent in radii)
     return pounding_probability(
         radius_1 * np.exp(ratio_1),
         radius_2 * np.exp(ratio_2),
         correlation,
-        _median_gap(table),
+        median_gap(table),
         combined_dispersion(source_1),
         combined_dispersion(source_2),
         dispersion_correlation=combined_dispersion_correlation(source_1, source_2, shared),
-        model_dispersion=model_dispersion,
-        gap_dispersion=_gap_dispersion(table),
+        model_dispersion=_model_dispersion(table, screening),
+        gap_dispersion=gap_dispersion(table),
     )
 
 
-def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float) -> FloatArray:
+def _resampled(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
     """Return the mean over quasi-random periods and dampings of both buildings."""
     columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
     ratios, _ = _site_motion(table)
@@ -105,10 +109,17 @@ def _resampled(station: xr.Dataset, table: pd.DataFrame, model_dispersion: float
             values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)) + ratios[i - 1],
         ]
-    columns += [_median_gap(table), np.hypot(np.hypot(model_dispersion, _gap_dispersion(table)), unknown)]
+    estimate = _model_dispersion(table, screening)
+    columns += [median_gap(table), np.hypot(np.hypot(estimate, gap_dispersion(table)), unknown)]
     probability = np.empty(len(table))
     resampled_probabilities(tuple(log_spectra(station)), np.stack(columns, axis=1), NODES, probability)
     return probability
+
+
+def _model_dispersion(table: pd.DataFrame, screening: Screening) -> FloatArray:
+    """Return how far the estimate that decides may be from the exact demand."""
+    linearized = table["demand_rule"] == "linearized"
+    return np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
 
 
 def _site_motion(table: pd.DataFrame) -> tuple[Both, Both]:
@@ -135,7 +146,7 @@ def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> Flo
     return dispersion
 
 
-def _gap_dispersion(table: pd.DataFrame) -> FloatArray:
+def gap_dispersion(table: pd.DataFrame) -> FloatArray:
     """Return the log-standard deviation of a gap given by mean and standard deviation; 0 for touching pairs."""
     gap, deviation = values(table, "gap"), values(table, "gap_std")
     apart = gap > 0
@@ -144,7 +155,7 @@ def _gap_dispersion(table: pd.DataFrame) -> FloatArray:
     return dispersion
 
 
-def _median_gap(table: pd.DataFrame) -> FloatArray:
+def median_gap(table: pd.DataFrame) -> FloatArray:
     """Return the median of a lognormal gap of given mean, m."""
-    median: FloatArray = values(table, "gap") * np.exp(-(_gap_dispersion(table) ** 2) / 2.0)
+    median: FloatArray = values(table, "gap") * np.exp(-(gap_dispersion(table) ** 2) / 2.0)
     return median

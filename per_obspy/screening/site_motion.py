@@ -128,7 +128,7 @@ def motion_at_pairs(prepared: StationField, pairs: pd.DataFrame, station: ArrayL
     columns: dict[str, NDArray[np.generic]] = {}
     crossed = np.zeros(count, dtype=bool)
     for i in (1, 2):
-        period = np.ascontiguousarray(values(pairs, f"period_{i}"))
+        period = values(pairs, f"period_{i}")
         motion = motion_at(prepared.field, places, period)
         columns[f"ln_per_ratio_{i}"] = motion.ln_median - _stored(prepared, index, period)
         columns[f"ln_per_std_{i}"] = motion.log_std

@@ -8,8 +8,8 @@ from per_obspy.checks import FloatArray
 
 
 def values(table: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column as float64."""
-    return np.asarray(table[name], dtype=np.float64)
+    """Return a column as float64; contiguous, because functions of NumPy may differ in the last bit between strides."""
+    return np.ascontiguousarray(table[name], dtype=np.float64)
 
 
 def both(table: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
