@@ -90,6 +90,10 @@ class Records(Section):
     fdsn: Fdsn | None = Field(None, description="FDSN web services")
     sds: Sds | None = Field(None, description="SDS archive")
     asdf: Asdf | None = Field(None, description="ASDF workspace of gmprocess")
+    shakemap: RelativePath | None = Field(
+        None, description="grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach"
+    )
+    shakemap_uncertainty: RelativePath | None = Field(None, description="uncertainty.xml of the same ShakeMap")
 
     @model_validator(mode="after")
     def _known_window(self) -> Self:
@@ -97,4 +101,6 @@ class Records(Section):
             raise ValueError("fdsn needs event_id, or event, or latitude, longitude, start and end")
         if self.sds and not (self.event or (self.sds.start and self.sds.end)):
             raise ValueError("sds needs start and end, or event")
+        if self.shakemap_uncertainty and not self.shakemap:
+            raise ValueError("shakemap_uncertainty belongs to a shakemap: give both")
         return self

@@ -105,6 +105,7 @@ def input_files(records: config.Records | None, fetched: Fetched | None) -> list
     given = [records.folder, records.stationxml, records.event, *(table.file for table in records.columns)]
     given += [fetched.folder, fetched.event] if fetched else []
     given += [records.asdf.file] if records.asdf else []
+    given += [records.shakemap, records.shakemap_uncertainty]
     files = [path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])]
     if records.sds:
         found, _ = _sds(records, records.sds, records.event)

@@ -8,6 +8,8 @@ broad-band records the gap from SD and eq. (16) is within a log-standard deviati
 by row.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -63,6 +65,28 @@ def shakemap_rows(
     source = str(shakemap.attrs["source"])
     named = zip(pairs["pair_id"], reasons, strict=True)
     return rows, tuple(Rejection("pair", name, source, None, tuple(why)) for name, why in named if why)
+
+
+def shakemap_fallback(
+    shakemap: xr.Dataset, pairs: pd.DataFrame, unreached: Sequence[Rejection], screening: Screening
+) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """
+    Return the rows of pairs that were rejected for want of a station, and those that stay rejected, with both reasons.
+
+    Parameters
+    ----------
+    shakemap : Dataset
+        From :func:`per_obspy.records.shakemap.read_shakemap`.
+    pairs : DataFrame
+        Completed pairs, those with a station among them.
+    unreached : sequence of Rejection
+        Of pairs, from :func:`per_obspy.screening.assignment.assigned`.
+    screening : Screening
+        As for :func:`shakemap_rows`.
+    """
+    reasons = {one.name: one.reasons for one in unreached}
+    rows, lost = shakemap_rows(shakemap, pairs[pairs["pair_id"].isin(list(reasons))], screening)
+    return rows, tuple(one._replace(reasons=(*reasons[one.name], *one.reasons)) for one in lost)
 
 
 def _judged(shakemap: xr.Dataset, motion: MapMotion, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:

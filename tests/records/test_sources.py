@@ -107,11 +107,15 @@ def test_an_archive_needs_a_window():
 
 
 def test_what_a_result_depends_on(folder: Path, archive: Path, tmp_path: Path):
-    records = Records(folder=folder, columns=(table(tmp_path),), event=folder / "event.xml")
+    (tmp_path / "grid.xml").touch()
+    records = Records(
+        folder=folder, columns=(table(tmp_path),), event=folder / "event.xml", shakemap=tmp_path / "grid.xml"
+    )
     assert {path.name for path in input_files(records, None)} == {
         "XX.S001.mseed",
         "XX.S002.mseed",
         "event.xml",
+        "grid.xml",
         "stations.xml",
         "table.txt",
     }

@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
 from per_obspy.config import Building, Screening
+from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.gap import critical_gap
 from per_obspy.screening.columns import FLAGS, ORDER
-from per_obspy.screening.shakemap import shakemap_rows
+from per_obspy.screening.shakemap import shakemap_fallback, shakemap_rows
 from per_obspy.screening.shakemap_motion import damping_factor, motion_on_map
 
 from .conftest import make_pairs
@@ -196,6 +197,17 @@ def test_pairs_outside_are_rejected_with_the_value():
     assert east.reasons == ("longitude = 30 is outside the ShakeMap's 19.5 to 20.5",)
     assert {one.source for one in rejected} == {"grid.xml"}
     assert all(one.kind == "pair" for one in rejected)
+
+
+def test_pairs_without_a_station_fall_back_on_the_map():
+    # one has a station, one is on the map, one is out of reach of both: it says why in both words
+    pairs = _completed([{}, {}, {"latitude_1": 12.0, "latitude_2": 12.0}])
+    station = Rejection("pair", "", "", None, ("nearest station XX.ONE is 99999 m away, beyond 20000 m",))
+    far = (station._replace(name="P1"), station._replace(name="P2"))
+    table, (lost,) = shakemap_fallback(make_map(), pairs, far, Screening())
+    assert table["pair_id"].tolist() == ["P1"]
+    assert lost.name == "P2"
+    assert lost.reasons == (*station.reasons, "latitude = 12 is outside the ShakeMap's 9.5 to 10.5")
 
 
 def test_a_map_without_motion_judges_nothing():
