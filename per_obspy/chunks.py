@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import xarray as xr
 
-from per_obspy.config import Building, Screening
+from per_obspy.config import Building, Interpolation, Screening
 from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import PairChunk, checked_chunk
@@ -30,10 +30,14 @@ from per_obspy.screening.assignment import Stations
 from per_obspy.screening.judgement import impact_velocity_that_counts
 from per_obspy.screening.ranking import order_keys
 from per_obspy.screening.rows import risk_rows
+from per_obspy.screening.site_motion import Source, StationField, prepared_field
 from per_obspy.spectra.storage import read_spectra
 
 #: Rows of a chunk: a worker needs about 1 kB for each.
 CHUNK = 50_000
+
+#: Attribute of a station's Dataset that tells where the earthquake started, beside those of latitude and depth.
+HYPOCENTRE = "hypocentre_longitude"
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
 STATIONS_KEPT = 200
@@ -72,6 +76,8 @@ class ChunkJob(NamedTuple):
         Raw rows.
     stations : tuple of StationFile
         Which there are.
+    field : StationField or None
+        The motion between them; None if there are none.
     building, screening : Building, Screening
         Settings.
     part : Path
@@ -80,6 +86,7 @@ class ChunkJob(NamedTuple):
 
     chunk: PairChunk
     stations: tuple[StationFile, ...]
+    field: StationField | None
     building: Building
     screening: Screening
     part: Path
@@ -131,6 +138,15 @@ def station_files(shards: Iterable[Path]) -> tuple[tuple[StationFile, ...], tupl
     return tuple(files), tuple(nowhere)
 
 
+def field_of(stations: Sequence[StationFile], settings: Interpolation) -> StationField | None:
+    """Return the motion between stations, about a trend with the distance from the hypocentre where that is known."""
+    if not stations:
+        return None
+    known = [read_spectra(one.shard).attrs for one in stations[:1]]
+    source = [Source(*(one[f"hypocentre_{name}"] for name in Source._fields)) for one in known if HYPOCENTRE in one]
+    return prepared_field((read_spectra(one.shard) for one in stations), settings, *source)
+
+
 def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
     """Give every part as it is finished, in parallel; what an earlier run did is not done again."""
     waiting = list[Part]()
@@ -177,7 +193,7 @@ def _note(job: ChunkJob) -> Path:
 def _surviving(pairs: pd.DataFrame, stations: Stations, job: ChunkJob) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """Return the rows of all pairs but those that cannot be computed, which are found by halving."""
     try:
-        return risk_rows(pairs, stations, job.building, job.screening)
+        return risk_rows(pairs, stations, job.field, job.building, job.screening)
     except (ValueError, ArithmeticError) as error:
         if len(pairs) == 1:
             return pairs.iloc[:0], (Rejection("pair", pairs["pair_id"].iloc[0], "", None, (str(error),)),)
@@ -203,7 +219,7 @@ def _station(shard: Path, content: str) -> xr.Dataset:
 def _key(job: ChunkJob) -> str:
     """Return the hash of everything that the part depends on."""
     rows, digest = job.chunk.rows, hashlib.sha256()
-    settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
+    settings = [job.building.model_dump_json(), job.screening.model_dump_json(), str(job.field and job.field.source)]
     stations = [f"{one.name} {one.hash}" for one in job.stations]
     digest.update("\n".join([version("per_obspy"), rows.source, *settings, *stations]).encode())
     digest.update(repr(rows.broken).encode())

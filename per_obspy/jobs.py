@@ -44,8 +44,17 @@ def spectra_shard(job: "Job", stream: "Stream", event: "Event | None") -> tuple[
         periods = np.geomspace(grid.shortest, grid.longest, grid.count)
         dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
         dataset.attrs["simulated"] = str(job.simulated).lower()
+        dataset.attrs |= _hypocentre(event)
         write_spectra(dataset, job.shard)
     return unfit, {}
+
+
+def _hypocentre(event: "Event | None") -> dict[str, float]:
+    """Return where the earthquake started, degrees and m, if that is known."""
+    origin = event and (event.preferred_origin() or next(iter(event.origins), None))
+    if not origin or None in (origin.longitude, origin.latitude, origin.depth):
+        return {}
+    return {f"hypocentre_{name}": float(origin[name]) for name in ("longitude", "latitude", "depth")}
 
 
 class Job(NamedTuple):

@@ -53,7 +53,7 @@ RESULTS: dict[str, Column] = {
         Column("correlation_linearized", "float64", "1", "eq. (16) of them; in narrow motion not above correlation"),
         *_both("ductility", "1", "estimated displacement / yield displacement; up to 1 it stays elastic"),
         Column("missing_gap", "float64", "m", "by which the gap is below the demand; 0 where it is enough"),
-        Column("supplemental_damping", "float64", "1", "estimate: least to add to both; empty: up to 0.4 is too little"),
+        Column("supplemental_damping", "float64", "1", "estimate: least to add to both; empty: 0.4 is too little"),
         Column("bumper_restitution", "float64", "1", "estimate: largest for target_amplification; empty: none helps"),
         Column("srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"),
         Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
@@ -70,7 +70,8 @@ ORDER = (
     "per_2", "sd_1", "sd_2", "correlation", "correlation_record", "critical_gap_per", "critical_gap_record",
     "critical_gap_linearized", "correlation_linearized", "ductility_1", "ductility_2", "critical_gap_sd", "srss_gap",
     "absolute_gap", "demand_exact", "demand_two_sided", "missing_gap", "supplemental_damping", "bumper_restitution",
-    "ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2", "contact_mass_1", "contact_mass_2", "restitution", "derived",
+    "ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2", "contact_mass_1", "contact_mass_2",
+    "restitution", "derived",
 )  # fmt: skip
 
 #: Flags of a pair and what each means.

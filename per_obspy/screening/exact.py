@@ -135,6 +135,13 @@ def _oscillators(pairs: pd.DataFrame, azimuth: FloatArray) -> Oscillators:
     return period_1, damping_1, period_2, damping_2, azimuth, share_1, share_2
 
 
+def no_outcome(table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+    """Return the columns of :func:`exact_outcome`, all empty."""
+    names = ("demand_exact", "demand_two_sided", "impacts", "impact_velocity_exact", "amplification_exact_1",
+             "amplification_exact_2")  # fmt: skip
+    return {name: np.full(len(table), np.nan) for name in names}
+
+
 def _ratio(after: FloatArray, before: FloatArray) -> FloatArray:
     """Return after / before, 1 where there was no motion."""
     return np.divide(after, before, out=np.ones_like(after), where=before > 0)

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.screening.demand import gap_estimates, governing_demand
-from per_obspy.screening.exact import exact_decides, exact_outcome
+from per_obspy.screening.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.motion import PairMotion
 from per_obspy.screening.values import at_contact, both, values
+from per_obspy.screening.yielding import linearized_columns
 
 #: Demand / sum of the radii below which two oscillators move as one: the difference of equal numbers.
 ROUND_OFF = 1e-12
@@ -21,7 +22,7 @@ ROUND_OFF = 1e-12
 Column = NDArray[Any]
 
 
-def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: str) -> pd.DataFrame:
+def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: str, exact: bool) -> pd.DataFrame:
     """
     Return the pairs with estimates, single hit, exact outcome and the demand that decides.
 
@@ -35,17 +36,35 @@ def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: s
         What the record does to them, along one azimuth or many.
     rule : str
         How the azimuth was found: ``given``, ``worst`` or ``station``.
+    exact : bool
+        Whether the exact demand and the history of every pair are computed; they are empty otherwise.
     """
     table = pairs.assign(azimuth_rule=rule, **_at_worst(motion, pairs))
+    table = table.assign(**linearized_columns(station, table))
+    table = table.assign(**_estimated_demand(table))
     table = table.assign(**_single_hits(table))
+    if not exact:
+        return _without_round_off(table.assign(**no_outcome(table)))
     azimuth = np.zeros(len(table)) if rule == "station" else values(table, "azimuth_used")
     table = table.assign(**exact_outcome(station, table, azimuth))
-    exact = exact_decides(station, table)
-    demand = np.where(exact, table["demand_exact"], table["demand"])
-    return table.assign(
-        demand=np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0),
-        demand_rule=np.where(exact, "exact", table["demand_rule"]),
-    )
+    decides = exact_decides(station, table)
+    demand = np.where(decides, table["demand_exact"], table["demand"])
+    return _without_round_off(table.assign(demand=demand, demand_rule=np.where(decides, "exact", table["demand_rule"])))
+
+
+def _estimated_demand(table: pd.DataFrame) -> dict[str, Column]:
+    """Return the larger of the elastic and the linearized demand: elastic alone is too small for yielding pairs."""
+    elastic, linearized = values(table, "demand"), values(table, "critical_gap_linearized")
+    larger = linearized > elastic
+    return {
+        "demand": np.where(larger, linearized, elastic),
+        "demand_rule": np.where(larger, "linearized", table["demand_rule"]),
+    }
+
+
+def _without_round_off(table: pd.DataFrame) -> pd.DataFrame:
+    demand = values(table, "demand")
+    return table.assign(demand=np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0))
 
 
 def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
@@ -83,8 +102,8 @@ def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
 
 def _single_hits(table: pd.DataFrame) -> dict[str, Column]:
     """Return the single hit of every pair; its critical gap is the estimated demand."""
-    per_1, per_2 = at_contact(table, "per")
-    period_1, period_2 = both(table, "period")
+    per_1, per_2 = at_contact(table, "equivalent_per")
+    period_1, period_2 = both(table, "equivalent_period")
     mass_1, mass_2 = both(table, "contact_mass")
     restitution, demand, gap = (values(table, name) for name in ("restitution", "demand", "gap"))
     hit = single_hit(per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, demand, gap)
@@ -99,5 +118,5 @@ def _single_hits(table: pd.DataFrame) -> dict[str, Column]:
 def impact_velocity_that_counts(table: pd.DataFrame) -> FloatArray:
     """Return that of the exact history where it decides, else the larger of it and of the single hit, m/s."""
     estimated = np.where(table["demand_rule"] == "exact", 0.0, np.nan_to_num(values(table, "impact_velocity")))
-    larger: FloatArray = np.maximum(values(table, "impact_velocity_exact"), estimated)
+    larger: FloatArray = np.fmax(values(table, "impact_velocity_exact"), estimated)
     return larger

@@ -15,7 +15,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.schema import Column
 from per_obspy.kernels.added_damping import least_dampings
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.gap import critical_gap, srss_gap
@@ -28,13 +27,6 @@ from per_obspy.screening.values import at_contact, both, values
 LARGEST_DAMPING = 0.4
 #: Critical gap / sum of the radii below which it is the difference of equal numbers: then they count as uncorrelated.
 ROUND_OFF = 1e-12
-
-#: What :func:`mitigation_columns` adds to the risk table.
-MITIGATION = (
-    Column("missing_gap", "float64", "m", "by which the gap is below the demand; 0 where it is enough"),
-    Column("supplemental_damping", "float64", "1", "estimate: least to add to both; empty: up to 0.4 is not enough"),
-    Column("bumper_restitution", "float64", "1", "estimate: largest for a target amplification; empty: none is enough"),
-)  # fmt: skip
 
 
 def mitigation_columns(
@@ -55,7 +47,7 @@ def mitigation_columns(
     Returns
     -------
     dict of (n_pairs,) ndarray
-        The columns of ``MITIGATION``.
+        ``missing_gap``, ``supplemental_damping``, ``bumper_restitution``, see ``columns.RESULTS``.
 
     Raises
     ------

@@ -10,6 +10,7 @@ from per_obspy.screening.assignment import stations_of
 from per_obspy.screening.judgement import impact_velocity_that_counts
 from per_obspy.screening.ranking import worst_first
 from per_obspy.screening.rows import risk_rows
+from per_obspy.screening.site_motion import prepared_field
 
 #: Defaults of the configuration.
 BUILDING, SCREENING = Building(), Screening()
@@ -42,7 +43,9 @@ def risk_table(
         ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
     """
     stations, nowhere = stations_of([spectra] if isinstance(spectra, xr.Dataset) else list(spectra))
-    rows, far = risk_rows(pairs, stations, building, screening)
+    located = [stations.read(index) for index in range(stations.names.size)]
+    field = prepared_field(located, screening.interpolation) if located else None
+    rows, far = risk_rows(pairs, stations, field, building, screening)
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *nowhere, *far)

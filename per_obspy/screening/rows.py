@@ -20,6 +20,7 @@ from per_obspy.screening.demand import demand_ratio, pounding_state
 from per_obspy.screening.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.flags import flag_text, period_is_derived
 from per_obspy.screening.judgement import judged
+from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.motion import (
     PairMotion,
     motion_along_azimuths,
@@ -28,14 +29,22 @@ from per_obspy.screening.motion import (
 )
 from per_obspy.screening.probability import pair_probability
 from per_obspy.screening.ranking import risk_class
+from per_obspy.screening.site_motion import StationField, motion_at_pairs
 from per_obspy.screening.values import at_contact, values
+
+#: Needed on the way only; flags tell what is to be known of them.
+ON_THE_WAY = [
+    "linearized_converged",
+    "motion_from_other_site_class",
+    *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
+]
 
 #: Pairs in a block: at 180 azimuths a block of every array stays below 3 MB.
 BLOCK = 2000
 
 
 def risk_rows(
-    pairs: pd.DataFrame, stations: Stations, building: Building, screening: Screening
+    pairs: pd.DataFrame, stations: Stations, field: StationField | None, building: Building, screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
     Return one row a pair, in no particular order, and the pairs that have no station in reach.
@@ -46,6 +55,8 @@ def risk_rows(
         From :func:`per_obspy.read_pairs`, or some rows of it.
     stations : Stations
         Which there are; only those that serve a pair are read.
+    field : StationField or None
+        The motion between them; None if there are none.
     building, screening : Building, Screening
         What is assumed; thresholds.
 
@@ -57,6 +68,8 @@ def risk_rows(
         Pairs without a station in reach.
     """
     placed, far = assigned(completed_pairs(pairs, building), stations, screening.largest_distance)
+    if field is not None:
+        placed = placed.assign(**motion_at_pairs(field, placed, placed["station_index"].to_numpy()))
     blocks = [_rows(stations.read(index), block, screening) for index, block in _blocks(placed)]
     rows = pd.concat(blocks, ignore_index=True) if blocks else placed.reindex(columns=[*ORDER])
     first = [name for name in ORDER if name != "rank"]
@@ -74,9 +87,11 @@ def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
 
 def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the finished rows of one block, not ranked yet."""
-    table = pd.concat([judged(station, pairs, motion, rule) for pairs, motion, rule in _motions(station, block)])
+    motions = _motions(station, block, screening.exact)
+    table = pd.concat([judged(station, *motion, screening.exact) for motion in motions])
+    table = table.assign(**mitigation_columns(station, table, screening.target_amplification))
     gap, demand = values(table, "gap"), values(table, "demand")
-    probability = pair_probability(station, table, screening.model_dispersion)
+    probability = pair_probability(station, table, screening)
     possible = period_is_derived(table) | (probability >= screening.possible_from)
     ratio = demand_ratio(gap, demand)
     table = table.assign(
@@ -86,18 +101,18 @@ def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.
         risk_class=risk_class(ratio, screening.classes),
     )
     rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
-    return table.assign(flags=flag_text(table, station, screening)).join(rules)
+    return table.assign(flags=flag_text(table, station, screening)).join(rules).drop(columns=ON_THE_WAY)
 
 
-def _motions(station: xr.Dataset, block: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
+def _motions(station: xr.Dataset, block: pd.DataFrame, exact: bool) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
     """Give the pairs of a block by how their azimuth is found, with their motion and the name of that way."""
     if station.sizes["horizontal"] == 1:
         yield block, motion_of_one_horizontal(station, block), "station"
         return
-    unknown, exact = block["azimuth"].isna().to_numpy(), exact_decides(station, block)
+    unknown, decides = block["azimuth"].isna().to_numpy(), exact & exact_decides(station, block)
     if len(given := block[~unknown]):
         yield given, motion_along_azimuths(station, given, values(given, "azimuth")), "given"
-    if len(worst := block[unknown & exact]):
+    if len(worst := block[unknown & decides]):
         yield worst, motion_along_azimuths(station, worst, furthest_azimuth(station, worst)), "worst"
-    if len(worst := block[unknown & ~exact]):
+    if len(worst := block[unknown & ~decides]):
         yield worst, motion_along_every_azimuth(station, worst), "worst"

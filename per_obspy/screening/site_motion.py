@@ -62,8 +62,8 @@ def prepared_field(
     Parameters
     ----------
     stations : iterable of Dataset
-        From :func:`per_obspy.station_spectra`, with coordinates, one after the other; a scalar ``site_class`` (text)
-        or ``vs30`` (m/s) is used where a station has it.
+        From :func:`per_obspy.station_spectra`, with coordinates, one after the other; ``site_class`` (text)
+        and ``vs30`` (m/s) are used where a station has them.
     settings : Interpolation
         What is assumed of the deviation, and the case of the correlation.
     source : Source, optional

@@ -17,7 +17,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.schema import Column
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.equivalent_linear import iwan
 from per_obspy.pounding.gap import critical_gap
@@ -31,23 +30,6 @@ PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
 
 #: What an equivalent building has of its own.
 EQUIVALENT = ("period", "damping", "per")
-
-
-def _of_each(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
-    first, second = (Column(f"{name}_{i}", "float64", unit, f"building {i}: {meaning}") for i in (1, 2))
-    return first, second
-
-
-#: What :func:`linearized_columns` adds to the risk table.
-LINEARIZED = (
-    Column("critical_gap_linearized", "float64", "m", "eq. (15) of equivalent linear buildings, at contact height"),
-    Column("correlation_linearized", "float64", "1", "eq. (16) of them; in narrow motion not above correlation"),
-    *_of_each("ductility", "1", "estimated displacement / yield displacement; up to 1 it stays elastic"),
-    *_of_each("equivalent_period", "s", "of the equivalent linear building (Iwan 1980)"),
-    *_of_each("equivalent_damping", "1", "of the equivalent linear building, fraction of critical"),
-    *_of_each("equivalent_per", "m", "PER of the equivalent linear oscillator"),
-    Column("linearized_converged", "bool", "", "no: a ductility is above 40, the estimate is that of 40"),
-)  # fmt: skip
 
 
 class Equivalent(NamedTuple):
@@ -85,8 +67,9 @@ def linearized_columns(station: xr.Dataset, table: pd.DataFrame) -> dict[str, ND
     Returns
     -------
     dict of (n_pairs,) ndarray
-        The columns of ``LINEARIZED``. Where no building is taken beyond its yield displacement they equal the elastic
-        ones.
+        ``critical_gap_linearized, correlation_linearized, ductility_i`` (see ``columns.RESULTS``), period, damping and
+        PER of the equivalent oscillators, ``equivalent_..._i``, and ``linearized_converged``. Where no building is
+        taken beyond its yield displacement they equal the elastic ones.
 
     References
     ----------

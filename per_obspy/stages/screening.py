@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from per_obspy.chunks import CHUNK, ChunkJob, Part, StationFile, do_chunks, rejections, station_files
+from per_obspy.chunks import CHUNK, ChunkJob, Part, StationFile, do_chunks, field_of, rejections, station_files
 from per_obspy.config import Run, Simulation, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import written_whole
@@ -20,6 +20,7 @@ from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.progress import Progress
 from per_obspy.report.ranked import ranked, write_risk
 from per_obspy.report.tables import write_rejected
+from per_obspy.screening.site_motion import StationField
 
 KINDS = ("file", "record", "station", "service", "pair")
 STATES = ("yes", "possible", "no")
@@ -96,9 +97,10 @@ def _parts(
     if settings.totals.area and settings.totals.area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
     progress("screening", 0, inventory.count)
+    field = field_of(stations, settings.screening.interpolation)
     parts, rows = list[Part](), 0
     for part in do_chunks(
-        _jobs(settings, folder, stations, inventory), settings.workers or os.cpu_count() or 1, executor
+        _jobs(settings, folder, (stations, field), inventory), settings.workers or os.cpu_count() or 1, executor
     ):
         parts.append(part)
         rows += part.rows
@@ -112,11 +114,11 @@ def _parts(
 
 
 def _jobs(
-    settings: Run, folder: Path, stations: tuple[StationFile, ...], inventory: PairInventory
+    settings: Run, folder: Path, motion: tuple[tuple[StationFile, ...], StationField | None], inventory: PairInventory
 ) -> Iterator[ChunkJob]:
     for number, chunk in enumerate(inventory.chunks(CHUNK)):
         part = _chunk_folder(folder) / f"{number:06}.parquet"
-        yield ChunkJob(chunk, stations, settings.building, settings.screening, part)
+        yield ChunkJob(chunk, *motion, settings.building, settings.screening, part)
 
 
 def _chunk_folder(folder: Path) -> Path:

@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import RegularGridInterpolator
 
 import per_obspy
+from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.mitigation import MITIGATION, mitigation_columns
+from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.values import at_contact, both, components, values
 from per_obspy.screening.yielding import linearized_columns
 
@@ -32,7 +33,7 @@ def table(station):
 
 
 def test_every_column_is_described(station, table):
-    assert set(mitigation_columns(station, table, TARGET)) == {column.name for column in MITIGATION}
+    assert set(mitigation_columns(station, table, TARGET)) <= set(RESULTS)
 
 
 def test_nothing_is_asked_of_a_pair_whose_gap_is_enough(station, table):

@@ -4,9 +4,11 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 import per_obspy
+from per_obspy.config import Screening
 from per_obspy.screening.pair_motion import period_correlation
 from per_obspy.screening.probability import NODES, pair_probability
 from per_obspy.screening.stored import log_spectra, stored_log
+from per_obspy.screening.yielding import linearized_columns
 
 from .conftest import make_pairs, make_station
 
@@ -29,7 +31,8 @@ def test_stored_spectra_are_met_at_their_grid_points(station):
 
 
 def test_given_buildings_and_an_exact_demand_leave_no_doubt(station):
-    given = {"damping_1": 0.05, "damping_2": 0.05}
+    # at the station itself, where the motion is the record's
+    given = {"damping_1": 0.05, "damping_2": 0.05, "longitude_1": 19.9999, "longitude_2": 20.0001}
     demand = _one(station, **given)["demand"]
     assert _one(station, **given, gap=0.99 * demand)["probability"] == 1.0
     assert _one(station, **given, gap=1.01 * demand)["probability"] == 0.0
@@ -80,7 +83,8 @@ def _with_motion(station, rows, ratio_1=0.0, ratio_2=0.0, std_1=0.0, std_2=0.0):
     table = per_obspy.risk_table(station, make_pairs(rows))
     table = table.drop(columns=[name for name in table if name.startswith("ln_per_")])
     columns = {"ln_per_ratio_1": ratio_1, "ln_per_ratio_2": ratio_2, "ln_per_std_1": std_1, "ln_per_std_2": std_2}
-    return table, pair_probability(station, table, 0.35), pair_probability(station, table.assign(**columns), 0.35)
+    table = table.assign(**linearized_columns(station, table))
+    return table, *(pair_probability(station, one, Screening()) for one in (table, table.assign(**columns)))
 
 
 #: Every way to a probability: exact demand, radii of a yielding pair outside the usable periods, derived periods.
@@ -99,10 +103,10 @@ def test_motion_times_two_is_a_gap_of_half(station):
     # the certain motion at the site against a gap that is narrower by as much, in every way to a probability; would
     # catch a ratio upside down or one that moves a single building
     for way in EVERY_WAY:
-        plain, _, twice = _with_motion(station, [{**way, "gap": 0.2, "gap_std": 0.04}], np.log(2.0), np.log(2.0))
-        narrow, _, _ = _with_motion(station, [{**way, "gap": 0.1, "gap_std": 0.02}])
-        assert_allclose(twice, narrow["probability"], rtol=1e-6)
-        assert twice[0] > plain["probability"][0] or twice[0] == 1.0
+        _, plain, twice = _with_motion(station, [{**way, "gap": 0.2, "gap_std": 0.04}], np.log(2.0), np.log(2.0))
+        _, narrow, _ = _with_motion(station, [{**way, "gap": 0.1, "gap_std": 0.02}])
+        assert_allclose(twice, narrow, rtol=1e-6)
+        assert twice[0] > plain[0] or twice[0] == 1.0
 
 
 def test_a_site_whose_motion_nobody_knows_is_even_at_the_demand(station):

@@ -3,10 +3,10 @@
 import per_obspy.screening.warmup as warmup
 
 
-def test_both_pairs_are_judged(monkeypatch):
+def test_every_pair_is_judged(monkeypatch):
     tables = []
     real = warmup.risk_table
     monkeypatch.setattr(warmup, "risk_table", lambda *arguments: tables.append(real(*arguments)))
     warmup.compile_screening()
-    assert tables[0]["demand_rule"].tolist() == ["exact", "srss"]
+    assert sorted(tables[0]["demand_rule"]) == ["exact", "exact", "srss"]
     assert tables[0]["impacts"].min() >= 1
