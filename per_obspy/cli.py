@@ -8,10 +8,10 @@ import sys
 
 import typer
 
-from per_obspy.commands.design import design
 from per_obspy.commands.inventory import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
-from per_obspy.commands.walk import process, report, run, screen, simulate, spectra
+from per_obspy.commands.screen import screen
+from per_obspy.commands.walk import process, report, run, simulate, spectra
 from per_obspy.errors import PerError, ServiceError
 
 WRONG_INPUT, SERVICE_UNAVAILABLE = 2, 75
@@ -26,7 +26,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, process, spectra, screen, report, events, fetch, info, design):
+for command in (run, simulate, process, spectra, screen, report, events, fetch, info):
     app.command()(command)
 
 

@@ -74,6 +74,17 @@ def test_json_is_for_machines(monkeypatch, capsys, configuration):
     assert json.loads(out)["counts"]["pairs"] == 1
 
 
+def test_pairs_are_screened_again_with_the_stations_of_a_run(monkeypatch, capsys, configuration):
+    code, _, err = _call(monkeypatch, capsys, "screen", configuration)
+    assert code == 2
+    assert "no stations here: a whole run comes first" in err.strip().splitlines()[-1]
+    _call(monkeypatch, capsys, "run", configuration)
+    (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{ROW}\nb{ROW[1:]}\n")
+    code, out, _ = _call(monkeypatch, capsys, "screen", configuration, "--json")
+    assert code == 0
+    assert json.loads(out)["counts"]["pairs"] == 2
+
+
 BAD_TABLES = {
     "missing column": (f"{HEADER.replace(',gap', '')}\n{ROW[:-5]}\n".encode(), "gap"),
     "empty table": (f"{HEADER}\n".encode(), "pairs.csv"),

@@ -1,4 +1,4 @@
-"""``per-obspy design`` as a user meets it."""
+"""``per-obspy screen`` by a design spectrum as a user meets it."""
 
 import json
 import sys
@@ -25,7 +25,7 @@ def call(monkeypatch, capsys, tmp_path):
     )
 
     def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["per-obspy", "design", str(tmp_path / "design.toml"), *arguments])
+        monkeypatch.setattr(sys, "argv", ["per-obspy", "screen", str(tmp_path / "design.toml"), *arguments])
         with pytest.raises(SystemExit) as stop:
             cli.main()
         out, err = capsys.readouterr()
@@ -70,3 +70,29 @@ def test_nothing_inside_the_spectrum_exits_with_3(call, tmp_path):
     code, _, err = call()
     assert code == 3
     assert "rejected.csv" in err
+
+
+def test_results_go_where_they_are_asked_for(call, tmp_path):
+    assert call("-o", str(tmp_path / "elsewhere"))[0] == 0
+    assert (tmp_path / "elsewhere" / "design.csv").is_file()
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('name = "x"\noutput = "out"\n', "nothing to screen by: give records or simulation"),
+        ("[scenario]\nmagnitude = 7.0\n", "nothing to screen by"),  # what `simulate` takes
+        ("spectrum = ", "cannot be read as TOML"),
+        ('spectrum = "code.csv"\npairs = "pairs.csv"\n', "output: Field required"),
+        ('spectrum = "code.csv"\nsimulation = "s.toml"\noutput = "out"\n', "simulation: unknown key"),
+        ('simulation = "s.toml"\n', "name: Field required"),
+    ],
+)
+def test_a_configuration_of_another_kind_stops_with_one_line(call, tmp_path, text, message):
+    (tmp_path / "design.toml").write_text(text)
+    code, _, err = call()
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "design.toml: " in err
+    assert message in err

@@ -1,9 +1,8 @@
-"""``per-obspy design``: screening by a design or user spectrum, without a record."""
+"""``per-obspy screen`` by a design or user spectrum, without a record."""
 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -15,15 +14,8 @@ NOTHING_USABLE = 3
 SHOWN = ("pair_id", "period_1", "period_2", "gap", "demand", "demand_rule", "state", "probability", "impact_velocity")
 
 
-def design(
-    configuration: Annotated[Path, typer.Argument(help="TOML file: spectrum, pairs, output, assumptions.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")] = False,
-) -> None:
-    """
-    Screen pairs by a design or user spectrum instead of a record.
-
-    Example: per-obspy design design.toml
-    """
+def screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
+    """Screen pairs by a design or user spectrum instead of a record, and print what was found."""
     from per_obspy.config import Design, load
     from per_obspy.inventory.reading import read_pairs
     from per_obspy.report.design import write_design
@@ -33,7 +25,7 @@ def design(
     settings = load(configuration, Design)
     spectrum = read_design_spectrum(settings.spectrum)
     table = design_table(spectrum, read_pairs(settings.pairs), settings.building, settings.screening)
-    files = write_design(table, settings.output)
+    files = write_design(table, output or settings.output)
     states = {state: int((table["state"] == state).sum()) for state in ("yes", "possible", "no")}
     rejected = len(table.attrs["rejected"])
     if as_json:

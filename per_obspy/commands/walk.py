@@ -1,4 +1,4 @@
-"""``per-obspy run`` and its parts on records: ``simulate``, ``process`` and ``spectra``."""
+"""``per-obspy run`` and its parts: ``simulate``, ``process``, ``spectra`` and ``report``."""
 
 import json
 import sys
@@ -42,24 +42,7 @@ def run(
 
     with shown_progress() as progress:
         result = whole_run(configuration, output, progress=progress)
-    _tell(result.folder, result.record, result.did_nothing, as_json)
-
-
-def screen(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
-    as_json: AsJson = False,
-) -> None:
-    """
-    Screen pairs again with the stations of an earlier run; only what has changed is computed.
-
-    Example: per-obspy screen workflows/demo.toml
-    """
-    from per_obspy.run import screen as screen_again
-
-    with shown_progress() as progress:
-        result = screen_again(configuration, output, progress=progress)
-    _tell(result.folder, result.record, result.did_nothing, as_json)
+    tell(result.folder, result.record, result.did_nothing, as_json)
 
 
 def report(
@@ -76,10 +59,10 @@ def report(
 
     with shown_progress() as progress:
         result = report_again(configuration, output, progress=progress)
-    _tell(result.folder, result.record, result.did_nothing, as_json)
+    tell(result.folder, result.record, result.did_nothing, as_json)
 
 
-def _tell(folder: Path, record: dict[str, Any], did_nothing: bool, as_json: bool) -> None:
+def tell(folder: Path, record: dict[str, Any], did_nothing: bool, as_json: bool) -> None:
     """Print the result of a run, and stop where nothing usable was left."""
     if as_json:
         print(json.dumps({"folder": str(folder), "did_nothing": did_nothing, **record}))

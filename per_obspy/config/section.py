@@ -65,11 +65,22 @@ def load(path: Path, section: type[SectionType]) -> SectionType:
     CatalogError
         If the file cannot be read, or naming every key that is unknown, missing or has a wrong value.
     """
+    return checked(section, read_toml(path), str(path), path.resolve().parent)
+
+
+def read_toml(path: Path) -> dict[str, object]:
+    """
+    Return the content of a TOML file.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read.
+    """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise CatalogError(str(path), f"cannot be read as TOML: {error}") from error
-    return checked(section, content, str(path), path.resolve().parent)
 
 
 def checked(
