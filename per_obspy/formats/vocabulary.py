@@ -19,6 +19,7 @@ instrument                     model, serial, natural_frequency (Hz), damping (f
                                sensitivity (V/(m/s2))
 event                          name, time (UTC), latitude, longitude (degrees), depth (m), magnitude
 station_name                   as the header has it
+site_class, vs30               of the ground as the metadata have it: any word; m/s
 header_peak                    largest absolute value according to the header, in ``units``
 ============================== ================================================================================
 

@@ -1,4 +1,4 @@
-"""What StationXML knows about a trace, merged by epoch: coordinates, orientation, response."""
+"""What StationXML knows about a trace, merged by epoch: coordinates, orientation, response, and the ground."""
 
 from collections.abc import Iterator
 from io import BytesIO
@@ -49,6 +49,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
         raise RecordRejected(trace.id, f"{_missing(trace, inventory)}, so what its samples measure is unknown")
     if not result.stats.get("coordinates"):
         _place_station(result, inventory)
+    result.stats.update(_ground(result, inventory))
     result.data = _samples(result)
     return result
 
@@ -161,6 +162,18 @@ def _place_station(trace: Trace, inventory: Inventory | None) -> None:
     station = _only(trace, "station", list(_stations(trace, inventory)), _station_facts)
     if station is not None:
         trace.stats.coordinates = _place(station)
+
+
+def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]:
+    """Return what comments of the station say of its ground: ``site_class=`` any word, ``vs30=`` m/s."""
+    comments = (comment.value or "" for station in _stations(trace, inventory) for comment in station.comments)
+    said = {name.strip(): value.strip() for name, _, value in (text.partition("=") for text in comments)}
+    ground: dict[str, str | float] = {"site_class": said["site_class"]} if said.get("site_class") else {}
+    if "vs30" not in said:
+        return ground
+    if not said["vs30"].replace(".", "", 1).isdecimal() or not float(said["vs30"]):
+        raise RecordRejected(trace.id, f"StationXML says vs30={said['vs30']}, which is no velocity in m/s")
+    return ground | {"vs30": float(said["vs30"])}
 
 
 def metadata_text(inventory: Inventory) -> bytes:

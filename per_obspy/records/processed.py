@@ -21,7 +21,8 @@ from per_obspy.files import file_hash, written_whole
 #: words of ``trace.stats`` that are kept where a trace has them
 WORDS = (
     "network", "station", "location", "channel", "delta", "units", "quantity", "processing_level", "coordinates",
-    "sensor_azimuth", "sensor_dip", "sensor_location", "station_name", "corners", "per_obspy", "processing",
+    "sensor_azimuth", "sensor_dip", "sensor_location", "station_name", "site_class", "vs30", "corners", "per_obspy",
+    "processing",
 )  # fmt: skip
 _LENGTHS = {"network": 2, "station": 5, "location": 2, "channel": 3}  # of codes in MiniSEED
 

@@ -221,7 +221,7 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
 
 
 def _place(trace: Trace) -> dict[str, Any]:
-    """Return the name and the coordinates of the station; missing (NaN) where they are not known."""
+    """Return name, coordinates and ground of the station; missing (NaN, no text) where they are not known."""
     known = trace.stats.get("coordinates", {})
     described = {
         "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
@@ -230,6 +230,9 @@ def _place(trace: Trace) -> dict[str, Any]:
     }
     station = f"{trace.stats.network}.{trace.stats.station}"
     names: dict[str, Any] = {"station": ((), station, {"cf_role": "timeseries_id", "long_name": "station"})}
+    names["site_class"] = ((), str(trace.stats.get("site_class", "")), {"long_name": "site class; empty if unknown"})
+    velocity = {"units": "m s-1", "long_name": "mean shear-wave velocity of the upper 30 m of ground"}
+    names["vs30"] = ((), float(trace.stats.get("vs30", np.nan)), velocity)
     return names | {name: ((), float(known.get(name, np.nan)), text) for name, text in described.items()}
 
 

@@ -7,7 +7,7 @@ import obspy
 import pytest
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.event import Catalog, Event, Origin
-from obspy.core.inventory import Channel, Inventory, Network, Response, Station
+from obspy.core.inventory import Channel, Comment, Inventory, Network, Response, Station
 from obspy.core.inventory.response import InstrumentSensitivity
 
 from per_obspy.errors import CatalogError
@@ -75,6 +75,27 @@ def test_records_in_subfolders_get_their_metadata(folder: Path):
         assert trace.stats.coordinates == {"latitude": 35, "longitude": -117, "elevation": 700}
         assert trace.stats.response.instrument_sensitivity.value == 2e5
         assert trace.data.dtype == np.float64
+
+
+def test_comments_of_the_station_tell_its_ground(folder: Path):
+    described = inventory(THREE)
+    described[0][0].comments = [Comment("a park"), Comment("site_class = lakebed"), Comment("vs30=180.5")]
+    described.write(str(folder / "station.xml"), format="STATIONXML")
+    stream, _ = read_all(folder)
+    assert {(trace.stats.site_class, trace.stats.vs30) for trace in stream} == {("lakebed", 180.5)}
+    described[0][0].comments = [Comment("site_class=")]
+    described.write(str(folder / "station.xml"), format="STATIONXML")
+    assert not any("site_class" in trace.stats or "vs30" in trace.stats for trace in read_all(folder)[0])
+
+
+@pytest.mark.parametrize("velocity", ["soft", "-200", "0", "nan", "inf", "1e5"])
+def test_a_vs30_that_is_no_velocity_is_a_reason(folder: Path, velocity: str):
+    described = inventory(THREE)
+    described[0][0].comments = [Comment(f"vs30={velocity}")]
+    described.write(str(folder / "station.xml"), format="STATIONXML")
+    stream, reasons = read_all(folder)
+    assert not stream
+    assert set(reasons) == {f"StationXML says vs30={velocity}, which is no velocity in m/s"}
 
 
 def test_stationxml_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempPathFactory):

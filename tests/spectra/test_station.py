@@ -99,6 +99,15 @@ def test_usable_periods_are_those_of_the_processing(station):
     assert float(station["shortest_usable_period"]) == 0.3
 
 
+def test_the_ground_is_kept_where_it_is_known(station):
+    assert station["site_class"].item() == ""
+    assert np.isnan(station["vs30"].item())
+    known = per_obspy.station_spectra(_stream(site_class="lakebed", vs30=180.0), PERIODS)
+    assert known["site_class"].item() == "lakebed"
+    assert known["vs30"].item() == 180.0
+    assert known["vs30"].attrs["units"] == "m s-1"
+
+
 def test_processing_is_kept_as_json(station):
     assert json.loads(station["processing"].values[0])["highpass"] == 0.1
 
