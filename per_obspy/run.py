@@ -8,25 +8,22 @@ nothing.
 
 import json
 import os
-import platform
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
 from typing import Any, NamedTuple
 
-from filelock import FileLock, Timeout
-
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import file_hash
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.jobs import Done
 from per_obspy.progress import Progress, silent
+from per_obspy.provenance import Result, earlier_record, file_hashes, held, now, recorded, software_versions
 from per_obspy.records.fdsn import Fetched
 from per_obspy.records.sources import fetched_records, input_files
 from per_obspy.screening.warmup import compile_screening
@@ -36,28 +33,6 @@ from per_obspy.stages.stations import content_hash, finished_stations, station_j
 
 #: Written last.
 RECORD = "run.json"
-
-#: Libraries whose versions a result may depend on.
-LIBRARIES = ("per_obspy", "numpy", "scipy", "numba", "obspy", "pandas", "xarray", "netCDF4", "pyarrow", "duckdb")
-
-
-class Result(NamedTuple):
-    """
-    What a run has done.
-
-    Attributes
-    ----------
-    folder : Path
-        Where everything is.
-    record : dict
-        The content of ``run.json``.
-    did_nothing : bool
-        Whether the same had been done before.
-    """
-
-    folder: Path
-    record: dict[str, Any]
-    did_nothing: bool
 
 
 def run(
@@ -96,23 +71,20 @@ def run(
     configuration = configuration.resolve()
     settings = load(configuration, Run)
     folder = (output or settings.output).resolve()
-    configuration = configuration.resolve()
-    settings = load(configuration, Run)
-    folder = (output or settings.output).resolve()
-    with _held(folder):
+    with held(folder):
         fetched = fetched_records(settings.records, progress)
         head = _head(settings, configuration, fetched)
-        if earlier := _earlier(folder, head["key"]):
-            return Result(folder, earlier, did_nothing=True)
+        if known := earlier_record(folder / RECORD, head["key"]):
+            return Result(folder, known, did_nothing=True)
         (folder / RECORD).unlink(missing_ok=True)
-        seconds, started = dict[str, float](), datetime.now(UTC)
+        seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             jobs, rejected = station_jobs(settings, folder, fetched, progress)
         with _timed(seconds, "stations"), _compiling(progress):
             done = finished_stations(jobs, settings.workers, executor, progress)
         found = _screened_and_reported(settings, folder, _after_stations(done, rejected), executor, progress)
         found["seconds"] = seconds | found["seconds"]
-        return _recorded(folder, {**found, "started": _said(started), **head})
+        return recorded(folder / RECORD, {**found, "started": started, **head})
 
 
 def screen(
@@ -130,14 +102,14 @@ def screen(
     configuration = configuration.resolve()
     settings = load(configuration, Run)
     folder = (output or settings.output).resolve()
-    with _held(folder):
+    with held(folder):
         done = stations_of_earlier_run(folder)
         (folder / RECORD).unlink(missing_ok=True)
-        started = datetime.now(UTC)
-        head = _head(settings, configuration, None) | {"key": f"screening of stations as they were at {_said(started)}"}
+        started = now()
+        head = _head(settings, configuration, None) | {"key": f"screening of stations as they were at {started}"}
         with _compiling(progress):
             found = _screened_and_reported(settings, folder, _after_stations(done, []), executor, progress)
-        return _recorded(folder, {**found, "started": _said(started), **head})
+        return recorded(folder / RECORD, {**found, "started": started, **head})
 
 
 def report(configuration: Path, output: Path | None = None, progress: Progress = silent) -> Result:
@@ -151,7 +123,7 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
     """
     settings = load(configuration.resolve(), Run)
     folder = (output or settings.output).resolve()
-    with _held(folder):
+    with held(folder):
         record = _finished(folder)
         needed = [name for name in record["outputs"] if name in ("risk.parquet", "spectra.nc")]
         for name in needed:
@@ -159,7 +131,7 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
                 raise CatalogError(str(folder / name), "not as the run left it: run again")
         shards = [one.shard for one in stations_of_earlier_run(folder) if one.shard]
         outputs = reported(settings, folder, shards, progress)
-        return _recorded(folder, {**record, "outputs": record["outputs"] | _hashes(folder, outputs)})
+        return recorded(folder / RECORD, {**record, "outputs": record["outputs"] | file_hashes(folder, outputs)})
 
 
 def _head(settings: Run, configuration: Path, fetched: Fetched | None) -> dict[str, Any]:
@@ -200,25 +172,10 @@ def _screened_and_reported(
         "partial": any(count for name, count in found.counts.items() if name.startswith("rejected_")),
         "simulated": settings.simulation is not None,
         "counts": {"stations": len(stations.shards), "stations_resumed": stations.resumed, **found.counts},
-        "outputs": _hashes(folder, outputs),
-        "versions": {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()},
+        "outputs": file_hashes(folder, outputs),
+        "versions": software_versions(),
         "seconds": seconds,
     }
-
-
-def _recorded(folder: Path, record: dict[str, Any]) -> Result:
-    """Write the record, after everything else."""
-    with written_whole(folder / RECORD) as part:
-        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
-    return Result(folder, record, did_nothing=False)
-
-
-def _hashes(folder: Path, files: Sequence[Path]) -> dict[str, str]:
-    return {str(path.relative_to(folder)): file_hash(path) for path in files}
-
-
-def _said(time: datetime) -> str:
-    return time.isoformat(timespec="seconds")
 
 
 def _input_hashes(settings: Run, fetched: Fetched | None, configuration: Path) -> dict[str, str]:
@@ -246,49 +203,6 @@ def _finished(folder: Path) -> dict[str, Any]:
         return record | {"outputs": dict(record["outputs"])}
     except (OSError, ValueError, KeyError) as error:
         raise CatalogError(str(folder / RECORD), "no finished run here: a whole run comes first") from error
-
-
-def _earlier(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of an earlier run, if it did the same and its outputs are as it left them."""
-    try:
-        record: dict[str, Any] = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        intact = all(file_hash(folder / name) == known for name, known in record["outputs"].items())
-    except (OSError, ValueError, KeyError):
-        return None
-    return record if intact and record["key"] == key else None
-
-
-@contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """Hold the output folder; a second run is told who has it."""
-    holder = folder / ".holder.json"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(str(folder / ".lock"), timeout=0)
-        lock.acquire()
-    except Timeout as error:
-        raise CatalogError(str(folder), f"another run holds this folder: {_holder(holder)}") from error
-    except OSError as error:
-        raise CatalogError(str(folder), f"cannot be used as output folder: {error.strerror}") from error
-    try:
-        said = {
-            "process": os.getpid(),
-            "host": platform.node(),
-            "since": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-        holder.write_text(json.dumps(said), encoding="utf-8")
-        yield
-    finally:
-        holder.unlink(missing_ok=True)
-        lock.release()
-
-
-def _holder(path: Path) -> str:
-    try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return "it does not say which"
-    return f"process {said['process']} on {said['host']} since {said['since']}"
 
 
 @contextmanager
