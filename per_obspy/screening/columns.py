@@ -55,8 +55,6 @@ RESULTS: dict[str, Column] = {
         Column("missing_gap", "float64", "m", "by which the gap is below the demand; 0 where it is enough"),
         Column("supplemental_damping", "float64", "1", "estimate: least to add to both; empty: 0.4 is too little"),
         Column("bumper_restitution", "float64", "1", "estimate: largest for target_amplification; empty: none helps"),
-        Column("srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"),
-        Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
     )
 }  # fmt: skip
 

@@ -26,6 +26,8 @@ DESIGN: dict[str, Column] = {
     column.name: column
     for column in (
         Column("spectrum", "str", "", "file of the spectrum that was used instead of a record"),
+        Column("srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"),
+        Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
         Column("demand_rule", "str", "", "what the demand is: sd_white_noise, or sd_srss for derived periods"),
         Column("probability", "float64", "1", "of pounding under the spectrum, with what is uncertain of the pair"),
     )

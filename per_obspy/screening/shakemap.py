@@ -45,8 +45,8 @@ def shakemap_rows(
     Returns
     -------
     rows : DataFrame
-        Not ranked, with every column of ``screening.columns.ORDER``; those that need a record (``per_1``, ``impacts``,
-        ``station``, ...) are empty. ``demand_rule`` is ``shakemap``.
+        Not ranked, with the columns of :func:`~per_obspy.screening.rows.risk_rows`; those that need a record
+        (``per_1``, ``impacts``, ``station``, ...) are empty. ``demand_rule`` is ``shakemap``.
     rejected : tuple of Rejection
         Pairs outside the map, without motion there, or with a period outside the map's, each with the value.
     """
@@ -102,8 +102,10 @@ def _judged(shakemap: xr.Dataset, motion: MapMotion, pairs: pd.DataFrame, screen
         "shakemap_assumed_deviation": every & ("psa_log_std" not in shakemap),
         "simulated": every & (shakemap.attrs.get("shakemap_event_type", "").upper() == "SCENARIO"),
     }
-    table = table.assign(flags=joined_flags(raised, len(table)))
-    return table.assign(**{name: _empty(name) for name in ORDER if name not in table and name != "rank"})
+    missing = np.maximum(asked.demand - values(pairs, "gap"), 0.0)
+    table = table.assign(flags=joined_flags(raised, len(table)), missing_gap=missing)
+    empty = {name: _empty(name) for name in ORDER if name not in table and name != "rank"}
+    return table.assign(**empty).drop(columns=["srss_gap_sd", "absolute_gap_sd"])
 
 
 def _empty(name: str) -> str | float:

@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
+import per_obspy
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
@@ -44,6 +45,10 @@ def _rows(rows, shakemap=None, screening=None):
     return shakemap_rows(make_map() if shakemap is None else shakemap, _completed(rows), screening or Screening())
 
 
+def _root_of_squares(row):
+    return np.hypot(row["participation_1"] * row["sd_1"], row["participation_2"] * row["sd_2"])
+
+
 #: Two oscillators of given damping on a node of the map.
 GIVEN = {
     "longitude_2": 20.0,
@@ -65,13 +70,20 @@ def test_the_demand_by_hand():
     assert_allclose([row["sd_1"], row["sd_2"]], sd, rtol=1e-12)
     expected = critical_gap(*sd, ddc_correlation(0.3, 0.05, 1.0, 0.05))
     assert_allclose([row["demand"], row["critical_gap_sd"]], expected, rtol=1e-12)
-    assert_allclose(row["srss_gap_sd"], np.hypot(*sd), rtol=1e-12)
+    assert_allclose(row["missing_gap"], max(expected - row["gap"], 0.0), rtol=1e-12)
     assert row["demand_rule"] == "shakemap"
     assert {"shakemap_demand", "shakemap_assumed_deviation"} <= set(row["flags"].split())
     assert set(row["flags"].split()) <= set(FLAGS)
     assert {*ORDER} - {*table} == {"rank"}
     assert np.isnan(row["per_1"])
     assert row["station"] == ""
+
+
+def test_rows_have_the_columns_of_those_with_a_record(station):
+    # chunks with and without such rows go into one file
+    with_record = per_obspy.risk_table(station, make_pairs([{}]))
+    table, _ = _rows([{}])
+    assert {*table} == {*with_record} - {"rank"}
 
 
 def test_between_nodes_it_is_bilinear_and_between_periods_a_power():
@@ -122,7 +134,8 @@ def test_equal_periods_are_certain_only_if_they_are_given():
     derived = {**GIVEN, "period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0, "gap": 0.01}
     table, _ = _rows([derived])
     row = table.iloc[0]
-    assert row["demand"] == row["srss_gap_sd"] > row["critical_gap_sd"]
+    assert_allclose(row["demand"], _root_of_squares(row), rtol=1e-12)
+    assert row["demand"] > row["critical_gap_sd"]
     assert row["probability"] > 0.3
 
 
@@ -154,7 +167,7 @@ def test_derived_periods_against_monte_carlo():
     }
     derived |= {"height_1": 60.0, "height_2": 30.0, "longitude_2": 20.0, "storeys_1": 20.0, "storeys_2": 10.0}
     shakemap = make_map(log_std=0.5)
-    gap = 0.8 * _rows([derived], shakemap)[0]["srss_gap_sd"].iloc[0]
+    gap = 0.8 * _root_of_squares(_rows([derived], shakemap)[0].iloc[0])
     row = _rows([{**derived, "gap": gap}], shakemap)[0].iloc[0]
     random, n = np.random.default_rng(2), 100_000
     sd = np.array([8.0, 4.0, 1.0]) * (PERIODS / 2 / np.pi) ** 2
