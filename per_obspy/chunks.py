@@ -33,8 +33,8 @@ from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.site_motion import Source, StationField, prepared_field
 from per_obspy.spectra.storage import read_spectra
 
-#: Rows of a chunk: a worker needs about 1 kB for each.
-CHUNK = 50_000
+#: Rows of a chunk: a worker needs about 10 kB for each.
+CHUNK = 100_000
 
 #: Attribute of a station's Dataset that tells where the earthquake started, beside those of latitude and depth.
 HYPOCENTRE = "hypocentre_longitude"

@@ -20,11 +20,6 @@ def period_is_derived(pairs: pd.DataFrame) -> NDArray[np.bool_]:
     return pairs["derived"].str.contains(r"\bperiod_[12]\b", regex=True).to_numpy(dtype=bool)
 
 
-def flag_text(table: pd.DataFrame, station: xr.Dataset, screening: Screening) -> NDArray[np.object_]:
-    """Return the flags of every row, names separated by a space."""
-    return joined_flags(raised_by_pairs(table) | _raised_by_record(table, station, screening), len(table))
-
-
 def joined_flags(raised: Mapping[str, NDArray[np.bool_]], count: int) -> NDArray[np.object_]:
     """Return the names of the flags that rows raise, in the order of ``FLAGS``, separated by a space."""
     text = np.full(count, "", dtype=object)
@@ -46,7 +41,7 @@ def raised_by_pairs(table: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def _raised_by_record(table: pd.DataFrame, station: xr.Dataset, screening: Screening) -> dict[str, NDArray[np.bool_]]:
+def raised_by_record(table: pd.DataFrame, station: xr.Dataset, screening: Screening) -> dict[str, NDArray[np.bool_]]:
     """Return for every flag of the record the rows that raise it."""
     periods = table[["period_1", "period_2"]].to_numpy(np.float64)
     shortest, longest = float(station["shortest_usable_period"]), float(station["longest_usable_period"])

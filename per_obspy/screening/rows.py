@@ -1,5 +1,5 @@
 """
-The rows of the risk table, not ranked yet: pairs with the records of their stations, station by station, in blocks.
+The rows of the risk table, not ranked yet: pairs with the records of their stations, station by station.
 
 A row depends on its pair, its station and the settings, and on no other row.
 """
@@ -15,10 +15,10 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.assignment import Stations, assigned
 from per_obspy.screening.codes import code_columns
-from per_obspy.screening.columns import ORDER
+from per_obspy.screening.columns import FLAGS, ORDER
 from per_obspy.screening.demand import demand_ratio, pounding_state
 from per_obspy.screening.exact import exact_decides, furthest_azimuth
-from per_obspy.screening.flags import flag_text, period_is_derived
+from per_obspy.screening.flags import joined_flags, period_is_derived, raised_by_pairs, raised_by_record
 from per_obspy.screening.judgement import judged
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.motion import (
@@ -33,13 +33,14 @@ from per_obspy.screening.site_motion import StationField, motion_at_pairs
 from per_obspy.screening.values import at_contact, values
 
 #: Needed on the way only; flags tell what is to be known of them.
-ON_THE_WAY = [
+ON_THE_WAY = (
+    "station_index",
     "linearized_converged",
     "motion_from_other_site_class",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
-]
+)
 
-#: Pairs in a block: at 180 azimuths a block of every array stays below 3 MB.
+#: Pairs of unknown azimuth that are judged together: at 180 azimuths every array of theirs stays below 3 MB.
 BLOCK = 2000
 
 
@@ -68,40 +69,52 @@ def risk_rows(
         Pairs without a station in reach.
     """
     placed, far = assigned(completed_pairs(pairs, building), stations, screening.largest_distance)
+    placed = placed.reset_index(drop=True)
     if field is not None:
         placed = placed.assign(**motion_at_pairs(field, placed, placed["station_index"].to_numpy()))
-    blocks = [_rows(stations.read(index), block, screening) for index, block in _blocks(placed)]
-    rows = pd.concat(blocks, ignore_index=True) if blocks else placed.reindex(columns=[*ORDER])
-    first = [name for name in ORDER if name != "rank"]
-    others = [name for name in rows if name not in ORDER and name != "station_index"]
-    return rows[[*first, *others]], far
+    told = [_told(stations.read(index), block, screening) for index, block in _blocks(placed)]
+    if not told:
+        return placed.reindex(columns=[*ORDER]), far
+    table = pd.concat([placed, pd.concat(told).sort_index()], axis=1)
+    return _ordered(_judged_as_a_whole(table, screening)), far
 
 
 def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Give blocks of pairs that share a station."""
-    for index in np.unique(pairs["station_index"].to_numpy(np.int64)).tolist():
-        group = pairs[pairs["station_index"] == index]
-        for start in range(0, len(group), BLOCK):
-            yield index, group.iloc[start : start + BLOCK]
+    """Give the pairs of each station, what is text left out but the names of derived columns."""
+    numbers = pairs[[name for name in pairs if name == "derived" or pd.api.types.is_numeric_dtype(pairs[name])]]
+    index = pairs["station_index"].to_numpy(np.int64)
+    for station in np.unique(index).tolist():
+        yield station, numbers.iloc[np.flatnonzero(index == station)]
 
 
-def _rows(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.DataFrame:
-    """Return the finished rows of one block, not ranked yet."""
+def _told(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return what a record tells of its pairs, on their index; flags that it raises as columns ``raised_...``."""
     motions = _motions(station, block, screening.exact)
     table = pd.concat([judged(station, *motion, screening.exact) for motion in motions])
     table = table.assign(**mitigation_columns(station, table, screening.target_amplification))
-    gap, demand = values(table, "gap"), values(table, "demand")
-    probability = pair_probability(station, table, screening)
-    possible = period_is_derived(table) | (probability >= screening.possible_from)
+    raised = {f"raised_{name}": rows for name, rows in raised_by_record(table, station, screening).items()}
+    table = table.assign(probability=pair_probability(station, table, screening), **raised)
+    return table[[name for name in table if name not in block]]
+
+
+def _judged_as_a_whole(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return the table with everything that needs no record any more: state, class, code rules, flags."""
+    gap, demand, probability = (values(table, name) for name in ("gap", "demand", "probability"))
     ratio = demand_ratio(gap, demand)
-    table = table.assign(
-        probability=probability,
-        demand_ratio=ratio,
-        state=pounding_state(gap, demand, possible),
-        risk_class=risk_class(ratio, screening.classes),
-    )
+    possible = period_is_derived(table) | (probability >= screening.possible_from)
+    state, named = pounding_state(gap, demand, possible), risk_class(ratio, screening.classes)
+    table = table.assign(demand_ratio=ratio, state=state, risk_class=named)
+    by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}
+    raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}
+    flags = joined_flags(raised_by_pairs(table) | raised, len(table))
     rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
-    return table.assign(flags=flag_text(table, station, screening)).join(rules).drop(columns=ON_THE_WAY)
+    return table.drop(columns=[*ON_THE_WAY, *by_record.values()]).assign(flags=flags).join(rules)
+
+
+def _ordered(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the leading columns in their order, then the others."""
+    first = [name for name in ORDER if name != "rank"]
+    return table[[*first, *(name for name in table if name not in ORDER)]]
 
 
 def _motions(station: xr.Dataset, block: pd.DataFrame, exact: bool) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
@@ -114,5 +127,6 @@ def _motions(station: xr.Dataset, block: pd.DataFrame, exact: bool) -> Iterator[
         yield given, motion_along_azimuths(station, given, values(given, "azimuth")), "given"
     if len(worst := block[unknown & decides]):
         yield worst, motion_along_azimuths(station, worst, furthest_azimuth(station, worst)), "worst"
-    if len(worst := block[unknown & ~decides]):
-        yield worst, motion_along_every_azimuth(station, worst), "worst"
+    worst = block[unknown & ~decides]
+    for some in (worst.iloc[first : first + BLOCK] for first in range(0, len(worst), BLOCK)):
+        yield some, motion_along_every_azimuth(station, some), "worst"

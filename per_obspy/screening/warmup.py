@@ -7,7 +7,7 @@ import xarray as xr
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.screening.risk import risk_table
 
-#: Two oscillators that touch, two whose periods nobody gave, and one that yields: together they call every kernel.
+#: Two oscillators that touch, two whose periods nobody gave, and one that could yield: together they call every kernel.
 PAIRS = pd.DataFrame(
     {
         "pair_id": ["given", "derived", "yielding"],
@@ -16,9 +16,9 @@ PAIRS = pd.DataFrame(
         "height_2": [9.0, 15.0, 9.0],
         "period_1": [0.5, np.nan, 0.5],
         "period_2": [0.7, np.nan, 0.7],
-        "gap": [0.001, 0.001, 0.0],
+        "gap": 0.001,
         "azimuth": 0.0,
-        "yield_displacement_1": [np.nan, np.nan, 0.001],
+        "yield_displacement_1": [np.nan, np.nan, 0.02],
     }
 )
 
