@@ -13,6 +13,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation import ddc_correlation
 from per_obspy.pounding.gap import critical_gap
+from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.columns import FLAGS, ORDER
 from per_obspy.screening.shakemap import shakemap_fallback, shakemap_rows
 from per_obspy.screening.shakemap_motion import damping_factor, motion_on_map
@@ -77,6 +78,29 @@ def test_the_demand_by_hand():
     assert {*ORDER} - {*table} == {"rank"}
     assert np.isnan(row["per_1"])
     assert row["station"] == ""
+
+
+def test_a_file_gives_what_its_map_gives(tmp_path):
+    # from the text of a grid to the demand; would catch a unit or an axis that reader and screening see differently
+    shakemap = make_map()
+    names = ("LON", "LAT", "PSA03", "PSA10", "PSA30")
+    fields = "".join(
+        f'<grid_field index="{i}" name="{name}" units="{"dd" if i < 3 else "pctg"}"/>'
+        for i, name in enumerate(names, start=1)
+    )
+    table = "".join(
+        f"{east!r} {north!r} {' '.join(repr(value / 0.0980665) for value in node['psa'].values.tolist())}\n"
+        for north in shakemap["latitude"].values[::-1].tolist()
+        for east in shakemap["longitude"].values.tolist()
+        for node in [shakemap.sel(latitude=north, longitude=east)]
+    )
+    head = '<grid_specification nlat="2" nlon="3"/>'
+    text = f"<shakemap_grid>{head}{fields}<grid_data>{table}</grid_data></shakemap_grid>"
+    (tmp_path / "grid.xml").write_text(text, encoding="utf-8")
+    from_file, _ = _rows([{}, {"period_1": np.nan}], read_shakemap(tmp_path / "grid.xml"))
+    from_map, _ = _rows([{}, {"period_1": np.nan}])
+    for name in ("sd_1", "sd_2", "demand", "probability"):
+        assert_allclose(from_file[name], from_map[name], rtol=1e-9)
 
 
 def test_rows_have_the_columns_of_those_with_a_record(station):
