@@ -13,65 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
 from per_obspy.kernels.kriging import kriged
 from per_obspy.screening.assignment import EARTH_RADIUS, on_sphere
-from per_obspy.screening.spatial import decay_length, great_circle, residual_correlation
-
-#: A slope of the trend (of ln distance, of ln Vs30) is fitted where so many stations differ by so much; our choice.
-STATIONS_PER_SLOPE, SPREAD = 6, 0.1
-
-#: Stations whose coordinates agree to so many decimals of a degree (1 m) are one place: their mean ln PER counts.
-DECIMALS = 5
+from per_obspy.screening.sites import Sites
+from per_obspy.screening.spatial import decay_length
+from per_obspy.screening.trend import Group, features_of, fitted_group
 
 #: Stations that tell the residual of a place, the nearest ones: they screen the others. Of 300 stations within 60 km
 #: whose motion has the assumed correlation, the nearest 20 give deviations within 0.7 % of those of all of them, and
 #: medians within 0.1 deviations at 99 places of 100.
 NEIGHBOURS = 20
-
-
-class Sites(NamedTuple):
-    """
-    Places, (n_places,).
-
-    Attributes
-    ----------
-    longitude, latitude : ndarray
-        Degrees east and north.
-    site_class : ndarray of str
-        Any words; ``""`` where it is unknown.
-    source_distance : ndarray
-        To the source of the earthquake, m; NaN where it is unknown.
-    vs30 : ndarray
-        m/s; NaN where it is unknown.
-    """
-
-    longitude: FloatArray
-    latitude: FloatArray
-    site_class: NDArray[np.object_]
-    source_distance: FloatArray
-    vs30: FloatArray
-
-    def at(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Sites":
-        """Return some of the places."""
-        return Sites(
-            self.longitude[rows],
-            self.latitude[rows],
-            self.site_class[rows],
-            self.source_distance[rows],
-            self.vs30[rows],
-        )
-
-
-class _Group(NamedTuple):
-    """Stations that serve places together, and their trend: what the kernel takes (see ``kernels/kriging.py``)."""
-
-    stations: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-    trend: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 class Field(NamedTuple):
@@ -89,7 +44,7 @@ class Field(NamedTuple):
     """
 
     periods: FloatArray
-    groups: dict[str | None, _Group]
+    groups: dict[str | None, Group]
     vs30_clustered: bool
 
 
@@ -110,24 +65,6 @@ class InterpolatedMotion(NamedTuple):
     ln_median: FloatArray
     log_std: FloatArray
     fallback: NDArray[np.bool_]
-
-
-def sites(
-    longitude: ArrayLike,
-    latitude: ArrayLike,
-    site_class: ArrayLike = "",
-    source_distance: ArrayLike = np.nan,
-    vs30: ArrayLike = np.nan,
-) -> Sites:
-    """Return places with what is known of them; one value may stand for all (see :class:`Sites`)."""
-    # contiguous: functions of NumPy may differ in the last bit between strides
-    east = np.ascontiguousarray(checks.between("longitude", longitude, -180.0, 180.0))
-    north = np.ascontiguousarray(checks.between("latitude", latitude, -90.0, 90.0))
-    numbers = (
-        np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=np.float64), east.shape))
-        for values in (source_distance, vs30)
-    )
-    return Sites(east, north, np.broadcast_to(np.asarray(site_class, dtype=object), east.shape), *numbers)
 
 
 def fitted_field(
@@ -173,10 +110,11 @@ def fitted_field(
     limits = checks.numbers("usable", usable)
     names = np.unique(stations.site_class.astype(str)).tolist()
     chosen = {name: np.flatnonzero(stations.site_class == name) for name in names if name or len(names) == 1}
-    groups: dict[str | None, _Group] = {
-        name: _group(stations.at(some), values[some], limits[some], grid, settings) for name, some in chosen.items()
+    groups: dict[str | None, Group] = {
+        name: fitted_group(stations.at(some), values[some], limits[some], grid, settings)
+        for name, some in chosen.items()
     }
-    groups[None] = groups[names[0]] if len(names) == 1 else _group(stations, values, limits, grid, settings)
+    groups[None] = groups[names[0]] if len(names) == 1 else fitted_group(stations, values, limits, grid, settings)
     return Field(grid, groups, settings.vs30_clustered)
 
 
@@ -210,20 +148,20 @@ def motion_at(field: Field, places: Sites, period: ArrayLike) -> InterpolatedMot
     return InterpolatedMotion(out[:, 0].copy(), out[:, 1].copy(), fallback)
 
 
-def _served(field: Field, places: Sites) -> Iterator[tuple[NDArray[np.intp], _Group]]:
+def _served(field: Field, places: Sites) -> Iterator[tuple[NDArray[np.intp], Group]]:
     """Give places with the stations on their site class."""
     for name in np.unique(places.site_class.astype(str)).tolist():
         if name in field.groups:
             yield np.flatnonzero(places.site_class == name), field.groups[name]
 
 
-def _kriged(field: Field, group: _Group, places: Sites, period: FloatArray) -> FloatArray:
+def _kriged(field: Field, group: Group, places: Sites, period: FloatArray) -> FloatArray:
     """Return median and deviation, (n_places, 2), NaN where no station of the group knows."""
     out = np.full((period.size, 2), np.nan)
     lower, share = on_grid(field.periods, period)
     arrays = (
         on_sphere(places.longitude, places.latitude),
-        _features(places),
+        features_of(places),
         period,
         lower,
         share,
@@ -240,82 +178,3 @@ def on_grid(periods: FloatArray, period: FloatArray) -> tuple[NDArray[np.int64],
     grid = np.log(periods)
     share = (np.log(period) - grid[lower]) / (grid[lower + 1] - grid[lower])
     return lower.astype(np.int64), np.clip(share, 0.0, 1.0)
-
-
-def _features(places: Sites) -> FloatArray:
-    """Return what the trend depends on, NaN where it is not known."""
-    return np.log(np.stack([places.source_distance, places.vs30], axis=1))
-
-
-def _group(
-    stations: Sites, values: FloatArray, usable: FloatArray, periods: FloatArray, settings: Interpolation
-) -> _Group:
-    """Return stations with their trend at every period."""
-    near, mean, limits = _one_a_place(stations, values, usable)
-    between = great_circle(
-        near.longitude[:, None], near.latitude[:, None], near.longitude[None, :], near.latitude[None, :]
-    )
-    features = _features(near)
-    reach = np.concatenate([periods[:1], periods, periods[-1:]])
-    fits = [
-        _fitted(
-            between, features, mean[:, k], (limits[:, 0] <= reach[k + 2]) & (limits[:, 1] >= reach[k]), period, settings
-        )
-        for k, period in enumerate(periods.tolist())
-    ]
-    coefficients, covariance, middles, deviation = (np.array(part) for part in zip(*fits, strict=True))
-    about = np.nan_to_num(features[None, :, :] - middles[:, None, :])
-    trend = coefficients[:, :1] + np.einsum("kf,knf->kn", coefficients[:, 1:], about)
-    position = on_sphere(near.longitude, near.latitude)
-    arrays = (position, between, limits, features, np.ascontiguousarray(mean - trend.T))
-    return _Group(arrays, (coefficients, covariance, middles, deviation))
-
-
-def _one_a_place(stations: Sites, values: FloatArray, usable: FloatArray) -> tuple[Sites, FloatArray, FloatArray]:
-    """Return one row for each place that has stations: their mean, and the periods that all of them support."""
-    position = np.round(np.stack([stations.longitude, stations.latitude], axis=1), DECIMALS)
-    _, first, place = np.unique(position, axis=0, return_index=True, return_inverse=True)
-    total, limits = np.zeros((first.size, values.shape[1])), usable[first].copy()
-    np.add.at(total, place, values)
-    np.maximum.at(limits[:, 0], place, usable[:, 0])
-    np.minimum.at(limits[:, 1], place, usable[:, 1])
-    return stations.at(first), total / np.bincount(place)[:, None], limits
-
-
-def _fitted(
-    between: FloatArray,
-    features: FloatArray,
-    values: FloatArray,
-    known: NDArray[np.bool_],
-    period: float,
-    settings: Interpolation,
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return coefficients, their covariance for a deviation of 1, middles of the features, and the deviation."""
-    size = 1 + features.shape[1]
-    coefficients, covariance, middles = np.zeros(size), np.zeros((size, size)), np.full(size - 1, np.nan)
-    if not known.any():
-        return coefficients, covariance, middles, np.nan
-    used = _slopes(features[known])
-    middles[used] = features[known][:, used].mean(axis=0)
-    columns = np.concatenate([[0], 1 + used])
-    trend = np.column_stack([np.ones(known.sum()), features[known][:, used] - middles[used]])
-    factor = cho_factor(
-        residual_correlation(between[np.ix_(known, known)], period, settings.vs30_clustered), lower=True
-    )
-    normal = cho_factor(trend.T @ cho_solve(factor, trend), lower=True)
-    coefficients[columns] = cho_solve(normal, trend.T @ cho_solve(factor, values[known]))
-    covariance[np.ix_(columns, columns)] = cho_solve(normal, np.eye(columns.size))
-    residual = values[known] - trend @ coefficients[columns]
-    freedom = settings.log_std_weight + residual.size - columns.size
-    variance = (settings.log_std_weight * settings.log_std**2 + residual @ cho_solve(factor, residual)) / freedom
-    return coefficients, covariance, middles, float(np.sqrt(variance))
-
-
-def _slopes(features: FloatArray) -> NDArray[np.intp]:
-    """Return the features whose slope these stations can tell."""
-    used: list[int] = []
-    for one, values in enumerate(features.T):
-        enough = values.size >= STATIONS_PER_SLOPE * (1 + len(used)) and bool(np.isfinite(values).all())
-        if enough and float(values.std()) > SPREAD:
-            used.append(one)
-    return np.array(used, dtype=np.intp)

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
-from per_obspy.screening.interpolation import Field, Sites, fitted_field, motion_at, on_grid, sites
+from per_obspy.screening.interpolation import Field, fitted_field, motion_at, on_grid
+from per_obspy.screening.sites import Sites, sites
 from per_obspy.screening.spatial import great_circle
 from per_obspy.screening.values import number, values
 

@@ -13,8 +13,8 @@ from per_obspy.screening.interpolation import (
     InterpolatedMotion,
     fitted_field,
     motion_at,
-    sites,
 )
+from per_obspy.screening.sites import sites
 from per_obspy.screening.spatial import great_circle, spatial_correlation
 
 SETTINGS = Interpolation()
