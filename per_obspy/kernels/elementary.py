@@ -16,8 +16,9 @@ TO_INTEGER = 1.5 * 2.0**52
 #: ln 2 in two parts; an exponent times the first is exact.
 LN_2, LN_2_HIGH, LN_2_LOW = math.log(2.0), math.floor(math.log(2.0) * 2.0**32) / 2.0**32, 1.9082149292705877e-10
 PER_LN_2 = 1.0 / LN_2
-#: Taylor series, highest power first: of exp up to ln 2 / 2, and of artanh(s) / s in s² up to s = 0.172.
+#: Taylor series, highest power first: of exp up to ln 2 / 2, of (exp - 1) / x, of artanh(s) / s in s² to s = 0.172.
 EXPONENTIAL = tuple(1.0 / math.factorial(n) for n in range(13, -1, -1))
+LESS_ONE = EXPONENTIAL[:-1]
 ARTANH = tuple(1.0 / (2 * n + 1) for n in range(10, -1, -1))
 #: Exponents between which an exponential is a normal number.
 LOWEST, HIGHEST = -708.0, 709.0
@@ -48,6 +49,23 @@ def exponentials(x, integers):
     powers = integers.view(np.float64)
     for i in range(x.size):
         x[i] *= powers[i]
+
+
+@kernel
+def exponentials_less_one(x, integers):
+    """Replace each number by its exponential less one, without cancellation; ``integers`` is room for as many."""
+    for i in range(x.size):
+        value = min(max(x[i], LOWEST), HIGHEST)
+        exponent = (value * PER_LN_2 + TO_INTEGER) - TO_INTEGER
+        rest = (value - exponent * LN_2_HIGH) - exponent * LN_2_LOW
+        integers[i] = (np.int64(exponent) + EXPONENT_BIAS) << MANTISSA_BITS
+        total = 0.0
+        for coefficient in LESS_ONE:
+            total = total * rest + coefficient
+        x[i] = total * rest
+    powers = integers.view(np.float64)
+    for i in range(x.size):
+        x[i] = powers[i] * x[i] + (powers[i] - 1.0)
 
 
 @kernel

@@ -14,6 +14,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
+from per_obspy.kernels.resampling import resampled_probabilities
+from per_obspy.pounding.directional import directional_correlation
 from per_obspy.pounding.probability import pounding_probability
 from per_obspy.pounding.relative import critical_gap_surface, directional_relative_displacement
 from per_obspy.pounding.single_hit import single_hit
@@ -80,12 +82,34 @@ def main() -> None:
     motion, periods = ground_motion(), np.geomspace(0.1, 5.0, 100)
     surface = best(lambda: critical_gap_surface(motion, DT, periods, periods), 3)
     print(f"critical_gap_surface      {surface:8.3f} s for 100 x 100 periods, {SAMPLES} samples")
-    rng = np.random.default_rng(2)
-    structures = rng.uniform([0.2, 0.02, 0.2, 0.02, 0.0], [3.0, 0.1, 3.0, 0.1, 360.0], (2000, 5)).T
-    each = best(lambda: directional_relative_displacement(motion, motion[::-1], DT, *structures), 3) / 2000
-    print(f"relative displacement     {1e-3 / each:8.1f} thousand pairs/s, {SAMPLES} samples, own azimuths")
+    of_a_record(motion)
     chance = best(lambda: pounding_probability(pairs["r1"][:5000], pairs["r2"][:5000], 0.3, 0.2, 0.4, 0.4, 0.8, 0.2), 3)
     print(f"pounding_probability      {5 / chance:8.1f} thousand pairs/s")
+    print(f"resampled, 128 nodes      {resampled_rate() / 1e3:8.1f} thousand pairs/s")
+
+
+def of_a_record(motion: np.ndarray) -> None:
+    """Print what a pair costs that is run through the record."""
+    rng = np.random.default_rng(2)
+    structures = rng.uniform([0.2, 0.02, 0.2, 0.02, 0.0], [3.0, 0.1, 3.0, 0.1, 360.0], (2000, 5)).T
+    alike = structures.copy()
+    alike[2:4] = structures[:2] * (1.0 + 1e-9)
+    for name, chosen in (("own azimuths", structures), ("alike to 1e-9", alike), ("a call of 64", structures[:, :64])):
+        each = best(lambda c=chosen: directional_relative_displacement(motion, motion[::-1], DT, *c), 3)
+        rate = 1e-3 * chosen.shape[1] / each
+        print(f"relative displacement     {rate:8.1f} thousand pairs/s, {SAMPLES} samples, {name}")
+    each = best(lambda: directional_correlation(motion, motion[::-1], DT, *structures[:4], structures[4:].T), 3) / 2000
+    print(f"correlation               {1e-3 / each:8.1f} thousand pairs/s, {SAMPLES} samples")
+
+
+def resampled_rate() -> float:
+    """Return pairs a second of the probability over 128 nodes of period and damping of both buildings."""
+    rng = np.random.default_rng(3)
+    grid = np.log(np.geomspace(0.05, 10.0, 100)), np.log([0.01, 0.02, 0.05, 0.1, 0.2]), rng.normal(size=(36, 5, 100))
+    building = np.log([0.5, 0.05]), np.full(2, 0.3), np.log([0.1])
+    pairs = np.concatenate([[3.0], *building, *building, [0.1, 0.35]]) * np.ones((4000, 1))
+    nodes, chance = rng.normal(size=(128, 4)), np.empty(4000)
+    return len(pairs) / best(lambda: resampled_probabilities(grid, pairs, nodes, chance), 3)
 
 
 if __name__ == "__main__":

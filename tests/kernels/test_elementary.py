@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import ndtr
 
-from per_obspy.kernels.elementary import exponentials, logarithms, normal_tails
+from per_obspy.kernels.elementary import exponentials, exponentials_less_one, logarithms, normal_tails
 
 ROOM = np.empty(200, np.int64)
 
@@ -16,6 +16,16 @@ def test_exponentials():
     np.testing.assert_allclose(found[:-2], np.exp(x[:-2]), rtol=1e-15)  # a few units of the last place
     assert found[-3] == 1.0
     assert np.all(found[-2:] < 1e-307)
+
+
+def test_exponentials_less_one():
+    # mutation: one taken from the exponential, which leaves nothing of a small number
+    x = np.concatenate(
+        [np.linspace(-3.0, 3.0, 100), np.geomspace(1e-300, 1.0, 49), -np.geomspace(1e-300, 1.0, 49), [0.0, 700.0]]
+    )
+    found = x.copy()
+    exponentials_less_one(found, ROOM)
+    np.testing.assert_allclose(found, np.expm1(x), rtol=1e-15)
 
 
 def test_logarithms():

@@ -73,6 +73,19 @@ def test_symmetry_scale_and_monotony(r1, r2, correlation, shared):
     assert here[0] > here[-1]
 
 
+@given(st.floats(0.05, 0.6), st.floats(-0.9, 1.0), st.floats(1.05, 20.0), st.sampled_from([0.0, 1e-9, 3e-5, 1e-4]))
+@settings(max_examples=40)
+def test_radii_that_grow_as_the_other_shrinks_have_a_closed_form(dispersion, correlation, cosine, model):
+    # mutation: a jump of the chance inside a panel, which no rule of points sees (7e-5 of the probability).
+    # Equal radii, correlation -1: g_cr² / r² = 2 cosh(2 b x) - 2 rho, x standard normal. A model error blurs the
+    # crossing x by its own size over the slope, which counts by its square
+    gap = 0.2 * np.sqrt(2.0 * (cosine - correlation))
+    crossing = np.arccosh(cosine) / (2.0 * dispersion)
+    blur = model * (cosine - correlation) / (np.sqrt(cosine**2 - 1.0) * dispersion)
+    found = pounding_probability(0.2, 0.2, correlation, gap, dispersion, dispersion, -1.0, model)
+    assert found == pytest.approx(2.0 * norm.sf(crossing), abs=1e-13 + 3.0 * blur**2)
+
+
 def test_certainty_walls_and_touching_pairs():
     # mutation: log of zero, NaN in place of an answer
     assert pounding_probability(0.1, 0.1, 0.0, [0.1, 0.2], 0.0, 0.0, 0.0).tolist() == [1.0, 0.0]
