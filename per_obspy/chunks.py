@@ -25,8 +25,10 @@ from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import PairChunk, checked_chunk
 from per_obspy.parallel import results
+from per_obspy.records.shakemap import read_shakemap
 from per_obspy.report.tables import as_arrow
 from per_obspy.screening.assignment import Stations
+from per_obspy.screening.ground import Ground
 from per_obspy.screening.judgement import impact_velocity_that_counts
 from per_obspy.screening.ranking import order_keys
 from per_obspy.screening.rows import risk_rows
@@ -36,8 +38,8 @@ from per_obspy.spectra.storage import read_spectra
 #: Rows of a chunk: a worker needs about 10 kB for each.
 CHUNK = 100_000
 
-#: Attribute of a station's Dataset that tells where the earthquake started, beside those of latitude and depth.
-HYPOCENTRE = "hypocentre_longitude"
+#: Attributes of a station's Dataset that tell where the earthquake started.
+HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Source._fields)
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
 STATIONS_KEPT = 200
@@ -66,6 +68,28 @@ class StationFile(NamedTuple):
     hash: str
 
 
+class GroundFiles(NamedTuple):
+    """
+    What is known of the ground motion, for other processes to read.
+
+    Attributes
+    ----------
+    stations : tuple of StationFile
+        Stations that can serve pairs.
+    field : StationField or None
+        The motion between them; None if there are none.
+    shakemap : tuple of Path
+        ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
+    key : str
+        Hash of all their contents.
+    """
+
+    stations: tuple[StationFile, ...]
+    field: StationField | None
+    shakemap: tuple[Path, ...]
+    key: str
+
+
 class ChunkJob(NamedTuple):
     """
     One chunk to do.
@@ -74,10 +98,8 @@ class ChunkJob(NamedTuple):
     ----------
     chunk : PairChunk
         Raw rows.
-    stations : tuple of StationFile
-        Which there are.
-    field : StationField or None
-        The motion between them; None if there are none.
+    ground : GroundFiles
+        The ground motion.
     building, screening : Building, Screening
         Settings.
     part : Path
@@ -85,8 +107,7 @@ class ChunkJob(NamedTuple):
     """
 
     chunk: PairChunk
-    stations: tuple[StationFile, ...]
-    field: StationField | None
+    ground: GroundFiles
     building: Building
     screening: Screening
     part: Path
@@ -124,27 +145,24 @@ def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
             yield Rejection.stored(one)
 
 
-def station_files(shards: Iterable[Path]) -> tuple[tuple[StationFile, ...], tuple[Rejection, ...]]:
-    """Return the stations that can serve pairs, and those that have no coordinates."""
-    files, nowhere = list[StationFile](), list[Rejection]()
+def ground_files(
+    shards: Iterable[Path], shakemap: tuple[Path, ...], settings: Interpolation
+) -> tuple[GroundFiles, tuple[Rejection, ...]]:
+    """Return what is known of the ground motion, and the stations that have no coordinates."""
+    files, nowhere, source = list[StationFile](), list[Rejection](), list[Source]()
     for shard in shards:
         station = read_spectra(shard)
         name, longitude, latitude = (station[key].item() for key in ("station", "longitude", "latitude"))
         if np.isfinite(longitude):
             files.append(StationFile(name, longitude, latitude, shard, file_hash(shard)))
+            source = [Source(*(station.attrs[one] for one in HYPOCENTRE))] if HYPOCENTRE[0] in station.attrs else []
         else:
             reason = "its coordinates are unknown: it serves no pair"
             nowhere.append(Rejection("station", name, "", None, (reason,)))
-    return tuple(files), tuple(nowhere)
-
-
-def field_of(stations: Sequence[StationFile], settings: Interpolation) -> StationField | None:
-    """Return the motion between stations, about a trend with the distance from the hypocentre where that is known."""
-    if not stations:
-        return None
-    known = [read_spectra(one.shard).attrs for one in stations[:1]]
-    source = [Source(*(one[f"hypocentre_{name}"] for name in Source._fields)) for one in known if HYPOCENTRE in one]
-    return prepared_field((read_spectra(one.shard) for one in stations), settings, *source)
+    field = prepared_field((read_spectra(one.shard) for one in files), settings, *source) if files else None
+    known = [*((one.name, one.hash) for one in files), *map(file_hash, shakemap), source]
+    key = hashlib.sha256(repr(known).encode()).hexdigest()
+    return GroundFiles(tuple(files), field, shakemap, key), tuple(nowhere)
 
 
 def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
@@ -169,7 +187,7 @@ def do_chunk(job: ChunkJob) -> Part:
     """Return the finished part, its rows and the note that tells what they were made from on disk."""
     job.part.unlink(missing_ok=True)
     pairs = checked_chunk(job.chunk)
-    rows, rejected = _surviving(pairs, _stations(job.stations), job)
+    rows, rejected = _surviving(pairs, _ground(job.ground), job)
     rejected = (*pairs.attrs["rejected"], *(one._replace(source=job.chunk.rows.source) for one in rejected))
     if len(rows):
         with written_whole(job.part) as part:
@@ -190,23 +208,31 @@ def _note(job: ChunkJob) -> Path:
     return job.part.with_suffix(".json")
 
 
-def _surviving(pairs: pd.DataFrame, stations: Stations, job: ChunkJob) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+def _surviving(pairs: pd.DataFrame, ground: Ground, job: ChunkJob) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """Return the rows of all pairs but those that cannot be computed, which are found by halving."""
     try:
-        return risk_rows(pairs, stations, job.field, job.building, job.screening)
+        return risk_rows(pairs, ground, job.building, job.screening)
     except (ValueError, ArithmeticError) as error:
         if len(pairs) == 1:
             return pairs.iloc[:0], (Rejection("pair", pairs["pair_id"].iloc[0], "", None, (str(error),)),)
         middle = len(pairs) // 2
-        halves = [_surviving(some, stations, job) for some in (pairs.iloc[:middle], pairs.iloc[middle:])]
+        halves = [_surviving(some, ground, job) for some in (pairs.iloc[:middle], pairs.iloc[middle:])]
         kept = [rows for rows, _ in halves if len(rows)]
         return pd.concat(kept) if kept else pairs.iloc[:0], tuple(one for _, lost in halves for one in lost)
 
 
-def _stations(files: Sequence[StationFile]) -> Stations:
-    longitude, latitude = np.array([(one.longitude, one.latitude) for one in files]).reshape(-1, 2).T
-    names = np.array([one.name for one in files], dtype=object)
-    return Stations(names, longitude, latitude, lambda index: _station(files[index].shard, files[index].hash))
+def _ground(files: GroundFiles) -> Ground:
+    longitude, latitude = np.array([(one.longitude, one.latitude) for one in files.stations]).reshape(-1, 2).T
+    names = np.array([one.name for one in files.stations], dtype=object)
+    shards = [(one.shard, one.hash) for one in files.stations]
+    stations = Stations(names, longitude, latitude, lambda index: _station(*shards[index]))
+    return Ground(stations, files.field, _shakemap(files.shakemap, files.key) if files.shakemap else None)
+
+
+@lru_cache(1)
+def _shakemap(files: tuple[Path, ...], content: str) -> xr.Dataset:
+    del content
+    return read_shakemap(*files)
 
 
 @lru_cache(STATIONS_KEPT)
@@ -219,9 +245,8 @@ def _station(shard: Path, content: str) -> xr.Dataset:
 def _key(job: ChunkJob) -> str:
     """Return the hash of everything that the part depends on."""
     rows, digest = job.chunk.rows, hashlib.sha256()
-    settings = [job.building.model_dump_json(), job.screening.model_dump_json(), str(job.field and job.field.source)]
-    stations = [f"{one.name} {one.hash}" for one in job.stations]
-    digest.update("\n".join([version("per_obspy"), rows.source, *settings, *stations]).encode())
+    settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
+    digest.update("\n".join([version("per_obspy"), rows.source, *settings, job.ground.key]).encode())
     digest.update(repr(rows.broken).encode())
     content = pa.BufferOutputStream()
     with pa.ipc.new_stream(content, rows.table.schema) as stream:

@@ -13,12 +13,13 @@ import xarray as xr
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.assignment import Stations, assigned
+from per_obspy.screening.assignment import assigned
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.columns import FLAGS, ORDER
 from per_obspy.screening.demand import demand_ratio, pounding_state
 from per_obspy.screening.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.flags import joined_flags, period_is_derived, raised_by_pairs, raised_by_record
+from per_obspy.screening.ground import Ground
 from per_obspy.screening.judgement import judged
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.motion import (
@@ -29,7 +30,8 @@ from per_obspy.screening.motion import (
 )
 from per_obspy.screening.probability import pair_probability
 from per_obspy.screening.ranking import risk_class
-from per_obspy.screening.site_motion import StationField, motion_at_pairs
+from per_obspy.screening.shakemap import shakemap_fallback
+from per_obspy.screening.site_motion import motion_at_pairs
 from per_obspy.screening.values import at_contact, values
 
 #: Needed on the way only; flags tell what is to be known of them.
@@ -45,7 +47,7 @@ BLOCK = 2000
 
 
 def risk_rows(
-    pairs: pd.DataFrame, stations: Stations, field: StationField | None, building: Building, screening: Screening
+    pairs: pd.DataFrame, ground: Ground, building: Building, screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
     Return one row a pair, in no particular order, and the pairs that have no station in reach.
@@ -54,10 +56,8 @@ def risk_rows(
     ----------
     pairs : DataFrame
         From :func:`per_obspy.read_pairs`, or some rows of it.
-    stations : Stations
-        Which there are; only those that serve a pair are read.
-    field : StationField or None
-        The motion between them; None if there are none.
+    ground : Ground
+        The ground motion; only stations that serve a pair are read.
     building, screening : Building, Screening
         What is assumed; thresholds.
 
@@ -66,17 +66,24 @@ def risk_rows(
     rows : DataFrame
         Columns in the order of ``screening.columns.ORDER`` without ``rank``, then the other columns of the pair table.
     rejected : tuple of Rejection
-        Pairs without a station in reach.
+        Pairs that neither a station nor the map serves.
     """
-    placed, far = assigned(completed_pairs(pairs, building), stations, screening.largest_distance)
-    placed = placed.reset_index(drop=True)
-    if field is not None:
-        placed = placed.assign(**motion_at_pairs(field, placed, placed["station_index"].to_numpy()))
-    told = [_told(stations.read(index), block, screening) for index, block in _blocks(placed)]
-    if not told:
-        return placed.reindex(columns=[*ORDER]), far
-    table = pd.concat([placed, pd.concat(told).sort_index()], axis=1)
-    return _ordered(_judged_as_a_whole(table, screening)), far
+    complete = completed_pairs(pairs, building)
+    placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
+    tables = [_of_stations(placed.reset_index(drop=True), ground, screening)] if len(placed) else []
+    if ground.shakemap is not None and rejected:
+        mapped, rejected = shakemap_fallback(ground.shakemap, complete, rejected, screening)
+        tables += [mapped] if len(mapped) else []
+    rows = pd.concat(tables, ignore_index=True) if tables else placed.reindex(columns=[*ORDER])
+    return _ordered(rows), rejected
+
+
+def _of_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:
+    """Return the rows of pairs that have a station."""
+    if ground.field is not None:
+        pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, pairs["station_index"].to_numpy()))
+    told = [_told(ground.stations.read(index), block, screening) for index, block in _blocks(pairs)]
+    return _judged_as_a_whole(pd.concat([pairs, pd.concat(told).sort_index()], axis=1), screening)
 
 
 def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:

@@ -33,23 +33,31 @@ def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Prog
     progress : callable
         Told when it begins and ends.
     """
-    if not shards:
-        return []
     progress("report", 0, 1)
-    spectra = region(read_spectra(shard) for shard in shards)
-    write_spectra(spectra, folder / "spectra.nc")
-    outputs, risk = [folder / "spectra.nc"], folder / "risk.parquet"
+    outputs, risk = list[Path](), folder / "risk.parquet"
+    if shards:
+        write_spectra(region(read_spectra(shard) for shard in shards), folder / "spectra.nc")
+        outputs.append(folder / "spectra.nc")
     if risk.exists():
-        worst = next(ranked(risk)).iloc[0]
-        (shard,) = (one for one in shards if one.stem == worst["station"].strip("."))
-        draw_walk(read_spectra(shard), worst, folder / "figures" / "worst_pair.png")
-        draw_overview(_shown(risk), spectra, settings.name, folder / "figures" / "overview.png")
-        outputs += [folder / "figures" / name for name in ("worst_pair.png", "overview.png")]
+        outputs += _figures(settings, risk, shards, folder) if shards else []
         outputs += write_totals(risk, settings.totals, folder)
         if settings.geopackage:
             outputs.append(_write_geopackage(settings, risk, folder / "risk.gpkg"))
     progress("report", 1, 1)
     return outputs
+
+
+def _figures(settings: Run, risk: Path, shards: Sequence[Path], folder: Path) -> list[Path]:
+    """Draw the worst pair that a record was given to, and the region."""
+    walk, overview = (folder / "figures" / name for name in ("worst_pair.png", "overview.png"))
+    named = (piece[piece["station"] != ""] for piece in ranked(risk))
+    worst = next((piece.iloc[0] for piece in named if len(piece)), None)
+    draw_overview(_shown(risk), read_spectra(folder / "spectra.nc"), settings.name, overview)
+    if worst is None:
+        return [overview]
+    (shard,) = (one for one in shards if one.stem == worst["station"].strip("."))
+    draw_walk(read_spectra(shard), worst, walk)
+    return [walk, overview]
 
 
 def _shown(risk: Path) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from per_obspy.chunks import CHUNK, ChunkJob, Part, StationFile, do_chunks, field_of, rejections, station_files
+from per_obspy.chunks import CHUNK, ChunkJob, GroundFiles, Part, StationFile, do_chunks, ground_files, rejections
 from per_obspy.config import Run, Simulation, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import written_whole
@@ -20,7 +20,6 @@ from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.progress import Progress
 from per_obspy.report.ranked import ranked, write_risk
 from per_obspy.report.tables import write_rejected
-from per_obspy.screening.site_motion import StationField
 
 KINDS = ("file", "record", "station", "service", "pair")
 STATES = ("yes", "possible", "no")
@@ -73,8 +72,13 @@ def screened(
     CatalogError
         If the inventory is wrong as a whole.
     """
-    stations, nowhere = station_files(shards)
-    parts = _parts(settings, folder, stations, executor, progress) if shards else []
+    maps = (
+        [one for one in (settings.records.shakemap, settings.records.shakemap_uncertainty) if one]
+        if settings.records
+        else []
+    )
+    ground, nowhere = ground_files(shards, tuple(maps), settings.screening.interpolation)
+    parts = _parts(settings, folder, ground, executor, progress) if shards or maps else []
     kinds = write_rejected(chain(rejected, nowhere, rejections(parts)), folder / "rejected.csv")
     outputs, states = [folder / "rejected.csv"], Counter[str]()
     if tables := [part.path for part in parts if part.path]:
@@ -90,17 +94,16 @@ def screened(
 
 
 def _parts(
-    settings: Run, folder: Path, stations: tuple[StationFile, ...], executor: Executor | None, progress: Progress
+    settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
 ) -> list[Part]:
     """Return the part of every chunk, in the order of the inventory; parts of a longer one before are removed."""
-    inventory = PairInventory(_pair_files(settings, folder, stations))
+    inventory = PairInventory(_pair_files(settings, folder, ground.stations))
     if settings.totals.area and settings.totals.area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
     progress("screening", 0, inventory.count)
-    field = field_of(stations, settings.screening.interpolation)
     parts, rows = list[Part](), 0
     for part in do_chunks(
-        _jobs(settings, folder, (stations, field), inventory), settings.workers or os.cpu_count() or 1, executor
+        _jobs(settings, folder, ground, inventory), settings.workers or os.cpu_count() or 1, executor
     ):
         parts.append(part)
         rows += part.rows
@@ -113,12 +116,10 @@ def _parts(
     return sorted(parts, key=lambda part: part.number)
 
 
-def _jobs(
-    settings: Run, folder: Path, motion: tuple[tuple[StationFile, ...], StationField | None], inventory: PairInventory
-) -> Iterator[ChunkJob]:
+def _jobs(settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory) -> Iterator[ChunkJob]:
     for number, chunk in enumerate(inventory.chunks(CHUNK)):
         part = _chunk_folder(folder) / f"{number:06}.parquet"
-        yield ChunkJob(chunk, *motion, settings.building, settings.screening, part)
+        yield ChunkJob(chunk, ground, settings.building, settings.screening, part)
 
 
 def _chunk_folder(folder: Path) -> Path:
