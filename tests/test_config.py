@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.config import Run, Simulation, load
+from per_obspy.config import Run, Simulation, load, screening_kind
 from per_obspy.errors import CatalogError
 
 GOOD = 'name = "x"\noutput = "out"\n[records]\nfolder = "in"\n[pairs]\nfile = "pairs.csv"\n'
@@ -57,7 +57,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 @pytest.mark.parametrize("path", sorted((CHECKOUT / "workflows").glob("*.toml")), ids=lambda path: path.name)
 def test_the_workflows_are_valid(path):
-    assert load(path, Run).name
+    assert load(path, screening_kind(path)).name
 
 
 def test_the_demo_scenario_is_what_the_readme_says():

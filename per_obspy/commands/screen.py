@@ -6,26 +6,30 @@ from typing import Annotated
 import typer
 
 from per_obspy.commands.design import screen_by_spectrum
+from per_obspy.commands.ensemble import screen_ensemble
 from per_obspy.commands.printing import shown_progress
 from per_obspy.commands.walk import tell
 
 
 def screen(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of a run, or of a spectrum and pairs.")],
+    configuration: Annotated[Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")] = False,
 ) -> None:
     """
-    Screen pairs again with the stations of an earlier run, or by a design spectrum.
+    Screen pairs: in every scenario of an ensemble, by a design spectrum, or again with the stations of a run.
 
-    Of a run only what has changed is computed. A configuration with a spectrum needs no run before.
+    Of an ensemble and of a run only what has changed is computed. A single run must have been done before.
 
-    Example: per-obspy screen workflows/demo.toml
+    Example: per-obspy screen workflows/ensemble.toml
     """
-    from per_obspy.config import Design, screening_kind
+    from per_obspy.config import Design, Ensemble, screening_kind
 
-    if screening_kind(configuration) is Design:
+    kind = screening_kind(configuration)
+    if kind is Design:
         screen_by_spectrum(configuration, output, as_json)
+    elif kind is Ensemble:
+        screen_ensemble(configuration, output, as_json)
     else:
         _screen_again(configuration, output, as_json)
 

@@ -5,6 +5,7 @@ Only ``run.py`` and the commands see a configuration as a whole. Rooms below tak
 Paths in a configuration are relative to the folder of its file.
 """
 
+from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.kinds import screening_kind
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Asdf, Columns, Fdsn, Records, Sds, Window
@@ -21,6 +22,8 @@ __all__ = [
     "Codes",
     "Columns",
     "Design",
+    "Ensemble",
+    "EnsembleScenario",
     "Fdsn",
     "Interpolation",
     "Pairs",

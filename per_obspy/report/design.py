@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from per_obspy.files import written_whole
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.inventory.writing import write_pairs
-from per_obspy.report.tables import write_rejected
+from per_obspy.report.tables import write_described, write_rejected
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.design import DESIGN
@@ -29,8 +28,6 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     write_pairs(table, paths[1])
     known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
-    rows = [(name, known.get(name, carried).unit, known.get(name, carried).meaning) for name in map(str, table)]
-    with written_whole(paths[2]) as part:
-        pd.DataFrame(rows, columns=["name", "unit", "meaning"]).to_csv(part, index=False)
+    write_described((known.get(name, carried)._replace(name=name) for name in map(str, table)), paths[2])
     write_rejected(table.attrs["rejected"], paths[3])
     return paths

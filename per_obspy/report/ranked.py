@@ -1,29 +1,20 @@
-"""
-The risk table on disk: parts of an inventory joined, worst pair first, without ever being in memory as a whole.
-
-DuckDB orders the rows; what does not fit its memory goes to the disk.
-"""
+"""The risk table on disk: parts of an inventory joined, worst first, without ever being in memory as a whole."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import duckdb
 import pandas as pd
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
+from per_obspy.report.database import bounded_database, write_worst
 from per_obspy.report.tables import write_columns
 from per_obspy.screening.ranking import KEYS
 
-#: Memory for ordering.
-MEMORY = "1GB"
-
 #: Rows that are read and written together.
 ROWS = 50_000
-
 
 #: The rows in their order, with the rank before the other columns.
 _ORDERED = f"""
@@ -32,8 +23,6 @@ _ORDERED = f"""
         FROM (SELECT * FROM read_parquet($parts) ORDER BY {", ".join(KEYS)}, pair_id)
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $said}})
 """
-
-_WORST = "COPY (SELECT * FROM read_parquet($table) WHERE rank <= $rows ORDER BY rank) TO $path (FORMAT csv, HEADER)"
 
 
 def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], csv_rows: int) -> list[Path]:
@@ -53,14 +42,9 @@ def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], cs
     """
     said = json.dumps({"version": version("per_obspy"), **facts})
     table, text, columns = (folder / name for name in ("risk.parquet", "risk.csv", "risk.columns.csv"))
-    with TemporaryDirectory(dir=folder) as room:
-        settings: dict[str, str | bool | int | float | list[str]] = {"memory_limit": MEMORY, "temp_directory": room}
-        with duckdb.connect(config=settings) as database, written_whole(table) as part:
-            # else columns without empty cells are marked so when there is one part, and not when there are two
-            database.execute("SET disabled_optimizers = 'statistics_propagation'")
-            database.execute(_ORDERED, {"parts": [str(one) for one in parts], "path": str(part), "said": said})
-        with duckdb.connect(config=settings) as database, written_whole(text) as part:
-            database.execute(_WORST, {"table": str(table), "rows": csv_rows, "path": str(part)})
+    with bounded_database(folder) as database, written_whole(table) as part:
+        database.execute(_ORDERED, {"parts": [str(one) for one in parts], "path": str(part), "said": said})
+    write_worst(table, csv_rows, text)
     write_columns(pq.read_schema(table).names, columns)
     return [table, text, columns]
 

@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from per_obspy.errors import Rejection
 from per_obspy.files import written_whole
+from per_obspy.inventory.schema import Column
 from per_obspy.screening.columns import column_table, known_column
 
 
@@ -36,6 +37,13 @@ def write_columns(names: Iterable[str], path: Path) -> None:
     """Write unit and meaning of each of these columns, and of every flag."""
     with written_whole(path) as part:
         column_table(names).to_csv(part, index=False)
+
+
+def write_described(columns: Iterable[Column], path: Path) -> None:
+    """Write name, unit and meaning of these columns."""
+    rows = [(column.name, column.unit, column.meaning) for column in columns]
+    with written_whole(path) as part:
+        pd.DataFrame(rows, columns=["name", "unit", "meaning"]).to_csv(part, index=False)
 
 
 def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:

@@ -1,14 +1,15 @@
 """Several scenarios together: the probability that a pair pounds in any of them, or in a year."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import Rejection
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 
 
 def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> FloatArray:
@@ -40,7 +41,7 @@ def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> Float
     chance, weight = _scenarios(probability, weights, "weights")
     if not weight.sum() > 0:
         raise ValueError(f"weights must have a positive sum, got {weight.sum():g}")
-    joined: FloatArray = np.minimum((weight / weight.sum()) @ chance, 1.0)
+    joined: FloatArray = np.minimum(_weighted(chance, weight / weight.sum()), 1.0)
     return joined
 
 
@@ -73,7 +74,15 @@ def annual_probability(probability: ArrayLike, rates: ArrayLike) -> FloatArray:
     [0.00995 0.     ]
     """
     chance, rate = _scenarios(probability, rates, "rates")
-    return np.asarray(-np.expm1(-(rate @ chance)))
+    return np.asarray(-np.expm1(-_weighted(chance, rate)))
+
+
+def _weighted(chance: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the weighted sum of each pair; unlike a matrix product, the same bits whatever pairs stand beside it."""
+    total = np.zeros(chance.shape[1])
+    for row, factor in zip(chance, weight, strict=True):
+        total += factor * row
+    return total
 
 
 def _scenarios(probability: ArrayLike, weights: ArrayLike, name: str) -> tuple[FloatArray, FloatArray]:
@@ -84,52 +93,73 @@ def _scenarios(probability: ArrayLike, weights: ArrayLike, name: str) -> tuple[F
     return chance, weight
 
 
-def ensemble_table(tables: Sequence[pd.DataFrame], names: Sequence[str], weights: ArrayLike) -> pd.DataFrame:
+#: What all scenarios must agree on, else equal names are not the same pair.
+SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
+
+
+def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
+    """Return name, unit and meaning of every column of the table of several scenarios, in their order."""
+    given = [f"{name} ({weight:g}{'/year' if yearly else ''})" for name, weight in weights.items()]
+    columns = [
+        Column("rank", "int64", "", "1 is the likeliest to pound"),
+        Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
+        Column("probability", "float64", "1", f"of pounding, given that one of these happens: {', '.join(given)}"),
+        Column(
+            "annual_probability", "float64", "1", "of pounding within a year, scenarios coming as a Poisson process"
+        ),
+        Column("worst_scenario", "str", "", "name of the one that is likeliest to make the pair pound"),
+        *(Column(f"probability_{name}", "float64", "1", f"of pounding in scenario {name}") for name in weights),
+        *((COLUMNS | COMPLETED)[name] for name in SAME),
+    ]
+    return {one.name: one for one in columns if yearly or one.name != "annual_probability"}
+
+
+def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> pd.DataFrame:
     """
-    Join the risk tables of several scenarios.
+    Return the probabilities of pairs whose scenarios were joined.
 
     Parameters
     ----------
-    tables : sequence of DataFrame
-        Risk tables of the same inventory with ``pair_id`` and ``probability``, in any order of rows.
-    names : sequence of str
-        Of the scenarios, each once.
-    weights : (n_scenarios,) array_like
-        See :func:`conditional_probability`. If they are rates (1/year), :func:`annual_probability` of
-        ``[f"probability_{name}"]`` gives the probability in a year.
+    joined : DataFrame
+        ``pair_id``, ``probability_<name>`` of each scenario, and the smallest and largest value in any scenario of
+        what is the same in all: ``gap``, ``gap_largest`` and so on.
+    weights : mapping of str to float
+        Weight of each scenario; see :func:`conditional_probability`.
+    yearly : bool
+        Whether weights are rates, 1/year: :func:`annual_probability` is a column then.
 
     Returns
     -------
     DataFrame
-        One row a pair, likeliest first: ``pair_id, probability`` (given that one of the scenarios happens),
-        ``worst_scenario`` and ``probability_<name>`` of each. ``attrs["rejected"]`` holds the pairs that lack a
-        probability in a scenario, with the names of these scenarios.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many names as tables, or one stands twice.
+        Columns of :func:`ensemble_columns` without ``rank``, in the order of the rows; without the pairs that
+        :func:`ensemble_rejections` names.
     """
-    if len(names) != len(tables) or len(set(names)) != len(names) or not names:
-        raise ValueError(f"names must be one a table ({len(tables)}), each once, got {', '.join(names)}")
-    each = {f"probability_{name}": _of_pairs(table) for name, table in zip(names, tables, strict=True)}
-    joined = pd.DataFrame(each).rename_axis("pair_id")
-    lacking = joined[joined.isna().any(axis=1)]
-    complete = joined.dropna()
-    probability = conditional_probability(complete.to_numpy().T, weights)
-    worst = np.array(names, dtype=object)[np.argmax(complete.to_numpy(), axis=1)]
-    table = complete.reset_index()
-    table.insert(1, "probability", probability)
-    table.insert(2, "worst_scenario", worst)
-    table = table.sort_values(["probability", "pair_id"], ascending=[False, True], ignore_index=True)
-    table.attrs["rejected"] = tuple(_lacks(str(pair), row) for pair, row in lacking.iterrows())
-    return table
+    kept = joined[_faultless(joined, weights)]
+    each = kept[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
+    values = np.array(list(weights.values()))
+    found = {"probability": conditional_probability(each.T, values)}
+    if yearly:
+        found["annual_probability"] = annual_probability(each.T, values)
+    worst = np.array(list(weights), dtype=object)[np.argmax(each, axis=1)]
+    names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
+    return kept.assign(**found, worst_scenario=worst)[names].reset_index(drop=True)
 
 
-def _of_pairs(table: pd.DataFrame) -> pd.Series:
-    return table.set_index("pair_id")["probability"]
+def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:
+    """Give the pairs that lack a probability in a scenario, or are not the same pair in all of them."""
+    for row in joined[~_faultless(joined, weights)].to_dict("records"):
+        lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
+        reasons = [f"no probability in {', '.join(lacking)}: not in its inventory, or rejected there"] * bool(lacking)
+        reasons += [
+            f"{name} = {row[name]:.9g} {unit} in one scenario and {row[f'{name}_largest']:.9g} {unit} in another"
+            for name, unit in SAME.items()
+            if row[name] != row[f"{name}_largest"]
+        ]
+        yield Rejection("pair", str(row["pair_id"]), "", None, tuple(reasons))
 
 
-def _lacks(pair: str, row: pd.Series) -> Rejection:
-    missing = ", ".join(str(name).removeprefix("probability_") for name in row.index[row.isna()])
-    return Rejection("pair", pair, "", None, (f"no probability in {missing}",))
+def _faultless(joined: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.bool_]:
+    good: NDArray[np.bool_] = joined[[f"probability_{name}" for name in weights]].notna().all(axis=1).to_numpy()
+    for name in SAME:
+        good = good & (joined[name] == joined[f"{name}_largest"]).to_numpy()
+    return good

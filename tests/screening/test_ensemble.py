@@ -5,7 +5,13 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.screening.ensemble import annual_probability, conditional_probability, ensemble_table
+from per_obspy.screening.ensemble import (
+    annual_probability,
+    conditional_probability,
+    ensemble_columns,
+    ensemble_rejections,
+    ensemble_rows,
+)
 
 
 def test_one_scenario_is_itself_and_equal_ones_are_one():
@@ -40,24 +46,57 @@ def test_rare_scenarios_keep_their_digits():
     assert annual_probability([[1.0]], [0.0])[0] == 0.0
 
 
-def _table(**probability):
-    return pd.DataFrame({"pair_id": list(probability), "probability": list(probability.values())})
+WEIGHTS = {"near": 3.0, "far": 1.0}
 
 
-def test_tables_are_joined_by_the_names_of_their_pairs():
-    # would catch rows joined by position
-    table = ensemble_table([_table(a=0.2, b=0.9), _table(b=0.1, a=0.4)], ["near", "far"], [3.0, 1.0])
-    assert table["pair_id"].tolist() == ["b", "a"]
-    assert_allclose(table["probability"], [0.7, 0.25])
-    assert table["worst_scenario"].tolist() == ["near", "far"]
-    assert_allclose(table[["probability_near", "probability_far"]], [[0.9, 0.1], [0.2, 0.4]])
+def _joined(*rows):
+    """Return pairs whose scenarios were joined: name and the probability in each; all at one place."""
+    table = pd.DataFrame(rows, columns=["pair_id", "probability_near", "probability_far"])
+    same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
+    return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
+
+
+def test_every_pair_has_its_probabilities_and_its_worst_scenario():
+    table = ensemble_rows(_joined(("a", 0.2, 0.4), ("b", 0.9, 0.1)), WEIGHTS, yearly=False)
+    assert_allclose(table["probability"], [0.25, 0.7])
+    assert table["worst_scenario"].tolist() == ["far", "near"]
+    assert list(table) == [name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"]
+    assert "annual_probability" not in table
+
+
+def test_rates_give_a_probability_in_a_year_too():
+    table = ensemble_rows(_joined(("a", 1.0, 0.0)), {"near": 0.01, "far": 0.03}, yearly=True)
+    assert_allclose(table["annual_probability"], 0.01 - 0.01**2 / 2, rtol=2e-5)  # the next term is 0.01**3 / 6
+    assert_allclose(table["probability"], 0.25)
+
+
+def test_a_pair_does_not_depend_on_those_beside_it():
+    # would catch a matrix product, which adds in another order for other sizes
+    random = np.random.default_rng(6)
+    rows = [(f"p{i}", *random.uniform(0, 1, 2)) for i in range(37)]
+    table = ensemble_rows(_joined(*rows), {"near": 0.3, "far": 0.1}, yearly=True)
+    for i, row in enumerate(rows):
+        alone = ensemble_rows(_joined(row), {"near": 0.3, "far": 0.1}, yearly=True)
+        pd.testing.assert_frame_equal(alone, table.iloc[i : i + 1].reset_index(drop=True), check_exact=True)
 
 
 def test_a_pair_that_a_scenario_does_not_know_is_rejected_with_its_name():
-    table = ensemble_table([_table(a=0.2, b=np.nan), _table(a=0.2)], ["near", "far"], [1.0, 1.0])
-    assert table["pair_id"].tolist() == ["a"]
-    (rejected,) = table.attrs["rejected"]
-    assert (rejected.name, rejected.reasons) == ("b", ("no probability in near, far",))
+    joined = _joined(("a", 0.2, 0.2), ("b", np.nan, np.nan), ("c", 0.1, np.nan))
+    assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
+    reasons = {one.name: one.reasons[0] for one in ensemble_rejections(joined, WEIGHTS)}
+    assert reasons["b"].startswith("no probability in near, far: ")
+    assert reasons["c"].startswith("no probability in far: ")
+    assert set(reasons) == {"b", "c"}
+
+
+def test_equal_names_of_different_pairs_are_rejected():
+    joined = _joined(("a", 0.2, 0.2), ("b", 0.2, 0.2)).assign(gap_largest=[0.05, 0.3], latitude_largest=[10.0, 11.0])
+    assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
+    (rejected,) = ensemble_rejections(joined, WEIGHTS)
+    assert rejected.reasons == (
+        "gap = 0.05 m in one scenario and 0.3 m in another",
+        "latitude = 10 degrees in one scenario and 11 degrees in another",
+    )
 
 
 def test_wrong_weights_are_named():
@@ -67,5 +106,3 @@ def test_wrong_weights_are_named():
         annual_probability([[0.5]], [-1.0])
     with pytest.raises(ValueError, match=r"weights must be one a scenario \(1\), got 2"):
         conditional_probability([[0.5]], [1.0, 1.0])
-    with pytest.raises(ValueError, match="each once, got a, a"):
-        ensemble_table([_table(x=0.1)] * 2, ["a", "a"], [1.0, 1.0])

@@ -1,0 +1,47 @@
+"""``per-obspy screen`` of several scenarios together."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from per_obspy.commands.printing import print_table, shown_progress
+
+NOTHING_USABLE = 3
+
+#: Columns of the worst pairs that are printed, where the table has them.
+SHOWN = ("rank", "pair_id", "probability", "annual_probability", "worst_scenario", "gap")
+
+
+def screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> None:
+    """Screen pairs in every scenario and print their joint probabilities."""
+    from per_obspy.scenarios import screen_scenarios
+
+    with shown_progress() as progress:
+        folder, record, did_nothing = screen_scenarios(configuration, output, progress=progress)
+    if as_json:
+        print(json.dumps({"folder": str(folder), "did_nothing": did_nothing, **record}))
+    else:
+        _print_ensemble(folder, record, did_nothing)
+    if record["state"] == "nothing_usable":
+        print(f"nothing usable was left: see {folder / 'rejected.csv'}", file=sys.stderr)
+        raise typer.Exit(NOTHING_USABLE)
+
+
+def _print_ensemble(folder: Path, record: dict[str, Any], did_nothing: bool) -> None:
+    import pandas as pd
+
+    if did_nothing:
+        print("Nothing to do: the same scenarios were joined before.")
+    if record["simulated"]:
+        print("The ground motion of a scenario is SIMULATED.")
+    counts, scenarios = record["counts"], record["scenarios"]
+    print(f"{len(scenarios)} scenarios, {counts['pairs']} pairs; {counts['rejected_pair']} rejected")
+    worst = pd.read_csv(folder / "ensemble.csv", nrows=10, dtype={"pair_id": str, "worst_scenario": str})
+    names = [name for name in SHOWN if name in worst]
+    rows = worst[names].itertuples(index=False)
+    print_table(f"The {len(worst)} worst pairs", [name.replace("_", " ") for name in names], rows)
+    for name in sorted({*record["outputs"], "ensemble.json"}):
+        print(f"  {folder / name}")
