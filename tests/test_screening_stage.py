@@ -12,7 +12,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import Origin, add_inventory
 from per_obspy.run import report, run, screen
 
-from .test_run import Here, _configuration
+from .test_run import SPECTRA, Here, _configuration
 
 RESULTS = ("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv")
 
@@ -190,3 +190,45 @@ def test_stored_inventories_are_found_by_name_and_by_region(copied):
     _configuration(copied, '[pairs]\ncatalog = "catalog.toml"\nnames = ["elsewhere"]\n')
     with pytest.raises(CatalogError, match="'elsewhere' is not stored here"):
         run(copied / "run.toml", executor=Here())
+
+
+def _shakemap(path, longitudes=(-0.5, 0.3, 1.1), latitudes=(0.5, 0.0, -0.5)):
+    """Write a ShakeMap with the same motion everywhere, in % g."""
+    names = ("LON", "LAT", "PGA", "PSA03", "PSA10", "PSA30")
+    units = dict.fromkeys(names, "pctg") | {"LON": "dd", "LAT": "dd"}
+    fields = "".join(
+        f'<grid_field index="{i}" name="{name}" units="{units[name]}"/>' for i, name in enumerate(names, start=1)
+    )
+    rows = "\n".join(f"{east} {north} 20 50 25 6" for north in latitudes for east in longitudes)
+    size = f'nlon="{len(longitudes)}" nlat="{len(latitudes)}" nominal_lon_spacing="0.8" nominal_lat_spacing="0.5"'
+    box = f'lon_min="{longitudes[0]}" lat_min="{latitudes[-1]}" lon_max="{longitudes[-1]}" lat_max="{latitudes[0]}"'
+    head = (
+        '<shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap" event_id="x" shakemap_event_type="ACTUAL">'
+    )
+    path.write_text(
+        f"{head}<grid_specification {box} {size}/>{fields}<grid_data>\n{rows}\n</grid_data></shakemap_grid>"
+    )
+
+
+@pytest.mark.parametrize("reach", [300.0, 1.0])
+def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
+    # reach 1 m: no pair has a station, there is no worst pair with a record to draw
+    shutil.copytree(copied / "out" / "simulated", copied / "records")
+    _shakemap(copied / "grid.xml")
+    (copied / "map.toml").write_text(
+        'name = "map"\noutput = "map"\n[records]\nfolder = "records"\nshakemap = "grid.xml"\n'
+        f'[pairs]\nfile = "pairs.csv"\n[screening]\nlargest_distance = {reach}\n{SPECTRA}'
+    )
+    record = run(copied / "map.toml", executor=Here()).record
+    table = pd.read_parquet(copied / "map" / "risk.parquet")
+    mapped = table["demand_rule"] == "shakemap"
+    assert mapped.any()
+    assert mapped.all() == (reach == 1.0)
+    assert table["distance"].isna().equals(mapped)
+    assert table["impacts"].isna().equals(mapped)
+    assert table["flags"].str.contains("shakemap_demand").equals(mapped)
+    assert record["counts"]["pairs"] + record["counts"]["rejected_pair"] == 61
+    assert ("figures/worst_pair.png" in record["outputs"]) == (not mapped.all())
+    assert run(copied / "map.toml", executor=Here()).did_nothing
+    _shakemap(copied / "grid.xml", longitudes=(-0.5, 0.2, 1.1))
+    assert run(copied / "map.toml", executor=Here()).record["counts"]["chunks_resumed"] == 0
