@@ -27,7 +27,7 @@ from per_obspy.inventory.reading import PairChunk, checked_chunk
 from per_obspy.parallel import results
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.report.tables import as_arrow
-from per_obspy.screening.assignment import Stations
+from per_obspy.screening.assignment import Stations, site_class_of
 from per_obspy.screening.ground import Ground
 from per_obspy.screening.judgement import impact_velocity_that_counts
 from per_obspy.screening.ranking import order_keys
@@ -55,6 +55,8 @@ class StationFile(NamedTuple):
         ``NETWORK.STATION``.
     longitude, latitude : float
         Degrees east and north.
+    site_class : str
+        Of the ground, empty if unknown.
     shard : Path
         Its Dataset.
     hash : str
@@ -64,6 +66,7 @@ class StationFile(NamedTuple):
     name: str
     longitude: float
     latitude: float
+    site_class: str
     shard: Path
     hash: str
 
@@ -154,7 +157,7 @@ def ground_files(
         station = read_spectra(shard)
         name, longitude, latitude = (station[key].item() for key in ("station", "longitude", "latitude"))
         if np.isfinite(longitude):
-            files.append(StationFile(name, longitude, latitude, shard, file_hash(shard)))
+            files.append(StationFile(name, longitude, latitude, site_class_of(station), shard, file_hash(shard)))
             source = [Source(*(station.attrs[one] for one in HYPOCENTRE))] if HYPOCENTRE[0] in station.attrs else []
         else:
             reason = "its coordinates are unknown: it serves no pair"
@@ -223,9 +226,11 @@ def _surviving(pairs: pd.DataFrame, ground: Ground, job: ChunkJob) -> tuple[pd.D
 
 def _ground(files: GroundFiles) -> Ground:
     longitude, latitude = np.array([(one.longitude, one.latitude) for one in files.stations]).reshape(-1, 2).T
-    names = np.array([one.name for one in files.stations], dtype=object)
+    names, ground = (
+        np.array([getattr(one, name) for one in files.stations], dtype=object) for name in ("name", "site_class")
+    )
     shards = [(one.shard, one.hash) for one in files.stations]
-    stations = Stations(names, longitude, latitude, lambda index: _station(*shards[index]))
+    stations = Stations(names, longitude, latitude, ground, lambda index: _station(*shards[index]))
     return Ground(stations, files.field, _shakemap(files.shakemap, files.key) if files.shakemap else None)
 
 

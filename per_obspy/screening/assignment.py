@@ -1,4 +1,4 @@
-"""Which station's record a pair of buildings is given: the nearest one."""
+"""Which station's record a pair of buildings is given: the nearest on its kind of ground, else the nearest."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -27,6 +27,8 @@ class Stations(NamedTuple):
         ``NETWORK.STATION``.
     longitude, latitude : (n_stations,) ndarray
         Degrees east and north.
+    site_class : (n_stations,) ndarray of str
+        Of the ground; empty if unknown.
     read : callable
         Return the Dataset of a station, given its index.
     """
@@ -34,6 +36,7 @@ class Stations(NamedTuple):
     names: NDArray[np.object_]
     longitude: FloatArray
     latitude: FloatArray
+    site_class: NDArray[np.object_]
     read: Callable[[int], xr.Dataset]
 
 
@@ -47,17 +50,26 @@ def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejecti
     )
     names = np.array([one["station"].item() for one in located], dtype=object)
     longitude, latitude = ([number(one, name) for one in located] for name in ("longitude", "latitude"))
-    return Stations(names, np.array(longitude), np.array(latitude), located.__getitem__), nowhere
+    ground = np.array([site_class_of(one) for one in located], dtype=object)
+    return Stations(names, np.array(longitude), np.array(latitude), ground, located.__getitem__), nowhere
+
+
+def site_class_of(station: xr.Dataset) -> str:
+    """Return the site class of a station, empty if unknown."""
+    return str(station["site_class"].item()) if "site_class" in station else ""
 
 
 def assigned(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
-    Return the pairs with the nearest station, its index and its distance, and those that have none in reach.
+    Return the pairs with their station, its index and its distance, and those that have none in reach.
+
+    The station is the nearest one of the pair's own site class; where none of these is in reach, or the class of the
+    pair is unknown, the nearest of all. ``other_site_class`` tells that both classes are known and differ.
 
     Parameters
     ----------
     pairs : DataFrame
-        With ``pair_id, longitude, latitude``.
+        With ``pair_id, longitude, latitude``, and ``site_class`` if it is known.
     stations : Stations
         Which there are.
     reach : float
@@ -65,17 +77,37 @@ def assigned(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[pd.
     """
     if not stations.names.size:
         lost = (Rejection("pair", name, "", None, ("no station has coordinates",)) for name in pairs["pair_id"])
-        return pairs.iloc[:0].assign(station="", station_index=0, distance=0.0), tuple(lost)
-    index, distance = nearest_station(
-        values(pairs, "longitude"), values(pairs, "latitude"), stations.longitude, stations.latitude
+        return pairs.iloc[:0].assign(station="", station_index=0, distance=0.0, other_site_class=False), tuple(lost)
+    ground = pairs["site_class"].to_numpy(object) if "site_class" in pairs else np.full(len(pairs), "", dtype=object)
+    index, distance = _serving(values(pairs, "longitude"), values(pairs, "latitude"), ground, stations, reach)
+    there = stations.site_class[index]
+    placed = pairs.assign(
+        station=stations.names[index],
+        station_index=index,
+        distance=distance,
+        other_site_class=(ground != "") & (there != "") & (ground != there),
     )
-    placed = pairs.assign(station=stations.names[index], station_index=index, distance=distance)
     far = placed[distance > reach]
     rejected = tuple(
         Rejection("pair", name, "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
         for name, station, metres in far[["pair_id", "station", "distance"]].itertuples(index=False)
     )
     return placed[distance <= reach], rejected
+
+
+def _serving(
+    longitude: FloatArray, latitude: FloatArray, ground: NDArray[np.object_], stations: Stations, reach: float
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the station of every place and the distance to it."""
+    index, distance = nearest_station(longitude, latitude, stations.longitude, stations.latitude)
+    for name in set(ground.tolist()) & set(stations.site_class.tolist()) - {""}:
+        alike, rows = np.flatnonzero(stations.site_class == name), np.flatnonzero(ground == name)
+        near, metres = nearest_station(
+            longitude[rows], latitude[rows], stations.longitude[alike], stations.latitude[alike]
+        )
+        within = metres <= reach
+        index[rows[within]], distance[rows[within]] = alike[near[within]], metres[within]
+    return index, distance
 
 
 def nearest_station(

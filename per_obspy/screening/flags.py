@@ -51,6 +51,7 @@ def raised_by_record(table: pd.DataFrame, station: xr.Dataset, screening: Screen
     return {
         "outside_usable_periods": ((periods < shortest) | (periods > longest)).any(axis=1),
         "per_far_above_sd": (per > screening.per_to_sd * sd).any(axis=1),
+        "record_from_other_site_class": table["other_site_class"].to_numpy(dtype=bool),
         "far_station": table["distance"].to_numpy() > screening.flag_distance,
         "one_horizontal": every & (station.sizes["horizontal"] == 1),
         "linearized_not_converged": ~table["linearized_converged"].to_numpy(dtype=bool),

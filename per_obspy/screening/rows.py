@@ -37,6 +37,7 @@ from per_obspy.screening.values import at_contact, values
 #: Needed on the way only; flags tell what is to be known of them.
 ON_THE_WAY = (
     "station_index",
+    "other_site_class",
     "linearized_converged",
     "motion_from_other_site_class",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),

@@ -8,18 +8,14 @@ from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from per_obspy.chunks import CHUNK, ChunkJob, GroundFiles, Part, StationFile, do_chunks, ground_files, rejections
-from per_obspy.config import Run, Simulation, load
+from per_obspy.chunks import CHUNK, ChunkJob, GroundFiles, Part, do_chunks, ground_files, rejections
+from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import written_whole
-from per_obspy.inventory.catalogue import find_inventories, region_around, stored_inventories, verified_file
 from per_obspy.inventory.reading import PairInventory
-from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.progress import Progress
 from per_obspy.report.ranked import ranked, write_risk
 from per_obspy.report.tables import write_rejected
+from per_obspy.stages.inventory import pair_files
 
 KINDS = ("file", "record", "station", "service", "pair")
 STATES = ("yes", "possible", "no")
@@ -97,7 +93,7 @@ def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
 ) -> list[Part]:
     """Return the part of every chunk, in the order of the inventory; parts of a longer one before are removed."""
-    inventory = PairInventory(_pair_files(settings, folder, ground.stations))
+    inventory = PairInventory(pair_files(settings, folder, ground.stations))
     if settings.totals.area and settings.totals.area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
     progress("screening", 0, inventory.count)
@@ -124,28 +120,3 @@ def _jobs(settings: Run, folder: Path, ground: GroundFiles, inventory: PairInven
 
 def _chunk_folder(folder: Path) -> Path:
     return folder / "chunks"
-
-
-def _pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> list[Path]:
-    """Return the files of the inventory; a simulated one is written first, stored ones are compared with their hash."""
-    pairs = settings.pairs
-    if pairs and pairs.file:
-        return [pairs.file]
-    longitudes, latitudes = ([getattr(one, name) for one in stations] for name in ("longitude", "latitude"))
-    if pairs and pairs.catalog:
-        named = [one for one in stored_inventories(pairs.catalog) if one.name in pairs.names]
-        if unknown := sorted(set(pairs.names) - {one.name for one in named}):
-            raise CatalogError(str(pairs.catalog), f"names: {unknown[0]!r} is not stored here")
-        region = region_around(longitudes, latitudes, settings.screening.largest_distance)
-        entries = named if pairs.names else find_inventories(pairs.catalog, region)
-        if not entries:
-            raise CatalogError(str(pairs.catalog), "no stored inventory touches the region of the stations")
-        return [verified_file(one) for one in entries]
-    wanted = pairs and pairs.simulated
-    if wanted is None:
-        assert settings.simulation is not None  # Run demands pairs or a simulation
-        wanted = load(settings.simulation, Simulation).pairs
-    with written_whole(folder / "pairs.csv") as part:
-        table = simulated_pairs(np.array(longitudes), np.array(latitudes), **wanted.model_dump())
-        table.to_csv(part, index=False)
-    return [folder / "pairs.csv"]

@@ -1,10 +1,12 @@
 """The nearest station, on a sphere."""
 
 import numpy as np
+import pandas as pd
+import pytest
 from numpy.testing import assert_allclose
 from obspy.geodetics import gps2dist_azimuth
 
-from per_obspy.screening.assignment import EARTH_RADIUS, nearest_station
+from per_obspy.screening.assignment import EARTH_RADIUS, Stations, assigned, nearest_station
 
 
 def test_distances_agree_with_the_ellipsoid():
@@ -26,3 +28,38 @@ def test_a_place_at_a_station_is_at_no_distance():
     station, distance = nearest_station(np.array([5.0]), np.array([50.0]), np.array([4.0, 5.0]), np.array([50.0, 50.0]))
     assert station.tolist() == [1]
     assert distance[0] < 1e-6  # m
+
+
+def _stations(*classes):
+    return Stations(
+        np.array(["NEAR", "FAR"], dtype=object),
+        np.array([0.01, 0.05]),
+        np.zeros(2),
+        np.array(classes, dtype=object),
+        lambda _: pytest.fail("no record is needed"),
+    )
+
+
+def _assigned(classes, stations, reach=20e3):
+    pairs = pd.DataFrame({"pair_id": [f"p{i}" for i in range(len(classes))], "longitude": 0.0, "latitude": 0.0})
+    table, rejected = assigned(pairs.assign(site_class=classes) if any(classes) else pairs, stations, reach)
+    return table["station"].tolist(), table["other_site_class"].tolist(), rejected
+
+
+def test_a_pair_is_given_the_nearest_station_of_its_own_ground():
+    # would catch a rock site that is shaken like the lakebed because a lakebed station is nearer
+    names, other, _ = _assigned(["rock", "lakebed", "", "clay"], _stations("lakebed", "rock"))
+    assert names == ["FAR", "NEAR", "NEAR", "NEAR"]
+    assert other == [False, False, False, True]
+
+
+def test_ground_that_nobody_knows_keeps_the_nearest_station():
+    assert _assigned(["rock"], _stations("", ""))[:2] == (["NEAR"], [False])
+    assert _assigned([""], _stations("lakebed", "rock"))[:2] == (["NEAR"], [False])
+
+
+def test_own_ground_out_of_reach_falls_back_on_the_nearest_station():
+    assert _assigned(["rock"], _stations("lakebed", "rock"), reach=3e3)[:2] == (["NEAR"], [True])
+    names, _, rejected = _assigned(["rock"], _stations("lakebed", "rock"), reach=1e3)
+    assert names == []
+    assert "nearest station NEAR is 1112 m away" in rejected[0].reasons[0]
