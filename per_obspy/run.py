@@ -27,7 +27,7 @@ from per_obspy.provenance import Result, earlier_record, file_hashes, held, now,
 from per_obspy.records.fdsn import Fetched
 from per_obspy.records.sources import fetched_records, input_files
 from per_obspy.screening.warmup import compile_screening
-from per_obspy.stages.report import reported
+from per_obspy.stages.report import reported, require_extras
 from per_obspy.stages.screening import screened
 from per_obspy.stages.stations import content_hash, finished_stations, station_jobs, stations_of_earlier_run
 
@@ -69,7 +69,7 @@ def run(
         If services fail and no record is at hand.
     """
     configuration = configuration.resolve()
-    settings = load(configuration, Run)
+    settings = _settings(configuration)
     folder = (output or settings.output).resolve()
     with held(folder):
         fetched = fetched_records(settings.records, progress)
@@ -100,7 +100,7 @@ def screen(
     an error as well if there are no stations.
     """
     configuration = configuration.resolve()
-    settings = load(configuration, Run)
+    settings = _settings(configuration)
     folder = (output or settings.output).resolve()
     with held(folder):
         done = stations_of_earlier_run(folder)
@@ -121,7 +121,7 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
     CatalogError
         If there is no finished run, or what it left has changed.
     """
-    settings = load(configuration.resolve(), Run)
+    settings = _settings(configuration.resolve())
     folder = (output or settings.output).resolve()
     with held(folder):
         record = _finished(folder)
@@ -132,6 +132,13 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
         shards = [one.shard for one in stations_of_earlier_run(folder) if one.shard]
         outputs = reported(settings, folder, shards, progress)
         return recorded(folder / RECORD, {**record, "outputs": record["outputs"] | file_hashes(folder, outputs)})
+
+
+def _settings(configuration: Path) -> Run:
+    """Return the settings of a run whose optional libraries are there."""
+    settings = load(configuration, Run)
+    require_extras(settings)
+    return settings
 
 
 def _head(settings: Run, configuration: Path, fetched: Fetched | None) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 import json
 import re
 import shutil
+import sys
 
 import pandas as pd
+import pyogrio
 import pytest
 
 from per_obspy import chunks
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, MissingExtra
 from per_obspy.inventory.catalogue import Origin, add_inventory
 from per_obspy.run import report, run, screen
 
@@ -232,3 +234,33 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     assert run(copied / "map.toml", executor=Here()).did_nothing
     _shakemap(copied / "grid.xml", longitudes=(-0.5, 0.2, 1.1))
     assert run(copied / "map.toml", executor=Here()).record["counts"]["chunks_resumed"] == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape"), [("", "Polygon"), ("[totals]\nh3 = 6\n", "Polygon"), ('[totals]\narea = "position"\n', "Point")]
+)
+def test_totals_are_a_layer_too(copied, kind, shape):
+    _configuration(copied, f'geopackage = true\n[pairs]\nfile = "pairs.csv"\n{kind}')
+    result = run(copied / "run.toml", executor=Here())
+    assert {"risk.gpkg", "totals.gpkg", "totals.csv"} <= set(result.record["outputs"])
+    information = pyogrio.read_info(copied / "out" / "totals.gpkg")
+    table = pd.read_csv(copied / "out" / "totals.csv", dtype={"area": str})
+    assert (information["features"], information["geometry_type"]) == (len(table), shape)
+    assert list(information["fields"]) == list(table)
+    assert table["pairs"].sum() == result.record["counts"]["pairs"]
+    if "h3" in kind:
+        assert table["area"].str.fullmatch("86[0-9a-f]{7}f{6}").all()  # an H3 index of resolution 6
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "missing"), [("", "[totals]\nh3 = 8\n", "h3"), ("geopackage = true\n", "", "pyogrio")]
+)
+def test_a_missing_extra_is_told_before_anything_is_computed(copied, monkeypatch, before, after, missing):
+    # would catch a run of an hour that ends with this
+    _configuration(copied, f'{before}[pairs]\nfile = "pairs.csv"\n{after}')
+    files = sorted(copied.rglob("*"))
+    monkeypatch.setitem(sys.modules, missing, None)
+    for stage in (run, screen, report):
+        with pytest.raises(MissingExtra, match=rf"{missing} not installed: pip install 'per_obspy\[gis\]'"):
+            stage(copied / "run.toml")
+    assert sorted(copied.rglob("*")) == files

@@ -1,8 +1,11 @@
 """What is assumed of buildings, and how pairs find their motion and their names."""
 
+from typing import Self
+
 from pydantic import (
     Field,
     field_validator,
+    model_validator,
 )
 
 from per_obspy.config.section import Section
@@ -69,7 +72,14 @@ class Screening(Section):
 
 
 class Totals(Section):
-    """How pairs are counted by area."""
+    """How pairs are counted by area: one of these decides."""
 
     cell: float = Field(1000.0, gt=0, description="m, size of the cells of a grid")
     area: str | None = Field(None, description="column of the pair table that names the area, instead of cells")
+    h3: int | None = Field(None, ge=0, le=15, description="resolution of H3 hexagons, instead; needs per_obspy[gis]")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if len(given := self.model_fields_set & {"cell", "area", "h3"}) > 1:
+            raise ValueError(f"give one of cell, area and h3, got {', '.join(sorted(given))}")
+        return self

@@ -14,6 +14,7 @@ import shapely
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.files import written_whole
 from per_obspy.report.style import STATE_COLOURS
 
@@ -50,7 +51,9 @@ def write_pairs_layer(
         _write_style(part, PAIRS, class_style(classes))
 
 
-def write_totals_layer(totals: pd.DataFrame, boxes: pd.DataFrame | None, path: Path, facts: Mapping[str, str]) -> None:
+def write_totals_layer(
+    totals: pd.DataFrame, outlines: Sequence[FloatArray] | None, path: Path, facts: Mapping[str, str]
+) -> None:
     """
     Write totals as the polygons of their cells, or as points in the middle of their pairs; whole or not at all.
 
@@ -58,17 +61,18 @@ def write_totals_layer(totals: pd.DataFrame, boxes: pd.DataFrame | None, path: P
     ----------
     totals : DataFrame
         From :func:`per_obspy.screening.totals.totals`.
-    boxes : DataFrame or None
-        ``west, south, east, north`` in degrees indexed by ``area``; None for areas whose outline nobody gave.
+    outlines : sequence of ndarray, or None
+        Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None for areas whose
+        outline nobody gave.
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
         What the layer says of all its rows.
     """
-    if boxes is None:
+    if outlines is None:
         shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())
     else:
-        shapes = shapely.box(*boxes.loc[totals["area"], ["west", "south", "east", "north"]].to_numpy().T)
+        shapes = np.array([shapely.Polygon(corners) for corners in outlines], dtype=object)
     with written_whole(path) as part:
         _write(part, TOTALS, shapes, totals, False, facts)
 

@@ -1,50 +1,89 @@
 """What a region adds up to, as files: totals by area and, where pounding was observed, how the prediction did."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
 from per_obspy.files import written_whole
 from per_obspy.report.ranked import ranked
 from per_obspy.screening.evaluation import evaluation
+from per_obspy.screening.outlines import box_outlines, hexagon_outlines, hexagons
 from per_obspy.screening.totals import grid_cells, joined_totals, partial_totals
 
 COLUMNS = ("rank", "pair_id", "state", "risk_class", "probability", "demand_ratio", "longitude", "latitude")
 
 
-def write_totals(risk: Path, settings: Totals, folder: Path) -> list[Path]:
+class RegionTotals(NamedTuple):
     """
-    Write ``totals.csv`` and, where pounding was observed, ``evaluation.json``; return their paths.
+    Totals of a region.
+
+    Attributes
+    ----------
+    table : DataFrame
+        One row an area: see :func:`per_obspy.screening.totals.totals`.
+    outlines : list of ndarray or None
+        Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None if nobody gave any.
+    """
+
+    table: pd.DataFrame
+    outlines: list[FloatArray] | None
+
+
+def region_totals(risk: Path, settings: Totals) -> RegionTotals:
+    """
+    Count the pairs of every area.
 
     Parameters
     ----------
     risk : Path
-        Parquet file of the risk table, at least one row.
+        Parquet file of the risk table, at least one row; it is read in pieces.
     settings : Totals
-        Column of the pair table that names the area, or else the size of the cells of a grid.
-    folder : Path
-        Where to.
+        Column of the pair table that names the area, or else what cells there are.
     """
-    columns = [*COLUMNS, *([settings.area] if settings.area else [])]
-    parts = [partial_totals(piece, _areas(piece, settings)) for piece in ranked(risk, columns)]
-    with written_whole(folder / "totals.csv") as part:
-        joined_totals(parts).to_csv(part, index=False)
-    if "observed" not in pq.read_schema(risk).names:
-        return [folder / "totals.csv"]
-    return [folder / "totals.csv", *_write_evaluation(risk, folder / "evaluation.json")]
-
-
-def _areas(table: pd.DataFrame, settings: Totals) -> pd.Series:
     if settings.area:
-        return table[settings.area].fillna("").astype(str)
-    return pd.Series(grid_cells(table["longitude"], table["latitude"], settings.cell).cell)
+        return RegionTotals(_counted(risk, settings.area, lambda piece: _named(piece, str(settings.area))), None)
+    if settings.h3 is not None:
+        resolution = settings.h3
+        table = _counted(risk, None, lambda piece: hexagons(piece["longitude"], piece["latitude"], resolution))
+        return RegionTotals(table, hexagon_outlines(table["area"]))
+    boxes: dict[str, FloatArray] = {}
+
+    def in_grid(piece: pd.DataFrame) -> NDArray[np.object_]:
+        cells = grid_cells(piece["longitude"], piece["latitude"], settings.cell)
+        boxes.update(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
+        return cells.cell
+
+    table = _counted(risk, None, in_grid)
+    return RegionTotals(table, [boxes[name] for name in table["area"]])
 
 
-def _write_evaluation(risk: Path, path: Path) -> list[Path]:
-    """Compare the pairs that somebody looked at, if there are any."""
+def _counted(risk: Path, column: str | None, area: Callable[[pd.DataFrame], NDArray[np.object_]]) -> pd.DataFrame:
+    pieces = ranked(risk, [*COLUMNS, *([column] if column else [])])
+    return joined_totals([partial_totals(piece, area(piece)) for piece in pieces])
+
+
+def _named(piece: pd.DataFrame, column: str) -> NDArray[np.object_]:
+    return np.asarray(piece[column].fillna("").astype(str), dtype=object)
+
+
+def write_totals(table: pd.DataFrame, path: Path) -> None:
+    """Write the totals as CSV."""
+    with written_whole(path) as part:
+        table.to_csv(part, index=False)
+
+
+def write_evaluation(risk: Path, path: Path) -> list[Path]:
+    """Compare the pairs that somebody looked at with the prediction, if there are any; return the file, if so."""
+    if "observed" not in pq.read_schema(risk).names:
+        return []
     pieces = ranked(risk, ["observed", "state", "probability"])
     seen = pd.concat([piece[piece["observed"].notna()] for piece in pieces], ignore_index=True)
     if seen.empty:

@@ -11,11 +11,26 @@ from per_obspy.errors import require_extra
 from per_obspy.progress import Progress
 from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.ranked import ranked
-from per_obspy.report.totals import write_totals
+from per_obspy.report.totals import RegionTotals, region_totals, write_evaluation, write_totals
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 #: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
 SHOWN = 20_000
+
+
+def require_extras(settings: Run) -> None:
+    """
+    Check that the optional libraries that the report needs are installed, before anything is computed.
+
+    Raises
+    ------
+    MissingExtra
+        If one is not.
+    """
+    if settings.geopackage:
+        require_extra("gis", "pyogrio", "shapely")
+    if settings.totals.h3 is not None:
+        require_extra("gis", "h3")
 
 
 def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Progress) -> list[Path]:
@@ -40,9 +55,11 @@ def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Prog
         outputs.append(folder / "spectra.nc")
     if risk.exists():
         outputs += _figures(settings, risk, shards, folder) if shards else []
-        outputs += write_totals(risk, settings.totals, folder)
+        totals = region_totals(risk, settings.totals)
+        write_totals(totals.table, folder / "totals.csv")
+        outputs += [folder / "totals.csv", *write_evaluation(risk, folder / "evaluation.json")]
         if settings.geopackage:
-            outputs.append(_write_geopackage(settings, risk, folder / "risk.gpkg"))
+            outputs += _write_layers(settings, risk, totals, folder)
     progress("report", 1, 1)
     return outputs
 
@@ -69,11 +86,11 @@ def _shown(risk: Path) -> pd.DataFrame:
     return shown
 
 
-def _write_geopackage(settings: Run, risk: Path, path: Path) -> Path:
-    """Write the layer for QGIS with the optional libraries."""
-    require_extra("gis", "pyogrio", "shapely")
-    from per_obspy.report.gis import write_pairs_layer
+def _write_layers(settings: Run, risk: Path, totals: RegionTotals, folder: Path) -> list[Path]:
+    """Write the layers for QGIS with the optional libraries."""
+    from per_obspy.report.gis import write_pairs_layer, write_totals_layer
 
     facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
-    write_pairs_layer(ranked(risk), list(settings.screening.classes), path, facts)
-    return path
+    write_pairs_layer(ranked(risk), list(settings.screening.classes), folder / "risk.gpkg", facts)
+    write_totals_layer(*totals, folder / "totals.gpkg", facts)
+    return [folder / "risk.gpkg", folder / "totals.gpkg"]

@@ -11,6 +11,7 @@ import pytest
 import shapely
 
 from per_obspy.report.gis import class_style, write_pairs_layer, write_totals_layer
+from per_obspy.screening.outlines import box_outlines
 from per_obspy.screening.totals import grid_cells, totals
 
 CLASSES = ("severe", "high", "low")
@@ -93,7 +94,8 @@ def test_a_class_may_have_any_name_and_be_alone():
 def test_totals_are_cells_or_points(tmp_path):
     cells = grid_cells(TABLE["longitude"], TABLE["latitude"], 1000.0)
     found = totals(TABLE, cells.cell)
-    write_totals_layer(found, cells.boxes, tmp_path / "cells.gpkg", FACTS)
+    outlines = box_outlines(cells.boxes.loc[found["area"]])
+    write_totals_layer(found, outlines, tmp_path / "cells.gpkg", FACTS)
     meta, _, geometry, fields = pyogrio.raw.read(tmp_path / "cells.gpkg")
     values = dict(zip(meta["fields"], fields, strict=True))
     assert meta["geometry_type"] == "Polygon"
