@@ -25,9 +25,9 @@ from per_obspy.screening.pair_motion import pair_motion, period_correlation
 from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
 from per_obspy.screening.values import at_contact, both, values
 
-#: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
-#: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
+#: Standard normal nodes for period and damping of both buildings: the second 128 Sobol points, which lie in the middle
+#: of their strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).fast_forward(128).random(128))
 
 #: Of building 1 and building 2.
 Both = tuple[FloatArray, FloatArray]

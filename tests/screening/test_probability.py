@@ -54,6 +54,14 @@ def test_more_gap_is_less_likely_to_close(station):
     assert chances[-1] < 0.01
 
 
+def test_equal_derived_buildings_that_touch_always_pound(station):
+    # would catch: nodes at which both are exactly equal, which move as one (0.984 with the first 128 Sobol points)
+    derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
+    assert _one(station, **derived, gap=0.0)["probability"] == 1.0
+    # a gap of a tenth of a millimetre is closed wherever periods differ by more than rounding
+    assert _one(station, **derived, gap=1e-4)["probability"] > 0.995
+
+
 def test_equal_derived_buildings_against_monte_carlo(station):
     # would catch: both periods resampled together, which keeps equal buildings in step and the probability at 0
     derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
