@@ -13,6 +13,7 @@ are those at the site and as uncertain as their motion; an exact demand is scale
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
@@ -22,7 +23,7 @@ from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import combined_dispersion, combined_dispersion_correlation, lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
 from per_obspy.screening.pair_motion import pair_motion, period_correlation
-from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
+from per_obspy.screening.stored import azimuth_row, log_period_and_damping, log_place, log_spectra, stored_log
 from per_obspy.screening.values import at_contact, both, values
 
 #: Standard normal nodes for period and damping of both buildings: the second 128 Sobol points, which lie in the middle
@@ -73,17 +74,15 @@ def _of_demand(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -
 
 def _of_radii(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
     """Return the exact integral over both radii with the correlation that governs the demand."""
-    yields = (table["demand_rule"] == "linearized").to_numpy()
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
-    correlation = np.where(yields, table["correlation_linearized"], correlation)
-    radii = zip(at_contact(table, "per"), at_contact(table, "equivalent_per"), strict=True)
+    correlation = np.where(_linearized(table), table["correlation_linearized"], correlation)
+    radius_1, radius_2 = _median_radii(table, screening)
     (ratio_1, ratio_2), unknown = _site_motion(table)
     source_1, source_2 = (
         np.stack([doubt, _damping_dispersion(station, table, i)], axis=-1) for i, doubt in enumerate(unknown, start=1)
     )
     # one motion moves both radii, each has a damping of its own
     shared = np.stack([period_correlation(*both(table, "period")), np.zeros(len(table))], axis=-1)
-    radius_1, radius_2 = (np.where(yields, equivalent, elastic) for elastic, equivalent in radii)
     return pounding_probability(
         radius_1 * np.exp(ratio_1),
         radius_2 * np.exp(ratio_2),
@@ -102,9 +101,9 @@ def _resampled(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -
     columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
     ratios, _ = _site_motion(table)
     _, unknown = _pair_motion(table)
-    for i, radius in enumerate(at_contact(table, "per"), start=1):
+    for i, radius in enumerate(_median_radii(table, screening), start=1):
         columns += [
-            *log_place(table, i),
+            *log_period_and_damping(*(_deciding(table, f"{name}_{i}") for name in ("period", "damping"))),
             values(table, f"period_log_std_{i}"),
             values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)) + ratios[i - 1],
@@ -116,10 +115,27 @@ def _resampled(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -
     return probability
 
 
+def _linearized(table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return where the gap of equivalent linear buildings decides."""
+    return (table["demand_rule"] == "linearized").to_numpy()
+
+
+def _deciding(table: pd.DataFrame, name: str) -> FloatArray:
+    """Return a column, that of the equivalent building where this decides."""
+    return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
+
+
+def _median_radii(table: pd.DataFrame, screening: Screening) -> Both:
+    """Return both radii at contact height, of which the critical gap is right in the median."""
+    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    first, second = (_deciding(table, f"per_{i}") / bias for i in (1, 2))
+    share_1, share_2 = both(table, "participation")
+    return share_1 * first, share_2 * second
+
+
 def _model_dispersion(table: pd.DataFrame, screening: Screening) -> FloatArray:
     """Return how far the estimate that decides may be from the exact demand."""
-    linearized = table["demand_rule"] == "linearized"
-    return np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
+    return np.where(_linearized(table), screening.linearized_dispersion, screening.model_dispersion)
 
 
 def _site_motion(table: pd.DataFrame) -> tuple[Both, Both]:
