@@ -193,10 +193,17 @@ def do_chunk(job: ChunkJob) -> Part:
     rows, rejected = _surviving(pairs, _ground(job.ground), job)
     rejected = (*pairs.attrs["rejected"], *(one._replace(source=job.chunk.rows.source) for one in rejected))
     if len(rows):
-        with written_whole(job.part) as part:
-            keys = order_keys(rows, impact_velocity_that_counts(rows))
-            pq.write_table(as_arrow(rows.assign(**keys)), part)
+        _write_rows(rows, job.part)
     return _noted(job, _key(job), job.part if len(rows) else None, rejected)
+
+
+def _write_rows(rows: pd.DataFrame, path: Path) -> None:
+    """Write the rows of a part with the keys of their order; numbers hardly repeat, so only texts get dictionaries."""
+    keys = order_keys(rows, impact_velocity_that_counts(rows))
+    table = as_arrow(rows.assign(**keys))
+    texts = [one.name for one in table.schema if pa.types.is_string(one.type)]
+    with written_whole(path) as part:
+        pq.write_table(table, part, use_dictionary=texts)
 
 
 def _noted(job: ChunkJob, key: str, part: Path | None, rejected: Sequence[Rejection]) -> Part:
