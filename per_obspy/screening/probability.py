@@ -12,6 +12,7 @@ are those at the site and as uncertain as their motion; an exact demand is scale
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
@@ -21,12 +22,12 @@ from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import combined_dispersion, combined_dispersion_correlation, lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
 from per_obspy.screening.pair_motion import pair_motion, period_correlation
-from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
+from per_obspy.screening.stored import azimuth_row, log_period_and_damping, log_place, log_spectra, stored_log
 from per_obspy.screening.values import Table, at_contact, both, chosen, values
 
-#: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
-#: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
+#: Standard normal nodes for period and damping of both buildings: the second 128 Sobol points, which lie in the middle
+#: of their strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).fast_forward(128).random(128))
 
 #: Of building 1 and building 2.
 Both = tuple[FloatArray, FloatArray]
@@ -44,7 +45,7 @@ def pair_probability(station: xr.Dataset, table: Table, screening: Screening) ->
         Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand;
         the motion at the site, where the table has it, of :func:`~per_obspy.screening.site_motion.motion_at_pairs`.
     screening : Screening
-        Log-standard deviations of the critical gap from PER, and of the linearized one, about the exact one.
+        Medians and log-standard deviations of the critical gap from PER, and of the linearized one, over the exact one.
 
     Returns
     -------
@@ -72,17 +73,15 @@ def _of_demand(station: xr.Dataset, table: Table, screening: Screening) -> Float
 
 def _of_radii(station: xr.Dataset, table: Table, screening: Screening) -> FloatArray:
     """Return the exact integral over both radii with the correlation that governs the demand."""
-    yields = np.asarray(table["demand_rule"] == "linearized")
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
-    correlation = np.where(yields, table["correlation_linearized"], correlation)
-    radii = zip(at_contact(table, "per"), at_contact(table, "equivalent_per"), strict=True)
+    correlation = np.where(_linearized(table), table["correlation_linearized"], correlation)
+    radius_1, radius_2 = _median_radii(table, screening)
     (ratio_1, ratio_2), unknown = _site_motion(table)
     source_1, source_2 = (
         np.stack([doubt, _damping_dispersion(station, table, i)], axis=-1) for i, doubt in enumerate(unknown, start=1)
     )
     # one motion moves both radii, each has a damping of its own
     shared = np.stack([period_correlation(*both(table, "period")), np.zeros_like(correlation)], axis=-1)
-    radius_1, radius_2 = (np.where(yields, equivalent, elastic) for elastic, equivalent in radii)
     return pounding_probability(
         radius_1 * np.exp(ratio_1),
         radius_2 * np.exp(ratio_2),
@@ -101,9 +100,9 @@ def _resampled(station: xr.Dataset, table: Table, screening: Screening) -> Float
     columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
     ratios, _ = _site_motion(table)
     _, unknown = _pair_motion(table)
-    for i, radius in enumerate(at_contact(table, "per"), start=1):
+    for i, radius in enumerate(_median_radii(table, screening), start=1):
         columns += [
-            *log_place(table, i),
+            *log_period_and_damping(_deciding(table, f"period_{i}"), _deciding(table, f"damping_{i}")),
             values(table, f"period_log_std_{i}"),
             values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)) + ratios[i - 1],
@@ -116,10 +115,26 @@ def _resampled(station: xr.Dataset, table: Table, screening: Screening) -> Float
     return probability
 
 
+def _linearized(table: Table) -> NDArray[np.bool_]:
+    """Return where the gap of equivalent linear buildings decides."""
+    return np.asarray(table["demand_rule"] == "linearized")
+
+
+def _deciding(table: Table, name: str) -> FloatArray:
+    """Return a column, that of the equivalent building where this decides."""
+    return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
+
+
+def _median_radii(table: Table, screening: Screening) -> Both:
+    """Return both radii at contact height, of which the critical gap is right in the median."""
+    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    share_1, share_2 = both(table, "participation")
+    return share_1 * _deciding(table, "per_1") / bias, share_2 * _deciding(table, "per_2") / bias
+
+
 def _model_dispersion(table: Table, screening: Screening) -> FloatArray:
     """Return how far the estimate that decides may be from the exact demand."""
-    linearized = table["demand_rule"] == "linearized"
-    return np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
+    return np.where(_linearized(table), screening.linearized_dispersion, screening.model_dispersion)
 
 
 def _site_motion(table: Table) -> tuple[Both, Both]:
