@@ -20,6 +20,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from per_obspy.errors import CatalogError, did_you_mean
+from per_obspy.files import looks_like
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -81,8 +82,11 @@ def read_toml(path: Path) -> dict[str, object]:
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise CatalogError(str(path), f"cannot be read as TOML: {error}") from error
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        kind = looks_like(path)
+        raise CatalogError(str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}") from error
 
 
 def checked(
