@@ -49,6 +49,7 @@ class Screening(Section):
     largest_distance: float = Field(20_000.0, gt=0, description="m from station to pair; pairs beyond are rejected")
     flag_distance: float = Field(5_000.0, gt=0, description="m, flagged beyond")
     exact: bool = Field(True, description="exact demand and history of every pair; false: estimates only, faster")
+    model_median: float = Field(1.16, gt=0, description="median of critical gap by PER / exact (docs/reliability.md)")
     model_dispersion: float = Field(0.35, ge=0, description="log-standard deviation of critical gap by PER / exact")
     possible_from: float = Field(0.1, ge=0, le=1, description="probability from which pounding counts as possible")
     per_to_sd: float = Field(1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large")
@@ -56,6 +57,7 @@ class Screening(Section):
         {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
         description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
     )
+    linearized_median: float = Field(2.5, gt=0, description="the same of the demand where the linearized gap decides")
     linearized_dispersion: float = Field(0.6, ge=0, description="the same of the linearized gap of yielding pairs")
     target_amplification: float = Field(1.25, ge=1, description="largest PER after / before that a bumper is to allow")
     shakemap_log_std: float = Field(0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from per_obspy import config
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.contact import contact_mass, contact_participation, floor_offset, floors_misaligned
+from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
 
 #: Standard acceleration of gravity, m/s2.
@@ -64,7 +65,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     _add_contact(columns, derived, pairs, building)
     _add_masses(columns, derived, pairs, building)
     _add_place(columns, pairs)
-    texts = {f"system_{i}": system[i] for i in (1, 2)} | {"derived": _names(derived, len(pairs))}
+    texts = {f"system_{i}": system[i] for i in (1, 2)} | {"derived": joined_names(derived)}
     flags = {"floors_misaligned": floors_misaligned(np.nan_to_num(columns["floor_offset"]), building.floor_tolerance)}
     return pairs.assign(**columns, **texts, **flags)
 
@@ -172,14 +173,3 @@ def _add_place(columns: Columns, pairs: pd.DataFrame) -> None:
     columns["longitude"] = (_given(pairs, "longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
     columns["latitude"] = (_given(pairs, "latitude_1") + _given(pairs, "latitude_2")) / 2.0
     columns["azimuth"] = _given(pairs, "azimuth")
-
-
-def _names(derived: Derived, count: int) -> NDArray[np.object_]:
-    """Return the names of the derived columns of each row; rows share few combinations, so each is written once."""
-    code = np.zeros(count, dtype=np.int64)
-    for bit, rows in enumerate(derived.values()):
-        code |= rows.astype(np.int64) << bit
-    codes, inverse = np.unique(code, return_inverse=True)
-    names = list(derived)
-    texts = [" ".join(name for bit, name in enumerate(names) if one >> bit & 1) for one in codes.tolist()]
-    return np.array(texts, dtype=object)[inverse]

@@ -7,3 +7,7 @@ import numba
 #: ``isnan`` find nothing. No ``parallel=True``: two threads that call such kernels abort the process on Numba's
 #: workqueue layer, so the only threads are one level above the kernels.
 kernel = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"}, boundscheck=False)
+#: The same for kernels that allocate nothing: without reference counts, which cost short kernels more than arithmetic.
+lean = numba.njit(  # type: ignore[call-overload]  # Numba's stubs do not know _nrt
+    _nrt=False, nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"}, boundscheck=False
+)

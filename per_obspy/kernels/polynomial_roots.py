@@ -7,7 +7,7 @@ costs more in reference counts than the arithmetic.)
 
 import math
 
-from ._jit import kernel
+from ._jit import lean
 
 #: A polynomial below this share of its own terms is zero.
 ROUNDING = 1e-15
@@ -15,7 +15,7 @@ ROUNDING = 1e-15
 LEAST_ADVANCE = 1e-7
 
 
-@kernel
+@lean
 def value_and_slope(table, line, column, terms, time):
     """Return the polynomial and its derivative at a time, by Horner's rule."""
     value = slope = 0.0
@@ -25,7 +25,7 @@ def value_and_slope(table, line, column, terms, time):
     return value, slope
 
 
-@kernel
+@lean
 def size_and_curvature(table, line, column, terms, end):
     """Return bounds on [0, end]: of the polynomial without its constant, and of its second derivative."""
     size = curvature = 0.0
@@ -40,17 +40,25 @@ def size_and_curvature(table, line, column, terms, end):
     return size, curvature
 
 
-@kernel
+@lean
 def first_fall(table, line, column, terms, sign, start, end, rounding):
     """
     Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, or -1 if it does not.
 
-    With K >= |p''| the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends like Newton's.
+    With K >= -p'' the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends like Newton's.
     A start at zero that rises is not a fall: the same step, written for c < 0, leaves it by 2 p' / K at least.
     """
     size, curvature = size_and_curvature(table, line, column, terms, end)
+    return fall_within(table, line, column, terms, sign, start, end, rounding, size, curvature)
+
+
+@lean
+def fall_within(table, line, column, terms, sign, start, end, rounding, size, curvature):
+    """Return what ``first_fall`` does, with the bounds of ``size_and_curvature``."""
     if sign * table[line, column] > size + rounding:
         return -1.0
+    if terms > 2:  # the second coefficient's share in the bound has a sign
+        curvature -= 2.0 * (abs(table[line, column + 2]) + sign * table[line, column + 2])
     tolerance = rounding + ROUNDING * (abs(table[line, column]) + size)
     time = start
     while True:
@@ -70,16 +78,19 @@ def first_fall(table, line, column, terms, sign, start, end, rounding):
             return -1.0
 
 
-@kernel
+@lean
 def safe_step(value, closing, curvature):
-    """Return a step within which a function of this value, closing speed and largest curvature has no root."""
-    root = math.sqrt(closing * closing + 2.0 * curvature * value)
+    """Return a step within which a function of this value, closing speed and largest downward curvature has no root."""
+    squared = closing * closing + 2.0 * curvature * value
+    if squared < 0.0:
+        return math.inf
+    root = math.sqrt(squared)
     if closing > 0.0:
         return 2.0 * value / (closing + root)
     return (root - closing) / curvature if curvature > 0.0 else math.inf
 
 
-@kernel
+@lean
 def is_last_root(table, line, column, terms, time, end):
     """Tell whether a polynomial cannot turn between a root and the end of the interval."""
     _, curvature = size_and_curvature(table, line, column, terms, end)

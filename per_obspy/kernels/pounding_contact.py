@@ -9,7 +9,7 @@ acceleration, or after MOST_BOUNCES impacts in a segment.
 
 import math
 
-from ._jit import kernel
+from ._jit import lean
 from .pounding_motion import (
     APPROACH,
     BOUNCES,
@@ -49,7 +49,7 @@ TOUCH = 1e-12
 PRESSED = 1e-14
 
 
-@kernel
+@lean
 def touches(row, interface):
     """Tell whether an interface is closed or has no clearance."""
     if row[interface, STUCK] or row[interface, ORDER] > 0:
@@ -59,7 +59,7 @@ def touches(row, interface):
     return clearance <= TOUCH * (abs(left) + abs(right) + row[interface, GAP])
 
 
-@kernel
+@lean
 def write_impact(log, row, j, time, impulse, before_1, before_2):
     """Write an impact that has just changed the velocities to the log, if it has room."""
     count = 0.0
@@ -72,7 +72,7 @@ def write_impact(log, row, j, time, impulse, before_1, before_2):
         log[line, BEFORE_2], log[line, AFTER_2], log[line, PLACE_2] = before_2, row[j + 1, V], row[j + 1, U]
 
 
-@kernel
+@lean
 def strike(row, log, j, time):
     """Let the two structures of an interface hit each other."""
     before_1, before_2 = row[j, V], row[j + 1, V]
@@ -93,7 +93,7 @@ def strike(row, log, j, time):
     row[0, BOUNCES] += 1.0
 
 
-@kernel
+@lean
 def strike_all(row, log, hit, time):
     """Let touching pairs hit each other, from left to right, until none approaches."""
     approaching = True
@@ -105,7 +105,7 @@ def strike_all(row, log, hit, time):
                 approaching = row[0, BOUNCES] < row[0, MOST_BOUNCES]
 
 
-@kernel
+@lean
 def free_acceleration(row, i, acceleration):
     """Return the acceleration that a structure has by itself."""
     stiffness, constant = restoring(row, i)
@@ -113,7 +113,7 @@ def free_acceleration(row, i, acceleration):
     return constant - stiffness * row[i, U] - damping - row[i, PARTICIPATION] * acceleration
 
 
-@kernel
+@lean
 def lingers(row, interface, acceleration):
     """Tell whether a touching pair separates so slowly that it may stay in contact."""
     separation = row[interface + 1, V] - row[interface, V]
@@ -123,7 +123,7 @@ def lingers(row, interface, acceleration):
     return separation <= row[0, DELAY] * closing
 
 
-@kernel
+@lean
 def close_pressed(row, acceleration, slope, duration):
     """
     Close lingering interfaces whose structures would accelerate into each other, until none would.
@@ -144,7 +144,7 @@ def close_pressed(row, acceleration, slope, duration):
                     closed = True
 
 
-@kernel
+@lean
 def join(row, first, last):
     """Give a cluster its common velocity, by momentum."""
     common = 0.0
@@ -157,7 +157,7 @@ def join(row, first, last):
         row[i, V] = common
 
 
-@kernel
+@lean
 def unload_reversed(row):
     """Return yielding structures whose velocity was reversed to their elastic phase."""
     for i in range(row.shape[0]):
@@ -167,18 +167,21 @@ def unload_reversed(row):
             row[i, PLASTIC] = row[i, U] - side * row[i, YIELD]
 
 
-@kernel
+@lean
 def meet(row, log, segment, elapsed, hit):
     """Carry out a contact of one interface, with all that it causes in the row at the same instant."""
     acceleration = segment.acceleration + segment.slope * elapsed
     strike_all(row, log, hit, segment.start + elapsed)
+    lingering = False
     for j in range(row.shape[0] - 1):
         row[j, LINGERING] = 0.0
         if j == hit or touches(row, j):
             row[j, ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
             row[j, STUCK] = 0.0
             row[j, LINGERING] = lingers(row, j, acceleration)
-    close_pressed(row, acceleration, segment.slope, segment.duration)
+            lingering |= row[j, LINGERING] != 0.0
+    if lingering:
+        close_pressed(row, acceleration, segment.slope, segment.duration)
     first = 0
     while first < row.shape[0]:
         last = last_in_contact(row, first)

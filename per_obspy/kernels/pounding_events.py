@@ -7,8 +7,8 @@ Event by event through a segment of piecewise-linear ground acceleration: hits, 
 
 import math
 
-from ._jit import kernel
-from .polynomial_roots import first_fall, is_last_root, size_and_curvature, value_and_slope
+from ._jit import lean
+from .polynomial_roots import fall_within, first_fall, is_last_root, size_and_curvature, value_and_slope
 from .pounding_contact import meet
 from .pounding_motion import (
     CURVE,
@@ -37,7 +37,7 @@ from .pounding_motion import (
 NOTHING, HIT, RELEASE, YIELDING, REVERSAL = 0, 1, 2, 3, 4
 
 
-@kernel
+@lean
 def find_event(row, segment, elapsed):
     """Return the time to the next event of a segment or to its end, the kind, and the interface or structure."""
     slope, terms = segment.slope, segment.terms
@@ -50,8 +50,8 @@ def find_event(row, segment, elapsed):
             row[j, GUARD] += rounding  # a force that is zero but for rounding does not open the interface
             time, found = first_fall(row, j, GUARD, terms, 1.0, 0.0, span, 0.0), RELEASE
         else:
-            rounding = fill_clearance(row, j, terms)
-            time, found = first_fall(row, j, GUARD, terms, 1.0, 0.0, span, rounding), HIT
+            rounding, size, curvature = fill_clearance(row, j, terms, span)
+            time, found = fall_within(row, j, GUARD, terms, 1.0, 0.0, span, rounding, size, curvature), HIT
         if time >= 0.0:
             span, kind, place = time, found, j
     for i in range(row.shape[0]):
@@ -62,7 +62,7 @@ def find_event(row, segment, elapsed):
     return span, kind, place
 
 
-@kernel
+@lean
 def _change_of_stiffness(row, i, span, terms):
     """Return when a bilinear structure starts to yield or to unload within a span (-1: not), and which."""
     side = row[i, PHASE]
@@ -84,12 +84,17 @@ def _change_of_stiffness(row, i, span, terms):
     return earliest, YIELDING
 
 
-@kernel
+@lean
 def finish_piece(row, log, segment, elapsed, span, kind, place):
-    """Move the row to the end of a piece, by then so much of the segment has elapsed, and carry out its event."""
-    terms = segment.terms
+    """
+    Move the row to the end of a piece, by then so much of the segment has elapsed, and carry out its event.
+
+    Largest displacements and radii are raised to those of the piece, exact between its ends.
+    """
     for i in range(row.shape[0]):
-        row[i, U], row[i, V] = value_and_slope(row, i, CURVE, terms, span)
+        u, v = value_and_slope(row, i, CURVE, segment.terms, span)
+        _raise_peaks(row, i, u, v, span, segment.terms)
+        row[i, U], row[i, V] = u, v
         side = row[i, PHASE]
         if side != 0.0:
             row[i, PLASTIC] = row[i, U] - side * row[i, YIELD]
@@ -105,46 +110,49 @@ def finish_piece(row, log, segment, elapsed, span, kind, place):
         row[place, UNLOADING], row[place, PHASE] = 2.0 * row[place, PHASE], 0.0
 
 
-@kernel
-def raise_peaks(row, span, terms):
-    """Raise the largest displacement and the largest radii to those of a piece, exact between its ends."""
-    for i in range(row.shape[0]):
-        _raise_at(row, i, 0.0, terms)
-        _raise_at(row, i, span, terms)
-        if _may_exceed(row, i, span, terms):
-            fill_velocity(row, i, terms)
-            _raise_at_roots(row, i, span, terms, terms - 1)
-            fill_power(row, i, row[i, STIFFNESS], 0.0, terms)
+@lean
+def _raise_peaks(row, i, end, end_speed, span, terms):
+    """Raise the peaks of a structure to those of a piece of which its row holds the start."""
+    _raise_to(row, i, row[i, U], row[i, V])
+    _raise_to(row, i, end, end_speed)
+    if _may_exceed(row, i, end, end_speed, span, terms):
+        fill_velocity(row, i, terms)
+        _raise_at_roots(row, i, span, terms, terms - 1)
+        fill_power(row, i, row[i, STIFFNESS], 0.0, terms)
+        _raise_at_roots(row, i, span, terms, terms - 2)
+        if row[i, YIELD] < math.inf:
+            stiffness, constant = restoring(row, i)
+            # while yielding, the elastoplastic part does not store more
+            fill_power(row, i, stiffness, constant if row[i, PHASE] == 0.0 else 0.0, terms)
             _raise_at_roots(row, i, span, terms, terms - 2)
-            if row[i, YIELD] < math.inf:
-                stiffness, constant = restoring(row, i)
-                # while yielding, the elastoplastic part does not store more
-                fill_power(row, i, stiffness, constant if row[i, PHASE] == 0.0 else 0.0, terms)
-                _raise_at_roots(row, i, span, terms, terms - 2)
 
 
-@kernel
-def _may_exceed(row, i, span, terms):
-    """Tell whether a bound on displacement and velocity of a piece is above what was reached before."""
-    reach, _ = size_and_curvature(row, i, CURVE, terms, span)
-    reach += abs(row[i, U])
-    fill_velocity(row, i, terms)
-    speed, _ = size_and_curvature(row, i, GUARD, terms - 1, span)
-    squared = (speed + abs(row[i, GUARD])) ** 2 / row[i, STIFFNESS]
+@lean
+def _may_exceed(row, i, end, end_speed, span, terms):
+    """
+    Tell whether a structure may pass its peaks inside a piece, by the largest |u''| in it.
+
+    A displacement leaves its chord by an eighth of span² times it at most, a speed is that of the nearer end but for
+    half the span times it: together they bound the radii.
+    """
+    _, curvature = size_and_curvature(row, i, CURVE, terms, span)
+    reach = max(abs(row[i, U]), abs(end)) + 0.125 * span * span * curvature
+    speed = max(abs(row[i, V]), abs(end_speed)) + 0.5 * span * curvature
+    squared = speed * speed / row[i, STIFFNESS]
     stretch = reach + abs(row[i, PLASTIC])
-    if reach > row[i, HIGHEST] or reach**2 + squared > row[i, WIDEST]:
+    if reach > row[i, HIGHEST] or reach * reach + squared > row[i, WIDEST]:
         return True
-    return stretch**2 + squared > row[i, RICHEST]
+    return stretch * stretch + squared > row[i, RICHEST]
 
 
-@kernel
+@lean
 def fill_velocity(row, i, terms):
     """Fill the guard with the velocity of a structure."""
     for n in range(1, terms):
         row[i, GUARD + n - 1] = n * row[i, CURVE + n]
 
 
-@kernel
+@lean
 def fill_power(row, i, stiffness, constant, terms):
     """Fill the guard with ``u'' + stiffness u - constant``: what makes a squared radius grow, over 2 v / omega²."""
     for n in range(terms - 2):
@@ -152,7 +160,7 @@ def fill_power(row, i, stiffness, constant, terms):
     row[i, GUARD] -= constant
 
 
-@kernel
+@lean
 def _raise_at_roots(row, i, span, terms, guard_terms):
     """Raise the peaks of a structure at every root of the guard within a piece."""
     value, slope = value_and_slope(row, i, GUARD, guard_terms, 0.0)
@@ -166,10 +174,16 @@ def _raise_at_roots(row, i, span, terms, guard_terms):
         time = first_fall(row, i, GUARD, guard_terms, sign, time, span, 0.0)
 
 
-@kernel
+@lean
 def _raise_at(row, i, time, terms):
     """Raise the peaks of a structure to the state at a time of the piece."""
     u, v = value_and_slope(row, i, CURVE, terms, time)
+    _raise_to(row, i, u, v)
+
+
+@lean
+def _raise_to(row, i, u, v):
+    """Raise the peaks of a structure to a state."""
     speed = v * v / row[i, STIFFNESS]
     row[i, HIGHEST] = max(row[i, HIGHEST], abs(u))
     row[i, WIDEST] = max(row[i, WIDEST], u * u + speed)

@@ -9,7 +9,7 @@ open or closed, without tension.
 import math
 from typing import NamedTuple
 
-from ._jit import kernel
+from ._jit import lean
 from .polynomial_roots import first_fall, value_and_slope
 from .pounding_motion import CURVE, GUARD, MASS, PARTICIPATION, RATE, STIFFNESS, U, V
 
@@ -33,7 +33,7 @@ class Element(NamedTuple):
     gap: float
 
 
-@kernel
+@lean
 def element_form(element, phase, plastic):
     """Return k, c and f of an element in a phase; ``plastic`` is the plastic part of z."""
     if phase == OPEN:
@@ -49,7 +49,7 @@ def element_form(element, phase, plastic):
     return soft, element.damping, phase * (1.0 - element.hardening) * element.yield_force
 
 
-@kernel
+@lean
 def fill_linked(row, form, acceleration, slope, terms):
     """Fill the Taylor coefficients of both displacements."""
     stiffness, damping, force = form
@@ -67,7 +67,7 @@ def fill_linked(row, form, acceleration, slope, terms):
             row[i, CURVE + n + 2] = -total / ((n + 2) * (n + 1))
 
 
-@kernel
+@lean
 def fill_force_of(row, form, terms):
     """Fill the guard of line 0 with the element's force."""
     stiffness, damping, force = form
@@ -78,7 +78,7 @@ def fill_force_of(row, form, terms):
     row[0, GUARD] += force
 
 
-@kernel
+@lean
 def fill_difference(row, sign, constant, terms):
     """Fill the guard of line 0 with ``constant + sign * z``."""
     for n in range(terms):
@@ -86,14 +86,14 @@ def fill_difference(row, sign, constant, terms):
     row[0, GUARD] += constant
 
 
-@kernel
+@lean
 def fill_rate(row, sign, terms):
     """Fill the guard of line 0 with ``sign * z'``."""
     for n in range(terms - 1):
         row[0, GUARD + n] = sign * (n + 1) * (row[0, CURVE + n + 1] - row[1, CURVE + n + 1])
 
 
-@kernel
+@lean
 def divide_by_square(row, terms):
     """Divide the guard of line 0 by t², its first two coefficients being zero but for rounding."""
     for n in range(terms - 2):
@@ -101,7 +101,7 @@ def divide_by_square(row, terms):
     row[0, GUARD + terms - 2] = row[0, GUARD + terms - 1] = 0.0
 
 
-@kernel
+@lean
 def next_phase(row, element, phase, left, plastic, span, terms):
     """
     Return when the element changes phase within a span (-1: not) and to which.
@@ -129,7 +129,7 @@ def next_phase(row, element, phase, left, plastic, span, terms):
     return _closing_time(row, element, left, span, terms), CLOSED
 
 
-@kernel
+@lean
 def _closing_time(row, element, left, span, terms):
     """Return when an open contact closes: overlap and the force it would have are both positive."""
     fill_difference(row, -1.0, element.gap, terms)
@@ -143,7 +143,7 @@ def _closing_time(row, element, left, span, terms):
     return first_fall(row, 0, GUARD, terms - 1, -1.0, 0.0, span, 0.0)
 
 
-@kernel
+@lean
 def largest_on(row, i, column, terms, span):
     """Return the largest and the least value of a polynomial on [0, span]."""
     start, end = row[i, column], value_and_slope(row, i, column, terms, span)[0]
@@ -160,7 +160,7 @@ def largest_on(row, i, column, terms, span):
     return low, high
 
 
-@kernel
+@lean
 def raise_linked(row, form, maxima, span, terms):
     """Raise the maxima to those of a piece, exact between its ends."""
     for i in range(2):
@@ -174,7 +174,7 @@ def raise_linked(row, form, maxima, span, terms):
     maxima[FORCE] = max(maxima[FORCE], high, -low)
 
 
-@kernel
+@lean
 def advance_linked(row, element, phase, plastic, maxima, duration, acceleration, slope, terms):
     """Carry both structures through a segment; return the element's phase, plastic part, and whether it got through."""
     elapsed, left = 0.0, phase
@@ -196,7 +196,7 @@ def advance_linked(row, element, phase, plastic, maxima, duration, acceleration,
     return phase, plastic, False
 
 
-@kernel
+@lean
 def run_linked(acceleration, dt, refinement, row, element, phase, terms, motion, force, maxima):
     """Fill motion (n_time, 2, 2) and force (n_time,) at the samples; tell whether the history got to its end."""
     duration, plastic = dt / refinement, 0.0

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import lean
 
 # A row of structures is one table, a line for each structure and for the interface to the next one on its right:
 #: xi omega, omega², hardening, yield displacement, participation, mass
@@ -41,6 +41,8 @@ LARGEST_PHASE = 0.7
 MOST_TERMS = 24
 #: 1 / (n (n - 1)), from n = 2 on.
 INVERSE = np.array([0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, MOST_TERMS))])
+#: 1 / n, from n = 1 on.
+RECIPROCAL = np.array([0.0, *(1.0 / n for n in range(1, MOST_TERMS))])
 #: What is dropped of a Taylor series, relative to the motion.
 TRUNCATION = 1e-18
 #: Below this share of its own terms a contact force is rounding, as is a clearance below the other share.
@@ -58,7 +60,7 @@ class Segment(NamedTuple):
     terms: int
 
 
-@kernel
+@lean
 def taylor_terms(row, duration):
     """Return how many Taylor coefficients a piece of this duration needs."""
     largest = 0.0
@@ -71,7 +73,7 @@ def taylor_terms(row, duration):
     return terms
 
 
-@kernel
+@lean
 def restoring(row, i):
     """Return stiffness K and constant b of a structure's restoring force ``K u - b`` per unit mass in its phase."""
     stiffness = row[i, STIFFNESS]
@@ -83,7 +85,7 @@ def restoring(row, i):
     return stiffness - lost, -lost * row[i, PHASE] * row[i, YIELD]
 
 
-@kernel
+@lean
 def fill_taylor(row, i, column, terms, velocity, damping, stiffness, force, force_rate):
     """Fill the coefficients from the first on of ``x'' + damping x' + stiffness x = force + force_rate t``."""
     before, last = velocity, 0.5 * (force - damping * velocity)
@@ -91,11 +93,11 @@ def fill_taylor(row, i, column, terms, velocity, damping, stiffness, force, forc
     before, last = last, (force_rate - 2.0 * damping * last - stiffness * before) / 6.0
     row[i, column + 3] = last
     for n in range(4, terms):
-        before, last = last, -(damping * (n - 1) * last + stiffness * before) * INVERSE[n]
+        before, last = last, -(damping * RECIPROCAL[n]) * last - (stiffness * INVERSE[n]) * before
         row[i, column + n] = last
 
 
-@kernel
+@lean
 def last_in_contact(row, first):
     """Return the last structure of the cluster that starts with the first."""
     last = first
@@ -104,7 +106,7 @@ def last_in_contact(row, first):
     return last
 
 
-@kernel
+@lean
 def mass_share(row, first, last, i):
     """Return the share of structure i in the mass of a cluster; a wall (infinite mass) has it all."""
     total, walls = 0.0, 0
@@ -116,7 +118,7 @@ def mass_share(row, first, last, i):
     return row[i, MASS] / total
 
 
-@kernel
+@lean
 def cluster_equation(row, first, last, acceleration, slope):
     """Return velocity, damping, stiffness, force and force rate of the equation of a cluster."""
     velocity = damping = stiffness = force = force_rate = 0.0
@@ -131,7 +133,7 @@ def cluster_equation(row, first, last, acceleration, slope):
     return velocity, damping, stiffness, force, force_rate
 
 
-@kernel
+@lean
 def fill_curves(row, acceleration, slope, terms):
     """Fill the Taylor coefficients of every displacement of the row."""
     first = 0
@@ -139,28 +141,44 @@ def fill_curves(row, acceleration, slope, terms):
         last = last_in_contact(row, first)
         velocity, damping, stiffness, force, force_rate = cluster_equation(row, first, last, acceleration, slope)
         fill_taylor(row, first, CURVE, terms, velocity, damping, stiffness, force, force_rate)
-        for i in range(first, last + 1):
+        row[first, CURVE] = row[first, U]
+        for i in range(first + 1, last + 1):
             row[i, CURVE] = row[i, U]
             for n in range(1, terms):
                 row[i, CURVE + n] = row[first, CURVE + n]
         first = last + 1
 
 
-@kernel
-def fill_clearance(row, j, terms):
-    """Fill the guard with an open interface's clearance over t**order; return the rounding of its first coefficient."""
+@lean
+def fill_clearance(row, j, terms, span):
+    """
+    Fill the guard with an open interface's clearance over t**order.
+
+    Return the rounding of its first coefficient, and its bounds as ``size_and_curvature`` does: in the same loop,
+    because a vector of numbers just written one by one is slow to read.
+    """
     order = int(row[j, ORDER])
-    for n in range(order, terms):
-        row[j, GUARD + n - order] = row[j + 1, CURVE + n] - row[j, CURVE + n]
+    size = curvature = 0.0
+    power = 1.0  # span**(n - 2)
+    for n in range(terms - order):
+        coefficient = row[j + 1, CURVE + n + order] - row[j, CURVE + n + order]
+        row[j, GUARD + n] = coefficient
+        if n == 1:
+            size = abs(coefficient) * span
+        elif n > 1:
+            term = abs(coefficient) * power
+            size += term * span * span
+            curvature += n * (n - 1) * term
+            power *= span
     for n in range(terms - order, terms):
         row[j, GUARD + n] = 0.0
     if order:
-        return 0.0
+        return 0.0, size, curvature
     row[j, GUARD] += row[j, GAP]
-    return GAP_ROUNDING * (abs(row[j, U]) + abs(row[j + 1, U]) + row[j, GAP])
+    return GAP_ROUNDING * (abs(row[j, U]) + abs(row[j + 1, U]) + row[j, GAP]), size, curvature
 
 
-@kernel
+@lean
 def size_of_forces(row, i, acceleration, slope, duration):
     """Return the sum of the sizes of the forces on a structure per unit mass, and of their changes in a duration."""
     stiffness, constant = restoring(row, i)
@@ -169,7 +187,7 @@ def size_of_forces(row, i, acceleration, slope, duration):
     return abs(constant) + stiffness * (u + v * duration) + 2.0 * row[i, RATE] * v + drive
 
 
-@kernel
+@lean
 def _add_force(row, i, j, factor, acceleration, slope, terms):
     """Add the outer force that structure i's motion needs, times a factor, to the guard of interface j."""
     factor *= row[i, MASS]
@@ -182,7 +200,7 @@ def _add_force(row, i, j, factor, acceleration, slope, terms):
     row[j, GUARD + 1] += factor * row[i, PARTICIPATION] * slope
 
 
-@kernel
+@lean
 def fill_force(row, j, acceleration, slope, duration, terms):
     """Fill the guard with a closed interface's force, positive in compression; return its rounding."""
     first, last = j, last_in_contact(row, j)

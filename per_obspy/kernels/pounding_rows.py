@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from ._jit import kernel
+from ._jit import kernel, lean
 from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
-from .pounding_events import find_event, finish_piece, raise_peaks
+from .pounding_events import find_event, finish_piece
 from .pounding_motion import (
     BOUNCES,
     CURVE,
@@ -41,13 +41,13 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 SETTLED = 1e-13
 
 
-@kernel
+@lean
 def _velocity_at(row, i, terms, time):
     """Return the velocity of a structure at a time of the piece."""
     return value_and_slope(row, i, CURVE, terms, time)[1]
 
 
-@kernel
+@lean
 def _add_ground_and_damping(row, work, acceleration, slope, span, terms):
     """Add input (per participation), viscous and hysteretic energy of a piece."""
     half = 0.5 * span
@@ -67,7 +67,7 @@ def _add_ground_and_damping(row, work, acceleration, slope, span, terms):
             work[i, HYSTERETIC] += mass * lost * abs(moved)
 
 
-@kernel
+@lean
 def _add_contact_work(row, work, acceleration, slope, span, terms):
     """Add the work of the contact forces of a piece to the energy that each structure has transferred."""
     half = 0.5 * span
@@ -82,7 +82,7 @@ def _add_contact_work(row, work, acceleration, slope, span, terms):
                 work[j + 1, TRANSFER] -= done
 
 
-@kernel
+@lean
 def raise_openings(row, span, terms):
     """Raise the largest opening of every interface to that of a piece, exact between its ends."""
     for j in range(row.shape[0] - 1):
@@ -95,14 +95,14 @@ def raise_openings(row, span, terms):
             _raise_opening_at_roots(row, j, span, terms)
 
 
-@kernel
+@lean
 def _opening_at(row, j, terms, time):
     """Return the opening of an interface at a time of the piece."""
     left, right = value_and_slope(row, j, CURVE, terms, time), value_and_slope(row, j + 1, CURVE, terms, time)
     return right[0] - left[0]
 
 
-@kernel
+@lean
 def _raise_opening_at_roots(row, j, span, terms):
     """Raise the largest opening where its rate, which the guard holds, falls through zero."""
     sign = 1.0 if row[j, GUARD] > 0.0 else -1.0
@@ -113,14 +113,13 @@ def _raise_opening_at_roots(row, j, span, terms):
         time = first_fall(row, j, GUARD, terms - 1, sign, time, span, 0.0)
 
 
-@kernel
+@lean
 def advance(row, log, work, segment):
     """Carry the row through one segment, event by event; tell whether it got through."""
     row[0, BOUNCES] = 0.0
     elapsed, slope, terms = 0.0, segment.slope, segment.terms
     for _ in range(int(2 * row[0, MOST_BOUNCES])):
         span, kind, place = find_event(row, segment, elapsed)
-        raise_peaks(row, span, terms)
         raise_openings(row, span, terms)
         acceleration = segment.acceleration + slope * elapsed
         _add_ground_and_damping(row, work, acceleration, slope, span, terms)
@@ -132,7 +131,7 @@ def advance(row, log, work, segment):
     return False
 
 
-@kernel
+@lean
 def reach_in_free_vibration(row, i):
     """
     Return the least and largest displacement that a structure can still reach in undisturbed free vibration.
@@ -150,7 +149,7 @@ def reach_in_free_vibration(row, i):
     return low, high
 
 
-@kernel
+@lean
 def is_settled(row):
     """Tell whether in free vibration no gap can close any more and no displacement can exceed its maximum."""
     left_high = -math.inf

@@ -13,7 +13,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as columns
 from per_obspy.kernels.pounding_block import run_block
 from per_obspy.kernels.pounding_contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes import LANES, ROWS
+from per_obspy.kernels.pounding_lanes import LANES, ROWS, TILE
 from per_obspy.pounding.history import SPEED_SHARE
 from per_obspy.pounding.pair_blocks import aligned, pair_blocks, pair_table
 from per_obspy.pounding.rows import closed_record, free_samples, largest_ground_velocity, refinement, row_at_rest
@@ -176,11 +176,10 @@ def _maxima(
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
         own, parts = rows[filled], int(refinements[block[0]])
-        lanes, flags = aligned(ROWS * LANES), aligned(LANES + 1).view(np.int64)
-        arrays = lanes, flags, own, np.zeros((0, LOG_COLUMNS))
-        pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
-        bilinear = bool(np.isfinite(table[block, :, 3]).any())
-        if not run_block(components, dt, parts, *arrays, *pairs, bilinear):
+        lanes, flags = aligned(ROWS * LANES), aligned(LANES).view(np.int64)
+        arrays = lanes, flags, np.empty((2, TILE + 1)), np.empty(ROWS), own, np.zeros((0, LOG_COLUMNS))
+        free = np.where(np.arange(LANES) < block.size, free_steps[filled], -1)
+        if not run_block(components, dt, parts, *arrays, np.cos(azimuth[filled]), np.sin(azimuth[filled]), free):
             raise RuntimeError(f"no end of contacts among the pairs {block.tolist()}")
         rows[block] = own[: block.size]
 

@@ -13,7 +13,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as columns
 from per_obspy.kernels.pounding_apart import FAR, ROWS_APART, run_apart
 from per_obspy.kernels.pounding_contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes import LANES
+from per_obspy.kernels.pounding_lanes import LANES, ROWS, TILE
 from per_obspy.pounding.pair_blocks import aligned, pair_blocks, pair_table
 from per_obspy.pounding.rows import closed_record, free_samples, refinement, row_at_rest
 
@@ -142,10 +142,10 @@ def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> Fl
     def run(block: NDArray[np.int64]) -> None:
         filled = np.resize(block, LANES)
         own, parts = rows[filled], int(refinements[block[0]])
-        lanes, flags = aligned(ROWS_APART * LANES), aligned(LANES + 1).view(np.int64)
-        arrays = lanes, flags, own, np.zeros((0, LOG_COLUMNS))
-        pairs = np.cos(azimuth[filled]), np.sin(azimuth[filled]), free_steps[filled]
-        if not run_apart(components, dt, parts, *arrays, *pairs):
+        lanes, flags = aligned(ROWS_APART * LANES), aligned(LANES).view(np.int64)
+        arrays = lanes, flags, np.empty((2, TILE + 1)), np.empty(ROWS), own, np.zeros((0, LOG_COLUMNS))
+        free = np.where(np.arange(LANES) < block.size, free_steps[filled], -1)
+        if not run_apart(components, dt, parts, *arrays, np.cos(azimuth[filled]), np.sin(azimuth[filled]), free):
             raise RuntimeError(f"too many changes of stiffness in a step among the pairs {block.tolist()}")
         rows[block] = own[: block.size]
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Codes
+from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.schema import Column
 
 INCH, FOOT = 0.0254, 0.3048
@@ -181,11 +182,7 @@ def _fema_flags(pair: _Pair, codes: Codes) -> NDArray[np.object_]:
     }
     others = flags["floor_misalignment"] | flags["height_difference"] | flags["end_of_row"]
     flags["pounding"] = flags["separation"] & others
-    code = sum(raised.astype(np.int64) << bit for bit, raised in enumerate(flags.values()))
-    names = list(flags)
-    texts = [" ".join(name for bit, name in enumerate(names) if one >> bit & 1) for one in range(1 << len(names))]
-    chosen: NDArray[np.object_] = np.array(texts, dtype=object)[code]
-    return chosen
+    return joined_names(flags)
 
 
 def _nzsee_factor(pair: _Pair) -> FloatArray:

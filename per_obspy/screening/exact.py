@@ -4,10 +4,9 @@ What a record does to pairs exactly: the relative displacement without contact, 
 Both buildings are oscillators at contact height, driven along one azimuth; nothing is estimated but the oscillators.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -17,7 +16,7 @@ from per_obspy.pounding.histories import pounding_histories
 from per_obspy.pounding.relative import directional_relative_displacement
 from per_obspy.pounding.relative_yielding import YieldingRelativeDisplacement, yielding_relative_displacement
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import at_contact, both, components, number, values
+from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, components, number, values
 
 #: Periods and dampings of 1 and 2, azimuth, participations.
 Oscillators = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -32,14 +31,14 @@ class _Apart(NamedTuple):
     per_2: FloatArray
 
 
-def furthest_azimuth(station: xr.Dataset, pairs: pd.DataFrame) -> FloatArray:
+def furthest_azimuth(station: xr.Dataset, pairs: Table) -> FloatArray:
     """Return, for pairs of unknown azimuth, the axis from 1 to 2 that the record makes worst, degrees."""
     (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
     shares = both(pairs, "participation")
     return worst_azimuth(*components(station), period_1, damping_1, period_2, damping_2, *shares)
 
 
-def exact_decides(station: xr.Dataset, pairs: pd.DataFrame) -> NDArray[np.bool_]:
+def exact_decides(station: xr.Dataset, pairs: Table) -> NDArray[np.bool_]:
     """
     Return for which pairs the exact demand is the demand.
 
@@ -49,17 +48,17 @@ def exact_decides(station: xr.Dataset, pairs: pd.DataFrame) -> NDArray[np.bool_]
     periods = np.stack(both(pairs, "period"))
     shortest, longest = number(station, "shortest_usable_period"), number(station, "longest_usable_period")
     usable = ((periods >= shortest) & (periods <= longest)).all(axis=0)
-    directed = ~can_yield(pairs) | pairs["azimuth"].notna().to_numpy()
+    directed = ~can_yield(pairs) | np.isfinite(values(pairs, "azimuth"))
     decides: NDArray[np.bool_] = usable & directed & ~period_is_derived(pairs) & (station.sizes["horizontal"] == 2)
     return decides
 
 
-def can_yield(pairs: pd.DataFrame) -> NDArray[np.bool_]:
+def can_yield(pairs: Table) -> NDArray[np.bool_]:
     """Return which pairs have a building with a yield displacement."""
     return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
 
 
-def exact_outcome(station: xr.Dataset, table: pd.DataFrame, azimuth: FloatArray) -> dict[str, NDArray[Any]]:
+def exact_outcome(station: xr.Dataset, table: Table, azimuth: FloatArray) -> Columns:
     """
     Return the exact relative displacements and pounding histories of a block, as columns of the risk table.
 
@@ -67,7 +66,7 @@ def exact_outcome(station: xr.Dataset, table: pd.DataFrame, azimuth: FloatArray)
     ----------
     station : Dataset
         The record.
-    table : DataFrame
+    table : Table
         Completed pairs with their radii along the azimuth.
     azimuth : (n_pairs,) ndarray
         Of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
@@ -106,40 +105,42 @@ def exact_outcome(station: xr.Dataset, table: pd.DataFrame, azimuth: FloatArray)
     }
 
 
-def _without_contact(station: xr.Dataset, table: pd.DataFrame, azimuth: FloatArray) -> _Apart:
+def _without_contact(station: xr.Dataset, table: Table, azimuth: FloatArray) -> _Apart:
     """Return what the record does to pairs that do not touch; those that cannot yield take the shorter way."""
     north, east, dt = components(station)
-    apart = _Apart(np.empty(len(table)), np.empty(len(table)), *(one.copy() for one in at_contact(table, "per")))
+    apart = _Apart(*np.empty((2, azimuth.size)), *(one.copy() for one in at_contact(table, "per")))
     yields = can_yield(table)
     if not yields.all():
-        linear = directional_relative_displacement(north, east, dt, *_oscillators(table[~yields], azimuth[~yields]))
+        linear = directional_relative_displacement(
+            north, east, dt, *_oscillators(chosen(table, ~yields), azimuth[~yields])
+        )
         apart.towards[~yields], apart.either_way[~yields] = linear.one_before_two, linear.largest
     if yields.any():
-        bilinear = _bilinear(np.stack([north, east]), dt, table[yields], azimuth[yields])
+        bilinear = _bilinear(np.stack([north, east]), dt, chosen(table, yields), azimuth[yields])
         apart.towards[yields], apart.either_way[yields] = bilinear.one_before_two, bilinear.largest
         apart.per_1[yields], apart.per_2[yields] = bilinear.per
     return apart
 
 
-def _bilinear(motion: FloatArray, dt: float, pairs: pd.DataFrame, azimuth: FloatArray) -> YieldingRelativeDisplacement:
+def _bilinear(motion: FloatArray, dt: float, pairs: Table, azimuth: FloatArray) -> YieldingRelativeDisplacement:
     limits, slopes = at_contact(pairs, "yield_displacement"), both(pairs, "hardening")
     strength = {f"yield_displacement_{i}": limit for i, limit in enumerate(limits, start=1)}
     strength |= {f"hardening_{i}": slope for i, slope in enumerate(slopes, start=1)}
     return yielding_relative_displacement(motion, dt, *_oscillators(pairs, azimuth), **strength)
 
 
-def _oscillators(pairs: pd.DataFrame, azimuth: FloatArray) -> Oscillators:
+def _oscillators(pairs: Table, azimuth: FloatArray) -> Oscillators:
     """Return periods and dampings, azimuth and participations in the order of relative displacements."""
     (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
     share_1, share_2 = both(pairs, "participation")
     return period_1, damping_1, period_2, damping_2, azimuth, share_1, share_2
 
 
-def no_outcome(table: pd.DataFrame) -> dict[str, NDArray[Any]]:
-    """Return the columns of :func:`exact_outcome`, all empty."""
+def no_outcome(count: int) -> Columns:
+    """Return the columns of :func:`exact_outcome`, all empty, for so many pairs."""
     names = ("demand_exact", "demand_two_sided", "impacts", "impact_velocity_exact", "amplification_exact_1",
              "amplification_exact_2")  # fmt: skip
-    return {name: np.full(len(table), np.nan) for name in names}
+    return {name: np.full(count, np.nan) for name in names}
 
 
 def _ratio(after: FloatArray, before: FloatArray) -> FloatArray:

@@ -1,11 +1,7 @@
 """What a record says of pairs: every estimate, the single hit, the exact outcome, and which demand decides."""
 
-from typing import Any
-
 import numpy as np
-import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.single_hit import single_hit
@@ -13,16 +9,14 @@ from per_obspy.screening.demand import gap_estimates, governing_demand
 from per_obspy.screening.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.motion import PairMotion
-from per_obspy.screening.values import at_contact, both, values
+from per_obspy.screening.values import Columns, Table, at_contact, both, values
 from per_obspy.screening.yielding import linearized_columns
 
 #: Demand / sum of the radii below which two oscillators move as one: the difference of equal numbers.
 ROUND_OFF = 1e-12
 
-Column = NDArray[Any]
 
-
-def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: str, exact: bool) -> pd.DataFrame:
+def judged(station: xr.Dataset, pairs: Table, motion: PairMotion, rule: str, exact: bool) -> Columns:
     """
     Return the pairs with estimates, single hit, exact outcome and the demand that decides.
 
@@ -30,7 +24,7 @@ def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: s
     ----------
     station : Dataset
         The record.
-    pairs : DataFrame
+    pairs : Table
         Completed pairs.
     motion : PairMotion
         What the record does to them, along one azimuth or many.
@@ -39,20 +33,23 @@ def judged(station: xr.Dataset, pairs: pd.DataFrame, motion: PairMotion, rule: s
     exact : bool
         Whether the exact demand and the history of every pair are computed; they are empty otherwise.
     """
-    table = pairs.assign(azimuth_rule=rule, **_at_worst(motion, pairs))
-    table = table.assign(**linearized_columns(station, table))
-    table = table.assign(**_estimated_demand(table))
-    table = table.assign(**_single_hits(table))
-    if not exact:
-        return _without_round_off(table.assign(**no_outcome(table)))
-    azimuth = np.zeros(len(table)) if rule == "station" else values(table, "azimuth_used")
-    table = table.assign(**exact_outcome(station, table, azimuth))
-    decides = exact_decides(station, table)
-    demand = np.where(decides, table["demand_exact"], table["demand"])
-    return _without_round_off(table.assign(demand=demand, demand_rule=np.where(decides, "exact", table["demand_rule"])))
+    table: Columns = {**pairs, **_at_worst(motion, pairs)}
+    table |= linearized_columns(station, table)
+    table |= _estimated_demand(table)
+    table |= _single_hits(table)
+    table["azimuth_rule"] = np.full(len(motion.azimuth), rule, dtype=object)
+    if exact:
+        azimuth = np.zeros(len(motion.azimuth)) if rule == "station" else values(table, "azimuth_used")
+        table |= exact_outcome(station, table, azimuth)
+        decides = exact_decides(station, table)
+        table["demand"] = np.where(decides, table["demand_exact"], table["demand"])
+        table["demand_rule"] = np.where(decides, "exact", table["demand_rule"])
+    else:
+        table |= no_outcome(len(motion.azimuth))
+    return table | {"demand": _without_round_off(table)}
 
 
-def _estimated_demand(table: pd.DataFrame) -> dict[str, Column]:
+def _estimated_demand(table: Table) -> Columns:
     """Return the larger of the elastic and the linearized demand: elastic alone is too small for yielding pairs."""
     elastic, linearized = values(table, "demand"), values(table, "critical_gap_linearized")
     larger = linearized > elastic
@@ -62,12 +59,12 @@ def _estimated_demand(table: pd.DataFrame) -> dict[str, Column]:
     }
 
 
-def _without_round_off(table: pd.DataFrame) -> pd.DataFrame:
+def _without_round_off(table: Table) -> FloatArray:
     demand = values(table, "demand")
-    return table.assign(demand=np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0))
+    return np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0)
 
 
-def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
+def _at_worst(motion: PairMotion, pairs: Table) -> Columns:
     """Return all estimates at the azimuth where the estimated demand of a pair is largest."""
     share = [one[:, None] for one in both(pairs, "participation")]
     period_1, period_2 = (one[:, None] for one in both(pairs, "period"))
@@ -80,7 +77,7 @@ def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
         motion.correlation,
     )
     demand, rule = governing_demand(estimates, period_is_derived(pairs)[:, None])
-    columns: dict[str, Column] = {
+    columns: Columns = {
         "azimuth_used": motion.azimuth,
         "per_1": motion.per[0],
         "per_2": motion.per[1],
@@ -100,7 +97,7 @@ def _at_worst(motion: PairMotion, pairs: pd.DataFrame) -> dict[str, Column]:
     return {name: np.take_along_axis(column, worst, axis=1)[:, 0] for name, column in columns.items()}
 
 
-def _single_hits(table: pd.DataFrame) -> dict[str, Column]:
+def _single_hits(table: Table) -> Columns:
     """Return the single hit of every pair; its critical gap is the estimated demand."""
     per_1, per_2 = at_contact(table, "equivalent_per")
     period_1, period_2 = both(table, "equivalent_period")
@@ -115,7 +112,7 @@ def _single_hits(table: pd.DataFrame) -> dict[str, Column]:
     }
 
 
-def impact_velocity_that_counts(table: pd.DataFrame) -> FloatArray:
+def impact_velocity_that_counts(table: Table) -> FloatArray:
     """Return that of the exact history where it decides, else the larger of it and of the single hit, m/s."""
     estimated = np.where(table["demand_rule"] == "exact", 0.0, np.nan_to_num(values(table, "impact_velocity")))
     larger: FloatArray = np.fmax(values(table, "impact_velocity_exact"), estimated)

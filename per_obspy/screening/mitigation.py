@@ -7,12 +7,8 @@ demand that decides, so that a pair whose gap is enough needs nothing. A bumper 
 that yields is its equivalent linear one, whose period and damping are not followed as damping is added.
 """
 
-from typing import Any
-
 import numpy as np
-import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.added_damping import least_dampings
@@ -21,7 +17,7 @@ from per_obspy.pounding.gap import critical_gap, srss_gap
 from per_obspy.pounding.restitution import required_restitution
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.stored import azimuth_row, log_spectra, stored_log
-from per_obspy.screening.values import at_contact, both, values
+from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, values
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4
@@ -29,9 +25,7 @@ LARGEST_DAMPING = 0.4
 ROUND_OFF = 1e-12
 
 
-def mitigation_columns(
-    station: xr.Dataset, table: pd.DataFrame, target_amplification: float
-) -> dict[str, NDArray[Any]]:
+def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: float) -> Columns:
     """
     Return what would have prevented pounding or its harm, as columns of the risk table.
 
@@ -39,7 +33,7 @@ def mitigation_columns(
     ----------
     station : Dataset
         The record, with its stored spectra.
-    table : DataFrame
+    table : Table
         Rows of the risk table with demand, radii and the columns of :func:`~.yielding.linearized_columns`.
     target_amplification : float
         Largest admissible PER after a single hit / before, at least 1, dimensionless.
@@ -60,12 +54,12 @@ def mitigation_columns(
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     pounds = demand > gap
-    damping, restitution = np.zeros(len(table)), np.ones(len(table))
+    damping, restitution = np.zeros_like(gap), np.ones_like(gap)
     damping[pounds] = np.nan
     if (apart := pounds & (gap > 0)).any():
-        damping[apart] = _supplemental_damping(station, table[apart])
+        damping[apart] = _supplemental_damping(station, chosen(table, apart))
     if pounds.any():
-        restitution[pounds] = _bumper_restitution(table[pounds], target_amplification)
+        restitution[pounds] = _bumper_restitution(chosen(table, pounds), target_amplification)
     return {
         "missing_gap": np.where(pounds, demand - gap, 0.0),
         "supplemental_damping": damping,
@@ -73,12 +67,12 @@ def mitigation_columns(
     }
 
 
-def _supplemental_damping(station: xr.Dataset, table: pd.DataFrame) -> FloatArray:
+def _supplemental_damping(station: xr.Dataset, table: Table) -> FloatArray:
     """Return the least equal damping to add to pairs that pound and do not touch; NaN where none is enough."""
     (period_1, period_2), (damping_1, damping_2) = both(table, "equivalent_period"), both(table, "equivalent_damping")
     radii = at_contact(table, "equivalent_per")
     correlated = critical_gap(*radii, ddc_correlation(period_1, damping_1, period_2, damping_2))
-    alone = (table["demand_rule"] == "srss").to_numpy() | (correlated <= ROUND_OFF * np.add(*radii))
+    alone = np.asarray(table["demand_rule"] == "srss") | (correlated <= ROUND_OFF * np.add(*radii))
     estimate = np.where(alone, srss_gap(*radii), correlated)
     pairs = np.stack(
         [
@@ -92,12 +86,12 @@ def _supplemental_damping(station: xr.Dataset, table: pd.DataFrame) -> FloatArra
     )
     spectra, row = log_spectra(station), azimuth_row(station, table)[:, None]
     stored = [stored_log(spectra, row, np.log(period)[:, None], spectra.dampings) for period in (period_1, period_2)]
-    added = np.empty(len(table))
+    added = np.empty(len(pairs))
     least_dampings(spectra.dampings, np.stack(stored, axis=1), pairs, LARGEST_DAMPING, added)
     return added
 
 
-def _bumper_restitution(table: pd.DataFrame, target_amplification: float) -> FloatArray:
+def _bumper_restitution(table: Table, target_amplification: float) -> FloatArray:
     """
     Return the largest restitution that keeps the amplifications of pairs that pound within the target.
 

@@ -9,12 +9,11 @@ are always driven along the same azimuth.
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.directional import directional_correlation
-from per_obspy.screening.values import both, components
+from per_obspy.screening.values import Table, both, components
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
 from per_obspy.spectra.elastic import azimuth_maxima
 
@@ -42,30 +41,30 @@ class PairMotion(NamedTuple):
     correlation: FloatArray
 
 
-def motion_along_azimuths(station: xr.Dataset, pairs: pd.DataFrame, azimuth: FloatArray) -> PairMotion:
+def motion_along_azimuths(station: xr.Dataset, pairs: Table, azimuth: FloatArray) -> PairMotion:
     """Return the motion along one azimuth a pair, (n_pairs,), degrees."""
     return _along(*components(station), pairs, azimuth)
 
 
-def motion_of_one_horizontal(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:
+def motion_of_one_horizontal(station: xr.Dataset, pairs: Table) -> PairMotion:
     """Return the motion along the only horizontal of a station, whatever the pairs' azimuths."""
-    motion = _along(*components(station), pairs, np.zeros(len(pairs)))
-    return motion._replace(azimuth=np.full((len(pairs), 1), float(station["horizontal_azimuth"][0])))
+    motion = _along(*components(station), pairs, np.zeros(len(pairs["azimuth"])))
+    return motion._replace(azimuth=np.full_like(motion.azimuth, float(station["horizontal_azimuth"][0])))
 
 
-def motion_along_every_azimuth(station: xr.Dataset, pairs: pd.DataFrame) -> PairMotion:
+def motion_along_every_azimuth(station: xr.Dataset, pairs: Table) -> PairMotion:
     """Return the motion along every degree of the half circle, for pairs whose azimuth is unknown."""
     north, east, dt = components(station)
     radii = [_every_radius(north, east, dt, *oscillator) for oscillator in _oscillators(pairs)]
     return PairMotion(
-        azimuth=np.broadcast_to(EVERY_AZIMUTH, (len(pairs), EVERY_AZIMUTH.size)),
+        azimuth=np.broadcast_to(EVERY_AZIMUTH, radii[0][0].shape),
         per=(radii[0][0], radii[1][0]),
         sd=(radii[0][1], radii[1][1]),
         correlation=_correlation(north, east, dt, pairs, EVERY_AZIMUTH[None, :]),
     )
 
 
-def _along(north: FloatArray, east: FloatArray, dt: float, pairs: pd.DataFrame, azimuth: FloatArray) -> PairMotion:
+def _along(north: FloatArray, east: FloatArray, dt: float, pairs: Table, azimuth: FloatArray) -> PairMotion:
     (per_1, sd_1), (per_2, sd_2) = (
         azimuth_maxima(north, east, dt, period, damping, azimuth) for period, damping in _oscillators(pairs)
     )
@@ -77,14 +76,12 @@ def _along(north: FloatArray, east: FloatArray, dt: float, pairs: pd.DataFrame, 
     )
 
 
-def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
+def _oscillators(pairs: Table) -> list[tuple[FloatArray, FloatArray]]:
     """Return period and damping of buildings 1 and of buildings 2."""
     return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
 
 
-def _correlation(
-    north: FloatArray, east: FloatArray, dt: float, pairs: pd.DataFrame, azimuths: FloatArray
-) -> FloatArray:
+def _correlation(north: FloatArray, east: FloatArray, dt: float, pairs: Table, azimuths: FloatArray) -> FloatArray:
     first, second = _oscillators(pairs)
     return directional_correlation(north, east, dt, *first, *second, azimuths)
 

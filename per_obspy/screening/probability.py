@@ -11,8 +11,8 @@ are those at the site and as uncertain as their motion; an exact demand is scale
 """
 
 import numpy as np
-import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
@@ -22,18 +22,18 @@ from per_obspy.kernels.resampling import resampled_probabilities
 from per_obspy.pounding.dispersion import combined_dispersion, combined_dispersion_correlation, lognormal_dispersion
 from per_obspy.pounding.probability import demand_probability, pounding_probability
 from per_obspy.screening.pair_motion import pair_motion, period_correlation
-from per_obspy.screening.stored import azimuth_row, log_place, log_spectra, stored_log
-from per_obspy.screening.values import at_contact, both, values
+from per_obspy.screening.stored import azimuth_row, log_period_and_damping, log_place, log_spectra, stored_log
+from per_obspy.screening.values import Table, at_contact, both, chosen, values
 
-#: Standard normal nodes for period and damping of both buildings: 128 Sobol points, moved to the middle of their
-#: strata. No grid: on one, equal buildings would be exactly equal, and in step, at many nodes.
-NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).random(128) + 0.5 / 128)
+#: Standard normal nodes for period and damping of both buildings: the second 128 Sobol points, which lie in the middle
+#: of their strata. On a grid, or at the first 128, equal buildings would be exactly equal, and in step, at some nodes.
+NODES: FloatArray = ndtri(qmc.Sobol(4, scramble=False).fast_forward(128).random(128))
 
 #: Of building 1 and building 2.
 Both = tuple[FloatArray, FloatArray]
 
 
-def pair_probability(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
+def pair_probability(station: xr.Dataset, table: Table, screening: Screening) -> FloatArray:
     """
     Return the probability of pounding of every pair of a block.
 
@@ -41,11 +41,11 @@ def pair_probability(station: xr.Dataset, table: pd.DataFrame, screening: Screen
     ----------
     station : Dataset
         The record, with its stored spectra.
-    table : DataFrame
+    table : Table
         Rows of the risk table with periods, dampings, their log-standard deviations, radii, correlations and demand;
         the motion at the site, where the table has it, of :func:`~per_obspy.screening.site_motion.motion_at_pairs`.
     screening : Screening
-        Log-standard deviations of the critical gap from PER, and of the linearized one, about the exact one.
+        Medians and log-standard deviations of the critical gap from PER, and of the linearized one, over the exact one.
 
     Returns
     -------
@@ -53,16 +53,16 @@ def pair_probability(station: xr.Dataset, table: pd.DataFrame, screening: Screen
         From 0 to 1. Where the exact demand decides it is that of the demand; only the motion at the site, gap and
         dampings are uncertain then.
     """
-    exact = (table["demand_rule"] == "exact").to_numpy()
-    uncertain = (table[["period_log_std_1", "period_log_std_2"]] > 0).any(axis=1).to_numpy()
-    probability = np.empty(len(table))
+    exact = np.asarray(table["demand_rule"] == "exact")
+    uncertain = np.maximum(*both(table, "period_log_std")) > 0
+    probability = np.empty(exact.size)
     for rows, chance in ((exact, _of_demand), (~exact & ~uncertain, _of_radii), (~exact & uncertain, _resampled)):
         if rows.any():
-            probability[rows] = chance(station, table[rows], screening)
+            probability[rows] = chance(station, chosen(table, rows), screening)
     return probability
 
 
-def _of_demand(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
+def _of_demand(station: xr.Dataset, table: Table, screening: Screening) -> FloatArray:
     """Return the probability that the exact demand of an uncertain damping exceeds an uncertain gap; no model error."""
     del screening
     spread = np.maximum(_damping_dispersion(station, table, 1), _damping_dispersion(station, table, 2))
@@ -71,19 +71,17 @@ def _of_demand(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -
     return demand_probability(values(table, "demand_exact") * np.exp(ratio), median_gap(table), dispersion)
 
 
-def _of_radii(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
+def _of_radii(station: xr.Dataset, table: Table, screening: Screening) -> FloatArray:
     """Return the exact integral over both radii with the correlation that governs the demand."""
-    yields = (table["demand_rule"] == "linearized").to_numpy()
     correlation = np.where(table["demand_rule"] == "per_record", table["correlation_record"], table["correlation"])
-    correlation = np.where(yields, table["correlation_linearized"], correlation)
-    radii = zip(at_contact(table, "per"), at_contact(table, "equivalent_per"), strict=True)
+    correlation = np.where(_linearized(table), table["correlation_linearized"], correlation)
+    radius_1, radius_2 = _median_radii(table, screening)
     (ratio_1, ratio_2), unknown = _site_motion(table)
     source_1, source_2 = (
         np.stack([doubt, _damping_dispersion(station, table, i)], axis=-1) for i, doubt in enumerate(unknown, start=1)
     )
     # one motion moves both radii, each has a damping of its own
-    shared = np.stack([period_correlation(*both(table, "period")), np.zeros(len(table))], axis=-1)
-    radius_1, radius_2 = (np.where(yields, equivalent, elastic) for elastic, equivalent in radii)
+    shared = np.stack([period_correlation(*both(table, "period")), np.zeros_like(correlation)], axis=-1)
     return pounding_probability(
         radius_1 * np.exp(ratio_1),
         radius_2 * np.exp(ratio_2),
@@ -97,47 +95,64 @@ def _of_radii(station: xr.Dataset, table: pd.DataFrame, screening: Screening) ->
     )
 
 
-def _resampled(station: xr.Dataset, table: pd.DataFrame, screening: Screening) -> FloatArray:
+def _resampled(station: xr.Dataset, table: Table, screening: Screening) -> FloatArray:
     """Return the mean over quasi-random periods and dampings of both buildings."""
     columns: list[FloatArray] = [azimuth_row(station, table).astype(np.float64)]
     ratios, _ = _site_motion(table)
     _, unknown = _pair_motion(table)
-    for i, radius in enumerate(at_contact(table, "per"), start=1):
+    for i, radius in enumerate(_median_radii(table, screening), start=1):
         columns += [
-            *log_place(table, i),
+            *log_period_and_damping(_deciding(table, f"period_{i}"), _deciding(table, f"damping_{i}")),
             values(table, f"period_log_std_{i}"),
             values(table, f"damping_log_std_{i}"),
             np.log(np.maximum(radius, np.finfo(np.float64).tiny)) + ratios[i - 1],
         ]
     estimate = _model_dispersion(table, screening)
     columns += [median_gap(table), np.hypot(np.hypot(estimate, gap_dispersion(table)), unknown)]
-    probability = np.empty(len(table))
-    resampled_probabilities(tuple(log_spectra(station)), np.stack(columns, axis=1), NODES, probability)
+    pairs = np.stack(columns, axis=1)
+    probability = np.empty(len(pairs))
+    resampled_probabilities(tuple(log_spectra(station)), pairs, NODES, probability)
     return probability
 
 
-def _model_dispersion(table: pd.DataFrame, screening: Screening) -> FloatArray:
+def _linearized(table: Table) -> NDArray[np.bool_]:
+    """Return where the gap of equivalent linear buildings decides."""
+    return np.asarray(table["demand_rule"] == "linearized")
+
+
+def _deciding(table: Table, name: str) -> FloatArray:
+    """Return a column, that of the equivalent building where this decides."""
+    return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
+
+
+def _median_radii(table: Table, screening: Screening) -> Both:
+    """Return both radii at contact height, of which the critical gap is right in the median."""
+    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    share_1, share_2 = both(table, "participation")
+    return share_1 * _deciding(table, "per_1") / bias, share_2 * _deciding(table, "per_2") / bias
+
+
+def _model_dispersion(table: Table, screening: Screening) -> FloatArray:
     """Return how far the estimate that decides may be from the exact demand."""
-    linearized = table["demand_rule"] == "linearized"
-    return np.where(linearized, screening.linearized_dispersion, screening.model_dispersion)
+    return np.where(_linearized(table), screening.linearized_dispersion, screening.model_dispersion)
 
 
-def _site_motion(table: pd.DataFrame) -> tuple[Both, Both]:
+def _site_motion(table: Table) -> tuple[Both, Both]:
     """Return ln of the radii at the site over those of the record, and their deviations; 0 where nothing is told."""
     if "ln_per_ratio_1" not in table:
-        nothing = np.zeros(len(table))
+        nothing = np.zeros_like(values(table, "gap"))
         return (nothing, nothing), (nothing, nothing)
     ratio_1, ratio_2 = map(np.nan_to_num, both(table, "ln_per_ratio"))
     std_1, std_2 = map(np.nan_to_num, both(table, "ln_per_std"))
     return (ratio_1, ratio_2), (std_1, std_2)
 
 
-def _pair_motion(table: pd.DataFrame) -> Both:
+def _pair_motion(table: Table) -> Both:
     """Return ln of the pair's demand at the site over that of the record, and its deviation."""
     return pair_motion(at_contact(table, "per"), *_site_motion(table), both(table, "period"))
 
 
-def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> FloatArray:
+def _damping_dispersion(station: xr.Dataset, table: Table, i: int) -> FloatArray:
     """Return the log-standard deviation of the radius that an uncertain damping causes."""
     spectra, (period, damping) = log_spectra(station), log_place(table, i)
     spread, row = values(table, f"damping_log_std_{i}"), azimuth_row(station, table)
@@ -146,7 +161,7 @@ def _damping_dispersion(station: xr.Dataset, table: pd.DataFrame, i: int) -> Flo
     return dispersion
 
 
-def gap_dispersion(table: pd.DataFrame) -> FloatArray:
+def gap_dispersion(table: Table) -> FloatArray:
     """Return the log-standard deviation of a gap given by mean and standard deviation; 0 for touching pairs."""
     gap, deviation = values(table, "gap"), values(table, "gap_std")
     apart = gap > 0
@@ -155,7 +170,7 @@ def gap_dispersion(table: pd.DataFrame) -> FloatArray:
     return dispersion
 
 
-def median_gap(table: pd.DataFrame) -> FloatArray:
+def median_gap(table: Table) -> FloatArray:
     """Return the median of a lognormal gap of given mean, m."""
     median: FloatArray = values(table, "gap") * np.exp(-(gap_dispersion(table) ** 2) / 2.0)
     return median

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
+from pandas.api.types import is_numeric_dtype
 
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
@@ -32,7 +34,7 @@ from per_obspy.screening.probability import pair_probability
 from per_obspy.screening.ranking import risk_class
 from per_obspy.screening.shakemap import shakemap_fallback
 from per_obspy.screening.site_motion import motion_at_pairs
-from per_obspy.screening.values import at_contact, values
+from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Needed on the way only; flags tell what is to be known of them.
 ON_THE_WAY = (
@@ -83,26 +85,25 @@ def _of_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> p
     """Return the rows of pairs that have a station."""
     if ground.field is not None:
         pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, pairs["station_index"].to_numpy()))
-    told = [_told(ground.stations.read(index), block, screening) for index, block in _blocks(pairs)]
-    return _judged_as_a_whole(pd.concat([pairs, pd.concat(told).sort_index()], axis=1), screening)
-
-
-def _blocks(pairs: pd.DataFrame) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Give the pairs of each station, what is text left out but the names of derived columns."""
-    numbers = pairs[[name for name in pairs if name == "derived" or pd.api.types.is_numeric_dtype(pairs[name])]]
     index = pairs["station_index"].to_numpy(np.int64)
-    for station in np.unique(index).tolist():
-        yield station, numbers.iloc[np.flatnonzero(index == station)]
+    known = {name: pairs[name].to_numpy() for name in pairs if name == "derived" or is_numeric_dtype(pairs[name])}
+    blocks = [(station, np.flatnonzero(index == station)) for station in np.unique(index).tolist()]
+    told = [(rows, _told(ground.stations.read(one), chosen(known, rows), screening)) for one, rows in blocks]
+    return _judged_as_a_whole(pairs.assign(**joined(told)), screening)
 
 
-def _told(station: xr.Dataset, block: pd.DataFrame, screening: Screening) -> pd.DataFrame:
-    """Return what a record tells of its pairs, on their index; flags that it raises as columns ``raised_...``."""
-    motions = _motions(station, block, screening.exact)
-    table = pd.concat([judged(station, *motion, screening.exact) for motion in motions])
-    table = table.assign(**mitigation_columns(station, table, screening.target_amplification))
+def _told(station: xr.Dataset, block: Columns, screening: Screening) -> Columns:
+    """Return what a record tells of its pairs; flags that it raises as columns ``raised_...``."""
+    table = joined(
+        [
+            (rows, judged(station, chosen(block, rows), motion, rule, screening.exact))
+            for rows, motion, rule in _motions(station, block, screening.exact)
+        ]
+    )
+    table |= mitigation_columns(station, table, screening.target_amplification)
     raised = {f"raised_{name}": rows for name, rows in raised_by_record(table, station, screening).items()}
-    table = table.assign(probability=pair_probability(station, table, screening), **raised)
-    return table[[name for name in table if name not in block]]
+    table |= {"probability": pair_probability(station, table, screening), **raised}
+    return {name: column for name, column in table.items() if name not in block}
 
 
 def _judged_as_a_whole(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
@@ -114,7 +115,7 @@ def _judged_as_a_whole(table: pd.DataFrame, screening: Screening) -> pd.DataFram
     table = table.assign(demand_ratio=ratio, state=state, risk_class=named)
     by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}
     raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}
-    flags = joined_flags(raised_by_pairs(table) | raised, len(table))
+    flags = joined_flags(raised_by_pairs(table) | raised)
     rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
     return table.drop(columns=[*ON_THE_WAY, *by_record.values()]).assign(flags=flags).join(rules)
 
@@ -125,16 +126,18 @@ def _ordered(table: pd.DataFrame) -> pd.DataFrame:
     return table[[*first, *(name for name in table if name not in ORDER)]]
 
 
-def _motions(station: xr.Dataset, block: pd.DataFrame, exact: bool) -> Iterator[tuple[pd.DataFrame, PairMotion, str]]:
-    """Give the pairs of a block by how their azimuth is found, with their motion and the name of that way."""
+def _motions(station: xr.Dataset, block: Columns, exact: bool) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
+    """Give the rows of a block by how their azimuth is found, with their motion and the name of that way."""
+    azimuth = values(block, "azimuth")
     if station.sizes["horizontal"] == 1:
-        yield block, motion_of_one_horizontal(station, block), "station"
+        yield np.arange(azimuth.size), motion_of_one_horizontal(station, block), "station"
         return
-    unknown, decides = block["azimuth"].isna().to_numpy(), exact & exact_decides(station, block)
-    if len(given := block[~unknown]):
-        yield given, motion_along_azimuths(station, given, values(given, "azimuth")), "given"
-    if len(worst := block[unknown & decides]):
-        yield worst, motion_along_azimuths(station, worst, furthest_azimuth(station, worst)), "worst"
-    worst = block[unknown & ~decides]
-    for some in (worst.iloc[first : first + BLOCK] for first in range(0, len(worst), BLOCK)):
-        yield some, motion_along_every_azimuth(station, some), "worst"
+    unknown, decides = np.isnan(azimuth), exact & exact_decides(station, block)
+    if (given := np.flatnonzero(~unknown)).size:
+        yield given, motion_along_azimuths(station, chosen(block, given), azimuth[given]), "given"
+    if (worst := np.flatnonzero(unknown & decides)).size:
+        pairs = chosen(block, worst)
+        yield worst, motion_along_azimuths(station, pairs, furthest_azimuth(station, pairs)), "worst"
+    worst = np.flatnonzero(unknown & ~decides)
+    for some in (worst[first : first + BLOCK] for first in range(0, worst.size, BLOCK)):
+        yield some, motion_along_every_azimuth(station, chosen(block, some)), "worst"

@@ -103,7 +103,7 @@ def _judged(shakemap: xr.Dataset, motion: MapMotion, pairs: pd.DataFrame, screen
         "simulated": every & (shakemap.attrs.get("shakemap_event_type", "").upper() == "SCENARIO"),
     }
     missing = np.maximum(asked.demand - values(pairs, "gap"), 0.0)
-    table = table.assign(flags=joined_flags(raised, len(table)), missing_gap=missing)
+    table = table.assign(flags=joined_flags(raised), missing_gap=missing)
     empty = {name: _empty(name) for name in ORDER if name not in table and name != "rank"}
     return table.assign(**empty).drop(columns=["srss_gap_sd", "absolute_gap_sd"])
 

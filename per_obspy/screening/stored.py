@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.screening.values import values
+from per_obspy.screening.values import Table, values
 
 #: Dampings are compared on a logarithmic scale; below this one they count as it.
 SMALLEST_DAMPING = 1e-3
@@ -40,7 +39,7 @@ def log_spectra(station: xr.Dataset, name: str = "per") -> LogSpectra:
     return LogSpectra(np.log(station["period"].to_numpy()), dampings, np.ascontiguousarray(radii))
 
 
-def azimuth_row(station: xr.Dataset, table: pd.DataFrame) -> NDArray[np.intp]:
+def azimuth_row(station: xr.Dataset, table: Table) -> NDArray[np.intp]:
     """Return the stored azimuth next to that of each pair."""
     count = station.sizes.get("azimuth", 1)
     azimuth = np.nan_to_num(values(table, "azimuth_used")) % 180.0
@@ -48,7 +47,7 @@ def azimuth_row(station: xr.Dataset, table: pd.DataFrame) -> NDArray[np.intp]:
     return row
 
 
-def log_place(table: pd.DataFrame, i: int) -> tuple[FloatArray, FloatArray]:
+def log_place(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
     """Return ln period and ln damping of building i."""
     return log_period_and_damping(values(table, f"period_{i}"), values(table, f"damping_{i}"))
 

@@ -1,23 +1,57 @@
 """Columns of tables and variables of stations as plain arrays."""
 
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Protocol
+
 import numpy as np
-import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 
 
-def values(table: pd.DataFrame, name: str) -> FloatArray:
+class Table(Protocol):
+    """Columns by name: a DataFrame, or a dict of arrays, of which thousands are made where stations are many."""
+
+    def keys(self) -> Iterable[Any]:
+        """Return the names of the columns."""
+
+    def __iter__(self) -> Iterator[Any]:
+        """Give the names of the columns."""
+
+    def __contains__(self, name: object, /) -> bool:
+        """Return whether there is a column of this name."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a column."""
+
+
+#: A table of nothing but arrays.
+Columns = dict[str, NDArray[Any]]
+
+
+def chosen(table: Table, rows: NDArray[Any]) -> Columns:
+    """Return some rows of a table, by their numbers or a mask."""
+    return {name: np.asarray(table[name])[rows] for name in table}
+
+
+def joined(parts: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
+    """Return the rows of all parts in the order of their numbers; all parts have the same columns."""
+    order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+    return {name: np.concatenate([part[name] for _, part in parts])[order] for name in parts[0][1]}
+
+
+def values(table: Table, name: str) -> FloatArray:
     """Return a column as float64; contiguous, because functions of NumPy may differ in the last bit between strides."""
     return np.ascontiguousarray(table[name], dtype=np.float64)
 
 
-def both(table: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
+def both(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     """Return a column of building 1 and that of building 2."""
     return values(table, f"{name}_1"), values(table, f"{name}_2")
 
 
-def at_contact(table: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
+def at_contact(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     """Return a length of both oscillators at contact height: times the participation."""
     (first, second), (share_1, share_2) = both(table, name), both(table, "participation")
     return share_1 * first, share_2 * second

@@ -9,10 +9,9 @@ equivalent properties give the critical gap. Yielding raises the correlation und
 one eq. (16) then makes too much of it, so that the smaller of the elastic and the equivalent correlation is used.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -22,7 +21,7 @@ from per_obspy.pounding.equivalent_linear import iwan
 from per_obspy.pounding.gap import critical_gap
 from per_obspy.pounding.linearization import NARROW, record_bandwidth
 from per_obspy.screening.stored import LogSpectra, azimuth_row, log_period_and_damping, log_spectra, stored_log
-from per_obspy.screening.values import both, components, values
+from per_obspy.screening.values import Columns, Table, both, chosen, components, values
 
 #: Ductilities that are tried; between two of them so many more.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
@@ -53,7 +52,7 @@ class Equivalent(NamedTuple):
     converged: NDArray[np.bool_]
 
 
-def linearized_columns(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+def linearized_columns(station: xr.Dataset, table: Table) -> Columns:
     """
     Return the estimated demand of equivalent linear buildings, as columns of the risk table.
 
@@ -61,7 +60,7 @@ def linearized_columns(station: xr.Dataset, table: pd.DataFrame) -> dict[str, ND
     ----------
     station : Dataset
         The record, with its stored spectra.
-    table : DataFrame
+    table : Table
         Completed pairs with ``azimuth_used``, radii and correlation along it, and ``critical_gap_per``.
 
     Returns
@@ -77,25 +76,25 @@ def linearized_columns(station: xr.Dataset, table: pd.DataFrame) -> dict[str, ND
     (16).
     """
     ductility = [_elastic_ductility(table, i) for i in (1, 2)]
-    columns: dict[str, NDArray[Any]] = {
+    columns: Columns = {
         "critical_gap_linearized": values(table, "critical_gap_per").copy(),
         "correlation_linearized": values(table, "correlation").copy(),
         **{f"ductility_{i}": ductility[i - 1] for i in (1, 2)},
         **{f"equivalent_{name}_{i}": values(table, f"{name}_{i}").copy() for name in EQUIVALENT for i in (1, 2)},
-        "linearized_converged": np.ones(len(table), dtype=bool),
+        "linearized_converged": np.ones(len(ductility[0]), dtype=bool),
     }
     yields = (np.maximum(*ductility) > 1.0) & (values(table, "absolute_gap") > 0)
     if yields.any():
-        for name, found in _of_yielding(station, table[yields]).items():
+        for name, found in _of_yielding(station, chosen(table, yields)).items():
             columns[name][yields] = found
     return columns
 
 
-def _elastic_ductility(table: pd.DataFrame, i: int) -> FloatArray:
+def _elastic_ductility(table: Table, i: int) -> FloatArray:
     return values(table, f"sd_{i}") / values(table, f"yield_displacement_{i}")
 
 
-def _of_yielding(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+def _of_yielding(station: xr.Dataset, table: Table) -> Columns:
     """Return the columns of pairs in which a building yields."""
     spectra = log_spectra(station, "sd"), log_spectra(station, "per")
     row = azimuth_row(station, table)
@@ -104,7 +103,7 @@ def _of_yielding(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[
     if record_bandwidth(*components(station)) < NARROW:
         correlation = np.minimum(correlation, values(table, "correlation"))
     share_1, share_2 = both(table, "participation")
-    columns: dict[str, NDArray[Any]] = {
+    columns: Columns = {
         "critical_gap_linearized": critical_gap(share_1 * first.per, share_2 * second.per, correlation),
         "correlation_linearized": correlation,
         "linearized_converged": first.converged & second.converged,
@@ -117,12 +116,12 @@ def _of_yielding(station: xr.Dataset, table: pd.DataFrame) -> dict[str, NDArray[
     return columns
 
 
-def _equivalent(sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: pd.DataFrame, i: int) -> Equivalent:
+def _equivalent(sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: Table, i: int) -> Equivalent:
     """Return the equivalent linear buildings i; those that stay elastic as they are."""
     elastic, period, damping = _elastic_ductility(table, i), values(table, f"period_{i}"), values(table, f"damping_{i}")
     yields = elastic > 1.0
     own = _Building(row[yields], period[yields], damping[yields])
-    ductility, converged = elastic.copy(), np.ones(len(table), dtype=bool)
+    ductility, converged = elastic.copy(), np.ones(elastic.size, dtype=bool)
     ductility[yields], converged[yields] = _first_ductility(sd, own, elastic[yields])
     longer, more = iwan(np.maximum(ductility, 1.0), 0.0)
     radius = values(table, f"per_{i}").copy()

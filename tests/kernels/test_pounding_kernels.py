@@ -8,11 +8,17 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from per_obspy.kernels import pounding_lanes as lanes
+from per_obspy.kernels.oscillator import unit_responses
 from per_obspy.kernels.polynomial_roots import first_fall, value_and_slope
+from per_obspy.kernels.pounding_lanes import sweep
 from per_obspy.kernels.pounding_motion import fill_taylor, taylor_terms
+from per_obspy.kernels.pounding_pairs import write_constants, write_phase
+from per_obspy.kernels.pounding_search import pull, step
+from per_obspy.kernels.pounding_walk import write_lane
 from per_obspy.pounding.histories import pounding_histories
 from per_obspy.pounding.history import pounding_history
-from per_obspy.pounding.rows import refinement, structure_table
+from per_obspy.pounding.pair_blocks import pair_table
+from per_obspy.pounding.rows import refinement, row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
 
 
@@ -98,19 +104,70 @@ class TestSmallHistories:
         assert history.closure <= 1e-10
 
 
-def test_a_step_of_the_lanes_flags_what_it_must():
-    # catches: a bound that leaves a contact inside the step unseen
-    table, flags = np.zeros(lanes.ROWS * lanes.LANES), np.zeros(lanes.LANES + 1, np.int64)
-    half = lanes.STRUCTURE_ROWS * lanes.LANES
-    rows = table.reshape(lanes.ROWS, lanes.LANES)
-    for first in (0, lanes.STRUCTURE_ROWS):
-        rows[first + lanes.STEP_PLACE] = rows[first + lanes.STEP_SPEED + 1] = 1.0
-        rows[first + lanes.STEP_PLACE + 1] = 0.01  # free flight over a step of 0.01 s
-        rows[first + lanes.HIGHEST_PLACE] = rows[first + lanes.WIDEST_RADIUS] = 9.0
-    rows[lanes.CLEAR], rows[lanes.FORCE + 4] = 1.0, 1.0
-    rows[lanes.SPEED, 3] = 101.0  # closes 1.01 m in the step
-    rows[lanes.SPEED, 4] = 99.0
-    rest = (0.0, 0.0, 0.0, 0.0)
-    total = lanes.step_lanes((table, table[:half], table[half:]), flags, rest, 0.01, False, True)
-    assert total == lanes.EVENT
-    assert flags[3] == lanes.EVENT
+def lane_of(fields, duration):
+    """Return the line of numbers that the lanes hold of a pair, at rest, and its row."""
+    table = pair_table({name: np.array([value]) for name, value in fields.items()})
+    row = row_at_rest(table, np.array([[fields["gap"]]]), np.array([[0.5]]))[0]
+    pair = np.zeros(lanes.ROWS)
+    write_constants(pair, row, 1.0, 0.0, duration)
+    write_phase(pair, row, duration)
+    return pair, row
+
+
+LINEAR = {
+    "period_1": 0.9, "damping_1": 0.05, "mass_1": 2.0, "period_2": 0.4, "damping_2": 0.2, "mass_2": 1.0, "gap": 1.0,
+    "participation_1": 1.0, "participation_2": 1.0, "yield_displacement_1": math.inf,
+    "yield_displacement_2": math.inf, "hardening_1": 0.0, "hardening_2": 0.0,
+}  # fmt: skip
+
+
+class TestSweep:
+    def swept(self, speeds, **changes):
+        """Return the flags after a tile at rest ground, of lanes of one pair that start with these speeds, m/s."""
+        pair, _ = lane_of({**LINEAR, **changes}, 0.001)
+        table, flags = np.zeros(lanes.ROWS * lanes.LANES), np.zeros(lanes.LANES, np.int64)
+        for lane in range(lanes.LANES):
+            pair[lanes.SPEED] = speeds[lane] / pair[lanes.OMEGA] if lane < len(speeds) else 0.0
+            pair[lanes.HIGHEST_PLACE] = pair[lanes.WIDEST_RADIUS] = math.inf  # no maximum is looked for
+            pair[lanes.STRUCTURE_ROWS + lanes.HIGHEST_PLACE] = math.inf
+            write_lane(table, lane, pair)
+        sweep(table, flags, np.zeros((2, lanes.TILE + 1)), lanes.TILE)
+        return flags
+
+    def test_flags_a_lane_that_meets_within_the_tile(self):
+        # catches: a guard of the last sample only, the clearance with the wrong sign
+        duration = 0.001 * lanes.TILE
+        reach = unit_responses(2 * math.pi / 0.9 * duration, 0.05)[0] / (2 * math.pi / 0.9)  # of 1 m/s
+        flags = self.swept([0.0, 1.001 / reach, 0.999 / reach, -1.001 / reach], gap=1.0)
+        assert flags.tolist() == [0, lanes.EVENT, 0, 0] + 28 * [0]
+
+    def test_flags_a_structure_that_yields_within_the_tile(self):
+        flags = self.swept([0.1, -0.1, 0.001], gap=100.0, yield_displacement_1=0.002)
+        assert flags.tolist() == [lanes.EVENT, lanes.EVENT, 0] + 29 * [0]
+
+
+class TestBoundsInAStep:
+    @pytest.mark.parametrize(("period", "damping"), [(0.09, 0.0), (0.09, 0.3), (0.09, 0.95), (3.0, 0.05)])
+    def test_hold_for_any_state(self, period, damping):
+        # catches: any of the shares in write_bounds halved, the acceleration inside a step taken for that at its ends
+        pair, _ = lane_of({**LINEAR, "period_1": period, "damping_1": damping}, 0.01)
+        angle, worst = pair[lanes.ANGLE], np.zeros(3)
+        for u, z, ground in np.random.default_rng(0).normal(size=(60, 3)):
+            start = u, z, pull(pair, 0, u, z, ground)
+            end = step(pair, 0, u, z, ground, 0.3 * ground)
+            strength, row = max(abs(start[2]), abs(end[2])), np.zeros((1, 30))
+            row[0, 0] = u
+            rate = 2.0 * damping
+            force = start[2] + rate * z
+            fill_taylor(row, 0, 0, 22, z, rate, 1.0, force, -0.7 * pair[lanes.PULL + 2] * ground / angle)
+            share = np.linspace(0.0, 1.0, 33)[1:-1]
+            inside = np.array([value_and_slope(row, 0, 0, 22, s * angle) for s in share]).T
+            here, there = (ground, 0.3 * ground)
+            pulls = np.array([pull(pair, 0, *inside[:, k], here + s * (there - here)) for k, s in enumerate(share)])
+            powers = pulls + inside[0], (u + start[2], end[0] + end[2])
+            for k, (motion, ends) in enumerate(((inside[0], (u, end[0])), (inside[1], (z, end[1])), powers)):
+                off = np.abs(motion - (ends[0] + share * (ends[1] - ends[0]))).max()
+                worst[k] = max(worst[k], off / strength)
+        bounds = pair[[lanes.PLACE_SAG, lanes.SPEED_SAG, lanes.POWER_SAG]]
+        assert (worst <= bounds + 1e-12).all()  # rounding
+        assert worst[0] > 0.3 * bounds[0]  # not so wide that they never rule anything out

@@ -12,6 +12,9 @@ from per_obspy.screening.yielding import linearized_columns
 
 from .conftest import make_pairs, make_station
 
+#: Of the critical gap by PER over the exact one.
+MEDIAN = Screening().model_median
+
 
 def _one(station, **row):
     return per_obspy.risk_table(station, make_pairs([row])).iloc[0]
@@ -46,12 +49,41 @@ def test_doubt_about_the_gap_is_even_where_gap_and_demand_are_equal(station):
     assert 0.5 < probability < 0.56
 
 
+def test_an_estimate_is_even_where_the_gap_is_the_exact_one_of_its_median():
+    # would catch: a bias that widens the demand, or none
+    station = make_station(channels=("HNN",))  # of one horizontal no demand is exact
+    given = {"damping_1": 0.05, "damping_2": 0.05}
+    found = _one(station, **given)
+    assert found["demand_rule"] != "exact"
+    table, even, _ = _with_motion(station, [{**given, "gap": found["demand"] / MEDIAN}])
+    assert table["demand_rule"][0] == found["demand_rule"]
+    assert_allclose(even, 0.5, atol=1e-9)
+
+
+def test_where_equivalent_buildings_decide_the_elastic_ones_do_not_count(station):
+    # would catch: resampling about elastic radii a pair whose demand is that of equivalent linear buildings
+    weak = {"period_1": 0.2, "period_2": np.nan, "height_2": 9.0, "storeys_2": 3.0, "yield_displacement_1": 2e-4}
+    table, plain, _ = _with_motion(station, [{**weak, "gap": 0.05}])
+    assert table["demand_rule"][0] == "linearized"
+    assert 0.05 < plain[0] < 0.95
+    assert pair_probability(station, table.assign(per_1=9.0, per_2=9.0), Screening())[0] == plain[0]
+    assert pair_probability(station, table.assign(equivalent_per_1=9.0), Screening())[0] > plain[0]
+
+
 def test_more_gap_is_less_likely_to_close(station):
     derived = {"period_1": np.nan, "period_2": np.nan}
     chances = [_one(station, **derived, gap=gap)["probability"] for gap in (0.0, 0.02, 0.1, 0.3, 1.0, 5.0)]
     assert chances[0] == 1.0
     assert np.all(np.diff(chances) <= 0)
     assert chances[-1] < 0.01
+
+
+def test_equal_derived_buildings_that_touch_always_pound(station):
+    # would catch: nodes at which both are exactly equal, which move as one (0.984 with the first 128 Sobol points)
+    derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
+    assert _one(station, **derived, gap=0.0)["probability"] == 1.0
+    # a gap of a tenth of a millimetre is closed wherever periods differ by more than rounding
+    assert _one(station, **derived, gap=1e-4)["probability"] > 0.995
 
 
 def test_equal_derived_buildings_against_monte_carlo(station):
@@ -73,7 +105,7 @@ def test_equal_derived_buildings_against_monte_carlo(station):
         periods.append(np.exp(period))
         dampings.append(np.exp(damping))
     rho = per_obspy.ddc_correlation(periods[0], dampings[0], periods[1], dampings[1])
-    critical = per_obspy.critical_gap(*radii, rho) * np.exp(0.35 * random.normal(size=n))
+    critical = per_obspy.critical_gap(*radii, rho) / MEDIAN * np.exp(0.35 * random.normal(size=n))
     # 128 quasi-random nodes in four dimensions against 40 000 samples (standard error 0.0025)
     assert_allclose(row["probability"], np.mean(critical > gap), atol=0.02)
 
@@ -142,6 +174,6 @@ def test_radii_at_the_site_against_monte_carlo():
         for i, ratio, std in ((1, 0.3, 0.5), (2, 0.1, 0.6))
     ]
     name = "correlation_record" if one["demand_rule"] == "per_record" else "correlation"
-    critical = per_obspy.critical_gap(*radii, one[name]) * np.exp(0.35 * random.normal(size=200_000))
+    critical = per_obspy.critical_gap(*radii, one[name]) / MEDIAN * np.exp(0.35 * random.normal(size=200_000))
     # standard error of 200 000 samples: 0.0011
     assert_allclose(got[0], np.mean(critical > gap), atol=0.005)

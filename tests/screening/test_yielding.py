@@ -1,6 +1,7 @@
 """Pairs that yield: limits, scaling, an equivalent building checked by other means, and the exact demand beside it."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import RegularGridInterpolator
@@ -26,7 +27,8 @@ OTHERS = ("correlation_linearized", "ductility_1", "ductility_2", "equivalent_pe
 def table_of(station, rows):
     """Return pairs with radii and demands along their azimuths."""
     pairs = completed_pairs(make_pairs(rows), Building())
-    return judged(station, pairs, motion_along_azimuths(station, pairs, values(pairs, "azimuth")), "given", exact=True)
+    motion = motion_along_azimuths(station, pairs, values(pairs, "azimuth"))
+    return pd.DataFrame(judged(station, pairs, motion, "given", exact=True))
 
 
 def weak(table, ratio_1, ratio_2):
