@@ -40,7 +40,8 @@ def test_the_exact_demand_is_the_gap_at_which_impacts_begin(station):
 
 def test_the_estimate_beside_the_exact_demand_is_the_largest(station):
     # Mutations: the ratio upside down; the exact demand in the place of the estimate; SRSS for given periods.
-    table = _table(station, *({"period_1": 0.5, "period_2": other} for other in (0.5, 0.7, 1.5))).sort_index()
+    equal = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
+    table = _table(station, equal, {"period_2": 0.7}, {"period_2": 1.5}).sort_index()
     largest = np.maximum(table["critical_gap_per"], table["critical_gap_record"])
     assert_allclose(table["demand_estimated"], largest)
     assert set(table["estimate_rule"]) <= {"per_white_noise", "per_record"}
