@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 import xarray as xr
 
 from per_obspy.config import Building, Interpolation, Screening
@@ -26,11 +25,11 @@ from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.reading import PairChunk, checked_chunk
 from per_obspy.parallel import results
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.report.tables import as_arrow
+from per_obspy.report.parts import write_part
 from per_obspy.screening.assignment import Stations, site_class_of
 from per_obspy.screening.ground import Ground
 from per_obspy.screening.judgement import impact_velocity_that_counts
-from per_obspy.screening.ranking import order_keys
+from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.site_motion import Source, StationField, prepared_field
 from per_obspy.spectra.storage import read_spectra
@@ -193,17 +192,8 @@ def do_chunk(job: ChunkJob) -> Part:
     rows, rejected = _surviving(pairs, _ground(job.ground), job)
     rejected = (*pairs.attrs["rejected"], *(one._replace(source=job.chunk.rows.source) for one in rejected))
     if len(rows):
-        _write_rows(rows, job.part)
+        write_part(in_order(rows, impact_velocity_that_counts(rows)), _number(job), job.part)
     return _noted(job, _key(job), job.part if len(rows) else None, rejected)
-
-
-def _write_rows(rows: pd.DataFrame, path: Path) -> None:
-    """Write the rows of a part with the keys of their order; numbers hardly repeat, so only texts get dictionaries."""
-    keys = order_keys(rows, impact_velocity_that_counts(rows))
-    table = as_arrow(rows.assign(**keys))
-    texts = [one.name for one in table.schema if pa.types.is_string(one.type)]
-    with written_whole(path) as part:
-        pq.write_table(table, part, use_dictionary=texts)
 
 
 def _noted(job: ChunkJob, key: str, part: Path | None, rejected: Sequence[Rejection]) -> Part:

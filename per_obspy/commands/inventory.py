@@ -53,7 +53,7 @@ def find_pairs(
     output: Annotated[Path, typer.Option("--output", "-o", help="Pair table, .parquet or .csv.")] = Path(
         "pairs.parquet"
     ),
-    distance: Annotated[float, typer.Option(min=0.001, help="Largest gap of a pair, m.")] = 3.0,
+    distance: Annotated[float, typer.Option(min=0.001, max=10.0, help="Largest gap of a pair, m.")] = 3.0,
     layer: Annotated[str | None, typer.Option(help="Layer, for files that have several.")] = None,
     as_json: AsJson = False,
 ) -> None:

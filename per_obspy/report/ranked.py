@@ -5,24 +5,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
-from per_obspy.report.database import bounded_database, write_worst
+from per_obspy.report.database import write_worst
+from per_obspy.report.parts import joined_rows, joined_schema, text_columns
 from per_obspy.report.tables import write_columns
-from per_obspy.screening.ranking import KEYS
 
 #: Rows that are read and written together.
 ROWS = 50_000
-
-#: The rows in their order, with the rank before the other columns.
-_ORDERED = f"""
-    COPY (
-        SELECT row_number() OVER () AS rank, * EXCLUDE ({", ".join(KEYS)})
-        FROM (SELECT * FROM read_parquet($parts) ORDER BY {", ".join(KEYS)}, pair_id)
-    ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $said}})
-"""
 
 
 def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], csv_rows: int) -> list[Path]:
@@ -32,7 +26,7 @@ def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], cs
     Parameters
     ----------
     parts : sequence of Path
-        Parquet files with rows of the risk table and the columns ``KEYS``, by which they are ordered; at least one.
+        From :func:`~per_obspy.report.parts.write_part`, at least one.
     folder : Path
         Where to.
     facts : mapping of str to str
@@ -42,11 +36,21 @@ def write_risk(parts: Sequence[Path], folder: Path, facts: Mapping[str, str], cs
     """
     said = json.dumps({"version": version("per_obspy"), **facts})
     table, text, columns = (folder / name for name in ("risk.parquet", "risk.csv", "risk.columns.csv"))
-    with bounded_database(folder) as database, written_whole(table) as part:
-        database.execute(_ORDERED, {"parts": [str(one) for one in parts], "path": str(part), "said": said})
+    with written_whole(table) as part:
+        _write_ranked(parts, part, said)
     write_worst(table, csv_rows, text)
     write_columns(pq.read_schema(table).names, columns)
     return [table, text, columns]
+
+
+def _write_ranked(parts: Sequence[Path], path: Path, said: str) -> None:
+    schema, before = joined_schema(parts), 0
+    whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": said})
+    with pq.ParquetWriter(path, whole, use_dictionary=text_columns(whole)) as table:
+        for rows in joined_rows(parts, schema, ROWS):
+            rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
+            table.write_table(pa.table([rank, *rows.columns], schema=whole))
+            before += rows.num_rows
 
 
 def ranked(path: Path, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:

@@ -28,9 +28,9 @@ def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.objec
     return chosen
 
 
-def order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray]:
+def in_order(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
     """
-    Return the columns ``KEYS`` by which the worst pair comes first.
+    Return the rows with the columns ``KEYS``, the worst pair first.
 
     Parameters
     ----------
@@ -44,6 +44,19 @@ def order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray
     The order is by state, probability, impact velocity and ratio gap / demand; ties are broken by importance,
     occupants and at last the name, so that it does not depend on the order in which pairs were computed.
     """
+    keys = _order_keys(table, velocity)
+    worst = np.stack(list(keys.values()))
+    order = np.lexsort(worst[::-1])
+    order = _ties_by_name(order, worst[:, order], table["pair_id"].to_numpy(object))
+    return table.assign(**keys).iloc[order].reset_index(drop=True)
+
+
+def worst_first(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
+    """Return the rows in the order of :func:`in_order`, with a column ``rank`` from 1."""
+    return in_order(table, velocity).drop(columns=[*KEYS]).assign(rank=np.arange(1, len(table) + 1))
+
+
+def _order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray]:
     keys = (
         np.asarray(table["state"].map(STATES), dtype=np.float64),
         -_largest(table, "probability"),
@@ -53,14 +66,6 @@ def order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray
         -_largest(table, "occupants_1", "occupants_2"),
     )
     return dict(zip(KEYS, keys, strict=True))
-
-
-def worst_first(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
-    """Return the rows in the order of :func:`order_keys`, with a column ``rank`` from 1."""
-    worst = np.stack(list(order_keys(table, velocity).values()))
-    order = np.lexsort(worst[::-1])
-    order = _ties_by_name(order, worst[:, order], table["pair_id"].to_numpy(object))
-    return table.iloc[order].reset_index(drop=True).assign(rank=np.arange(1, len(table) + 1))
 
 
 def _ties_by_name(order: NDArray[np.intp], worst: FloatArray, names: NDArray[np.object_]) -> NDArray[np.intp]:
