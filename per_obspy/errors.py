@@ -12,6 +12,8 @@ The errors that a user can meet.
 Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error it amounts to.
 """
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from importlib.util import find_spec
 from typing import Any, NamedTuple, Self
 
@@ -85,6 +87,20 @@ def require_extra(extra: str, *modules: str) -> None:
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
         raise MissingExtra(extra, missing)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """
+    Return the question after a mistyped word, empty if nothing known is like it; capitals do not count.
+
+    Examples
+    --------
+    >>> did_you_mean("Heigth", ["height", "gap"])
+    ', did you mean height?'
+    """
+    names = {name.lower(): name for name in known}
+    alike = get_close_matches(word.lower(), names, n=1, cutoff=0.7)
+    return f", did you mean {names[alike[0]]}?" if alike else ""
 
 
 class ServiceError(PerError, ConnectionError):

@@ -1,7 +1,11 @@
 """A file appears whole or not at all."""
 
+import errno
+import os
+
 import pytest
 
+from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash, written_whole
 
 
@@ -28,6 +32,21 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
         fails()
     assert final.read_text() == "old"
     assert list(tmp_path.iterdir()) == [final]
+
+
+def test_what_cannot_be_written_is_said_in_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CatalogError, match=r"risk\.csv: cannot be written: .*file: (File exists|Not a directory)"):
+        written_whole(tmp_path / "file" / "risk.csv").__enter__()
+
+    def fill():
+        with written_whole(tmp_path / "risk.csv") as part:
+            part.write_text("half")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(CatalogError, match=r"risk\.csv: cannot be written: No space left"):
+        fill()
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_hash_is_sha256(tmp_path):

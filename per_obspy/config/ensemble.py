@@ -12,8 +12,8 @@ class EnsembleScenario(Section):
 
     name: str = Field(min_length=1, description="unique; stands in the name of its column")
     run: RelativePath = Field(description="TOML file of its run")
-    weight: float | None = Field(None, ge=0, allow_inf_nan=False, description="how likely it is beside the others")
-    rate: float | None = Field(None, ge=0, allow_inf_nan=False, description="how often it happens, 1/year")
+    weight: float | None = Field(None, ge=0, description="how likely it is beside the others")
+    rate: float | None = Field(None, ge=0, description="how often it happens, 1/year")
 
 
 class Ensemble(Section):

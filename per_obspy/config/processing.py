@@ -1,9 +1,11 @@
 """The chain from raw record to one that spectra may be computed from, and the grid of the spectra."""
 
-from typing import Self
+from itertools import pairwise
+from typing import Annotated, Self
 
 from pydantic import (
     Field,
+    field_validator,
     model_validator,
 )
 
@@ -62,13 +64,26 @@ class Processing(Section):
     highest_lowpass: float = Field(40.0, gt=0, description="Hz, where the noise does not ask for less")
     highpass_range: tuple[float, float] = Field((0.001, 0.5), description="Hz; never below 1 / duration")
     drift: float = Field(0.02, gt=0, lt=1, description="polynomial part of the displacement that counts as clean")
-    fallback_highpass: dict[float, float] = Field(
+    fallback_highpass: dict[float, Annotated[float, Field(gt=0)]] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
         description="without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)",
     )
     unknown_highpass: float = Field(0.08, gt=0, description="Hz, without noise to measure and without magnitude")
     permanent_offset: bool = Field(False, description="near a fault: keep it, no high-pass, adaptive baseline")
     checks: Checks = Checks()
+
+    @field_validator("required_band", "highpass_range")
+    @classmethod
+    def _rising(cls, band: tuple[float, float]) -> tuple[float, float]:
+        if not 0.0 < band[0] < band[1]:
+            raise ValueError(f"must be two rising frequencies above 0, got {band[0]:g} and {band[1]:g} Hz")
+        return band
+
+    @model_validator(mode="after")
+    def _a_band(self) -> Self:
+        if self.highpass is not None and self.lowpass is not None and self.highpass >= self.lowpass:
+            raise ValueError(f"highpass = {self.highpass:g} Hz must be below lowpass = {self.lowpass:g} Hz")
+        return self
 
     @model_validator(mode="after")
     def _one_long_period_limit(self) -> Self:
@@ -80,8 +95,30 @@ class Processing(Section):
 class Spectra(Section):
     """The grid of the stored spectra; pairs are computed at their own periods, not read off it."""
 
-    dampings: tuple[float, ...] = Field((0.02, 0.05, 0.10, 0.20), description="fractions of critical")
-    shortest: float = Field(0.05, gt=0, description="s")
-    longest: float = Field(10.0, gt=0, description="s")
-    count: int = Field(100, ge=2, description="periods, logarithmically spaced")
+    dampings: tuple[Annotated[float, Field(ge=0, lt=1)], ...] = Field(
+        (0.02, 0.05, 0.10, 0.20), min_length=1, description="fractions of critical, rising"
+    )
+    shortest: float = Field(0.05, ge=0.001, description="s")
+    longest: float = Field(10.0, le=100.0, description="s")
+    count: int = Field(100, ge=2, le=10_000, description="periods, logarithmically spaced")
     azimuth_step: int = Field(10, ge=1, le=90, description="degrees between stored azimuths; RotD uses every degree")
+
+    @field_validator("dampings")
+    @classmethod
+    def _rising(cls, dampings: tuple[float, ...]) -> tuple[float, ...]:
+        if any(later <= earlier for earlier, later in pairwise(dampings)):
+            raise ValueError(f"must rise, got {', '.join(f'{one:g}' for one in dampings)}")
+        return dampings
+
+    @field_validator("azimuth_step")
+    @classmethod
+    def _even(cls, step: int) -> int:
+        if 180 % step:
+            raise ValueError(f"must divide 180 degrees into equal parts, got {step}")
+        return step
+
+    @model_validator(mode="after")
+    def _a_range(self) -> Self:
+        if self.shortest >= self.longest:
+            raise ValueError(f"shortest = {self.shortest:g} s must be below longest = {self.longest:g} s")
+        return self

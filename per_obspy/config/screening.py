@@ -1,6 +1,6 @@
 """What is assumed of buildings, and how pairs find their motion and their names."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import (
     Field,
@@ -16,11 +16,11 @@ class Building(Section):
 
     damping: float = Field(0.05, ge=0, lt=1, description="fraction of critical")
     damping_log_std: float = Field(0.3, ge=0, description="log-standard deviation of an assumed damping")
-    storey_height: float = Field(3.0, gt=0, description="m")
-    mass_per_area: float = Field(1000.0, gt=0, description="kg/m2 and floor")
-    area: float = Field(200.0, gt=0, description="floor area, m2; only the ratio of the masses matters")
+    storey_height: float = Field(3.0, ge=2, le=12, description="m")
+    mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
+    area: float = Field(200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters")
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
-    floor_tolerance: float = Field(0.61, ge=0, description="m; floors further apart than 2 ft misalign (FEMA P-154)")
+    floor_tolerance: float = Field(0.61, ge=0, le=12, description="m; floors further apart misalign; 2 ft: FEMA P-154")
     period_formula: str = Field("asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds")
 
 
@@ -40,7 +40,7 @@ class Codes(Section):
     fema_seismicity: str | None = Field(
         None, pattern="^(very_high|high|moderately_high|lower)$", description="FEMA P-154: of the region"
     )
-    floor_tolerance: float = Field(0.61, ge=0, description="m; floors no further apart than 2 ft align (FEMA P-154)")
+    floor_tolerance: float = Field(0.61, ge=0, le=12, description="m; floors no further apart align; 2 ft: FEMA P-154")
 
 
 class Screening(Section):
@@ -53,7 +53,7 @@ class Screening(Section):
     model_dispersion: float = Field(0.35, ge=0, description="log-standard deviation of critical gap by PER / exact")
     possible_from: float = Field(0.1, ge=0, le=1, description="probability from which pounding counts as possible")
     per_to_sd: float = Field(1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large")
-    classes: dict[str, float] = Field(
+    classes: dict[str, Annotated[float, Field(gt=0, allow_inf_nan=True)]] = Field(
         {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
         description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
     )

@@ -2,9 +2,10 @@
 
 import os
 import tomllib
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -15,9 +16,11 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, did_you_mean
+from per_obspy.files import looks_like
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -41,9 +44,9 @@ RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to
 
 
 class Section(BaseModel):
-    """A frozen group of settings; an unknown key is an error."""
+    """A frozen group of settings; an unknown key is an error, and so is a number that is not finite."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="strings")
 
 
 SectionType = TypeVar("SectionType", bound=Section)
@@ -79,8 +82,11 @@ def read_toml(path: Path) -> dict[str, object]:
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise CatalogError(str(path), f"cannot be read as TOML: {error}") from error
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        kind = looks_like(path)
+        raise CatalogError(str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}") from error
 
 
 def checked(
@@ -108,12 +114,52 @@ def checked(
     try:
         return section.model_validate(content, context=folder and {"folder": folder})
     except ValidationError as error:
-        raise CatalogError(source, "; ".join(_fault(fault) for fault in error.errors())) from error
+        faults = [fault for fault in error.errors() if not _follows(fault, error.errors())]
+        raise CatalogError(source, "; ".join(_fault(fault, section) for fault in faults)) from error
 
 
-def _fault(fault: ErrorDetails) -> str:
-    """Return one fault of a configuration: key, what is wrong, value."""
-    key = ".".join(map(str, fault["loc"])) or "the file"
+def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
+    """Return whether a list is too short only because what stands in it is wrong."""
+    above = len(fault["loc"])
+    inside = [one for one in faults if len(one["loc"]) > above and one["loc"][:above] == fault["loc"]]
+    return fault["type"] == "too_short" and bool(inside)
+
+
+def _fault(fault: ErrorDetails, section: type[Section]) -> str:
+    """Return one fault of a configuration: key, what is wrong, value, and what is expected."""
+    key = ".".join(map(str, fault["loc"]))
+    said = f"{key}: " if key else ""
     given = "" if fault["type"] in {"missing", "value_error"} else f" (got {fault['input']!r:.60})"
-    unknown = "unknown key" if fault["type"] == "extra_forbidden" else fault["msg"]
-    return f"{key}: {unknown}{given}"
+    fields, name = _fields_at(section, fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        return f"{said}unknown key{given}{_place_of(name, fields) or did_you_mean(name, fields)}"
+    meaning = fields[name].description if name in fields else None
+    expected = f", expected: {meaning}" if meaning and given else ""
+    return f"{said}{fault['msg'].removeprefix('Value error, ')}{given}{expected}"
+
+
+def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
+    """Return to which section beside it a key belongs, empty if to none."""
+    inside = (name for name, field in fields.items() for one in _sections(field.annotation) if key in one.model_fields)
+    return next((f", it belongs to [{name}]" for name in inside), "")
+
+
+def _fields_at(section: type[Section], keys: Sequence[str | int]) -> tuple[dict[str, FieldInfo], str]:
+    """Return the last of some keys that is no place in a list or a table, and the fields beside it."""
+    name = ""
+    for key in keys:
+        if isinstance(key, int):
+            continue
+        inner = next(_sections(section.model_fields[name].annotation), None) if name else section
+        if inner is None:  # a table whose keys are free
+            break
+        section, name = inner, key
+    return section.model_fields, name
+
+
+def _sections(annotation: Any) -> Iterator[type[Section]]:
+    """Give the sections that stand in the type of a field: itself, or one, or several, or none of it."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _sections(inner)

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.errors import CatalogError, Rejection
+from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
 #: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or storeys.
@@ -104,7 +104,8 @@ def check_columns(names: Sequence[str], source: str) -> None:
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
         found = ", ".join(names)
-        raise CatalogError(source, f"missing column {', '.join(missing)} (columns found: {found:.200})")
+        asked = "".join(did_you_mean(name, set(names) - set(COLUMNS)) for name in missing[:1])
+        raise CatalogError(source, f"missing column {', '.join(missing)} (columns found: {found:.200}){asked}")
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -183,7 +184,7 @@ def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
     for group in ONE_OF:
         known = [~np.isnan(_column(pairs, name)) for name in group]
         for i in _rows(~np.any(known, axis=0)):
-            yield i, f"{', '.join(group)} are all empty, one is needed"
+            yield i, f"none of {', '.join(group)} is a number, one is needed"
 
 
 def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
@@ -218,7 +219,8 @@ def _positions(pairs: pd.DataFrame) -> Iterator[Fault]:
     north = place["latitude_2"] - place["latitude_1"]
     east = (place["longitude_2"] - place["longitude_1"] + 180.0) % 360.0 - 180.0
     distance = METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(place["latitude_1"])))
-    for i in _rows(distance > LARGEST_SEPARATION):
+    on_earth = np.all([np.abs(place[name]) <= COLUMNS[name].high for name in place], axis=0)
+    for i in _rows(on_earth & (distance > LARGEST_SEPARATION)):
         yield (
             i,
             f"the positions (longitude_1 = {place['longitude_1'][i]:g}, latitude_1 = {place['latitude_1'][i]:g}) and "

@@ -1,5 +1,6 @@
 """Pairs of neighbouring buildings from footprints."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +51,17 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
     CatalogError
         If the file cannot be read, holds no polygons, spans more than 6 degrees of longitude, or has no neighbours.
     ValueError
-        If the distance is not positive.
+        If the distance is not positive or larger than any gap may be.
     """
     largest = checks.number("distance", distance, checks.positive)
+    if largest > COLUMNS["gap"].high:
+        raise ValueError(f"distance must not be above the largest gap, {COLUMNS['gap'].high:g} m, got {largest:g}")
     source = str(path)
     found = read_layer(path, layer)
     buildings = imported(found.attributes, source)
     unique, repeated = _without_repetitions(found, buildings, source)
     if len(unique.polygons) < 2:
-        raise CatalogError(source, f"{len(unique.polygons)} usable footprints make no pair")
+        raise CatalogError(source, _too_few(len(unique.polygons), (*found.rejected, *repeated)))
     table = _table(unique, buildings.loc[unique.attributes.index], largest, source)
     pairs, overlapping = _without_overlaps(table, source)
     rejected = (*found.rejected, *repeated, *overlapping)
@@ -83,6 +86,12 @@ def _without_repetitions(found: Layer, buildings: pd.DataFrame, source: str) -> 
         rejected.append(Rejection("building", identifiers[number], source, int(number), tuple(reasons)))
     good = ~(same_shape | same_name).to_numpy()
     return Layer(found.polygons[good], found.attributes[good], ()), tuple(rejected)
+
+
+def _too_few(usable: int, rejected: Sequence[Rejection]) -> str:
+    """Return that there are too few footprints, and why the first of the others is none."""
+    others = f" ({len(rejected)} rejected, {rejected[0].name}: {'; '.join(rejected[0].reasons)})" if rejected else ""
+    return f"{usable} usable footprints make no pair{others}"
 
 
 def _table(found: Layer, buildings: pd.DataFrame, distance: float, source: str) -> pd.DataFrame:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, did_you_mean
 
 
 class Importer(NamedTuple):
@@ -98,7 +98,12 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
     found = {ours: attributes[theirs] for ours, theirs in importer.columns.items() if theirs in attributes.columns}
     if not {"height", "storeys", "period"} & set(found):
         columns = ", ".join(map(str, attributes.columns)) or "none"
-        raise CatalogError(source, f"no column height, storeys or period in the layer (columns found: {columns:.200})")
+        asked = next(
+            filter(None, (did_you_mean(name, map(str, attributes.columns)) for name in ("height", "storeys"))), ""
+        )
+        raise CatalogError(
+            source, f"no column height, storeys or period in the layer (columns found: {columns:.200}){asked}"
+        )
     table = pd.DataFrame(found, index=attributes.index)
     if "system" in attributes.columns and not importer.systems:
         table["system"] = attributes["system"].fillna("")

@@ -14,9 +14,16 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import told_apart
 
 #: Files that GDAL reads for us; GeoParquet is read by pyarrow.
-GDAL_SUFFIXES = (".gpkg", ".geojson", ".json", ".shp", ".fgb")
+GDAL_KINDS = {
+    ".gpkg": "GeoPackage",
+    ".geojson": "GeoJSON file",
+    ".json": "GeoJSON file",
+    ".shp": "Shapefile",
+    ".fgb": "FlatGeobuf file",
+}
 PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 
 Geometries = NDArray[np.object_]
@@ -72,10 +79,13 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     kinds = shapely.get_type_id(raw.geometries)
     if set(kinds[kinds >= 0].tolist()) <= {shapely.GeometryType.POINT, shapely.GeometryType.MULTIPOINT}:
         raise CatalogError(str(file), "the layer holds points, not footprints: a gap is a distance between walls")
-    degrees = _in_degrees(file, shapely.force_2d(raw.geometries), raw.crs)
-    good = _are_footprints(degrees)
+    crs = _reference_system(file, raw.crs)
+    degrees = _in_degrees(shapely.force_2d(raw.geometries), crs)
+    # a town lies within 180 m and 90 m of the origin of its projection only if its coordinates are degrees
+    stray = _on_earth(raw.geometries) & bool(crs.is_projected)
+    good = _are_footprints(degrees) & ~stray
     rejected = tuple(
-        Rejection("building", f"feature {i + 1}", str(file), i + 1, (_fault(degrees[i], raw.geometries[i]),))
+        Rejection("building", f"feature {i + 1}", str(file), i + 1, (_fault(degrees[i], raw.geometries[i], stray[i]),))
         for i in np.flatnonzero(~good).tolist()
     )
     attributes = raw.attributes.set_index(pd.RangeIndex(1, len(good) + 1))
@@ -84,16 +94,16 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
 
 def _read(file: Path, layer: str | None) -> _Raw:
     suffix = file.suffix.lower()
+    if not file.exists():
+        raise CatalogError(str(file), "no such file")
     if suffix == ".csv":
         raise CatalogError(
             str(file), "a table has no walls, and a gap is a distance between walls: footprints are needed"
         )
-    if suffix not in (*GDAL_SUFFIXES, *PARQUET_SUFFIXES):
-        expected = ", ".join((*GDAL_SUFFIXES, *PARQUET_SUFFIXES))
+    if suffix not in (*GDAL_KINDS, *PARQUET_SUFFIXES):
+        expected = ", ".join((*GDAL_KINDS, *PARQUET_SUFFIXES))
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
-    if not file.is_file():
-        raise CatalogError(str(file), "no such file")
-    return _read_gdal(file, layer) if suffix in GDAL_SUFFIXES else _read_geoparquet(file)
+    return _read_gdal(file, layer) if suffix in GDAL_KINDS else _read_geoparquet(file)
 
 
 def _read_gdal(file: Path, layer: str | None) -> _Raw:
@@ -101,9 +111,9 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
         name = _layer_name(file, layer)
         meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), f"cannot be read: {error}") from error
+        raise CatalogError(str(file), told_apart(file, GDAL_KINDS[file.suffix.lower()], error)) from error
     attributes = pd.DataFrame(dict(zip(meta["fields"], fields, strict=True)), index=range(len(geometries)))
-    return _Raw(shapely.from_wkb(geometries), attributes, meta["crs"])
+    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, meta["crs"])
 
 
 def _layer_name(file: Path, layer: str | None) -> str:
@@ -124,28 +134,35 @@ def _layer_name(file: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> _Raw:
     try:
         table = pa.parquet.read_table(file)
-    except pa.ArrowInvalid as error:
-        raise CatalogError(str(file), f"not a Parquet table: {error}") from error
+    except (pa.ArrowInvalid, OSError) as error:
+        raise CatalogError(str(file), told_apart(file, "Parquet table", error)) from error
     described = (table.schema.metadata or {}).get(b"geo")
     if described is None:
         raise CatalogError(str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints")
-    geo = json.loads(described)
-    name = geo["primary_column"]
-    column = geo["columns"][name]
-    if column.get("encoding") != "WKB":
-        raise CatalogError(str(file), f"geometries are encoded as {column.get('encoding')!r}, expected WKB")
-    geometries = shapely.from_wkb(table[name].to_numpy())
+    try:
+        geo = json.loads(described)
+        name = geo["primary_column"]
+        column = geo["columns"][name]
+        if column.get("encoding") != "WKB":
+            raise CatalogError(str(file), f"geometries are encoded as {column.get('encoding')!r}, expected WKB")
+        geometries = shapely.from_wkb(table[name].to_numpy(), on_invalid="ignore")
+    except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
+        raise CatalogError(str(file), f"wrong GeoParquet metadata: {type(error).__name__} {error}") from error
     # a missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
     return _Raw(geometries, table.drop_columns([name]).to_pandas(), column.get("crs", "OGC:CRS84"))
 
 
-def _in_degrees(file: Path, geometries: Geometries, crs: Any) -> Geometries:
+def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
     if crs is None:
         raise CatalogError(str(file), "no coordinate reference system (a Shapefile needs its .prj)")
     try:
-        transformer = pyproj.Transformer.from_crs(pyproj.CRS.from_user_input(crs), "OGC:CRS84", always_xy=True)
+        return pyproj.CRS.from_user_input(crs)
     except pyproj.exceptions.CRSError as error:
         raise CatalogError(str(file), f"unknown coordinate reference system {str(crs)!r:.60}") from error
+
+
+def _in_degrees(geometries: Geometries, crs: pyproj.CRS) -> Geometries:
+    transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
     return np.asarray(shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T))))
 
 
@@ -159,7 +176,7 @@ def _on_earth(degrees: Geometries | shapely.Geometry) -> NDArray[np.bool_]:
     return np.asarray((np.abs(shapely.bounds(degrees)) <= [180.0, 90.0, 180.0, 90.0]).all(axis=-1))
 
 
-def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None) -> str:
+def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None, stray: bool) -> str:
     """Return why a geometry is no footprint."""
     if degrees is None or original is None:
         return "no geometry"
@@ -167,7 +184,11 @@ def _fault(degrees: shapely.Geometry | None, original: shapely.Geometry | None) 
         return "the geometry is empty"
     if shapely.get_type_id(degrees) not in _POLYGONAL:
         return f"the geometry is a {degrees.geom_type}, not a polygon"
+    place = ", ".join(f"{value:g}" for value in original.bounds[:2])
+    if stray:
+        return f"coordinates {place} are degrees, the layer's coordinate reference system is in metres"
     if not _on_earth(degrees):
-        place = ", ".join(f"{value:g}" for value in original.bounds[:2])
-        return f"coordinates {place} lie outside the layer's coordinate reference system"
+        swapped = _on_earth(shapely.transform(degrees, np.fliplr))
+        asked = " (longitude and latitude swapped?)" if swapped else ""
+        return f"coordinates {place} lie outside the layer's coordinate reference system{asked}"
     return f"the polygon is invalid: {shapely.is_valid_reason(original)}"

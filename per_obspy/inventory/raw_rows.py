@@ -7,6 +7,7 @@ stand twice), then block by block.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -19,6 +20,8 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import told_apart
+from per_obspy.inventory.csv_text import check_separator, check_text, line_breaks
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 IDENTIFIER = "pair_id"
@@ -86,7 +89,7 @@ class ParquetFile:
         try:
             yield
         except (pa.ArrowInvalid, OSError) as error:
-            raise CatalogError(str(self.file), f"not a Parquet table: {error}") from error
+            raise CatalogError(str(self.file), told_apart(self.file, "Parquet table", error)) from error
 
 
 class CsvFile:
@@ -94,13 +97,23 @@ class CsvFile:
 
     def __init__(self, file: Path) -> None:
         self.file = file
+        check_text(file)
         with self._readable():
             self._raw_names = list(pa.csv.open_csv(file, _ORDERED, _skipping(lambda _: "skip")).schema.names)
+        check_separator(file, self._raw_names)
         self.names: Sequence[str] = [name.strip() for name in self._raw_names]
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise CatalogError(str(file), f"column {twice} stands more than once")
-        self._kinds = self._kinds_of_carried()
+
+    @cached_property
+    def _kinds(self) -> dict[str, pa.DataType | None]:
+        """What kind of number each column is that the schema does not know; None for text."""
+        kinds: dict[str, list[pa.DataType]] = {n: [pa.int64(), pa.float64()] for n in self.names if n not in COLUMNS}
+        for batch in self._batches([], *kinds) if kinds else ():
+            for name, cells in zip(kinds, batch.columns, strict=True):
+                kinds[name] = [kind for kind in kinds[name] if _as_numbers(cells, kind) is not None]
+        return {name: possible[0] if possible else None for name, possible in kinds.items()}
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Give the names of the pairs, block by block."""
@@ -110,30 +123,35 @@ class CsvFile:
     def rows(self, size: int) -> Iterator[RawRows]:
         """Give the rows, so many at a time; lines without any content are left out."""
         broken: list[Rejection] = []
-        line = 2
+        row = 2
+        swallowed = 0
         for table in _regrouped(self._batches(broken, *self.names), size):
-            lines = _lines(line, len(table), broken)
-            line = int(lines[-1]) + 1
-            full = _has_content(table)
+            rows, breaks = _lines(row, len(table), broken), line_breaks(table)
+            row = int(rows[-1]) + 1
+            offset = swallowed + np.concatenate([[0], np.cumsum(breaks)])
+            lines, swallowed = rows + offset[:-1], int(offset[-1])
+            before = [_moved(one, rows, offset) for one in _taken(broken, row)]
+            before += self._torn(table, lines, breaks)
+            full = _has_content(table) & (breaks == 0)
             cells = pa.table({name: self._as_kind(name, table[name]) for name in self.names})
-            yield RawRows(str(self.file), cells.filter(pa.array(full)), lines[full], _taken(broken, line))
+            yield RawRows(str(self.file), cells.filter(pa.array(full)), lines[full], tuple(before))
         if broken:
             nothing = pa.table({name: pa.array([], pa.string()) for name in self.names})
-            yield RawRows(str(self.file), nothing, np.zeros(0, np.int64), tuple(broken))
+            left = tuple(one._replace(row=(one.row or 0) + swallowed) for one in broken)
+            yield RawRows(str(self.file), nothing, np.zeros(0, np.int64), left)
+
+    def _torn(self, table: pa.Table, lines: NDArray[np.int64], breaks: NDArray[np.int64]) -> Iterator[Rejection]:
+        """Give the rows that have swallowed lines, which may have been rows themselves."""
+        for i in np.flatnonzero(breaks).tolist():
+            column = next(name for name in self.names if "\n" in table[name][i].as_py())
+            reason = f"{column} has a line break: is a quotation mark not closed? {breaks[i]} further lines are lost"
+            yield Rejection("pair", table[IDENTIFIER][i].as_py(), str(self.file), int(lines[i]), (reason,))
 
     def _as_kind(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
         """Return cells as numbers where all are; otherwise the text, whose faults are named later."""
         if name in COLUMNS:
             return cells if COLUMNS[name].dtype == "str" else _as_numbers(cells, pa.float64()) or cells
         return cells if self._kinds[name] is None else _as_numbers(cells, self._kinds[name])
-
-    def _kinds_of_carried(self) -> dict[str, pa.DataType | None]:
-        """Return what kind of number each column is that the schema does not know; None for text."""
-        kinds: dict[str, list[pa.DataType]] = {n: [pa.int64(), pa.float64()] for n in self.names if n not in COLUMNS}
-        for batch in self._batches([], *kinds) if kinds else ():
-            for name, cells in zip(kinds, batch.columns, strict=True):
-                kinds[name] = [kind for kind in kinds[name] if _as_numbers(cells, kind) is not None]
-        return {name: possible[0] if possible else None for name, possible in kinds.items()}
 
     def _batches(self, broken: list[Rejection], *names: str) -> Iterator[pa.RecordBatch]:
         """Give some columns as text, and add lines that are no rows to a list as they are met."""
@@ -160,8 +178,8 @@ class CsvFile:
     def _readable(self) -> Iterator[None]:
         try:
             yield
-        except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-            raise CatalogError(str(self.file), _undecodable(self.file) or f"not a CSV table: {error}") from error
+        except pa.ArrowInvalid as error:
+            raise CatalogError(str(self.file), f"not a CSV table: {error}") from error
 
 
 #: With threads, rows have no numbers.
@@ -217,6 +235,12 @@ def _taken(broken: list[Rejection], line: int) -> tuple[Rejection, ...]:
     return before
 
 
+def _moved(rejection: Rejection, rows: NDArray[np.int64], offset: NDArray[np.int64]) -> Rejection:
+    """Return a broken line at its place in the file: line breaks in the cells before it count."""
+    row = rejection.row or 0
+    return rejection._replace(row=row + int(offset[np.searchsorted(rows, row)]))
+
+
 def _has_content(table: pa.Table) -> NDArray[np.bool_]:
     full = np.zeros(len(table), dtype=bool)
     for column in table.columns:
@@ -235,17 +259,6 @@ def _as_numbers(cells: pa.ChunkedArray | pa.Array, kind: pa.DataType) -> pa.Chun
 
 
 _NOTHING = pa.array(sorted(EMPTY))
-
-
-def _undecodable(file: Path) -> str | None:
-    """Return where the file is not UTF-8, or None."""
-    with file.open("rb") as text:
-        for number, line in enumerate(text, start=1):
-            try:
-                line.decode("utf-8")
-            except UnicodeDecodeError as error:
-                return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} at position {error.start + 1})"
-    return None
 
 
 def name_hashes(names: pa.Array) -> NDArray[np.uint64]:

@@ -59,11 +59,11 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     file = pair_file(Path(path))
     check_columns(file.names, str(path))
     blocks = list(file.rows(ALL))
-    if not sum(len(block.table) for block in blocks):
+    if not any(len(block.table) or block.broken for block in blocks):
         raise CatalogError(str(path), "the table has no rows")
     rows = RawRows(
         str(path),
-        pa.concat_tables([block.table for block in blocks if len(block.table)]),
+        pa.concat_tables([block.table for block in blocks if len(block.table)] or [blocks[0].table]),
         np.concatenate([block.lines for block in blocks]),
         tuple(one for block in blocks for one in block.broken),
     )

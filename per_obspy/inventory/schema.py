@@ -77,13 +77,15 @@ _PAIR = (
 
 _BUILDING = (
     Column("building_id", "str", "", "identifier of the building"),
-    Column("longitude", "float64", "degrees", "east", required=True, low=-180.0, high=180.0),
+    Column("longitude", "float64", "degrees", "east", required=True, low=-180.0, high=180.0,
+           hint="metres of a projection?"),
     Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
-           hint="longitude and latitude swapped?"),
+           hint="longitude and latitude swapped, or metres of a projection?"),
     Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0, hint="metres above ground expected"),
     Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
     Column("system", "str", "", "structural system", choices=SYSTEMS),
-    Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0),
+    Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0,
+           hint="in milliseconds?"),
     Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period", low=0.0, high=2.0),
     Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=1.0 - 1e-9,
            hint="a fraction is expected, not per cent"),

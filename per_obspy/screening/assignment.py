@@ -88,11 +88,32 @@ def assigned(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[pd.
         other_site_class=(ground != "") & (there != "") & (ground != there),
     )
     far = placed[distance > reach]
+    told = zip(far["pair_id"], far["station"], far["distance"], _if_swapped(far, stations, reach), strict=True)
     rejected = tuple(
-        Rejection("pair", name, "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m",))
-        for name, station, metres in far[["pair_id", "station", "distance"]].itertuples(index=False)
+        Rejection(
+            "pair", name, "", None, (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m{hint}",)
+        )
+        for name, station, metres, hint in told
     )
     return placed[distance <= reach], rejected
+
+
+def _if_swapped(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
+    """Return, pair by pair, what to add if exchanged coordinates would bring a station into reach; empty if not."""
+    longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
+    on_earth = np.abs(longitude) <= 90.0
+    index, distance = nearest_station(
+        latitude, np.where(on_earth, longitude, 0.0), stations.longitude, stations.latitude
+    )
+    return [
+        f"; with longitude = {east:g} and latitude = {north:g} exchanged, {stations.names[station]} would be "
+        f"{metres:.0f} m away: are they swapped?"
+        if near
+        else ""
+        for east, north, station, metres, near in zip(
+            longitude, latitude, index, distance, on_earth & (distance <= reach), strict=True
+        )
+    ]
 
 
 def _serving(

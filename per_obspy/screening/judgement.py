@@ -36,6 +36,7 @@ def judged(station: xr.Dataset, pairs: Table, motion: PairMotion, rule: str, exa
     table: Columns = {**pairs, **_at_worst(motion, pairs)}
     table |= linearized_columns(station, table)
     table |= _estimated_demand(table)
+    table |= {"demand_estimated": table["demand"], "estimate_rule": table["demand_rule"]}
     table |= _single_hits(table)
     table["azimuth_rule"] = np.full(len(motion.azimuth), rule, dtype=object)
     if exact:
@@ -46,7 +47,7 @@ def judged(station: xr.Dataset, pairs: Table, motion: PairMotion, rule: str, exa
         table["demand_rule"] = np.where(decides, "exact", table["demand_rule"])
     else:
         table |= no_outcome(len(motion.azimuth))
-    return table | {"demand": _without_round_off(table)}
+    return table | {"demand": _without_round_off(table), "estimate_over_exact": _estimate_over_exact(table)}
 
 
 def _estimated_demand(table: Table) -> Columns:
@@ -57,6 +58,13 @@ def _estimated_demand(table: Table) -> Columns:
         "demand": np.where(larger, linearized, elastic),
         "demand_rule": np.where(larger, "linearized", table["demand_rule"]),
     }
+
+
+def _estimate_over_exact(table: Table) -> FloatArray:
+    """Return the governing estimate over the exact demand, NaN where that is not known, 0, or round-off."""
+    exact, estimate = values(table, "demand_exact"), values(table, "demand_estimated")
+    known = exact > ROUND_OFF * values(table, "absolute_gap")
+    return np.divide(estimate, exact, out=np.full_like(exact, np.nan), where=known)
 
 
 def _without_round_off(table: Table) -> FloatArray:

@@ -46,6 +46,8 @@ def test_a_good_row_in_the_order_of_the_schema():
         ({"damping_2": 1.0}, "damping_2 = 1 is outside 0 to 1 (a fraction is expected, not per cent)"),
         ({"damping_2": 5.0}, "damping_2 = 5 is outside 0 to 1 (a fraction is expected, not per cent)"),
         ({"damping_1": -0.1}, "damping_1 = -0.1 is outside 0 to 1"),
+        ({"mass_1": -2e5}, "mass_1 = -200000 kg is outside 1 to 1e+12 kg"),
+        ({"period_1": 500.0}, "period_1 = 500 s is outside 0.01 to 20 s (in milliseconds?)"),
         ({"mass_1": 0.0}, "mass_1 = 0 kg is outside 1 to 1e+12 kg"),
         ({"system_1": "masonry"},
          "system_1 = 'masonry' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
@@ -66,8 +68,17 @@ def test_one_fault(changes, reason):
 
 def test_swapped_coordinates_outside_their_range_are_suspected():
     reasons = _reasons(longitude_1=19.4, latitude_1=-99.1, longitude_2=19.4, latitude_2=-99.1)
-    hint = "is outside -90 to 90 degrees (longitude and latitude swapped?)"
+    hint = "is outside -90 to 90 degrees (longitude and latitude swapped, or metres of a projection?)"
     assert reasons == (f"latitude_1 = -99.1 degrees {hint}", f"latitude_2 = -99.1 degrees {hint}")
+
+
+def test_metres_are_no_degrees_and_no_distance_is_told_of_them():
+    metres = dict.fromkeys(("longitude_1", "longitude_2"), 485_000.0) | dict.fromkeys(
+        ("latitude_1", "latitude_2"), 2_149_000.0
+    )
+    reasons = _reasons(**metres)
+    assert len(reasons) == 4
+    assert all("metres of a projection?" in reason for reason in reasons)
 
 
 def test_one_building_swapped_within_range_is_found_by_its_neighbour():
@@ -98,7 +109,7 @@ def test_every_reason_of_a_row_is_told():
 @pytest.mark.parametrize("index", [0, 1])
 def test_a_building_of_unknown_size(index):
     empty = dict.fromkeys(ONE_OF[index], np.nan)
-    assert _reasons(**empty) == (f"{', '.join(ONE_OF[index])} are all empty, one is needed",)
+    assert _reasons(**empty) == (f"none of {', '.join(ONE_OF[index])} is a number, one is needed",)
 
 
 @pytest.mark.parametrize("name", ONE_OF[0])

@@ -176,6 +176,37 @@ def test_coordinates_that_are_no_degrees(write):
     assert "coordinates 500000, 1e+06 lie outside" in rejection.reasons[0]
 
 
+def test_degrees_in_a_layer_of_metres(write):
+    # would catch a feature at the origin of the projection, which makes the town too wide for a local one
+    to_utm = Transformer.from_crs("OGC:CRS84", "EPSG:32719", always_xy=True)
+    utm = shapely.transform(_degrees(ROW[:2]), lambda xy: np.column_stack(to_utm.transform(*xy.T)))
+    pairs = pairs_from_footprints(write([*utm, _degrees(ROW)[2]], crs="EPSG:32719", degrees=False))
+    assert len(pairs) == 1
+    (rejection,) = pairs.attrs["rejected"]
+    assert rejection.reasons == (
+        "coordinates -67.9498, -20.35 are degrees, the layer's coordinate reference system is in metres",
+    )
+
+
+def test_too_few_footprints_say_why(write):
+    swapped = shapely.transform(np.array([shapely.box(-99.1, 19.4, -99.0, 19.5)] * 2), np.fliplr)
+    with pytest.raises(
+        CatalogError, match=r"0 usable .*2 rejected, feature 1: coordinates 19.4, -99.1 lie .*swapped\?"
+    ):
+        pairs_from_footprints(write(swapped, degrees=False))
+
+
+def test_heights_that_are_none(write):
+    pairs = pairs_from_footprints(write(ROW[:3], height=["9", "nine", "-3"]))
+    assert pairs.empty
+    reasons = [one.reasons for one in pairs.attrs["rejected"]]
+    missing = "none of height_{0}, storeys_{0}, period_{0} is a number, one is needed"
+    assert reasons == [
+        ("height_2 = 'nine' is not a number", missing.format(2)),
+        ("height_1 = 'nine' is not a number", "height_2 = -3 m is outside 2 to 1000 m", missing.format(1)),
+    ]
+
+
 def test_whole_file_faults(write, tmp_path):
     faults = {
         "points, not footprints": write([shapely.Point(0, 0), shapely.Point(1, 1)], "points.gpkg", kind="Point"),
@@ -184,22 +215,62 @@ def test_whole_file_faults(write, tmp_path):
         "no two footprints lie within 3 m": write([ROW[0], ROW[3]], "far.gpkg"),
         "1 usable footprints make no pair": write(ROW[:1], "one.gpkg"),
         "no column height, storeys or period": write(ROW, "bare.gpkg", colour=["red"] * 4),
+        r"columns found: HEIGHT\), did you mean HEIGHT\?": write(ROW, "capitals.gpkg", HEIGHT=HEIGHTS),
         "split the layer": write([shapely.box(0, 0, 1, 1), shapely.box(9, 0, 10, 1)], "wide.gpkg", degrees=False),
         "no such file": tmp_path / "absent.gpkg",
         "unknown suffix '.dwg'": tmp_path / "plan.dwg",
     }
     (tmp_path / "nowhere.prj").unlink()
+    (tmp_path / "plan.dwg").touch()
     for message, path in faults.items():
         with pytest.raises(CatalogError, match=message) as error:
             pairs_from_footprints(path)
         assert str(error.value).startswith(f"{path}: ")
 
 
-def test_text_files_and_damaged_files(tmp_path):
-    for name in ("town.gpkg", "town.geojson", "town.parquet"):
-        (tmp_path / name).write_text("Dear colleague,\n")
-        with pytest.raises(CatalogError, match=r"cannot be read|not a Parquet table"):
-            pairs_from_footprints(tmp_path / name)
+KINDS = {
+    "town.gpkg": "GeoPackage",
+    "town.geojson": "GeoJSON file",
+    "town.shp": "Shapefile",
+    "town.fgb": "FlatGeobuf file",
+    "town.parquet": "Parquet table",
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [(b"Dear colleague,\n", ": "), (b"%PDF-1.4\n", ": it is a PDF document$"), (b"", ": it is an empty file$")],
+)
+def test_files_of_another_kind(tmp_path, name, content, reason):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(CatalogError, match=f"{name}: not a {KINDS[name]}{reason}"):
+        pairs_from_footprints(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["town.gpkg", "town.geojson"])
+def test_files_that_were_cut(write, name):
+    path = write(ROW, name)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(CatalogError, match=f"{name}: not a Geo") as error:
+        pairs_from_footprints(path)
+    assert "\n" not in str(error.value)
+
+
+def test_damaged_geoparquet(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet", ROW)
+    content = path.read_bytes()
+    path.write_bytes(content[:100] + bytes(400) + content[500:])
+    with pytest.raises(CatalogError, match=r"town\.parquet: not a Parquet table"):
+        pairs_from_footprints(path)
+
+
+@pytest.mark.parametrize("geo", ["{", "{}", "[]", '{"primary_column": "x", "columns": {"x": {"encoding": "WKB"}}}'])
+def test_wrong_geoparquet_metadata(tmp_path, geo):
+    table = pa.table({"height": HEIGHTS}).replace_schema_metadata({"geo": geo})
+    pa.parquet.write_table(table, tmp_path / "town.parquet")
+    with pytest.raises(CatalogError, match="wrong GeoParquet metadata"):
+        pairs_from_footprints(tmp_path / "town.parquet")
 
 
 def test_a_parquet_table_of_pairs_is_no_layer(tmp_path):
@@ -225,7 +296,7 @@ def test_several_layers_need_a_name(write):
     assert len(pairs_from_footprints(path, layer="new_town")) == 1
 
 
-@pytest.mark.parametrize("distance", [0.0, -1.0, np.nan])
+@pytest.mark.parametrize("distance", [0.0, -1.0, np.nan, 3000.0])
 def test_bad_distance(write, distance):
     with pytest.raises(ValueError, match="distance"):
         pairs_from_footprints(write(ROW), distance)

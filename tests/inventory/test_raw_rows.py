@@ -58,6 +58,31 @@ def test_chunks_hold_what_the_whole_file_holds(csv, size):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("size", [1, 2, 100])
+def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, size):
+    # the reader takes everything up to the next mark, or to the end, for one cell
+    path = tmp_path / "pairs.csv"
+    rows = [_row("a"), "short,1", _row("b", note='"it says'), _row("c"), _row("d", note='so"'), "short too", _row("e")]
+    path.write_text("\n".join([HEADER, *rows, _row("f", zone='"3'), _row("g"), ""]))
+    table, rejected = _in_chunks([path], size)
+    assert table["pair_id"].tolist() == ["a", "e"]
+    reason = "{} has a line break: is a quotation mark not closed? {} further lines are lost"
+    assert [(one.name, one.row, *one.reasons) for one in rejected] == [
+        ("short", 3, "2 columns, the header has 10"),
+        ("b", 4, reason.format("note", 2)),
+        ("short too", 7, "1 columns, the header has 10"),
+        ("f", 9, reason.format("zone", 2)),
+    ]
+
+
+def test_a_quotation_mark_inside_a_cell_is_text(tmp_path):
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, _row("a", note='a 5" wall'), _row("b")]))
+    table, rejected = _in_chunks([path], 100)
+    assert table["note"].tolist() == ['a 5" wall', "shop"]
+    assert rejected == []
+
+
 @pytest.mark.parametrize("size", [1, 3, 100])
 def test_parquet_in_chunks(csv, tmp_path, size):
     whole = read_pairs(csv)

@@ -84,7 +84,7 @@ def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("content", "name", "message"),
     [
-        (b"", "pairs.csv", "Empty CSV file"),
+        (b"", "pairs.csv", "not a CSV table: it is an empty file"),
         (f"{HEADER}\n", "pairs.csv", "the table has no rows"),
         (f"{HEADER}\n\n\n", "pairs.csv", "the table has no rows"),
         (f"{HEADER.replace('gap,', '')}\n{GOOD.replace('0.05,', '')}\n", "pairs.csv", "missing column gap "),
@@ -93,7 +93,7 @@ def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
             "pairs.csv",
             "missing column height_2 or storeys_2 or period_2 ",
         ),
-        (f"{HEADER}\n{GOOD}\n".replace(",", ";"), "pairs.csv", r"missing column pair_id.*columns found: pair_id;gap"),
+        (f"{HEADER}\n{GOOD}\n".replace(",", ";"), "pairs.csv", "columns are separated by semicolons, commas are"),
         (f"{HEADER},gap\n{GOOD},0.1\n", "pairs.csv", "column gap stands more than once"),
         (f"{HEADER}\n{GOOD.replace('shop', 'café')}\n".encode("latin-1"), "pairs.csv",
          "line 2 is not UTF-8 .byte 0xe9 at position 57"),
@@ -101,6 +101,13 @@ def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
         (f"{HEADER}é\n{GOOD}\n".encode("latin-1"), "pairs.csv", "line 1 is not UTF-8"),
         (b"PAR1 no, it is not", "pairs.parquet", "not a Parquet table"),
         (b"", "pairs.parquet", "not a Parquet table"),
+        (f"{HEADER}\n{GOOD}\n".replace(",", "\t"), "pairs.csv", "columns are separated by tabulators, commas are exp"),
+        (f"{HEADER.upper()}\n{GOOD}\n", "pairs.csv", r"missing column pair_id, .*, did you mean PAIR_ID\?$"),
+        (b"%PDF-1.4\n%\xe2\xe3\n", "pairs.csv", "not a CSV table: it is a PDF document"),
+        (b"%PDF-1.4\n", "pairs.parquet", "not a Parquet table: it is a PDF document"),
+        (b"PK\x03\x04" + bytes(range(256)), "pairs.csv", "it is a ZIP archive, as Excel workbooks are"),
+        (bytes(100), "pairs.csv", "not a CSV table: it holds zero bytes"),
+        (f"{HEADER}\n{GOOD}".encode() + b"\xc3", "pairs.csv", "line 2 is not UTF-8"),
         (b"x", "pairs.xlsx", r"unknown suffix '.xlsx', expected .csv or .parquet"),
     ],
 )  # fmt: skip
@@ -110,6 +117,21 @@ def test_files_that_are_wrong_as_a_whole(write, content, name, message):
         read_pairs(path)
     assert str(error.value).startswith(f"{path}: ")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("damage", ["cut", "zeroed"])
+def test_a_damaged_parquet_table(write, tmp_path, damage):
+    read_pairs(write(f"{HEADER}\n{GOOD}\n")).to_parquet(tmp_path / "whole.parquet")
+    whole = (tmp_path / "whole.parquet").read_bytes()
+    damaged = {"cut": whole[: len(whole) // 2], "zeroed": whole[:40] + bytes(300) + whole[340:]}[damage]
+    with pytest.raises(CatalogError, match=r"damaged\.parquet: not a Parquet table"):
+        read_pairs(write(damaged, "damaged.parquet"))
+
+
+def test_a_table_of_broken_lines_alone_says_so_line_by_line(write):
+    pairs = read_pairs(write(f"{HEADER}\n{GOOD.replace('corner', chr(34) + 'corner')}\n008,0.1\n"))
+    assert pairs.empty
+    assert [one.row for one in pairs.attrs["rejected"]] == [2]
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -63,3 +63,22 @@ def test_own_ground_out_of_reach_falls_back_on_the_nearest_station():
     names, _, rejected = _assigned(["rock"], _stations("lakebed", "rock"), reach=1e3)
     assert names == []
     assert "nearest station NEAR is 1112 m away" in rejected[0].reasons[0]
+
+
+def test_coordinates_that_would_reach_a_station_if_exchanged_are_suspected():
+    # three pairs out of reach: swapped, far anyway, and with a longitude that can be no latitude
+    pairs = pd.DataFrame({"pair_id": ["s", "f", "w"], "longitude": [45.07, 7.0, 145.0], "latitude": [7.68, 10.0, 7.68]})
+    turin = Stations(
+        np.array(["NEAR"], dtype=object),
+        np.array([7.68]),
+        np.array([45.08]),
+        np.array([""], dtype=object),
+        lambda _: None,
+    )
+    table, rejected = assigned(pairs, turin, 20e3)
+    assert table.empty
+    swapped, far, wide = (one.reasons[0] for one in rejected)
+    hint = "with longitude = 45.07 and latitude = 7.68 exchanged, NEAR would be 1112 m away: are they swapped?"
+    assert swapped.endswith(f"beyond 20000 m; {hint}")
+    assert far.endswith("beyond 20000 m")
+    assert wide.endswith("beyond 20000 m")

@@ -38,6 +38,17 @@ def test_the_exact_demand_is_the_gap_at_which_impacts_begin(station):
     assert table.loc["P1", "impacts"] >= 1
 
 
+def test_the_estimate_beside_the_exact_demand_is_the_largest(station):
+    # Mutations: the ratio upside down; the exact demand in the place of the estimate; SRSS for given periods.
+    equal = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
+    table = _table(station, equal, {"period_2": 0.7}, {"period_2": 1.5}).sort_index()
+    largest = np.maximum(table["critical_gap_per"], table["critical_gap_record"])
+    assert_allclose(table["demand_estimated"], largest)
+    assert set(table["estimate_rule"]) <= {"per_white_noise", "per_record"}
+    assert np.isnan(table["estimate_over_exact"].iloc[0])  # equal buildings need no gap
+    assert_allclose(table["estimate_over_exact"][1:] * table["demand_exact"][1:], table["demand_estimated"][1:])
+
+
 def test_radii_are_computed_at_the_pairs_own_period_damping_and_azimuth(station):
     # would catch: values read off the stored grid, buildings exchanged
     table = _table(station, {"period_1": 0.777, "damping_1": 0.031, "period_2": 1.234, "damping_2": 0.07})

@@ -1,0 +1,117 @@
+"""
+Time and memory of the whole command as inventories grow.
+
+Run: ``python tests/benchmarks/screening.py [PAIRS...]``, 10 000 to 1 000 000 if none are given; Linux. The pairs stand
+around the 24 simulated stations of the demonstration, whose records are made first. Each inventory is screened with
+estimates only, and with the exact demand and history of every pair. Seconds are by the clock, of screening, of ranking
+and report, and of the whole command from its start; processor time is that of all processes; memory is the largest sum
+over all processes (proportional set size: what they share counts once).
+"""
+
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from per_obspy.config import Simulation, load
+from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.spectra.storage import read_spectra
+
+SIZES = (10_000, 100_000, 1_000_000)
+TOGETHER = 250_000
+SCENARIO = Path(__file__).parents[2] / "catalogs" / "demo" / "scenario.toml"
+
+RECORDS = f'''
+name = "Benchmark"
+output = "output"
+simulation = "{SCENARIO}"
+'''
+PAIRS = """
+[pairs]
+file = "pairs.parquet"
+[screening]
+exact = {exact}
+"""
+HEADER = f"{'pairs':>10} {'way':9} {'screening':>9} {'report':>7} {'whole':>7} {'processors':>10} {'memory':>9} a pair"
+
+
+def write_inventory(path: Path, count: int, stations: Path) -> None:
+    """Write so many pairs around the stations, a part at a time."""
+    shards = [read_spectra(shard) for shard in sorted(stations.glob("*.nc"))]
+    longitude, latitude = (np.array([one[name].item() for one in shards]) for name in ("longitude", "latitude"))
+    wanted = load(SCENARIO, Simulation).pairs
+    writer = None
+    for seed, first in enumerate(range(0, count, TOGETHER)):
+        settings = wanted.model_copy(update={"count": min(TOGETHER, count - first), "seed": seed})
+        table = simulated_pairs(longitude, latitude, **settings.model_dump())
+        rows = pa.Table.from_pandas(table.assign(pair_id=f"{seed}-" + table["pair_id"]), preserve_index=False)
+        writer = writer or pq.ParquetWriter(path, rows.schema)
+        writer.write_table(rows)
+    assert writer is not None
+    writer.close()
+
+
+def memory(process: int) -> int:
+    """Return the memory of a process and its descendants, bytes; 0 for those that have ended meanwhile."""
+    try:
+        rollup = Path(f"/proc/{process}/smaps_rollup").read_text()
+        own = next(int(line.split()[1]) * 1024 for line in rollup.splitlines() if line.startswith("Pss:"))
+        children = [one.read_text().split() for one in Path(f"/proc/{process}/task").glob("*/children")]
+    except OSError:
+        return 0
+    return own + sum(memory(int(child)) for some in children for child in some)
+
+
+def measured(configuration: Path) -> dict[str, float]:
+    """Run the command and return its seconds, by the clock and of the processors, and its memory in bytes."""
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    command = [sys.executable, "-m", "per_obspy", "run", str(configuration)]
+    said = configuration.with_suffix(".log")
+    with said.open("w") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log)
+    most = 0
+    while process.poll() is None:
+        most = max(most, memory(process.pid))
+        time.sleep(0.2)
+    whole, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert process.returncode == 0, said.read_text()
+    processors = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"whole": whole, "processors": processors, "memory": most}
+
+
+def main(sizes: list[int]) -> None:
+    """Print a row for every inventory and way."""
+    with tempfile.TemporaryDirectory() as room:
+        folder = Path(room)
+        output, pairs, configuration = (folder / name for name in ("output", "pairs.parquet", "run.toml"))
+        configuration.write_text(RECORDS)
+        measured(configuration)  # makes the records and their spectra
+        print(HEADER)
+        for count in sizes:
+            write_inventory(pairs, count, output / "stations")
+            for exact in ("false", "true"):
+                shutil.rmtree(output / "chunks")
+                configuration.write_text(RECORDS + PAIRS.format(exact=exact))
+                found = measured(configuration)
+                seconds = json.loads((output / "run.json").read_text())["seconds"]
+                print(_row(count, exact, seconds, found), flush=True)
+
+
+def _row(count: int, exact: str, seconds: dict[str, float], found: dict[str, float]) -> str:
+    way, each = "exact" if exact == "true" else "estimates", found["processors"] / count * 1e6
+    return (
+        f"{count:10} {way:9} {seconds['screening']:7.1f} s {seconds['report']:5.1f} s {found['whole']:5.1f} s"
+        f" {found['processors']:8.1f} s {found['memory'] / 1e6:6.0f} MB {each:4.0f} us"
+    )
+
+
+if __name__ == "__main__":
+    main([int(one) for one in sys.argv[1:]] or list(SIZES))
