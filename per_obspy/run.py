@@ -27,6 +27,7 @@ from per_obspy.provenance import Result, earlier_record, file_hashes, held, now,
 from per_obspy.records.fdsn import Fetched
 from per_obspy.records.sources import fetched_records, input_files
 from per_obspy.screening.warmup import compile_screening
+from per_obspy.stages.inputs import check_inputs
 from per_obspy.stages.report import reported, require_extras
 from per_obspy.stages.screening import screened
 from per_obspy.stages.stations import content_hash, finished_stations, station_jobs, stations_of_earlier_run
@@ -76,6 +77,7 @@ def run(
         head = _head(settings, configuration, fetched)
         if known := earlier_record(folder / RECORD, head["key"]):
             return Result(folder, known, did_nothing=True)
+        check_inputs(settings)
         (folder / RECORD).unlink(missing_ok=True)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
@@ -104,6 +106,7 @@ def screen(
     folder = (output or settings.output).resolve()
     with held(folder):
         done = stations_of_earlier_run(folder)
+        check_inputs(settings)
         (folder / RECORD).unlink(missing_ok=True)
         started = now()
         head = _head(settings, configuration, None) | {"key": f"screening of stations as they were at {started}"}

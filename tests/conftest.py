@@ -1,10 +1,13 @@
 """What several test modules share: where the real records are."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from per_obspy import cli
 
 # The first example of a test may compile a kernel, which takes seconds. In CI every run tries the same examples, so
 # that a change is judged by itself; elsewhere each run tries new ones.
@@ -21,3 +24,19 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real records are not at {folder}: set PER_OBSPY_DATA")
     return folder
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Return exit code, output and errors of ``per-obspy`` with these arguments; a traceback is no answer."""
+
+    def called(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        code = stop.value.code
+        return (code if isinstance(code, int) else 0), out, err
+
+    return called

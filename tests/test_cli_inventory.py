@@ -8,27 +8,11 @@ import pyogrio
 import pytest
 import shapely
 
-from per_obspy import cli
 from per_obspy.inventory.reading import read_pairs
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap"
 ROW = "a,0.3,0.0,10,0.3001,0.0,12,0.05"
 BAD_ROW = "b,0.3,0.0,10,0.3001,0.0,12,50"
-
-
-@pytest.fixture
-def call(monkeypatch, capsys):
-    """Exit code, output and errors of ``per-obspy`` with these arguments."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return stop.value.code or 0, out, err
-
-    return call
 
 
 @pytest.fixture
@@ -92,9 +76,16 @@ def test_wrong_footprints_stop_with_one_line(call, tmp_path):
 def test_check_prints_what_a_table_gives_and_what_is_wrong(call, table):
     code, out, _ = call("pairs", "check", table)
     assert code == 0
-    assert "1 usable pairs, 1 rejected rows" in out
+    assert "1 usable pairs, 0 of them touching, 1 rejected rows" in out
+    assert "period_1 (1)" in out.partition("Derived or assumed instead (rows): ")[2]
     assert "line 3, b: gap = 50" in out
     assert "height_1" in out
+
+
+def test_many_rejected_rows_are_counted_by_fault(call, table):
+    table.write_text("\n".join([HEADER, ROW, *(f"x{i}{BAD_ROW[1:]}" for i in range(12))]))
+    _, out, _ = call("pairs", "check", table)
+    assert "and 2 more; rows by fault: gap (12)" in out
 
 
 def test_check_as_json(call, table):
@@ -102,6 +93,7 @@ def test_check_as_json(call, table):
     said = json.loads(out)
     assert code == 0
     assert said["pairs"] == 1
+    assert said["derived"]["period_1"] == 1
     assert said["rejected"][0]["name"] == "b"
     assert {row["column"]: row["largest"] for row in said["columns"]}["height_2"] == 12.0
 

@@ -1,7 +1,6 @@
 """``per-obspy events``, ``fetch``, ``info`` and a run whose records come from a service on loopback."""
 
 import json
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
@@ -11,7 +10,6 @@ import pandas as pd
 import pytest
 from fdsn_server import FdsnServer, serving, status
 
-from per_obspy import cli
 from per_obspy.config import Scenario
 from per_obspy.records.simulated import Simulation, simulate, write_simulation
 from per_obspy.run import run
@@ -64,21 +62,6 @@ def configuration(server: FdsnServer, tmp_path: Path) -> Path:
     file = tmp_path / "run.toml"
     file.write_text(CONFIGURATION.format(url=server.url))
     return file
-
-
-@pytest.fixture
-def call(monkeypatch, capsys):
-    """Return exit code, output and errors of ``per-obspy`` with these arguments."""
-
-    def called(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return stop.value.code or 0, out, err
-
-    return called
 
 
 def test_a_run_fetches_its_records_once_and_works_without_the_network_after(server, configuration, call):

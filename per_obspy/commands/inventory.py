@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from per_obspy.commands.printing import print_table
-from per_obspy.errors import require_extra
+from per_obspy.errors import CatalogError, require_extra
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,33 +92,54 @@ def check_pairs(
 
     Example: per-obspy pairs check pairs.csv
     """
-    from per_obspy.inventory.profile import inventory_profile
+    from per_obspy.inventory.profile import derived_counts, inventory_profile, suspicions, unused_columns
     from per_obspy.inventory.reading import read_pairs
 
     table = read_pairs(file)
     rejected = table.attrs["rejected"]
     profile = inventory_profile(table)
+    touching = int((table["gap"] == 0.0).sum())
+    derived, unused, odd = derived_counts(table), unused_columns(table), suspicions(table)
     if as_json:
         columns = json.loads(profile.to_json(orient="records"))
         faults = [one._asdict() for one in rejected]
-        print(json.dumps({"pairs": len(table), "rejected": faults, "columns": columns}))
+        known = {"pairs": len(table), "touching": touching, "rejected": faults, "columns": columns}
+        print(json.dumps({**known, "derived": derived, "unused": unused, "suspicions": odd}))
     else:
-        _print_profile(file, len(table), rejected, profile)
+        print(f"{file}: {len(table)} usable pairs, {touching} of them touching, {len(rejected)} rejected rows")
+        _print_rejected(rejected)
+        if not table.empty:
+            _print_profile(profile, derived, unused, odd)
     if table.empty:
         print(f"no usable row in {file}", file=sys.stderr)
         raise typer.Exit(NOTHING_USABLE)
 
 
-def _print_profile(file: Path, count: int, rejected: "Sequence[Rejection]", profile: "pd.DataFrame") -> None:
-    print(f"{file}: {count} usable pairs, {len(rejected)} rejected rows")
+def _print_rejected(rejected: "Sequence[Rejection]") -> None:
+    """Print the first rejected rows, and where there are more, how many were rejected for what."""
+    from per_obspy.inventory.profile import faults_by_column
+
     for one in rejected[:SHOWN]:
         print(f"  line {one.row}, {one.name}: {'; '.join(one.reasons)}")
     if len(rejected) > SHOWN:
-        print(f"  and {len(rejected) - SHOWN} more")
-    # the commonest of many numbers says nothing
+        counts = ", ".join(f"{fault} ({count})" for fault, count in faults_by_column(rejected).items())
+        print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
+
+
+def _print_profile(profile: "pd.DataFrame", derived: dict[str, int], unused: list[str], suspicions: list[str]) -> None:
+    # the commonest of many numbers says nothing, and a place needs more than three digits
     described = profile.assign(most_frequent=profile["most_frequent"].where(profile["median"].isna(), ""))
+    for name in ("smallest", "median", "largest"):
+        degrees = described["column"].str.match("longitude|latitude")
+        described[name] = described[name].astype(object).mask(degrees, described[name].map("{:.5f}".format))
     titles = [str(name).replace("_", " ") for name in profile.columns]
     print_table("What it gives", titles, described.itertuples(index=False))
+    if derived:
+        print("Derived or assumed instead (rows):", ", ".join(f"{name} ({rows})" for name, rows in derived.items()))
+    if unused:
+        print("Unknown columns, carried along unchanged:", "; ".join(unused))
+    for one in suspicions:
+        print("Suspicious:", one)
 
 
 @catalog.command("add")
@@ -188,6 +209,8 @@ def find(
 
     try:
         found = find_inventories(index, Box(*bbox))
+    except CatalogError:  # a ValueError as well, but of the index
+        raise
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--bbox") from error
     _print_inventories(found, as_json)

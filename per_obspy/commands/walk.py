@@ -99,7 +99,9 @@ def spectra(
     longest: Annotated[float, typer.Option(help="Longest period, s.")] = 10.0,
     count: Annotated[int, typer.Option(help="Number of periods.")] = 100,
     plot: Annotated[bool, typer.Option("--plot", help="Draw spectra and state space of every station.")] = False,
-    plot_period: Annotated[float, typer.Option(help="Of the oscillator in the state-space figure, s.")] = 1.0,
+    plot_period: Annotated[
+        float, typer.Option(min=0.01, max=100.0, help="Of the oscillator in the state-space figure, s.")
+    ] = 1.0,
     as_json: AsJson = False,
 ) -> None:
     """

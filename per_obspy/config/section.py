@@ -127,14 +127,21 @@ def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
 
 def _fault(fault: ErrorDetails, section: type[Section]) -> str:
     """Return one fault of a configuration: key, what is wrong, value, and what is expected."""
-    key = ".".join(map(str, fault["loc"])) or "the file"
+    key = ".".join(map(str, fault["loc"]))
+    said = f"{key}: " if key else ""
     given = "" if fault["type"] in {"missing", "value_error"} else f" (got {fault['input']!r:.60})"
     fields, name = _fields_at(section, fault["loc"])
     if fault["type"] == "extra_forbidden":
-        return f"{key}: unknown key{given}{did_you_mean(name, fields)}"
+        return f"{said}unknown key{given}{_place_of(name, fields) or did_you_mean(name, fields)}"
     meaning = fields[name].description if name in fields else None
     expected = f", expected: {meaning}" if meaning and given else ""
-    return f"{key}: {fault['msg'].removeprefix('Value error, ')}{given}{expected}"
+    return f"{said}{fault['msg'].removeprefix('Value error, ')}{given}{expected}"
+
+
+def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
+    """Return to which section beside it a key belongs, empty if to none."""
+    inside = (name for name, field in fields.items() for one in _sections(field.annotation) if key in one.model_fields)
+    return next((f", it belongs to [{name}]" for name in inside), "")
 
 
 def _fields_at(section: type[Section], keys: Sequence[str | int]) -> tuple[dict[str, FieldInfo], str]:

@@ -7,6 +7,7 @@ stand twice), then block by block.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -104,7 +105,15 @@ class CsvFile:
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise CatalogError(str(file), f"column {twice} stands more than once")
-        self._kinds = self._kinds_of_carried()
+
+    @cached_property
+    def _kinds(self) -> dict[str, pa.DataType | None]:
+        """What kind of number each column is that the schema does not know; None for text."""
+        kinds: dict[str, list[pa.DataType]] = {n: [pa.int64(), pa.float64()] for n in self.names if n not in COLUMNS}
+        for batch in self._batches([], *kinds) if kinds else ():
+            for name, cells in zip(kinds, batch.columns, strict=True):
+                kinds[name] = [kind for kind in kinds[name] if _as_numbers(cells, kind) is not None]
+        return {name: possible[0] if possible else None for name, possible in kinds.items()}
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Give the names of the pairs, block by block."""
@@ -143,14 +152,6 @@ class CsvFile:
         if name in COLUMNS:
             return cells if COLUMNS[name].dtype == "str" else _as_numbers(cells, pa.float64()) or cells
         return cells if self._kinds[name] is None else _as_numbers(cells, self._kinds[name])
-
-    def _kinds_of_carried(self) -> dict[str, pa.DataType | None]:
-        """Return what kind of number each column is that the schema does not know; None for text."""
-        kinds: dict[str, list[pa.DataType]] = {n: [pa.int64(), pa.float64()] for n in self.names if n not in COLUMNS}
-        for batch in self._batches([], *kinds) if kinds else ():
-            for name, cells in zip(kinds, batch.columns, strict=True):
-                kinds[name] = [kind for kind in kinds[name] if _as_numbers(cells, kind) is not None]
-        return {name: possible[0] if possible else None for name, possible in kinds.items()}
 
     def _batches(self, broken: list[Rejection], *names: str) -> Iterator[pa.RecordBatch]:
         """Give some columns as text, and add lines that are no rows to a list as they are met."""

@@ -55,7 +55,7 @@ def open_file(path: Path) -> BinaryIO:
     try:
         return path.open("rb") if archive is None else _member(archive, path.relative_to(archive).as_posix())
     except _DAMAGES as error:
-        raise RecordRejected(str(path), f"cannot be read: {error}") from error
+        raise RecordRejected(str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _member(archive: Path, name: str) -> BinaryIO:

@@ -51,6 +51,10 @@ class EventRow(NamedTuple):
     place: str
 
 
+#: What files of events are called; other sources that are no file are services.
+FILES = (".xml", ".quakeml", ".json", ".geojson")
+
+
 def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     """
     List earthquakes, the latest first.
@@ -74,6 +78,8 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         rows = _rows_of_file(Path(source))
     elif source.startswith(("http://", "https://")) and ".geojson" in source:
         rows = _rows_of_answer(source, _feed_rows, answer(web_pool(*_PATIENCE), source, {}))
+    elif Path(source).suffix.lower() in FILES and "://" not in source:
+        raise CatalogError(source, "no such file")
     else:
         url = f"{base_url(source)}/fdsnws/event/1/query"
         rows = _rows_of_answer(url, _text_rows, answer(web_pool(*_PATIENCE), url, {**query, "format": "text"}))

@@ -156,7 +156,7 @@ def _text(path: Path) -> str:
             content = file.read(LARGEST_FILE + 1)
         text = content.decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise CatalogError(str(path), f"cannot be read: {error}") from error
+        raise CatalogError(str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if len(content) > LARGEST_FILE:
         raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError
+from per_obspy.inventory.csv_text import check_separator, check_text
 
-#: Largest value that a spectrum may have: larger ones are in other units (cm/s2, mm).
-LARGEST = {"sd": 20.0, "psa": 200.0}
+#: Largest value that a spectrum may have and its unit: larger ones are in other units (ms, per cent, mm, cm/s2).
+LARGEST = {"period": (100.0, "s"), "damping": (1.0 - 1e-9, "of critical"), "sd": (20.0, "m"), "psa": (200.0, "m/s2")}
+
+QUANTITIES = ("sd", "psa")
 
 
 class DesignSpectrum(NamedTuple):
@@ -45,8 +48,8 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
     ----------
     path : str or Path
         CSV with the columns ``period`` (s), ``damping`` (fraction of critical) and either ``sd`` (m) or ``psa``
-        (pseudo-acceleration, m/s2), one row a value; every damping has the same periods. Lines that start with # are
-        comments.
+        (pseudo-acceleration, m/s2), one row a value in any order; every damping has the same periods. Lines that start
+        with # are comments.
 
     Raises
     ------
@@ -57,12 +60,6 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
     table = _read(source)
     quantity = _quantity(table, source)
     values = {name: _positive(table, name, source) for name in ("period", "damping", quantity)}
-    too_much = values[quantity] > LARGEST[quantity]
-    if too_much.any():
-        unit = {"sd": "m", "psa": "m/s2"}[quantity]
-        raise CatalogError(source, f"{quantity} = {values[quantity][too_much][0]:g} {unit}: in other units?")
-    if (values["damping"] >= 1.0).any():
-        raise CatalogError(source, f"damping = {values['damping'].max():g}: a fraction of critical is expected")
     grid = pd.DataFrame(values)
     if grid.duplicated(["period", "damping"]).any():
         first = grid[grid.duplicated(["period", "damping"])].iloc[0]
@@ -77,14 +74,19 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
 
 def _read(source: str) -> pd.DataFrame:
     try:
-        return pd.read_csv(source, comment="#", skipinitialspace=True)
-    except (OSError, UnicodeDecodeError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+        check_text(Path(source))
+        table = pd.read_csv(source, comment="#", skipinitialspace=True)
+    except OSError as error:
+        raise CatalogError(source, f"cannot be read as CSV: {error.strerror}") from error
+    except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise CatalogError(source, f"cannot be read as CSV: {error}") from error
+    check_separator(Path(source), list(map(str, table.columns)))
+    return table
 
 
 def _quantity(table: pd.DataFrame, source: str) -> str:
     """Return which of the two quantities the table gives."""
-    given = [name for name in LARGEST if name in table]
+    given = [name for name in QUANTITIES if name in table]
     missing = [name for name in ("period", "damping") if name not in table]
     if missing or len(given) != 1:
         columns = ", ".join(map(str, table.columns))
@@ -93,11 +95,15 @@ def _quantity(table: pd.DataFrame, source: str) -> str:
 
 
 def _positive(table: pd.DataFrame, name: str, source: str) -> FloatArray:
+    """Return a column of plausible numbers above zero; rows are counted without the header and comments."""
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64)
-    bad = ~(np.isfinite(values) & (values > 0.0))
-    if bad.any() or not values.size:
-        given = table[name].iloc[int(np.argmax(bad))] if values.size else "no row"
-        raise CatalogError(source, f"{name} must be a positive number, got {given}")
+    if not values.size:
+        raise CatalogError(source, "has no row")
+    largest, unit = LARGEST[name]
+    for bad, reason in ((~(values > 0.0), "must be a positive number"), (values > largest, "in other units?")):
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise CatalogError(source, f"{name} = {table[name].iloc[row]} {unit} in row {row + 1}: {reason}")
     return values
 
 

@@ -15,7 +15,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.pounding.directional import directional_correlation
 from per_obspy.screening.values import Table, both, components
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
-from per_obspy.spectra.elastic import azimuth_maxima
+from per_obspy.spectra.maxima import azimuth_maxima
 
 #: Every degree of the half circle; radii repeat after 180 degrees.
 EVERY_AZIMUTH = np.arange(180.0)

@@ -6,15 +6,18 @@ filled up with zeros to whole tiles. Results do not depend on the number of thre
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels import blocks
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
 
 #: Steps of all oscillators together below which starting threads costs more than it saves.
 STEPS_WORTH_THREADS = 20_000_000
@@ -110,13 +113,17 @@ def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> 
 def over_blocks(work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, ground: Ground) -> FloatArray:
     """Return the rows that the work gives for each block of oscillators, (rows, n); in threads where that pays."""
     parts = [_block(oscillators, first) for first in range(0, oscillators.wanted, blocks.LANES)]
-    threads = min(len(parts), len(os.sched_getaffinity(0)))
-    if threads == 1 or oscillators.wanted * ground.north.size < STEPS_WORTH_THREADS:
-        rows = [work(part) for part in parts]
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            rows = list(pool.map(work, parts))
+    rows = in_threads(work, parts, oscillators.wanted * ground.north.size)
     return np.concatenate(rows, axis=1)[:, : oscillators.wanted]
+
+
+def in_threads(work: Callable[[Part], Result], parts: Sequence[Part], steps: int) -> list[Result]:
+    """Return what the work gives for each part, in threads where that many steps of all oscillators are worth them."""
+    threads = min(len(parts), len(os.sched_getaffinity(0)))
+    if threads == 1 or steps < STEPS_WORTH_THREADS:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
 
 
 def _block(oscillators: Oscillators, first: int) -> Oscillators:

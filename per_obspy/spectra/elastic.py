@@ -154,61 +154,6 @@ def sampled_response_spectra(
     return _spectra(_responses(prepare_ground(record), oscillators, exact=False), oscillators, shape)
 
 
-class OscillatorMaxima(NamedTuple):
-    """Largest radius and largest displacement of each oscillator, (n,), m."""
-
-    per: FloatArray
-    sd: FloatArray
-
-
-def oscillator_maxima(acceleration: ArrayLike, dt: float, periods: ArrayLike, dampings: ArrayLike) -> OscillatorMaxima:
-    """
-    Largest radius and displacement of many oscillators, each with its own period and damping.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) array_like
-        Ground acceleration, m/s², as for `per_spectrum`.
-    dt : float
-        Time between samples, s.
-    periods, dampings : array_like
-        Undamped periods, s, and fractions of critical, broadcast to the shape (n,).
-
-    Returns
-    -------
-    OscillatorMaxima
-        Two arrays (n,), m, exact between samples, with the free vibration after the record.
-    """
-    record = checks.record("acceleration", acceleration)
-    oscillators = _paired(dt, periods, dampings, None)
-    return OscillatorMaxima(*_responses(prepare_ground(record), oscillators, exact=True)[:2])
-
-
-def azimuth_maxima(
-    north: ArrayLike, east: ArrayLike, dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike
-) -> OscillatorMaxima:
-    """
-    Largest radius and displacement of many oscillators, each with its own period, damping and azimuth.
-
-    Parameters
-    ----------
-    north, east : (n_samples,) array_like
-        Components of the ground acceleration, m/s², as for `per_spectrum`.
-    dt : float
-        Time between samples, s.
-    periods, dampings, azimuths : array_like
-        Undamped periods, s, fractions of critical, and degrees clockwise from north, broadcast to the shape (n,).
-
-    Returns
-    -------
-    OscillatorMaxima
-        Two arrays (n,), m, exact between samples, with the free vibration after the record.
-    """
-    ground = prepare_ground(*two_components(north, east))
-    oscillators = _paired(dt, periods, dampings, azimuths)
-    return OscillatorMaxima(*_responses(ground, oscillators, exact=True)[:2])
-
-
 def _arguments(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike
 ) -> tuple[FloatArray, float, tuple[FloatArray, FloatArray], tuple[int, ...]]:
@@ -240,17 +185,6 @@ def row_of(name: str, values: FloatArray) -> FloatArray:
     if values.ndim != 1 or values.size == 0:
         raise ValueError(f"{name} must be one row of at least one value, got the shape {values.shape}")
     return values
-
-
-def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike | None) -> Oscillators:
-    dt = checks.number("dt", dt, checks.positive)
-    period, damping, azimuth = np.broadcast_arrays(
-        checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))),
-        checks.fraction_of_critical("dampings", dampings),
-        checks.finite("azimuths", 0.0 if azimuths is None else azimuths),
-    )
-    row_of("periods", period)
-    return prepare_oscillators(dt, period, damping, None if azimuths is None else azimuth)
 
 
 def _radius_block(ground: Ground, block: Oscillators, exact: bool) -> FloatArray:

@@ -9,7 +9,7 @@ import pandas as pd
 from per_obspy.chunks import StationFile
 from per_obspy.config import Pairs, Run, Simulation, load
 from per_obspy.config.simulation import SimulatedPairs
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.files import written_whole
 from per_obspy.inventory.catalogue import find_inventories, region_around, stored_inventories, verified_file
 from per_obspy.inventory.simulated import simulated_pairs
@@ -57,15 +57,27 @@ def _wanted(settings: Run) -> SimulatedPairs:
 def _stored(pairs: Pairs, catalog: Path, stations: Sequence[StationFile], reach: float) -> list[Path]:
     """Return the files of stored inventories, by name or by region, each compared with its hash."""
     if pairs.names:
-        entries = {one.name: one for one in stored_inventories(catalog)}
-        if unknown := [name for name in pairs.names if name not in entries]:
-            raise CatalogError(str(catalog), f"names: {unknown[0]!r} is not stored here")
-        return [verified_file(entries[name]) for name in pairs.names]
+        return named_files(pairs.names, catalog)
     region = region_around([one.longitude for one in stations], [one.latitude for one in stations], reach)
     found = find_inventories(catalog, region)
     if not found:
         raise CatalogError(str(catalog), "no stored inventory touches the region of the stations")
     return [verified_file(one) for one in found]
+
+
+def named_files(names: Sequence[str], catalog: Path) -> list[Path]:
+    """
+    Return the files of stored inventories, each compared with its hash.
+
+    Raises
+    ------
+    CatalogError
+        If a name is not stored or a file has changed.
+    """
+    entries = {one.name: one for one in stored_inventories(catalog)}
+    if unknown := [name for name in names if name not in entries]:
+        raise CatalogError(str(catalog), f"names: {unknown[0]!r} is not stored here{did_you_mean(unknown[0], entries)}")
+    return [verified_file(entries[name]) for name in names]
 
 
 def _simulated(wanted: SimulatedPairs, stations: Sequence[StationFile]) -> pd.DataFrame:

@@ -68,12 +68,8 @@ def screened(
     CatalogError
         If the inventory is wrong as a whole.
     """
-    maps = (
-        [one for one in (settings.records.shakemap, settings.records.shakemap_uncertainty) if one]
-        if settings.records
-        else []
-    )
-    ground, nowhere = ground_files(shards, tuple(maps), settings.screening.interpolation)
+    maps = _maps(settings)
+    ground, nowhere = ground_files(shards, maps, settings.screening.interpolation)
     parts = _parts(settings, folder, ground, executor, progress) if shards or maps else []
     kinds = write_rejected(chain(rejected, nowhere, rejections(parts)), folder / "rejected.csv")
     outputs, states = [folder / "rejected.csv"], Counter[str]()
@@ -89,6 +85,12 @@ def screened(
     return Screened(outputs, counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)})
 
 
+def _maps(settings: Run) -> tuple[Path, ...]:
+    """Return the files of the ShakeMap, none if there is no map."""
+    records = settings.records
+    return tuple(one for one in (records.shakemap, records.shakemap_uncertainty) if one) if records else ()
+
+
 def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
 ) -> list[Part]:
@@ -98,18 +100,20 @@ def _parts(
         raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
     progress("screening", 0, inventory.count)
     parts, rows = list[Part](), 0
-    for part in do_chunks(
-        _jobs(settings, folder, ground, inventory), settings.workers or os.cpu_count() or 1, executor
-    ):
+    jobs, workers = _jobs(settings, folder, ground, inventory), settings.workers or os.cpu_count() or 1
+    for part in do_chunks(jobs, workers, executor):
         parts.append(part)
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
-    for number in sorted(
-        {int(note.stem) for note in _chunk_folder(folder).glob("*.json")} - {one.number for one in parts}
-    ):
-        for suffix in (".json", ".parquet"):
-            (_chunk_folder(folder) / f"{number:06}{suffix}").unlink(missing_ok=True)
+    _remove_others(_chunk_folder(folder), parts)
     return sorted(parts, key=lambda part: part.number)
+
+
+def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
+    known = {part.number for part in parts}
+    for note in [one for one in folder.glob("*.json") if int(one.stem) not in known]:
+        note.with_suffix(".parquet").unlink(missing_ok=True)
+        note.unlink()
 
 
 def _jobs(settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory) -> Iterator[ChunkJob]:

@@ -64,24 +64,32 @@ def test_nothing_is_extrapolated(write):
 FAULTS = {
     "both quantities": ("period,damping,sd,psa\n1,0.05,0.1,3.9\n", "either sd or psa"),
     "no damping": ("period,sd\n1,0.1\n", "has period, sd"),
-    "text": ("period,damping,sd\n1,0.05,big\n", "sd must be a positive number, got big"),
-    "an empty cell": ("period,damping,sd\n1,0.05,\n", "sd must be a positive number, got nan"),
-    "a period of 0": ("period,damping,sd\n0,0.05,0.1\n", "period must be a positive number, got 0"),
-    "per cent": ("period,damping,sd\n1,5,0.1\n2,5,0.1\n", "damping = 5: a fraction of critical"),
-    "gal": ("period,damping,psa\n1,0.05,980\n2,0.05,500\n", "psa = 980 m/s2: in other units"),
-    "millimetres": ("period,damping,sd\n1,0.05,98\n2,0.05,98\n", "sd = 98 m: in other units"),
+    "text": ("period,damping,sd\n1,0.05,big\n", "sd = big m in row 1: must be a positive number"),
+    "an empty cell": ("period,damping,sd\n1,0.05,\n", "sd = nan m in row 1: must be a positive number"),
+    "a period of 0": ("period,damping,sd\n0,0.05,0.1\n", "period = 0 s in row 1: must be a positive number"),
+    "per cent": ("period,damping,sd\n1,5,0.1\n2,5,0.1\n", "damping = 5 of critical in row 1: in other units?"),
+    "gal": ("period,damping,psa\n1,0.05,980\n2,0.05,500\n", "psa = 980 m/s2 in row 1: in other units?"),
+    "millimetres": ("period,damping,sd\n1,0.05,98\n2,0.05,98\n", "sd = 98 m in row 1: in other units?"),
     "a row twice": ("period,damping,sd\n1,0.05,0.1\n1,0.05,0.2\n", "period = 1, damping = 0.05 stands twice"),
     "a hole": ("period,damping,sd\n1,0.05,0.1\n2,0.05,0.2\n1,0.02,0.1\n", "every damping needs the same periods"),
     "one period": ("period,damping,sd\n1,0.05,0.1\n", "at least two"),
-    "no row": ("period,damping,sd\n", "period must be a positive number, got no row"),
-    "nothing": ("", "cannot be read as CSV"),
+    "no row": ("period,damping,sd\n", "has no row"),
+    "a negative value": (
+        "period,damping,sd\n1,0.05,0.1\n2,0.05,-0.2\n",
+        "sd = -0.2 m in row 2: must be a positive number",
+    ),
+    "milliseconds": ("period,damping,sd\n100,0.05,0.1\n2000,0.05,0.2\n", "period = 2000 s in row 2: in other units?"),
+    "semicolons": ("period;damping;sd\n1;0,05;0,1\n", "columns are separated by semicolons"),
+    "a ragged row": ("period,damping,sd\n1,0.05,0.1\n2,0.05,0.2,3\n", "cannot be read as CSV: .*line 3"),
+    "a PDF document": ("%PDF-1.4\n", "not a CSV table: it is a PDF document"),
+    "nothing": ("", "not a CSV table: it is an empty file"),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_named(write, fault):
     text, said = FAULTS[fault]
-    with pytest.raises(CatalogError, match=r"spectrum\.csv: .*" + said.replace(".", r"\.")):
+    with pytest.raises(CatalogError, match=r"spectrum\.csv: .*" + said.replace("?", r"\?")):
         read_design_spectrum(write(text))
 
 

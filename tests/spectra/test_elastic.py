@@ -9,8 +9,6 @@ from scipy.signal import lsim
 
 from per_obspy.spectra import blocks
 from per_obspy.spectra.elastic import (
-    azimuth_maxima,
-    oscillator_maxima,
     per_spectrum,
     response_spectra,
     sampled_per_spectrum,
@@ -223,24 +221,6 @@ def test_threads_change_no_bit(noise, monkeypatch):
         assert_array_equal(threaded, once)
 
 
-def test_paired_oscillators_are_the_grid(noise):
-    dampings = np.array([0.02, 0.05, 0.1, 0.0, 0.3])
-    paired = oscillator_maxima(noise, DT, PERIODS, dampings)
-    spectra = response_spectra(noise, DT, PERIODS, dampings)
-    assert_array_equal(paired.per, np.diagonal(spectra.per))
-    assert_array_equal(paired.sd, np.diagonal(spectra.sd))
-
-
-def test_azimuths_superpose_before_the_maximum(noise):
-    # catches cos and sin exchanged, radians for degrees, and counter-clockwise azimuths
-    east = noise[::-1].copy()
-    azimuths = np.array([0.0, 90.0, 180.0, 30.0, -60.0])
-    ours = azimuth_maxima(noise, east, DT, 0.5, 0.05, azimuths)
-    for i, azimuth in enumerate(np.radians(azimuths)):
-        along = response_spectra(noise * np.cos(azimuth) + east * np.sin(azimuth), DT, [0.5])
-        assert_allclose([ours.per[i], ours.sd[i]], [along.per[0], along.sd[0]], rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
@@ -267,8 +247,3 @@ def test_wrong_arguments_are_named(changed, message):
     for function in (per_spectrum, response_spectra, sampled_per_spectrum, sampled_response_spectra):
         with pytest.raises(ValueError, match=message):
             function(**arguments)
-
-
-def test_components_of_different_length_are_refused():
-    with pytest.raises(ValueError, match="north and east must be equally long, got 2 and 3"):
-        azimuth_maxima([0.0, 1.0], [0.0, 1.0, 0.0], DT, 1.0, 0.05, 0.0)
