@@ -85,7 +85,7 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
     Parameters
     ----------
     attributes : DataFrame
-        As the layer has them, one row a footprint.
+        As the layer has them, one row a footprint; the index is the number of the feature.
     source : str
         The file, for messages.
 
@@ -118,7 +118,7 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
 
 def _identifiers(table: pd.DataFrame) -> pd.Series:
     """Return identifiers as text: whole numbers without a decimal point, and the feature's number where none is."""
-    numbers = pd.Series([f"feature {number}" for number in range(1, len(table) + 1)], index=table.index)
+    numbers = pd.Series([f"feature {number}" for number in table.index], index=table.index)
     if "building_id" not in table:
         return numbers
     given = table["building_id"]
