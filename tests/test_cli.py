@@ -52,9 +52,20 @@ def test_a_run_prints_the_worst_pairs_and_where_everything_is(call, configuratio
     code, out, err = call("run", configuration)
     assert code == 0
     assert "1 pairs" in out
+    assert "looked at" not in out
     assert "The 1 worst pairs" in out
     assert "risk.csv" in out
     assert "stations: 2 of 2" in err  # plain lines, because nobody watches
+
+
+def test_what_was_seen_is_compared(call, configuration):
+    (configuration.parent / "pairs.csv").write_text(f"{HEADER},observed\n{ROW},0\nb{ROW[1:-4]}0,1\nc{ROW[1:]},\n")
+    code, out, _ = call("run", configuration)
+    assert code == 0
+    # a touching pair pounds; the other has five times the gap that it needs
+    assert "2 pairs were looked at, 1 pounded: 100% of the pounded ones were told yes" in out
+    assert "0% of the others yes" in out
+    assert "figures/reliability.png" in out
 
 
 def test_json_is_for_machines(call, configuration):

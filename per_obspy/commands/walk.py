@@ -175,10 +175,25 @@ def _print_result(folder: Path, record: dict[str, Any], did_nothing: bool) -> No
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
         f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
     )
+    if "evaluation.json" in record["outputs"]:
+        _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
         _print_worst(folder / "risk.csv", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
+
+
+def _print_evaluation(found: dict[str, Any]) -> None:
+    """Print how the prediction did where somebody looked; nothing for a share of nothing."""
+    shares = {
+        "of the pounded ones were told yes": found["hit_rate"],
+        "yes or possible": found["hit_rate_with_possible"],
+        "of the others yes": found["false_alarm_rate"],
+    }
+    told = ", ".join(f"{value:.0%} {name}" for name, value in shares.items() if value is not None)
+    print(f"{found['pairs']} pairs were looked at, {found['pounded']} pounded: {told}")
+    if found["brier_score"] is not None:
+        print(f"Brier score {found['brier_score']:.3f}; the share alone {found['brier_score_of_the_share']:.3f}")
 
 
 def _print_worst(path: Path, count: int) -> None:

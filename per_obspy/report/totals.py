@@ -1,20 +1,17 @@
-"""What a region adds up to, as files: totals by area and, where pounding was observed, how the prediction did."""
+"""What a region adds up to, as files: totals by area."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
 from per_obspy.files import written_whole
 from per_obspy.report.ranked import ranked
-from per_obspy.screening.evaluation import evaluation
 from per_obspy.screening.outlines import box_outlines, hexagon_outlines, hexagons
 from per_obspy.screening.totals import grid_cells, joined_totals, partial_totals
 
@@ -78,18 +75,3 @@ def write_totals(table: pd.DataFrame, path: Path) -> None:
     """Write the totals as CSV."""
     with written_whole(path) as part:
         table.to_csv(part, index=False)
-
-
-def write_evaluation(risk: Path, path: Path) -> list[Path]:
-    """Compare the pairs that somebody looked at with the prediction, if there are any; return the file, if so."""
-    if "observed" not in pq.read_schema(risk).names:
-        return []
-    pieces = ranked(risk, ["observed", "state", "probability"])
-    seen = pd.concat([piece[piece["observed"].notna()] for piece in pieces], ignore_index=True)
-    if seen.empty:
-        return []
-    found = evaluation(seen)._asdict()
-    found["reliability"] = found["reliability"].to_dict("records")
-    with written_whole(path) as part:
-        part.write_text(json.dumps(found, indent=1, default=float), encoding="utf-8")
-    return [path]

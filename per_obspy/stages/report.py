@@ -9,9 +9,10 @@ import pyarrow.parquet as pq
 from per_obspy.config import Run
 from per_obspy.errors import require_extra
 from per_obspy.progress import Progress
+from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.figures import draw_overview, draw_walk
 from per_obspy.report.ranked import ranked
-from per_obspy.report.totals import RegionTotals, region_totals, write_evaluation, write_totals
+from per_obspy.report.totals import RegionTotals, region_totals, write_totals
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 #: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
@@ -57,7 +58,7 @@ def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Prog
         outputs += _figures(settings, risk, shards, folder) if shards else []
         totals = region_totals(risk, settings.totals)
         write_totals(totals.table, folder / "totals.csv")
-        outputs += [folder / "totals.csv", *write_evaluation(risk, folder / "evaluation.json")]
+        outputs += [folder / "totals.csv", *write_evaluation(risk, folder, settings.simulation is not None)]
         if settings.geopackage:
             outputs += _write_layers(settings, risk, totals, folder)
     progress("report", 1, 1)

@@ -1,0 +1,64 @@
+"""What is written of a prediction where somebody looked."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from per_obspy.report.evaluation import _draw_shares, write_evaluation
+from per_obspy.screening.evaluation import evaluation
+
+
+@pytest.fixture
+def risk(tmp_path):
+    """Write a risk table with these observations, and probabilities if there are any; return its path."""
+
+    def risk(observed, probability):
+        count = len(probability)
+        state = np.where(np.nan_to_num(probability) > 0.5, "yes", "no")
+        table = pd.DataFrame({"rank": range(1, count + 1), "state": state, "probability": probability})
+        table = table if observed is None else table.assign(observed=observed)
+        table.to_parquet(tmp_path / "risk.parquet")
+        return tmp_path / "risk.parquet"
+
+    return risk
+
+
+def test_only_pairs_that_were_looked_at_count(risk, tmp_path):
+    path = risk([1.0, np.nan, 0.0, 1.0], [0.9, 0.9, 0.1, 0.2])
+    files = write_evaluation(path, tmp_path, simulated=True)
+    assert [file.relative_to(tmp_path).as_posix() for file in files] == ["evaluation.json", "figures/reliability.png"]
+    told = json.loads(files[0].read_text())
+    assert (told["pairs"], told["pounded"], told["hit_rate"], told["false_alarm_rate"]) == (3, 2, 0.5, 0.0)
+    assert told["brier_score"] == pytest.approx((0.1**2 + 0.1**2 + 0.8**2) / 3)
+    assert sum(one["events"] for one in told["reliability"]) == 3
+    assert files[1].read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_share_of_nothing_is_null_and_the_file_is_json(risk, tmp_path):
+    # would catch NaN, which JSON does not know
+    (table,) = write_evaluation(risk([0.0, 0.0], [np.nan, np.nan]), tmp_path, simulated=False)
+    told = json.loads(table.read_text(), parse_constant=pytest.fail)
+    assert told["hit_rate"] is told["brier_score"] is None
+    assert told["reliability"] == []
+
+
+@pytest.mark.parametrize("observed", [None, [np.nan, np.nan]])
+def test_files_of_an_earlier_run_do_not_stay(risk, tmp_path, observed):
+    earlier = write_evaluation(risk([1.0, 0.0], [0.9, 0.1]), tmp_path, simulated=False)
+    assert write_evaluation(risk(observed, [0.9, 0.1]), tmp_path, simulated=False) == []
+    assert not any(file.exists() for file in earlier)
+
+
+def test_the_diagram_has_the_range_of_a_true_prediction():
+    # 100 fair coins: 40 to 60 heads in 19 of 20 tries; would catch a range about the observed share
+    observed = np.repeat([1.0, 0.0], [30, 70])
+    table = pd.DataFrame({"observed": observed, "state": "yes", "probability": 0.5})
+    axes = Figure().subplots()
+    _draw_shares(axes, evaluation(table))
+    (segment,) = axes.collections[0].get_segments()
+    assert segment[:, 0].tolist() == [0.5, 0.5]
+    assert segment[:, 1] == pytest.approx([0.4, 0.6])
+    assert axes.lines[-1].get_xydata().tolist() == [[0.5, 0.3]]
