@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
+from per_obspy.kernels.elementary import exponentials
 
 
 @kernel
@@ -28,11 +29,15 @@ def kriged(stations, trend, places, diameter, neighbours, out):
     nearest, chord = np.empty(neighbours, dtype=np.int64), np.empty(neighbours)
     across, weights, work = np.empty(neighbours), np.empty(neighbours), np.empty(neighbours)
     factor, unmatched = np.empty((neighbours, neighbours)), np.empty(trend[0].shape[1])
+    powers = np.empty(neighbours * (neighbours + 1) // 2)
+    integers = np.empty(powers.size, dtype=np.int64)
     for row in range(out.shape[0]):
         count = _nearest(position, known, vectors[row], periods[row], nearest, chord)
         if count == 0:
             continue
-        _correlate(between, nearest[:count], chord, diameter, lengths[row], factor, across)
+        _distances(between, nearest[:count], chord, diameter, -1.0 / lengths[row], powers)
+        exponentials(powers[: count * (count + 1) // 2], integers)
+        _correlations(powers, count, factor, across)
         _factorise(factor, count)
         left = max(1.0 - _solve(factor, across, count, work, weights), 0.0)
         median = variance = 0.0
@@ -78,13 +83,26 @@ def _nearest(position, known, vector, period, nearest, chord):
 
 
 @kernel
-def _correlate(between, nearest, chord, diameter, length, factor, across):
-    """Fill the correlations between the stations (lower triangle) and with the place."""
+def _distances(between, nearest, chord, diameter, scale, powers):
+    """Fill the distances of the place from each station, then those between stations, each times a scale."""
     for i in range(nearest.size):
-        across[i] = math.exp(-diameter * math.asin(min(0.5 * math.sqrt(chord[i]), 1.0)) / length)
-        factor[i, i] = 1.0
+        powers[i] = scale * diameter * math.asin(min(0.5 * math.sqrt(chord[i]), 1.0))
+    position = nearest.size
+    for i in range(nearest.size):
         for j in range(i):
-            factor[i, j] = math.exp(-between[nearest[i], nearest[j]] / length)
+            powers[position + j] = scale * between[nearest[i], nearest[j]]
+        position += i
+
+
+@kernel
+def _correlations(powers, count, factor, across):
+    """Fill the correlations with the place and, as a lower triangle, between the stations."""
+    across[:count] = powers[:count]
+    position = count
+    for i in range(count):
+        factor[i, i] = 1.0
+        factor[i, :i] = powers[position : position + i]
+        position += i
 
 
 @kernel
