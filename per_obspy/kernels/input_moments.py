@@ -2,101 +2,126 @@
 Time integrals of an oscillator's response times the ground acceleration, exact for a piecewise-linear record.
 
 Over one step the response is a linear function of the state and the two samples at its ends, so an integral over the
-whole record is a weighted sum of products ``state * sample``; the weights are integrals over one step. Only the
-products of the state before each step with the sample at its end are summed: one step relates them to the others.
+whole record is a weighted sum of products ``state * sample``; the weights are integrals over one step. A state is a sum
+over all samples before it, so that what is left of the record are the sums of the products of its samples that are so
+many steps apart. Of these only as many count as the oscillator remembers.
 """
+
+import math
 
 import numpy as np
 
+from per_obspy.kernels._aligned import aligned
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.oscillator import step, unit_responses
+from per_obspy.kernels.oscillator import integrals, step
 from per_obspy.kernels.shifted import shifted_rest, shifted_step, unshifted
 
 #: Oscillators side by side: a constant trip count, which the compiler turns into vectors.
 LANES = 32
+#: Lags after which an oscillator may begin.
+TILE = 64
+#: What an oscillator remembers of the lags that are left out: rounding.
+FORGOTTEN = 1e-15
 
-#: Rows of a block's table, one column an oscillator: the step matrix; the shifted states under north and under east;
-#: the sums of both parts of the state times the sample at the step's end, for north-north, north-east plus east-north,
-#: and east-east.
-STATE, SUMS, ROWS = 4, 8, 14
-
-#: Gauss-Legendre nodes and weights on [0, 1]; 24 integrate a step of up to one radian of phase to round-off.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-NODES, WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
+#: Rows of a block's table, one column an oscillator: the step matrix; the shifted state of rest under a first sample;
+#: both parts of the sum for north-north, north-east plus east-north, and east-east.
+REST, SUMS, ROWS = 4, 6, 12
 
 
 @kernel
-def input_moments(north, east, dt, omega, damping, moments):
+def input_moments(lagged, firsts, dt, omega, damping, order, moments):
     """
     Fill ``moments`` (n, 2, 3) with the integrals of u times a and of v times a, over a record that ends at zero.
 
     The last axis is north-north, north-east plus east-north, east-east: along an azimuth with cosine c and sine s the
-    integral is ``c² m0 + c s m1 + s² m2``.
+    integral is ``c² m0 + c s m1 + s² m2``. ``lagged`` (3, tiles * TILE + 2) are the sums of all products of samples so
+    many steps apart, ``firsts`` the products of the first sample with those so many steps later, zero beyond the
+    record. Those neighbours in the ``order`` (n,) are best that forget equally fast.
     """
-    squares = _sample_products(north, east)
-    sums = np.empty((6, LANES))
-    for first in range(0, omega.size, LANES):
-        count = min(LANES, omega.size - first)
-        _state_products(north, east, dt, omega[first : first + count], damping[first : first + count], sums)
-        for lane in range(count):
-            ahead, here = _both_products(omega[first + lane], damping[first + lane], dt, sums[:, lane], squares)
-            weights = _step_weights(omega[first + lane], damping[first + lane], dt)
+    table, sums, limits = aligned(ROWS, LANES), np.empty((6, LANES)), np.empty(LANES)
+    tails = _tails(lagged, firsts)
+    squares = np.stack((lagged[:, 0], lagged[:, 1], lagged[:, 0] - firsts[:, 0]), axis=1)
+    for first in range(0, order.size, LANES):
+        chosen = order[first : first + LANES]
+        for lane in range(LANES):
+            index = chosen[min(lane, chosen.size - 1)]
+            _pack(omega[index], damping[index], dt, table, lane)
+            limits[lane] = _limit(math.exp(-damping[index] * omega[index] * dt * TILE), tails)
+        _sum_backwards(lagged, firsts, limits, table)
+        sums[:] = table[SUMS:]
+        for lane in range(chosen.size):
+            index = chosen[lane]
+            ahead, here = _both_products(omega[index], damping[index], dt, sums[:, lane], squares)
+            weights = _step_weights(omega[index], damping[index], dt)
             for row in range(2):
-                _combine(weights[row], here, ahead, squares, moments[first + lane, row])
+                _combine(weights[row], here, ahead, squares, moments[index, row])
 
 
 @kernel
-def _sample_products(north, east):
-    """Return the sums of a0 a0, a0 a1 and a1 a1 for north-north, north-east plus east-north and east-east, (3, 3)."""
-    out = np.zeros((3, 3))
-    for i in range(north.size - 1):
-        n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
-        out[0, 0] += n0 * n0
-        out[0, 1] += n0 * n1
-        out[0, 2] += n1 * n1
-        out[1, 0] += 2.0 * n0 * e0
-        out[1, 1] += n0 * e1 + n1 * e0
-        out[1, 2] += 2.0 * n1 * e1
-        out[2, 0] += e0 * e0
-        out[2, 1] += e0 * e1
-        out[2, 2] += e1 * e1
-    return out
+def _tails(lagged, firsts):
+    """Return which part of all products, by their sizes, comes from each tile of lags on."""
+    tiles = (lagged.shape[1] - 2) // TILE
+    tails = np.zeros(tiles + 1)
+    for row in range(3):
+        sizes = np.zeros(tiles + 1)
+        for tile in range(tiles - 1, -1, -1):
+            lags = slice(tile * TILE, (tile + 1) * TILE)
+            sizes[tile] = sizes[tile + 1] + np.abs(lagged[row, lags]).sum() + np.abs(firsts[row, lags]).sum()
+        if sizes[0] > 0.0:
+            tails = np.maximum(tails, sizes / sizes[0])
+    return tails
 
 
 @kernel
-def _state_products(north, east, dt, omega, damping, sums):
-    """Fill the sums (6, lane) over all steps of the shifted states times the samples at the ends of the steps."""
-    table = np.zeros((ROWS, LANES))
-    for lane in range(omega.size):
-        matrix, frame = shifted_step(omega[lane], damping[lane], dt)
-        for row in range(4):
-            table[row, lane] = matrix[row]
-        table[STATE, lane], table[STATE + 1, lane] = shifted_rest(frame, north[0])
-        table[STATE + 2, lane], table[STATE + 3, lane] = shifted_rest(frame, east[0])
-    last = north.size - 1
-    for i in range(0, last - 1, 2):
-        n0, n1, n2, e0, e1, e2 = north[i], north[i + 1], north[i + 2], east[i], east[i + 1], east[i + 2]
-        for lane in range(LANES):
-            _sum_and_step(table, lane, n0, n1, e0, e1)
-            _sum_and_step(table, lane, n1, n2, e1, e2)
-    if last % 2:
-        for lane in range(LANES):
-            _sum_and_step(table, lane, north[last - 1], north[last], east[last - 1], east[last])
-    sums[:] = table[SUMS:]
+def _limit(decay, tails):
+    """Return how many tiles of lags count for an oscillator that forgets at a rate."""
+    left, tile = 1.0, 0
+    while tile < tails.size - 1 and left * tails[tile] > FORGOTTEN:
+        left *= decay
+        tile += 1
+    return tile
 
 
 @kernel
-def _sum_and_step(t, lane, north, next_north, east, next_east):
-    """Add the products of a step to the sums, and advance the states."""
-    u, z, w, y = t[4, lane], t[5, lane], t[6, lane], t[7, lane]
-    t[8, lane] += u * next_north
-    t[9, lane] += z * next_north
-    t[10, lane] += u * next_east + w * next_north
-    t[11, lane] += z * next_east + y * next_north
-    t[12, lane] += w * next_east
-    t[13, lane] += y * next_east
-    t[4, lane], t[5, lane] = t[0, lane] * u + (t[1, lane] * z + north), t[2, lane] * u + t[3, lane] * z
-    t[6, lane], t[7, lane] = t[0, lane] * w + (t[1, lane] * y + east), t[2, lane] * w + t[3, lane] * y
+def _pack(omega, damping, dt, table, lane):
+    """Fill the rows of an oscillator; nothing is summed yet."""
+    matrix, frame = shifted_step(omega, damping, dt)
+    table[:, lane] = 0.0
+    for row in range(4):
+        table[row, lane] = matrix[row]
+    table[REST, lane], table[REST + 1, lane] = shifted_rest(frame, 1.0)
+
+
+@kernel
+def _sum_backwards(lagged, firsts, limits, table):
+    """
+    Sum the shifted states times the samples at the ends of the steps, over all steps.
+
+    ``sum over k of M^k ((1, 0) lagged[k + 2] + rest firsts[k + 1])``, from the largest lag of each oscillator down.
+    """
+    t = aligned(ROWS, LANES)  # of a size that the compiler knows, so that it makes vectors
+    t[:] = table
+    for tile in range(math.ceil(limits.max()) - 1, -1, -1):
+        for row in range(SUMS, ROWS):
+            for lane in range(LANES):
+                t[row, lane] = t[row, lane] if tile + 1 < limits[lane] else 0.0
+        for k in range((tile + 1) * TILE - 4, tile * TILE - 4, -4):
+            for row in range(3):
+                x0, x1, x2, x3 = lagged[row, k + 2], lagged[row, k + 3], lagged[row, k + 4], lagged[row, k + 5]
+                y0, y1, y2, y3 = firsts[row, k + 1], firsts[row, k + 2], firsts[row, k + 3], firsts[row, k + 4]
+                for lane in range(LANES):
+                    u, z = _moved(t, lane, t[6 + 2 * row, lane], t[7 + 2 * row, lane], x3, y3)
+                    u, z = _moved(t, lane, u, z, x2, y2)
+                    u, z = _moved(t, lane, u, z, x1, y1)
+                    t[6 + 2 * row, lane], t[7 + 2 * row, lane] = _moved(t, lane, u, z, x0, y0)
+    table[:] = t
+
+
+@kernel
+def _moved(t, lane, u, z, product, first):
+    """Return a sum times the step matrix, and what the next lag adds to it."""
+    along = t[0, lane] * u + (t[1, lane] * z + (t[4, lane] * first + product))
+    return along, t[2, lane] * u + (t[3, lane] * z + t[5, lane] * first)
 
 
 @kernel
@@ -121,36 +146,37 @@ def _both_products(omega, damping, dt, sums, squares):
 @kernel
 def _step_weights(omega, damping, dt):
     """
-    Return the weights (2, 8) of one step's integrals of u a and v a.
+    Return the weights (2, 7) of one step's integrals of u a and v a.
 
-    In the order u0 a0, u0 a1, z0 a0, z0 a1, a0 a0, a0 a1, a1 a1 (the eighth is not used).
+    In the order u0 a0, u0 a1, z0 a0, z0 a1, a0 a0, a0 a1, a1 a1.
     """
-    phase = omega * dt
-    panels = int(np.ceil(phase))
-    compliance = 1.0 / (omega * omega)
-    weights = np.zeros((2, 8))
-    for panel in range(panels):
-        for node in range(NODES.size):
-            part = (panel + NODES[node]) / panels
-            impulse, slope, once, twice = unit_responses(part * phase, damping)
-            # the response to the samples at the start and at the end of the step, displacement then velocity
-            rising_u, rising_v = -compliance * twice / phase, -compliance * once / phase
-            falling_u, falling_v = -compliance * once - rising_u, -compliance * impulse - rising_v
-            weight = WEIGHTS[node] * dt / panels
-            _add(weights[0], weight, part, 1.0 - once, impulse, falling_u, rising_u)
-            _add(weights[1], weight * omega, part, -impulse, slope, falling_v, rising_v)
+    phase, compliance = omega * dt, 1.0 / (omega * omega)
+    _, impulse, once, twice, thrice, four_times = integrals(phase, damping)
+    of_slope, of_impulse = _means(impulse, once, phase), _means(once, twice, phase)
+    of_once, of_twice = _means(twice, thrice, phase), _means(thrice, four_times, phase)
+    weights = np.empty((2, 7))
+    remaining = 1.0 - of_once[0], 0.5 - of_once[1]
+    _fill(dt, remaining, of_impulse, of_once, of_twice, compliance, phase, weights[0])
+    against = -of_impulse[0], -of_impulse[1]
+    _fill(dt * omega, against, of_slope, of_impulse, of_once, compliance, phase, weights[1])
     return weights
 
 
 @kernel
-def _add(weights, weight, part, by_u, by_z, by_start, by_end):
-    weights[0] += weight * by_u * (1.0 - part)
-    weights[1] += weight * by_u * part
-    weights[2] += weight * by_z * (1.0 - part)
-    weights[3] += weight * by_z * part
-    weights[4] += weight * by_start * (1.0 - part)
-    weights[5] += weight * (by_start * part + by_end * (1.0 - part))
-    weights[6] += weight * by_end * part
+def _means(once, twice, phase):
+    """Return the means over a step of a function, and of it times the part of the step, from its two integrals."""
+    return once / phase, (once - twice / phase) / phase
+
+
+@kernel
+def _fill(scale, by_u, by_z, constant, growing, compliance, phase, weights):
+    """Fill the weights from the means of the responses to the state, and to a constant and a growing acceleration."""
+    rising = -compliance * growing[0] / phase, -compliance * growing[1] / phase
+    falling = -compliance * constant[0] - rising[0], -compliance * constant[1] - rising[1]
+    weights[0], weights[1] = scale * (by_u[0] - by_u[1]), scale * by_u[1]
+    weights[2], weights[3] = scale * (by_z[0] - by_z[1]), scale * by_z[1]
+    weights[4], weights[6] = scale * (falling[0] - falling[1]), scale * rising[1]
+    weights[5] = scale * (falling[1] + rising[0] - rising[1])
 
 
 @kernel

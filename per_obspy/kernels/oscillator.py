@@ -27,7 +27,7 @@ def unit_responses(phase, damping):
     ``H' = 1 - 2 xi H - I1`` and ``H = phase - 2 xi I1 - I2``.
     """
     if phase < SERIES_PHASE:
-        once, twice = _integral_series(phase, damping)
+        once, twice = _integral_series(1, phase, damping)
         impulse = phase - 2.0 * damping * once - twice
         return impulse, 1.0 - 2.0 * damping * impulse - once, once, twice
     root = math.sqrt((1.0 - damping) * (1.0 + damping))
@@ -39,14 +39,35 @@ def unit_responses(phase, damping):
 
 
 @kernel
-def _integral_series(phase, damping):
-    """Return ``I1, I2`` by the Taylor series of the impulse response, each coefficient from the two before."""
-    older, newer = 0.0, 1.0  # H^(n) at zero
-    power = 0.5 * phase * phase  # phase^(n+1) / (n+1)! for n = 1
+def integrals(phase, damping):
+    """
+    Return ``H', H, I1, I2, I3, I4`` at a phase: what `unit_responses` does, and two integrals more.
+
+    Integrating ``H = phase - 2 xi I1 - I2`` gives ``I1 = phase² / 2 - 2 xi I2 - I3``, and this ``I2`` in the same way.
+    """
+    square, cube = phase * phase / 2.0, phase * phase * phase / 6.0
+    if phase < SERIES_PHASE:
+        thrice, four_times = _integral_series(3, phase, damping)
+        twice = cube - 2.0 * damping * thrice - four_times
+        once = square - 2.0 * damping * twice - thrice
+        impulse = phase - 2.0 * damping * once - twice
+        return 1.0 - 2.0 * damping * impulse - once, impulse, once, twice, thrice, four_times
+    impulse, slope, once, twice = unit_responses(phase, damping)
+    thrice = square - 2.0 * damping * twice - once
+    return slope, impulse, once, twice, thrice, cube - 2.0 * damping * thrice - twice
+
+
+@kernel
+def _integral_series(fold, phase, damping):
+    """Return so many fold integrals of the impulse response, and once more, by its Taylor series."""
+    older, newer = 0.0, 1.0  # H^(n) at zero, each from the two before
+    power = phase  # phase^(n + fold) / (n + fold)! for n = 1
+    for order in range(2, fold + 2):
+        power *= phase / order
     once = twice = 0.0
     for order in range(1, SERIES_TERMS):
         once += newer * power
-        power *= phase / (order + 2)
+        power *= phase / (order + fold + 1)
         twice += newer * power
         older, newer = newer, -2.0 * damping * newer - older
     return once, twice

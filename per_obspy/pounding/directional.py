@@ -8,10 +8,11 @@ through once a building, and a pair costs a few operations whatever the record's
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import fft
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.input_moments import input_moments
+from per_obspy.kernels.input_moments import TILE, input_moments
 from per_obspy.kernels.resultant import furthest_apart
 
 
@@ -149,12 +150,24 @@ def _closed(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _moments(north: FloatArray, east: FloatArray, dt: float, period: FloatArray, damping: FloatArray) -> FloatArray:
-    """Return the moments (n, 2, 3) of the kernel; equal oscillators are computed once."""
-    distinct, position = np.unique(np.stack([period, damping], axis=1), axis=0, return_inverse=True)
-    moments = np.empty((len(distinct), 2, 3))
-    omega, ratio = np.ascontiguousarray(2.0 * np.pi / distinct[:, 0]), np.ascontiguousarray(distinct[:, 1])
-    input_moments(north, east, dt, omega, ratio, moments)
-    return moments[position.reshape(-1)]
+    """Return the moments (n, 2, 3) of the kernel."""
+    omega, ratio = 2.0 * np.pi / period, np.ascontiguousarray(damping)
+    moments = np.empty((omega.size, 2, 3))
+    lagged, firsts = _sample_products(north, east)
+    input_moments(lagged, firsts, dt, omega, ratio, np.argsort(omega * ratio, kind="stable"), moments)
+    return moments
+
+
+def _sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the sums of products of samples, and the products of the first ones, by their distance, (3, n) each."""
+    count = north.size
+    spectra = fft.rfft([north, east], fft.next_fast_len(2 * count, real=True))
+    powers = np.stack([np.abs(spectra[0]) ** 2, 2.0 * (spectra[0].conj() * spectra[1]).real, np.abs(spectra[1]) ** 2])
+    lagged, firsts = np.zeros((2, 3, -(-count // TILE) * TILE + 2))
+    lagged[:, :count] = fft.irfft(powers, fft.next_fast_len(2 * count, real=True))[:, :count]
+    firsts[0, :count], firsts[2, :count] = north[0] * north, east[0] * east
+    firsts[1, :count] = north[0] * east + east[0] * north
+    return lagged, firsts
 
 
 def _along(moments: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
