@@ -9,12 +9,11 @@ import sys
 import typer
 
 from per_obspy.commands.inventory import catalog, pairs
+from per_obspy.commands.outcome import SERVICE_UNAVAILABLE, WRONG_INPUT
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.screen import screen
 from per_obspy.commands.walk import process, report, run, simulate, spectra
 from per_obspy.errors import PerError, ServiceError
-
-WRONG_INPUT, SERVICE_UNAVAILABLE = 2, 75
 
 app = typer.Typer(
     name="per-obspy",

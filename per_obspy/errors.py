@@ -103,6 +103,18 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f", did you mean {names[alike[0]]}?" if alike else ""
 
 
+def reason_of(error: Exception) -> str:
+    """
+    Return what an error says; of an error of the operating system without its number and path.
+
+    Examples
+    --------
+    >>> reason_of(FileNotFoundError(2, "No such file or directory", "pairs.csv"))
+    'No such file or directory'
+    """
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+
+
 class ServiceError(PerError, ConnectionError):
     """A service cannot be reached or answers with an error."""
 

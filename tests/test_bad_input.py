@@ -133,7 +133,11 @@ WHOLE = {
     "no run yet": ({}, "report run.toml", "run.json: no finished run here"),
     "no stations yet": ({}, "screen run.toml", "stations: no stations here"),
     # records
-    "no record": ({"notes/a.txt": "Dear colleague"}, "info notes", "notes: none of its 1 files is a record; a.txt: "),
+    "no record": (
+        {"notes/a.txt": "Dear colleague"},
+        "info notes",
+        "none of its 1 files is a record; a.txt: ObsPy cannot read it: its format is unknown",
+    ),
     "no such folder": ({}, "info absent", "absent: no such folder or file"),
     "no event": ({"event.xml": PDF}, "events event.xml", "event.xml: is no list of events"),
     "no such event": ({}, "events absent.xml", "absent.xml: no such file"),

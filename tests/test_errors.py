@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
+from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, did_you_mean, reason_of
 
 
 @pytest.mark.parametrize(("error", "built_in"), [(RecordRejected, ValueError), (CatalogError, ValueError)])
@@ -21,3 +21,17 @@ def test_every_reason_is_in_the_text():
 @pytest.mark.parametrize("error", [RecordRejected("CI.CLC", "a", "b"), CatalogError("pairs.csv", "no column gap")])
 def test_errors_come_back_from_a_worker_process_as_they_left(error):
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_a_mistyped_word_is_asked_about_and_a_strange_one_is_not():
+    known = ["height_1", "gap", "system_1"]
+    assert did_you_mean("Hieght_1", known) == ", did you mean height_1?"
+    assert did_you_mean("GAP", known) == ", did you mean gap?"
+    assert did_you_mean("owner", known) == ""
+
+
+def test_what_an_error_says(tmp_path):
+    with pytest.raises(FileNotFoundError) as error:
+        (tmp_path / "absent").read_text()
+    assert reason_of(error.value) == "No such file or directory"
+    assert reason_of(OSError("Corrupt snappy compressed data.")) == "Corrupt snappy compressed data."

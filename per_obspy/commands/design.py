@@ -1,14 +1,10 @@
 """``per-obspy screen`` by a design or user spectrum, without a record."""
 
 import json
-import sys
 from pathlib import Path
 
-import typer
-
+from per_obspy.commands.outcome import end_if_nothing
 from per_obspy.commands.printing import print_table
-
-NOTHING_USABLE = 3
 
 #: Columns of the worst pairs that are printed.
 SHOWN = ("pair_id", "period_1", "period_2", "gap", "demand", "demand_rule", "state", "probability", "impact_velocity")
@@ -38,6 +34,4 @@ def screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) 
         titles = [name.replace("_", " ") for name in SHOWN]
         print_table(f"The {len(worst)} worst pairs", titles, worst[list(SHOWN)].itertuples(index=False))
         print(*files, sep="\n")
-    if table.empty:
-        print(f"nothing usable was left: see {files[-1]}", file=sys.stderr)
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(table), f"nothing usable was left: see {files[-1]}")

@@ -1,15 +1,13 @@
 """``per-obspy screen`` of several scenarios together."""
 
-import json
-import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-import typer
-
+from per_obspy.commands.outcome import tell
 from per_obspy.commands.printing import print_table, shown_progress
 
-NOTHING_USABLE = 3
+if TYPE_CHECKING:
+    from per_obspy.provenance import Result
 
 #: Columns of the worst pairs that are printed, where the table has them.
 SHOWN = ("rank", "pair_id", "probability", "annual_probability", "worst_scenario", "gap")
@@ -20,20 +18,15 @@ def screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> 
     from per_obspy.scenarios import screen_scenarios
 
     with shown_progress() as progress:
-        folder, record, did_nothing = screen_scenarios(configuration, output, progress=progress)
-    if as_json:
-        print(json.dumps({"folder": str(folder), "did_nothing": did_nothing, **record}))
-    else:
-        _print_ensemble(folder, record, did_nothing)
-    if record["state"] == "nothing_usable":
-        print(f"nothing usable was left: see {folder / 'rejected.csv'}", file=sys.stderr)
-        raise typer.Exit(NOTHING_USABLE)
+        result = screen_scenarios(configuration, output, progress=progress)
+    tell(result, as_json, _print_ensemble)
 
 
-def _print_ensemble(folder: Path, record: dict[str, Any], did_nothing: bool) -> None:
+def _print_ensemble(result: "Result") -> None:
     import pandas as pd
 
-    if did_nothing:
+    folder, record = result.folder, result.record
+    if result.did_nothing:
         print("Nothing to do: the same scenarios were joined before.")
     if record["simulated"]:
         print("The ground motion of a scenario is SIMULATED.")

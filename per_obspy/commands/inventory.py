@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from per_obspy.commands.outcome import WRONG_INPUT, AsJson, end_if_nothing
 from per_obspy.commands.printing import print_table
 from per_obspy.errors import CatalogError, require_extra
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
-
-WRONG_INPUT, NOTHING_USABLE = 2, 3
 
 #: Rejected rows that are printed, the others are counted; and the most common reasons for rejections.
 SHOWN, COMMON = 10, 3
@@ -42,7 +41,6 @@ pairs = typer.Typer(
 )
 catalog = typer.Typer(no_args_is_help=True, help="Stored inventories of pairs, with their sources and hashes.")
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Index = Annotated[Path, typer.Option("--index", help="Index of the stored inventories.")]
 CATALOG = Path("catalogs/catalog.toml")
 
@@ -78,8 +76,7 @@ def find_pairs(
         print(f"{facts['pairs']} pairs, {facts['touching']} of them touching, {len(rejected)} rejected: {output}")
         for reason, count in Counter(reason for one in rejected for reason in one.reasons).most_common(COMMON):
             print(f"  {count} times: {reason}")
-    if table.empty:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(table))
 
 
 @pairs.command("check")
@@ -110,9 +107,7 @@ def check_pairs(
         _print_rejected(rejected)
         if not table.empty:
             _print_profile(profile, derived, unused, odd)
-    if table.empty:
-        print(f"no usable row in {file}", file=sys.stderr)
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(table), f"no usable row in {file}")
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:

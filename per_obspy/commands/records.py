@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from per_obspy.commands.outcome import AsJson, end_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
@@ -14,12 +15,8 @@ if TYPE_CHECKING:
     from per_obspy.records.events import EventRow
     from per_obspy.records.info import RecordInfo
 
-NOTHING_USABLE = 3
-
 #: What the table of records shows of each; JSON has everything.
 SHOWN = ("record", "format", "level", "start", "dt", "duration", "azimuth", "peak", "unit", "file")
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 
 
 def events(
@@ -47,8 +44,7 @@ def events(
     else:
         titles = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
         print_table(f"{len(rows)} events, the latest first", titles, [_shown_event(row) for row in rows])
-    if not rows:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(rows))
 
 
 def fetch(
@@ -71,8 +67,7 @@ def fetch(
     else:
         print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
         _print_rejected(rejected)
-    if not stations:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(stations))
 
 
 def info(
@@ -94,8 +89,7 @@ def info(
     else:
         print_table(f"{len(records)} records", SHOWN, [_shown(record) for record in records])
         _print_rejected(rejected)
-    if not records:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(records))
 
 
 def _shown_event(row: "EventRow") -> list[object]:

@@ -7,14 +7,15 @@ import typer
 
 from per_obspy.commands.design import screen_by_spectrum
 from per_obspy.commands.ensemble import screen_ensemble
+from per_obspy.commands.outcome import AsJson, tell
 from per_obspy.commands.printing import shown_progress
-from per_obspy.commands.walk import tell
+from per_obspy.commands.walk import print_result
 
 
 def screen(
     configuration: Annotated[Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the results.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """
     Screen pairs: in every scenario of an ensemble, by a design spectrum, or again with the stations of a run.
@@ -39,4 +40,4 @@ def _screen_again(configuration: Path, output: Path | None, as_json: bool) -> No
 
     with shown_progress() as progress:
         result = screen_again(configuration, output, progress=progress)
-    tell(result.folder, result.record, result.did_nothing, as_json)
+    tell(result, as_json, print_result)

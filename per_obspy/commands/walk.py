@@ -1,17 +1,16 @@
 """``per-obspy run`` and its parts: ``simulate``, ``process``, ``spectra`` and ``report``."""
 
 import json
-import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from per_obspy.commands.outcome import AsJson, end_if_nothing, tell
 from per_obspy.commands.printing import print_table, shown_progress
 
-NOTHING_USABLE = 3
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+if TYPE_CHECKING:
+    from per_obspy.provenance import Result
 
 #: Columns of the worst pairs that are printed, with their titles.
 SHOWN = {
@@ -42,7 +41,7 @@ def run(
 
     with shown_progress() as progress:
         result = whole_run(configuration, output, progress=progress)
-    tell(result.folder, result.record, result.did_nothing, as_json)
+    tell(result, as_json, print_result)
 
 
 def report(
@@ -59,18 +58,7 @@ def report(
 
     with shown_progress() as progress:
         result = report_again(configuration, output, progress=progress)
-    tell(result.folder, result.record, result.did_nothing, as_json)
-
-
-def tell(folder: Path, record: dict[str, Any], did_nothing: bool, as_json: bool) -> None:
-    """Print the result of a run, and stop where nothing usable was left."""
-    if as_json:
-        print(json.dumps({"folder": str(folder), "did_nothing": did_nothing, **record}))
-    else:
-        _print_result(folder, record, did_nothing)
-    if record["state"] == "nothing_usable":
-        print(f"nothing usable was left: see {folder / 'rejected.csv'}", file=sys.stderr)
-        raise typer.Exit(NOTHING_USABLE)
+    tell(result, as_json, print_result)
 
 
 def simulate(
@@ -127,8 +115,7 @@ def spectra(
         print(
             f"{len(shards)} stations, {len(rejected)} rejected", output.with_suffix(".rejected.csv"), *files, sep="\n  "
         )
-    if not shards:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(shards))
 
 
 def process(
@@ -160,13 +147,14 @@ def process(
         print(json.dumps({"stations": len(stations), "resumed": resumed, "rejected": rows, "files": files}))
     else:
         print(f"{len(stations)} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
-    if not stations:
-        raise typer.Exit(NOTHING_USABLE)
+    end_if_nothing(len(stations))
 
 
-def _print_result(folder: Path, record: dict[str, Any], did_nothing: bool) -> None:
+def print_result(result: "Result") -> None:
+    """Print what a run has found and where it is."""
+    folder, record = result.folder, result.record
     counts = record["counts"]
-    if did_nothing:
+    if result.did_nothing:
         print("Nothing to do: the same inputs were run before.")
     if record["simulated"]:
         print("The ground motion is SIMULATED.")

@@ -8,7 +8,7 @@ import zlib
 from pathlib import Path
 from typing import BinaryIO
 
-from per_obspy.errors import RecordRejected
+from per_obspy.errors import RecordRejected, reason_of
 
 _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
@@ -55,7 +55,7 @@ def open_file(path: Path) -> BinaryIO:
     try:
         return path.open("rb") if archive is None else _member(archive, path.relative_to(archive).as_posix())
     except _DAMAGES as error:
-        raise RecordRejected(str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise RecordRejected(str(path), f"cannot be read: {reason_of(error)}") from error
 
 
 def _member(archive: Path, name: str) -> BinaryIO:

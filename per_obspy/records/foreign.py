@@ -45,5 +45,10 @@ def _called(reader: Callable[..., Any], file: Any, name: str, options: dict[str,
     except PerError:
         raise
     except Exception as error:  # ObsPy raises bare Exception, and whatever the libraries below it gave
-        reason = " ".join(str(error).split())
-        raise RecordRejected(name, f"ObsPy cannot read it: {type(error).__name__}: {reason}") from error
+        raise RecordRejected(name, f"ObsPy cannot read it: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    """Return what ObsPy says on one line; a format that it does not know is the user's file, not an error of types."""
+    reason = " ".join(str(error).split())
+    return "its format is unknown" if reason.startswith("Unknown format") else f"{type(error).__name__}: {reason}"

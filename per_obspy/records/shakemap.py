@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.checks import FloatArray
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, reason_of
 from per_obspy.formats.vocabulary import STANDARD_GRAVITY
 
 #: Pseudo-spectral acceleration is asked for at these periods; a map may have others beside them (PSA06: 0.6 s).
@@ -156,7 +156,7 @@ def _text(path: Path) -> str:
             content = file.read(LARGEST_FILE + 1)
         text = content.decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise CatalogError(str(path), f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     if len(content) > LARGEST_FILE:
         raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:

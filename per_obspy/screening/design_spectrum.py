@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, reason_of
 from per_obspy.inventory.csv_text import check_separator, check_text
 
 #: Largest value that a spectrum may have and its unit: larger ones are in other units (ms, per cent, mm, cm/s2).
@@ -76,10 +76,8 @@ def _read(source: str) -> pd.DataFrame:
     try:
         check_text(Path(source))
         table = pd.read_csv(source, comment="#", skipinitialspace=True)
-    except OSError as error:
-        raise CatalogError(source, f"cannot be read as CSV: {error.strerror}") from error
-    except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
-        raise CatalogError(source, f"cannot be read as CSV: {error}") from error
+    except (OSError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+        raise CatalogError(source, f"cannot be read as CSV: {reason_of(error)}") from error
     check_separator(Path(source), list(map(str, table.columns)))
     return table
 

@@ -172,7 +172,7 @@ def test_files_that_are_no_records_are_listed_and_the_rest_goes_on(folder: Path)
     reasons = {rejection.name: rejection.reasons[0] for rejection in contents.rejected}
     assert set(reasons) == {"notes.txt", "empty.mseed", "broken.xml"}
     assert reasons["empty.mseed"] == "the file is empty"
-    assert reasons["notes.txt"].startswith("ObsPy cannot read it: TypeError: Unknown format")
+    assert reasons["notes.txt"].startswith("ObsPy cannot read it: its format is unknown")
     assert {rejection.kind for rejection in contents.rejected} == {"file"}
 
 
