@@ -43,6 +43,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ),
         (GOOD + "[spectra]\ndampings = []\n", r"spectra\.dampings: .*at least 1 item"),
         (GOOD + "[spectra]\ndampings = [0.2, 0.05]\n", r"spectra\.dampings: must rise, got 0\.2, 0\.05"),
+        (GOOD + "[spectra]\ndampings = [0.1, 0.2]\n", r"spectra\.dampings must reach from 0\.05 .* got 0\.1, 0\.2"),
         (GOOD + "[spectra]\ndampings = [0.05, 0.05]\n", r"spectra\.dampings: must rise"),
         (GOOD + "[spectra]\nshortest = 5.0\nlongest = 1.0\n", r"spectra: shortest = 5 s must be below longest = 1 s"),
         (GOOD + "[spectra]\nlongest = inf\n", r"spectra\.longest: .*finite number \(got inf\), expected: s"),
