@@ -58,6 +58,11 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         (GOOD + "[totals]\ncell = 1000.0\nh3 = 8\n", r"totals: .*give one of cell, area and h3, got cell, h3"),
         (GOOD.replace('name = "x"\n', ""), r"name: Field required"),
         (GOOD.replace("[records]", "[record]"), r"record: unknown key"),
+        (
+            GOOD.replace('folder = "in"', 'columns = [{file = "a", station = "A", units = "mg", channels = {}}]'),
+            r"records\.columns\.0\.units: .*\(got 'mg'\), expected: of the samples: m/s2, cm/s2, gal, g",
+        ),
+        (GOOD.replace('folder = "in"\n', ""), r"records: give at least one of folder, columns, fdsn"),
         (GOOD + 'simulation = "s.toml"\n', r"pairs\.simulation: unknown key"),
         ('simulation = "s.toml"\n' + GOOD, r"give either simulation or records"),
         ('name = "x"\noutput = "o"\nsimulation = "s"\n[pairs]\n', r"pairs: .*give one of file, catalog and simulated"),
