@@ -60,3 +60,15 @@ def test_the_tables_need_real_records(tmp_path):
     done = _start("reliability_tables.py", tmp_path / "absent")
     assert done.returncode == 2
     assert "PER_OBSPY_DATA" in done.stderr
+
+
+def test_estimates_for_yielding_pairs(tmp_path):
+    said = _run("yielding_estimates.py", tmp_path / "absent", "-s", "2", "-n", "15")
+    rows = re.findall(r"simulated (\w+), 15 pairs \| ([\w .()]+) \| (\d+\.\d+), \d+\.\d+, (\d+)%", said)
+    assert [row[0] for row in rows] == ["rock"] * 3 + ["lakebed"] * 3
+    for ground in ("rock", "lakebed"):
+        (_, _, elastic, low), (_, _, linear, _), (_, name, governing, few) = [row for row in rows if row[0] == ground]
+        assert name == "the one that governs"
+        # the largest of several is no smaller than each of them, and so is its median
+        assert float(governing) >= max(float(elastic), float(linear))
+        assert int(few) <= int(low)

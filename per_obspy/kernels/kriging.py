@@ -1,7 +1,7 @@
 """
-Simple kriging of residuals about a fitted trend, one place after the other, from its nearest stations that know.
+Simple kriging of residuals about a fitted trend, places side by side, each from its nearest stations that know.
 
-A place's numbers depend on nothing but the place: no product of matrices goes over several places.
+A place's numbers depend on nothing but the place: its company shares the operations, not the numbers.
 """
 
 import math
@@ -10,6 +10,9 @@ import numpy as np
 
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.elementary import exponentials
+
+#: Places side by side: a constant trip count, which the compiler turns into vectors.
+LANES = 64
 
 
 @kernel
@@ -24,32 +27,43 @@ def kriged(stations, trend, places, diameter, neighbours, out):
     on the grid (m), part of the way to the next (m), decay length of the correlation (m) m. ``diameter``: of the
     sphere, m. ``neighbours``: largest number of stations that serve a place.
     """
-    position, between, known, features, residuals = stations
-    vectors, wanted, periods, columns, shares, lengths = places
-    nearest, chord = np.empty(neighbours, dtype=np.int64), np.empty(neighbours)
-    across, weights, work = np.empty(neighbours), np.empty(neighbours), np.empty(neighbours)
-    factor, unmatched = np.empty((neighbours, neighbours)), np.empty(trend[0].shape[1])
-    powers = np.empty(neighbours * (neighbours + 1) // 2)
-    integers = np.empty(powers.size, dtype=np.int64)
-    for row in range(out.shape[0]):
-        count = _nearest(position, known, vectors[row], periods[row], nearest, chord)
-        if count == 0:
-            continue
-        _distances(between, nearest[:count], chord, diameter, -1.0 / lengths[row], powers)
-        exponentials(powers[: count * (count + 1) // 2], integers)
-        _correlations(powers, count, factor, across)
-        _factorise(factor, count)
-        left = max(1.0 - _solve(factor, across, count, work, weights), 0.0)
-        median = variance = 0.0
-        for step in range(2):
-            share = shares[row] if step else 1.0 - shares[row]
-            column = columns[row] + step
-            if share > 0.0:
-                _unmatched(features, wanted[row], trend[2][column], nearest[:count], weights, unmatched)
-                estimate = _trend(trend[0][column], wanted[row], trend[2][column])
-                median += share * (estimate + _weighted(weights, residuals, nearest[:count], column))
-                variance += share * trend[3][column] ** 2 * (left + _square(trend[1][column], unmatched))
-        out[row, 0], out[row, 1] = median, math.sqrt(variance)
+    nearest, counts = np.empty((LANES, neighbours), dtype=np.int64), np.empty(LANES, dtype=np.int64)
+    room = _row(neighbours + 1, 0)
+    table, integers = np.zeros((room + neighbours, LANES)), np.empty((room, LANES), dtype=np.int64)
+    left, weights = np.empty(LANES), np.empty(neighbours)
+    for first in range(0, out.shape[0], LANES):
+        count = _correlations(stations, places, diameter, first, nearest, counts, table, integers)
+        _factorise(table, count)
+        _solve(table, count, room, left)
+        for lane in range(min(LANES, out.shape[0] - first)):
+            if counts[lane] > 0:
+                weights[:] = table[room : room + neighbours, lane]
+                told = nearest[lane, : counts[lane]]
+                _estimate(stations, trend, places, first + lane, told, weights, max(left[lane], 0.0), out[first + lane])
+
+
+@kernel
+def _row(i, j):
+    """Return the row of the table for station i and an earlier one j, or for the place, which comes before them all."""
+    return i * (i + 1) // 2 + j
+
+
+@kernel
+def _estimate(stations, trend, places, row, nearest, weights, left, out):
+    """Fill median and deviation at a place from the weights of its stations and what they leave, a part of 1."""
+    _, _, _, features, residuals = stations
+    _, wanted, _, columns, shares, _ = places
+    unmatched = np.empty(trend[0].shape[1])
+    median = variance = 0.0
+    for step in range(2):
+        share = shares[row] if step else 1.0 - shares[row]
+        column = columns[row] + step
+        if share > 0.0:
+            _unmatched(features, wanted[row], trend[2][column], nearest, weights, unmatched)
+            estimate = _trend(trend[0][column], wanted[row], trend[2][column])
+            median += share * (estimate + _weighted(weights, residuals, nearest, column))
+            variance += share * trend[3][column] ** 2 * (left + _square(trend[1][column], unmatched))
+    out[0], out[1] = median, math.sqrt(variance)
 
 
 @kernel
@@ -83,59 +97,78 @@ def _nearest(position, known, vector, period, nearest, chord):
 
 
 @kernel
-def _distances(between, nearest, chord, diameter, scale, powers):
-    """Fill the distances of the place from each station, then those between stations, each times a scale."""
-    for i in range(nearest.size):
-        powers[i] = scale * diameter * math.asin(min(0.5 * math.sqrt(chord[i]), 1.0))
-    position = nearest.size
-    for i in range(nearest.size):
+def _correlations(stations, places, diameter, first, nearest, counts, table, integers):
+    """
+    Fill the correlations of places with their nearest stations and between these; return how many serve one at most.
+
+    Each place is followed by its stations as the lower triangle of one matrix; a station too few is unlike all others.
+    """
+    position, between, known, _, _ = stations
+    vectors, _, periods, _, _, lengths = places
+    chord = np.empty(nearest.shape[1])
+    most = 0
+    for lane in range(LANES):
+        row = min(first + lane, periods.size - 1)
+        counts[lane] = _nearest(position, known, vectors[row], periods[row], nearest[lane], chord)
+        most = max(most, counts[lane])
+        _fill_distances(between, nearest[lane], counts[lane], chord, diameter, -1.0 / lengths[row], table[:, lane])
+    used = _row(most + 1, 0)
+    exponentials(table[:used].reshape(used * LANES), integers[:used].reshape(used * LANES))
+    for lane in range(LANES):
+        for i in range(counts[lane] + 1, most + 1):
+            for j in range(i):
+                table[_row(i, j), lane] = 0.0
+            table[_row(i, i), lane] = 1.0
+    return most
+
+
+@kernel
+def _fill_distances(between, nearest, count, chord, diameter, scale, column):
+    """Fill the distances of a place's stations from it and from each other, each times a scale."""
+    column[0] = 0.0
+    for i in range(count):
+        row = _row(i + 1, 0)
+        column[row] = scale * diameter * math.asin(min(0.5 * math.sqrt(chord[i]), 1.0))
         for j in range(i):
-            powers[position + j] = scale * between[nearest[i], nearest[j]]
-        position += i
+            column[row + 1 + j] = scale * between[nearest[i], nearest[j]]
+        column[row + 1 + i] = 0.0
 
 
 @kernel
-def _correlations(powers, count, factor, across):
-    """Fill the correlations with the place and, as a lower triangle, between the stations."""
-    across[:count] = powers[:count]
-    position = count
-    for i in range(count):
-        factor[i, i] = 1.0
-        factor[i, :i] = powers[position : position + i]
-        position += i
+def _factorise(t, count):
+    """Replace the stations' correlations by those of their Cholesky factor, with inverses on the diagonal."""
+    for i in range(1, count + 1):
+        for j in range(1, i + 1):
+            entry, diagonal = _row(i, j), _row(j, j)
+            for k in range(1, j):
+                one, other = _row(i, k), _row(j, k)
+                for lane in range(LANES):
+                    t[entry, lane] -= t[one, lane] * t[other, lane]
+            for lane in range(LANES):
+                t[entry, lane] = t[entry, lane] * t[diagonal, lane] if j < i else 1.0 / math.sqrt(t[entry, lane])
 
 
 @kernel
-def _factorise(matrix, count):
-    """Replace the lower triangle of a matrix by that of its Cholesky factor, with inverses on the diagonal."""
-    for j in range(count):
-        pivot = matrix[j, j]
-        for k in range(j):
-            pivot -= matrix[j, k] * matrix[j, k]
-        matrix[j, j] = 1.0 / math.sqrt(pivot)
-        for i in range(j + 1, count):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value * matrix[j, j]
-
-
-@kernel
-def _solve(factor, right, count, forward, weights):
-    """Fill the weights that solve for the right side; return what the stations tell, a part of 1."""
-    told = 0.0
-    for i in range(count):
-        value = right[i]
-        for k in range(i):
-            value -= factor[i, k] * forward[k]
-        forward[i] = value * factor[i, i]
-        told += forward[i] * forward[i]
-    for i in range(count - 1, -1, -1):
-        value = forward[i]
-        for k in range(i + 1, count):
-            value -= factor[k, i] * weights[k]
-        weights[i] = value * factor[i, i]
-    return told
+def _solve(t, count, room, left):
+    """Fill the weights, from the row ``room`` on, that solve for the correlations with the place, and what is left."""
+    left[:] = 1.0
+    for i in range(1, count + 1):
+        forward, diagonal, weight = _row(i, 0), _row(i, i), room + i - 1
+        for k in range(1, i):
+            one, other = _row(i, k), room + k - 1
+            for lane in range(LANES):
+                t[forward, lane] -= t[one, lane] * t[other, lane]
+        for lane in range(LANES):
+            t[weight, lane] = t[forward, lane] * t[diagonal, lane]
+            left[lane] -= t[weight, lane] ** 2
+    for i in range(count, 0, -1):
+        weight, diagonal = room + i - 1, _row(i, i)
+        for k in range(i + 1, count + 1):
+            one, other = _row(k, i), room + k - 1
+            for lane in range(LANES):
+                t[weight, lane] -= t[one, lane] * t[other, lane]
+        for lane in range(LANES):
+            t[weight, lane] *= t[diagonal, lane]
 
 
 @kernel

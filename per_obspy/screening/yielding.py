@@ -2,11 +2,13 @@
 The estimated demand of pairs in which a building yields.
 
 A building whose displacement exceeds its yield displacement is replaced by an equivalent linear one (Iwan 1980) at its
-own ductility. This is the first ductility, from 1 up, at which the equivalent building's displacement is that many
-yield displacements; it is found on the station's stored spectra, scaled to the building's own SD, interpolated in
-period and damping. PER at the equivalent period and damping, from the stored spectra too, and eq. (16) at the
-equivalent properties give the critical gap. Yielding raises the correlation under broad ground motion; under narrow
-one eq. (16) then makes too much of it, so that the smaller of the elastic and the equivalent correlation is used.
+own ductility. This is the largest ductility up to 40 at which the equivalent building's displacement is that many
+yield displacements: on a lakebed a stiff, weak building has several, and the first one is far too small where yielding
+takes its period into the resonance of the ground. It is found on the station's stored spectra, scaled to the building's
+own SD, interpolated in period and damping. PER at the equivalent period and damping, from the stored spectra too, and
+eq. (16) at the equivalent properties give the critical gap. Yielding raises the correlation under broad ground motion;
+under narrow one eq. (16) then makes too much of it, so that the smaller of the elastic and the equivalent correlation
+is used.
 """
 
 from typing import NamedTuple
@@ -122,7 +124,7 @@ def _equivalent(sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: T
     yields = elastic > 1.0
     own = _Building(row[yields], period[yields], damping[yields])
     ductility, converged = elastic.copy(), np.ones(elastic.size, dtype=bool)
-    ductility[yields], converged[yields] = _first_ductility(sd, own, elastic[yields])
+    ductility[yields], converged[yields] = _largest_ductility(sd, own, elastic[yields])
     longer, more = iwan(np.maximum(ductility, 1.0), 0.0)
     radius = values(table, f"per_{i}").copy()
     radius[yields] *= _change(per, own, ductility[yields, None])[:, 0]
@@ -146,8 +148,10 @@ def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> 
     return np.asarray(np.exp(equivalent - elastic))
 
 
-def _first_ductility(sd: LogSpectra, building: _Building, elastic: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the first ductility that the displacement does not exceed, and where there is one up to the largest."""
+def _largest_ductility(
+    sd: LogSpectra, building: _Building, elastic: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the ductility above which the displacement no longer exceeds it, and whether that is in reach."""
 
     def excess(ductility: FloatArray) -> FloatArray:
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
@@ -158,16 +162,16 @@ def _first_ductility(sd: LogSpectra, building: _Building, elastic: FloatArray) -
     finer = low + PARTS * (high - low)
     (low, high), (before, beyond) = _around(finer, excess(finer))
     part = np.divide(before, before - beyond, out=np.zeros_like(before), where=before > np.maximum(beyond, 0.0))
-    converged = np.asarray((over <= 0.0).any(axis=1))
+    converged = np.asarray(over[:, -1] <= 0.0)
     return np.where(converged, (low + part * (high - low))[:, 0], DUCTILITIES[-1]), converged
 
 
 def _around(tried: FloatArray, excess: FloatArray) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """Return the ductilities before and at the first end of an excess, else the last two, and the excess there."""
-    ends = excess <= 0.0
-    ends[:, 0], ends[:, -1] = False, True
-    after = ends.argmax(axis=1)[:, None]
-    places = after - 1, after
+    """Return the last ductility with an excess and the next one, at the ends the nearest two, and the excess there."""
+    lasting = excess > 0.0
+    lasting[:, 0], lasting[:, -1] = True, False
+    last = (excess.shape[1] - 1 - lasting[:, ::-1].argmax(axis=1))[:, None]
+    places = last, last + 1
     return tuple(np.take_along_axis(tried, place, axis=1) for place in places), tuple(
         np.take_along_axis(excess, place, axis=1) for place in places
     )
