@@ -185,6 +185,9 @@ class CsvFile:
 #: With threads, rows have no numbers.
 _ORDERED = pa.csv.ReadOptions(use_threads=False)
 
+#: What layers of footprints are called, which are no pairs yet.
+FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb")
+
 _KINDS: dict[str, type[CsvFile] | type[ParquetFile]] = {".csv": CsvFile, ".parquet": ParquetFile}
 
 
@@ -198,7 +201,8 @@ def pair_file(path: Path) -> PairFile:
         If it does not exist, is of an unknown kind, or cannot be read.
     """
     if path.suffix.lower() not in _KINDS:
-        raise CatalogError(str(path), f"unknown suffix {path.suffix!r}, expected {' or '.join(_KINDS)}")
+        made = "; per-obspy pairs makes such a table of footprints" if path.suffix.lower() in FOOTPRINTS else ""
+        raise CatalogError(str(path), f"unknown suffix {path.suffix!r}, expected {' or '.join(_KINDS)}{made}")
     if not path.is_file():
         raise CatalogError(str(path), "no such file")
     return _KINDS[path.suffix.lower()](path)

@@ -1,11 +1,13 @@
 """Figures of a run: from one record to one pair at risk, and the region at a glance."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 from per_obspy.checks import FloatArray
@@ -74,10 +76,12 @@ def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
 def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     """Draw the largest energy circle of each building, their centres separated by the gap (the paper's Fig. 4)."""
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    for i, (colour, centre) in enumerate(zip(BUILDING_COLOURS, (0.0, pair["gap"]), strict=True), start=1):
+    drawn = zip(BUILDING_COLOURS, (0.0, pair["gap"]), ("-", "--"), strict=True)  # dashes: equal ones touch all around
+    for i, (colour, centre, line) in enumerate(drawn, start=1):
         radius = pair[f"participation_{i}"] * pair[f"per_{i}"]
-        axes.fill(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, alpha=0.18)
-        axes.plot(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, label=f"building {i}")
+        x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
+        axes.fill(x, y, color=colour, alpha=0.18)
+        axes.plot(x, y, color=colour, linestyle=line, label=f"building {i}")
     axes.axvline(0.0, color=BUILDING_COLOURS[0], linewidth=0.8)
     axes.axvline(pair["gap"], color=BUILDING_COLOURS[1], linewidth=0.8)
     axes.set_aspect("equal", adjustable="datalim")
@@ -127,9 +131,17 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
     for state in ("no", "possible", "yes"):
         chosen = table[table["state"] == state]
         axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
-    largest = 100 * float(table["demand"].max())
-    axes.plot([0.0, largest], [0.0, largest], color="black", linewidth=0.8, label="gap = demand")
+    demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
+    axes.plot([0.0, demand], [0.0, demand], color="black", linewidth=0.8, label="gap = demand")
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)", title="gap against demand")
-    axes.set_xscale("symlog", linthresh=1.0)
-    axes.set_yscale("symlog", linthresh=1.0)
+    _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand)
+    _from_zero(axes.set_yscale, axes.set_ylim, axes.yaxis, max(demand, gap))
     axes.legend(fontsize=8)
+
+
+def _from_zero(set_scale: Callable[..., object], set_limits: Callable[..., object], axis: Axis, largest: float) -> None:
+    """Make an axis linear up to 1, or a tenth of what is largest on it if that is less, and logarithmic beyond."""
+    linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
+    set_scale("symlog", linthresh=linear)
+    set_limits(-0.1 * linear, 1.5 * max(largest, linear))
+    axis.set_major_formatter("{x:g}")
