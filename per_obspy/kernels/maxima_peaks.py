@@ -16,10 +16,12 @@ from .between import (
     may_vanish,
     radius_bound,
     rate_bounds,
+    series_terms,
     slacks,
     workspace,
 )
 from .blocks import TILE
+from .maxima_roots import raise_to_root
 from .maxima_samples import DAMPING, DISPLACEMENT, LANES, PHASE, SQUARE, STEP, WEIGHTS
 
 
@@ -114,7 +116,7 @@ def _walk(stride, north, east, limits, tile, lane, table, kept, motion, work, la
     best = np.array((max(largest[0, lane], square), max(largest[1, lane], displacement), np.inf, np.inf))
     if square + slack[0] > best[0] or displacement + slack[1] > best[1]:
         damping, phase = table[DAMPING, lane], table[PHASE, lane]
-        _search(motion, slack, dips(rates, damping, phase), damping, phase, work, best)
+        _search(motion, rates, slack, damping, phase, work, best)
     largest[0, lane], largest[1, lane] = best[0], best[1]
 
 
@@ -134,16 +136,23 @@ def _rerun(u, z, lane, table, motion):
 
 
 @kernel
-def _search(motion, slack, dip, damping, phase, work, best):
+def _search(motion, rates, slack, damping, phase, work, best):
     """Raise the largest values to the stationary ones within the steps of a tile."""
-    wanted, twice = np.zeros(4, np.bool_), 2.0 * damping
+    wanted, twice, terms = np.zeros(4, np.bool_), 2.0 * damping, series_terms(phase)
+    dip = dips(rates, damping, phase)
     for i in range(TILE):
         u, z, u_end, z_end = motion[0, i], motion[1, i], motion[0, i + 1], motion[1, i + 1]
         larger = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > best[0]
         if larger or max(abs(u), abs(u_end)) + slack[1] > best[1]:
             start, end = motion[2, i], motion[2, i + 1]
+            ends = (u, z, start, u_end, z_end, end)
             wanted[0] = larger and may_vanish(twice * z + start, twice * z_end + end, dip[0])
             wanted[1] = may_vanish(z, z_end, dip[1])
-            likely = phase <= LONGEST_SPAN or may_exceed(u, z, start, end, damping, phase, best)
-            if likely and (wanted[0] or wanted[1]):
+            if phase <= LONGEST_SPAN:
+                for number in range(2):
+                    if wanted[number]:
+                        wanted[number] = not raise_to_root(number, ends, rates, damping, phase, terms, work, best)
+            elif not may_exceed(u, z, start, end, damping, phase, best):
+                continue
+            if wanted[0] or wanted[1]:
                 largest_in_step(u, z, start, end, damping, phase, wanted, work, best)
