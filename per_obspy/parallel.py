@@ -14,6 +14,8 @@ from itertools import chain, islice
 from multiprocessing import get_context
 from typing import TypeVar
 
+from per_obspy.errors import PerError
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -107,5 +109,7 @@ def _caught(task: Task, work: Callable[[], Result], lost: Lost[Task, Result]) ->
         return work()
     except BrokenProcessPool:
         raise
+    except PerError as error:
+        return lost(task, str(error))
     except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
         return lost(task, f"{type(error).__name__}: {error}")

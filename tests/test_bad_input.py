@@ -5,6 +5,7 @@ What is wrong as a whole ends in exit code 2 and one line that names the file an
 told with its line and all its reasons, and the others go on. The rooms' own tests go into detail.
 """
 
+import json
 import sys
 
 import numpy as np
@@ -283,6 +284,21 @@ def test_a_wrong_row_is_told_with_its_line_and_the_others_go_on(write, call, fau
     assert code == 0
     assert "pairs.csv: 2 usable pairs, 0 of them touching, 1 rejected rows" in out
     assert message in next(line for line in out.splitlines() if line.startswith("  line 3, "))
+
+
+def test_a_run_lists_every_wrong_row_and_judges_the_others(write, call, tmp_path):
+    # would catch a fault that stops the chunk in which it stands
+    rows = [{"pair_id": fault} | row for fault, (row, _) in ROWS.items()]
+    write({"pairs.csv": _table({}, *rows)})
+    write_simulation(simulate(Scenario(stations=1, dt=0.02)), tmp_path / "records")
+    code, out, _ = call("run", "run.toml", "--json")
+    assert code == 0
+    counts = json.loads(out)["counts"]
+    assert (counts["pairs"], counts["rejected_pair"]) == (1, len(ROWS))
+    rejected = pd.read_csv("out/rejected.csv").query("kind == 'pair'").set_index("row")["reasons"]
+    assert rejected.index.tolist() == list(range(3, 3 + len(ROWS)))
+    for reason, (_, message) in zip(rejected, ROWS.values(), strict=True):
+        assert message in reason
 
 
 def test_every_fault_of_a_row_is_told(write, call):

@@ -85,54 +85,6 @@ def test_pairs_are_screened_again_with_the_stations_of_a_run(call, configuration
     assert json.loads(out)["counts"]["pairs"] == 2
 
 
-BAD_TABLES = {
-    "missing column": (f"{HEADER.replace(',gap', '')}\n{ROW[:-5]}\n".encode(), "gap"),
-    "empty table": (f"{HEADER}\n".encode(), "pairs.csv"),
-    "empty file": (b"", "pairs.csv"),
-    "wrong encoding": (f"{HEADER},owner\n{ROW},Peña\n".encode("latin-1"), "pairs.csv"),
-}
-
-
-@pytest.mark.parametrize("fault", BAD_TABLES)
-def test_a_wrong_pair_table_stops_with_one_line(call, configuration, fault):
-    content, named = BAD_TABLES[fault]
-    (configuration.parent / "pairs.csv").write_bytes(content)
-    code, _, err = call("run", configuration)
-    assert code == 2
-    last = err.strip().splitlines()[-1]
-    assert "pairs.csv" in last
-    assert named in last
-
-
-BAD_ROWS = {
-    "negative gap": (ROW.replace("0.05", "-0.05"), "gap", "-0.05"),
-    "gap in millimetres": (ROW.replace("0.05", "50"), "gap", "50"),
-    "28 m floor": (ROW.replace(",10,", ",28,"), "height", "28"),
-    "height of 0": (ROW.replace(",10,", ",0,"), "height_1", "0"),
-    "duplicate pair_id": (ROW, "pair_id", "a"),
-    "latitude out of range": (ROW.replace("0.3,0.0,", "0.3,95.0,", 1), "latitude_1", "95"),
-    "unknown system": (ROW, "system_1", "paper"),
-}
-
-
-@pytest.mark.parametrize("fault", BAD_ROWS)
-def test_a_wrong_row_is_rejected_by_name_and_the_rest_goes_on(call, configuration, fault):
-    row, column, value = BAD_ROWS[fault]
-    system = "paper" if fault == "unknown system" else ""
-    storeys = "1" if fault == "28 m floor" else ""
-    name = "a" if fault == "duplicate pair_id" else "b"
-    bad = f"{name}{row[1:]},{system},{storeys}"
-    (configuration.parent / "pairs.csv").write_text(f"{HEADER},system_1,storeys_1\n{ROW},,\n{bad}\n")
-    code, _, _err = call("run", configuration)
-    rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
-    pairs = rejected[rejected["kind"] == "pair"]
-    assert pairs["reasons"].str.contains(column).all()
-    assert pairs["reasons"].str.contains(value, regex=False).all()
-    assert pairs["row"].tolist()[-1:] == [3]
-    assert code == 0
-    assert len(pairs) == 1
-
-
 def test_wrong_folders_stop_with_one_line(call, configuration, tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "texts").mkdir()
@@ -158,7 +110,7 @@ def test_nothing_in_reach_exits_with_3(call, configuration):
     (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{far}\n")
     code, _, err = call("run", configuration)
     assert code == 3
-    assert "rejected.csv" in err
+    assert "rejected.csv, first pair a: nearest station" in err.splitlines()[-1]
     rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
     assert rejected[rejected["kind"] == "pair"]["reasons"].str.contains("m away").all()
 

@@ -5,6 +5,7 @@ from math import isqrt
 
 import pytest
 
+from per_obspy.errors import CatalogError
 from per_obspy.parallel import AHEAD, results
 
 #: Ends a process as the system does with one that takes too much memory.
@@ -31,6 +32,14 @@ class Here(Executor):
 def test_every_task_has_a_result_or_a_reason(workers):
     found = list(results(iter([1, -2, 9, 16]), isqrt, lost, workers, None))
     assert sorted(map(str, found)) == sorted(["1", "-2: ValueError: isqrt() argument must be nonnegative", "3", "4"])
+
+
+def _refused(number):
+    raise CatalogError("pairs.csv", f"row {number} is no row")
+
+
+def test_what_the_user_got_wrong_is_no_error_of_the_program():
+    assert list(results([7], _refused, lost, 1, None)) == ["7: pairs.csv: row 7 is no row"]
 
 
 def test_a_worker_that_dies_takes_only_its_task_with_it():

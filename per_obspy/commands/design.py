@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from per_obspy.commands.outcome import end_if_nothing
+from per_obspy.commands.outcome import end_if_nothing, why_nothing
 from per_obspy.commands.printing import print_table
 
 #: Columns of the worst pairs that are printed.
@@ -34,4 +34,5 @@ def screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) 
         titles = [name.replace("_", " ") for name in SHOWN]
         print_table(f"The {len(worst)} worst pairs", titles, worst[list(SHOWN)].itertuples(index=False))
         print(*files, sep="\n")
-    end_if_nothing(len(table), f"nothing usable was left: see {files[-1]}")
+    if table.empty:
+        end_if_nothing(0, why_nothing(files[-1]))

@@ -1,7 +1,9 @@
 """How a command ends, and the option that makes it print for machines: the same for all."""
 
+import csv
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -32,5 +34,13 @@ def tell(result: "Result", as_json: bool, show: "Callable[[Result], None]") -> N
         print(json.dumps({"folder": str(result.folder), "did_nothing": result.did_nothing, **result.record}))
     else:
         show(result)
-    left = int(result.record["state"] != "nothing_usable")
-    end_if_nothing(left, f"nothing usable was left: see {result.folder / 'rejected.csv'}")
+    if result.record["state"] == "nothing_usable":
+        end_if_nothing(0, why_nothing(result.folder / "rejected.csv"))
+
+
+def why_nothing(rejected: Path) -> str:
+    """Return that nothing usable was left, where the reasons are, and the first of them."""
+    with rejected.open(encoding="utf-8", newline="") as file:
+        first = next(csv.DictReader(file), None)
+    example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
+    return f"nothing usable was left: see {rejected}{example}"

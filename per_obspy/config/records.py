@@ -18,7 +18,7 @@ class Columns(Section):
     station: str = Field(description="SEED station code")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
     longitude: float = Field(ge=-180, le=180, description="degrees east")
-    units: str = Field(description="of the samples: m/s2, cm/s2, gal, g")
+    units: str = Field(pattern="^(m/s2|cm/s2|gal|g)$", description="of the samples: m/s2, cm/s2, gal, g")
     channels: dict[str, int] = Field(description="channel code -> column, counted from 0")
     azimuths: dict[str, float] = Field(default_factory=dict, description="channel code -> degrees from north")
     separator: str | None = Field(None, description="between columns; white space if not given")
@@ -94,6 +94,12 @@ class Records(Section):
         None, description="grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach"
     )
     shakemap_uncertainty: RelativePath | None = Field(None, description="uncertainty.xml of the same ShakeMap")
+
+    @model_validator(mode="after")
+    def _any_source(self) -> Self:
+        if not any((self.folder, self.columns, self.fdsn, self.sds, self.asdf, self.shakemap)):
+            raise ValueError("give at least one of folder, columns, fdsn, sds, asdf and shakemap")
+        return self
 
     @model_validator(mode="after")
     def _known_window(self) -> Self:

@@ -56,6 +56,17 @@ class Run(Section):
             raise ValueError("give pairs: a file, or how to simulate them")
         return self
 
+    @model_validator(mode="after")
+    def _comparable_stations(self) -> Self:
+        dampings = self.spectra.dampings
+        if not dampings[0] <= 0.05 <= dampings[-1]:
+            told = ", ".join(f"{one:g}" for one in dampings)
+            raise ValueError(
+                f"spectra.dampings must reach from 0.05 or below to 0.05 or above, got {told}: stations are "
+                "compared at 5 %"
+            )
+        return self
+
 
 class Design(Section):
     """A screening by a design or user spectrum instead of records."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
+from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
 #: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or storeys.
@@ -169,11 +170,6 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
     return faults
 
 
-def _column(pairs: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column, NaN everywhere if the file has none."""
-    return pairs[name].to_numpy() if name in pairs.columns else np.full(len(pairs), np.nan)
-
-
 def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
     for i in _rows(np.asarray(repeated) & (identifiers != "").to_numpy()):
         yield i, f"pair_id = {identifiers.iloc[i]!r} stands in an earlier row already"
@@ -182,7 +178,7 @@ def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
 def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
     """Yield rows in which a building has neither height nor storeys nor period."""
     for group in ONE_OF:
-        known = [~np.isnan(_column(pairs, name)) for name in group]
+        known = [~np.isnan(numbers_in(pairs, name)) for name in group]
         for i in _rows(~np.any(known, axis=0)):
             yield i, f"none of {', '.join(group)} is a number, one is needed"
 
@@ -190,7 +186,7 @@ def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
 def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
     low, high = STOREY_HEIGHTS
     for index in (1, 2):
-        height, storeys = _column(pairs, f"height_{index}"), _column(pairs, f"storeys_{index}")
+        height, storeys = numbers_in(pairs, f"height_{index}"), numbers_in(pairs, f"storeys_{index}")
         with np.errstate(divide="ignore", invalid="ignore"):
             storey = height / storeys
         for i in _rows((height > 0) & (storeys > 0) & ((storey < low) | (storey > high))):
@@ -202,8 +198,8 @@ def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
 
 
 def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
-    contact = _column(pairs, "contact_height")
-    lower = np.fmin(_column(pairs, "height_1"), _column(pairs, "height_2"))
+    contact = numbers_in(pairs, "contact_height")
+    lower = np.fmin(numbers_in(pairs, "height_1"), numbers_in(pairs, "height_2"))
     # heights are often rounded, contact heights computed: a millimetre does not matter
     for i in _rows(contact > lower + 1e-3):
         yield i, f"contact_height = {contact[i]:g} m is above the lower building, {lower[i]:g} m"
@@ -211,7 +207,7 @@ def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
 
 def _positions(pairs: pd.DataFrame) -> Iterator[Fault]:
     """Yield rows whose buildings are no neighbours, or stand where a missing position is written as 0, 0."""
-    place = {name: _column(pairs, name) for name in ("longitude_1", "latitude_1", "longitude_2", "latitude_2")}
+    place = {name: numbers_in(pairs, name) for name in ("longitude_1", "latitude_1", "longitude_2", "latitude_2")}
     for index in (1, 2):
         nowhere = (place[f"longitude_{index}"] == 0.0) & (place[f"latitude_{index}"] == 0.0)
         for i in _rows(nowhere):
@@ -240,7 +236,7 @@ def _same_building(pairs: pd.DataFrame) -> Iterator[Fault]:
 
 
 def _observations(pairs: pd.DataFrame) -> Iterator[Fault]:
-    observed = _column(pairs, "observed")
+    observed = numbers_in(pairs, "observed")
     for i in _rows((observed > 0.0) & (observed < 1.0)):
         yield i, f"observed = {observed[i]:g} is neither 0 nor 1"
 

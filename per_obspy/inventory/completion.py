@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from per_obspy import config
 from per_obspy.checks import FloatArray
+from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.contact import contact_mass, contact_participation, floor_offset, floors_misaligned
 from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
@@ -70,11 +71,6 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     return pairs.assign(**columns, **texts, **flags)
 
 
-def _given(pairs: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column of numbers, NaN where the table is silent."""
-    return pairs[name].to_numpy(dtype=np.float64) if name in pairs.columns else np.full(len(pairs), np.nan)
-
-
 def _fill(columns: Columns, derived: Derived, name: str, given: FloatArray, values: FloatArray | float) -> None:
     """Add a column: the given values, elsewhere the others; those that are numbers count as derived."""
     empty = np.isnan(given)
@@ -90,7 +86,7 @@ def _system(pairs: pd.DataFrame, i: int, derived: Derived) -> pd.Series:
 
 
 def _add_size(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int, building: config.Building) -> None:
-    height, storeys = _given(pairs, f"height_{i}"), _given(pairs, f"storeys_{i}")
+    height, storeys = numbers_in(pairs, f"height_{i}"), numbers_in(pairs, f"storeys_{i}")
     _fill(columns, derived, f"height_{i}", height, storeys * building.storey_height)
     _fill(columns, derived, f"storeys_{i}", storeys, np.maximum(np.rint(height / building.storey_height), 1.0))
 
@@ -98,16 +94,16 @@ def _add_size(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int, b
 def _add_period(
     columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int, system: NDArray[np.str_], building: config.Building
 ) -> None:
-    height, period = columns[f"height_{i}"], _given(pairs, f"period_{i}")
+    height, period = columns[f"height_{i}"], numbers_in(pairs, f"period_{i}")
     # a row without height has a period, or it would have been rejected; 1 m stands in where nothing is derived
     formula = _FORMULAS[building.period_formula](np.where(np.isnan(height), 1.0, height), system)
     _fill(columns, derived, f"period_{i}", period, np.where(np.isnan(height), np.nan, formula))
     spread = np.where(np.isnan(period), period_log_std(system), 0.0)
-    columns[f"period_log_std_{i}"] = _first(_given(pairs, f"period_log_std_{i}"), spread)
-    damping = _given(pairs, f"damping_{i}")
+    columns[f"period_log_std_{i}"] = _first(numbers_in(pairs, f"period_log_std_{i}"), spread)
+    damping = numbers_in(pairs, f"damping_{i}")
     _fill(columns, derived, f"damping_{i}", damping, building.damping)
     spread = np.where(np.isnan(damping), building.damping_log_std, 0.0)
-    columns[f"damping_log_std_{i}"] = _first(_given(pairs, f"damping_log_std_{i}"), spread)
+    columns[f"damping_log_std_{i}"] = _first(numbers_in(pairs, f"damping_log_std_{i}"), spread)
 
 
 def _first(given: FloatArray, values: FloatArray | float) -> FloatArray:
@@ -117,26 +113,30 @@ def _first(given: FloatArray, values: FloatArray | float) -> FloatArray:
 def _add_strength(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:
     """Yield displacement ``C_y g (T / 2 pi)**2`` from the yield coefficient; infinite where neither is given."""
     name = f"yield_displacement_{i}"
-    coefficient = _given(pairs, f"yield_coefficient_{i}")
+    coefficient = numbers_in(pairs, f"yield_coefficient_{i}")
     _fill(
-        columns, derived, name, _given(pairs, name), coefficient * GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2
+        columns,
+        derived,
+        name,
+        numbers_in(pairs, name),
+        coefficient * GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2,
     )
     columns[name] = _first(columns[name], np.inf)
-    columns[f"hardening_{i}"] = _first(_given(pairs, f"hardening_{i}"), 0.0)
+    columns[f"hardening_{i}"] = _first(numbers_in(pairs, f"hardening_{i}"), 0.0)
 
 
 def _add_contact(columns: Columns, derived: Derived, pairs: pd.DataFrame, building: config.Building) -> None:
     lower = np.fmin(columns["height_1"], columns["height_2"])
-    _fill(columns, derived, "contact_height", _given(pairs, "contact_height"), lower)
+    _fill(columns, derived, "contact_height", numbers_in(pairs, "contact_height"), lower)
     for i in (1, 2):
         storeys, height, known = _sized(columns, i)
         contact = np.where(known, np.fmin(columns["contact_height"], height), 1.0)
         participation = np.where(known, contact_participation(storeys, height, contact), 1.0)
-        _fill(columns, derived, f"participation_{i}", _given(pairs, f"participation_{i}"), participation)
+        _fill(columns, derived, f"participation_{i}", numbers_in(pairs, f"participation_{i}"), participation)
     offset = np.where(_measured(pairs), floor_offset(*_sized(columns, 1)[1::-1], *_sized(columns, 2)[1::-1]), np.nan)
-    _fill(columns, derived, "floor_offset", _given(pairs, "floor_offset"), offset)
-    _fill(columns, derived, "restitution", _given(pairs, "restitution"), building.restitution)
-    columns["gap_std"] = _first(_given(pairs, "gap_std"), 0.0)
+    _fill(columns, derived, "floor_offset", numbers_in(pairs, "floor_offset"), offset)
+    _fill(columns, derived, "restitution", numbers_in(pairs, "restitution"), building.restitution)
+    columns["gap_std"] = _first(numbers_in(pairs, "gap_std"), 0.0)
 
 
 def _sized(columns: Columns, i: int) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
@@ -148,19 +148,19 @@ def _sized(columns: Columns, i: int) -> tuple[FloatArray, FloatArray, NDArray[np
 def _measured(pairs: pd.DataFrame) -> NDArray[np.bool_]:
     """Return where heights and storeys of both buildings are given: only then do floors say where they are."""
     names = [f"{name}_{i}" for name in ("height", "storeys") for i in (1, 2)]
-    return np.asarray(~np.any([np.isnan(_given(pairs, name)) for name in names], axis=0))
+    return np.asarray(~np.any([np.isnan(numbers_in(pairs, name)) for name in names], axis=0))
 
 
 def _add_masses(columns: Columns, derived: Derived, pairs: pd.DataFrame, building: config.Building) -> None:
     masses = []
     for i in (1, 2):
-        area = _first(_given(pairs, f"area_{i}"), building.area)
+        area = _first(numbers_in(pairs, f"area_{i}"), building.area)
         derived_mass = area * columns[f"storeys_{i}"] * building.mass_per_area
-        masses.append(_first(_given(pairs, f"mass_{i}"), derived_mass))
+        masses.append(_first(numbers_in(pairs, f"mass_{i}"), derived_mass))
     nothing_known = building.area * building.mass_per_area
     for i, mass, neighbour in zip((1, 2), masses, masses[::-1], strict=True):
         assumed = _first(_first(mass, neighbour), nothing_known)
-        _fill(columns, derived, f"mass_{i}", _given(pairs, f"mass_{i}"), assumed)
+        _fill(columns, derived, f"mass_{i}", numbers_in(pairs, f"mass_{i}"), assumed)
         storeys, height, known = _sized(columns, i)
         contact = np.where(known, np.fmin(columns["contact_height"], height), 1.0)
         at_contact = contact_mass(columns[f"mass_{i}"], storeys, height, contact)
@@ -169,7 +169,7 @@ def _add_masses(columns: Columns, derived: Derived, pairs: pd.DataFrame, buildin
 
 def _add_place(columns: Columns, pairs: pd.DataFrame) -> None:
     """Add the middle of the pair, across the date line too, and the azimuth."""
-    east = (_given(pairs, "longitude_2") - _given(pairs, "longitude_1") + 180.0) % 360.0 - 180.0
-    columns["longitude"] = (_given(pairs, "longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
-    columns["latitude"] = (_given(pairs, "latitude_1") + _given(pairs, "latitude_2")) / 2.0
-    columns["azimuth"] = _given(pairs, "azimuth")
+    east = (numbers_in(pairs, "longitude_2") - numbers_in(pairs, "longitude_1") + 180.0) % 360.0 - 180.0
+    columns["longitude"] = (numbers_in(pairs, "longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
+    columns["latitude"] = (numbers_in(pairs, "latitude_1") + numbers_in(pairs, "latitude_2")) / 2.0
+    columns["azimuth"] = numbers_in(pairs, "azimuth")

@@ -17,9 +17,9 @@ BLOCK = 1 << 20
 OTHER_SEPARATORS = {";": "semicolons", "\t": "tabulators", "|": "vertical bars"}
 
 
-def check_text(file: Path) -> None:
+def check_text(file: Path) -> bool:
     """
-    Check that a file is text in UTF-8.
+    Check that a file is text in UTF-8, and return whether it has quotation marks.
 
     Raises
     ------
@@ -28,16 +28,18 @@ def check_text(file: Path) -> None:
     """
     if kind := looks_like(file):
         raise CatalogError(str(file), f"not a CSV table: it is {kind}")
-    decoder = codecs.getincrementaldecoder("utf-8")()
+    decoder, quoted = codecs.getincrementaldecoder("utf-8")(), False
     try:
         with file.open("rb") as stream:
             while block := stream.read(BLOCK):
                 decoder.decode(block)
+                quoted = quoted or b'"' in block
                 if b"\0" in block:
                     raise CatalogError(str(file), "not a CSV table: it holds zero bytes, as no text does")
         decoder.decode(b"", final=True)
     except UnicodeDecodeError as error:
         raise CatalogError(str(file), _undecodable(file)) from error
+    return quoted
 
 
 def _undecodable(file: Path) -> str:
@@ -49,6 +51,15 @@ def _undecodable(file: Path) -> str:
             except UnicodeDecodeError as error:
                 return f"line {number} is not UTF-8 (byte 0x{line[error.start]:02x} at position {error.start + 1})"
     return "the end is not UTF-8"
+
+
+def open_quotation(file: Path) -> str:
+    """Return which line has a cell whose quotation mark is not closed on it, as the reader needs; empty if none."""
+    with file.open(encoding="utf-8") as text:
+        for number, line in enumerate(text, start=1):
+            if line.count('"') % 2 and (line.startswith('"') or ',"' in line):
+                return f"line {number} has a quotation mark that is not closed on it"
+    return ""
 
 
 def check_separator(file: Path, names: list[str]) -> None:

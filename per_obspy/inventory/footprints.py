@@ -10,6 +10,7 @@ import shapely
 
 from per_obspy import checks
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.checking import Rejections, checked_pairs
 from per_obspy.inventory.contact import floor_offset
 from per_obspy.inventory.importers import imported
@@ -153,7 +154,7 @@ def _with_heights(table: pd.DataFrame) -> pd.DataFrame:
 def _with_floors(pairs: pd.DataFrame) -> pd.DataFrame:
     """Return checked pairs with contact height and floor offset where heights and storeys of both are known."""
     names = ("height_1", "storeys_1", "height_2", "storeys_2")
-    known = [pairs[name].to_numpy() if name in pairs else np.full(len(pairs), np.nan) for name in names]
+    known = [numbers_in(pairs, name) for name in names]
     full = ~np.isnan(known).any(axis=0)
     offset = np.where(full, floor_offset(*np.where(full, known, 1.0)), np.nan)
     pairs = pairs.assign(contact_height=np.minimum(known[0], known[2]), floor_offset=offset)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
-from per_obspy.inventory.raw_rows import IDENTIFIER, RawRows, name_hashes, pair_file
+from per_obspy.inventory.pair_files import pair_file
+from per_obspy.inventory.raw_rows import IDENTIFIER, RawRows, name_hashes
 
 #: As many rows as any table has.
 ALL = 1 << 40

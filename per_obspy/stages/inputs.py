@@ -2,7 +2,7 @@
 
 from per_obspy.config import Run
 from per_obspy.inventory.checking import check_columns
-from per_obspy.inventory.raw_rows import pair_file
+from per_obspy.inventory.pair_files import pair_file
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.stages.inventory import named_files
 

@@ -108,6 +108,7 @@ def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
         (b"PK\x03\x04" + bytes(range(256)), "pairs.csv", "it is a ZIP archive, as Excel workbooks are"),
         (bytes(100), "pairs.csv", "not a CSV table: it holds zero bytes"),
         (f"{HEADER}\n{GOOD}".encode() + b"\xc3", "pairs.csv", "line 2 is not UTF-8"),
+        (b"x", "town.gpkg", r"expected .csv or .parquet; per-obspy pairs makes such a table of footprints"),
         (b"x", "pairs.xlsx", r"unknown suffix '.xlsx', expected .csv or .parquet"),
     ],
 )  # fmt: skip

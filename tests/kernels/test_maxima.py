@@ -7,8 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels.between import largest_in_step, rate_bounds, series_terms, workspace
 from per_obspy.kernels.blocks import TILE
 from per_obspy.kernels.maxima import largest_responses
+from per_obspy.kernels.maxima_roots import raise_to_root
 from per_obspy.kernels.maxima_samples import KEPT, LANES, ROWS, SQUARE, pack_oscillator, run_strides
 from per_obspy.kernels.maxima_window import FORGOTTEN, find_windows
 from per_obspy.kernels.oscillator import step
@@ -114,6 +116,31 @@ def test_a_late_pulse_is_felt_afterwards(stride):
     phase = 0.1
     amplitude = phase * (np.sin(phase / 2) / (phase / 2)) ** 2
     assert_allclose(lengths(north, phase, 0.0, stride), amplitude, rtol=1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.7])
+def test_a_root_gives_the_value_of_a_search(damping):
+    # mutations: a sign of the correction, the slope of the other condition, a step with two roots called certain
+    rng, found = np.random.default_rng(8), 0
+    for phase in (0.01, 0.1, 0.45):
+        a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase)
+        for u, z, start, end in rng.normal(size=(60, 4)) * [1.0, phase, 1.0, 1.0]:
+            u_end, z_end = a11 * u + a12 * z + b11 * start + b12 * end, a21 * u + a22 * z + b21 * start + b22 * end
+            rates = rate_bounds(
+                np.hypot(u, z) + phase * 4.0, np.abs([start, end]).max(), abs(end - start), damping, phase
+            )
+            for number in (0, 1):
+                best, expected = np.zeros(4), np.zeros(4)
+                wanted = np.arange(4) == number
+                largest_in_step(u, z, start, end, damping, phase, wanted, workspace(), expected)
+                ends, terms = (u, z, start, u_end, z_end, end), series_terms(phase)
+                if raise_to_root(number, ends, rates, damping, phase, terms, workspace(), best):
+                    found += best.any()
+                    quantities = [(u * u + z * z, abs(u)), (u_end**2 + z_end**2, abs(u_end))]
+                    ours = np.maximum(best[:2], np.max(quantities, axis=0))
+                    # the ends are among what the search looks at; 1e-15 of a shift's third power, and rounding
+                    assert_allclose(ours[number], np.maximum(expected[:2], quantities[0])[number], rtol=1e-13)
+    assert found > 50  # roots
 
 
 def test_scratch_space_starts_at_a_cache_line():

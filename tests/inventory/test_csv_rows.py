@@ -71,8 +71,20 @@ def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, s
         ("short", 3, "2 columns, the header has 10"),
         ("b", 4, reason.format("note", 2)),
         ("short too", 7, "1 columns, the header has 10"),
-        ("f", 9, reason.format("zone", 2)),
+        ("f", 9, reason.format("zone", 1)),
     ]
+
+
+def test_a_quotation_mark_that_swallows_a_block_of_the_reader_is_found(tmp_path):
+    # blocks have 1 MB: here the reader itself gives up, without a line; the last block is read to its end
+    rows = [_row(f"p{i}", note="x" * 100) for i in range(20_000)]
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, *rows[:19_000], _row("open", note='"x'), *rows[19_000:], ""]))
+    table, rejected = _in_chunks([path], 7000)
+    assert (len(table), [(one.name, one.row) for one in rejected]) == (19_000, [("open", 19_002)])
+    path.write_text("\n".join([HEADER, *rows[:5000], _row("open", note='"x'), *rows[5000:], ""]))
+    with pytest.raises(CatalogError, match=r"pairs\.csv: line 5002 has a quotation mark that is not closed on it"):
+        read_pairs(path)
 
 
 def test_a_quotation_mark_inside_a_cell_is_text(tmp_path):
