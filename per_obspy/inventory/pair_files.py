@@ -12,6 +12,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import told_apart
 from per_obspy.inventory.csv_rows import CsvFile
 from per_obspy.inventory.raw_rows import IDENTIFIER, PairFile, RawRows
+from per_obspy.inventory.schema import COLUMNS
 
 
 class ParquetFile:
@@ -34,15 +35,23 @@ class ParquetFile:
         with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
             for batch in stored.iter_batches(batch_size=size):
                 lines = np.arange(line, line + batch.num_rows)
-                yield RawRows(str(self.file), pa.Table.from_batches([batch]), lines, ())
+                yield RawRows(str(self.file), _with_numbers(pa.Table.from_batches([batch])), lines, ())
                 line += batch.num_rows
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
         try:
             yield
-        except (pa.ArrowInvalid, OSError) as error:
+        except (pa.ArrowException, OSError) as error:
             raise CatalogError(str(self.file), told_apart(self.file, "Parquet table", error)) from error
+
+
+def _with_numbers(table: pa.Table) -> pa.Table:
+    """Return the table with truth values as 0 and 1 where numbers belong, as some programs write what was observed."""
+    for i, column in enumerate(table.schema):
+        if pa.types.is_boolean(column.type) and column.name in COLUMNS and COLUMNS[column.name].dtype == "float64":
+            table = table.set_column(i, column.name, table[i].cast(pa.float64()))
+    return table
 
 
 #: What layers of footprints are called, which are no pairs yet.
