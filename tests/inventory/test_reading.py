@@ -137,6 +137,16 @@ def test_truth_values_are_observations(write, tmp_path):
     assert_frame_equal(read_pairs(tmp_path / "seen.parquet")[["observed"]], pd.DataFrame({"observed": [1, 0, np.nan]}))
 
 
+def test_an_index_of_pandas_is_a_column_or_nothing(write, tmp_path):
+    # would catch names that become the index, and an index of numbers that becomes a column
+    table = read_pairs(write("\n".join([HEADER, GOOD, GOOD.replace("007", "008")])))
+    table.attrs = {}
+    table.set_index("pair_id").to_parquet(tmp_path / "named.parquet")
+    assert read_pairs(tmp_path / "named.parquet")["pair_id"].tolist() == ["007", "008"]
+    table.set_axis([5, 9]).to_parquet(tmp_path / "numbered.parquet")
+    assert_frame_equal(read_pairs(tmp_path / "numbered.parquet"), table)
+
+
 def test_names_that_are_no_text(write, tmp_path):
     table = read_pairs(write(f"{HEADER}\n{GOOD}\n"))
     table.assign(pair_id=[[1]]).to_parquet(tmp_path / "lists.parquet")
