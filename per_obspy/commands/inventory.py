@@ -53,6 +53,7 @@ def find_pairs(
     ),
     distance: Annotated[float, typer.Option(min=0.001, max=10.0, help="Largest gap of a pair, m.")] = 3.0,
     layer: Annotated[str | None, typer.Option(help="Layer, for files that have several.")] = None,
+    gap_std: Annotated[float, typer.Option(min=0.0, help="Standard deviation of drawn gaps, m.")] = 0.0,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -65,7 +66,7 @@ def find_pairs(
     from per_obspy.inventory.writing import write_pairs
     from per_obspy.report.tables import write_rejected
 
-    table = pairs_from_footprints(footprints, distance, layer)
+    table = pairs_from_footprints(footprints, distance, layer, gap_std)
     rejected = table.attrs["rejected"]
     write_pairs(table, output)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))

@@ -57,8 +57,8 @@ class Screening(Section):
         {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
         description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
     )
-    linearized_median: float = Field(2.5, gt=0, description="the same of the demand where the linearized gap decides")
-    linearized_dispersion: float = Field(0.6, ge=0, description="the same of the linearized gap of yielding pairs")
+    linearized_median: float = Field(2.7, gt=0, description="the same of the demand where the linearized gap decides")
+    linearized_dispersion: float = Field(0.65, ge=0, description="the same of the linearized gap of yielding pairs")
     target_amplification: float = Field(1.25, ge=1, description="largest PER after / before that a bumper is to allow")
     shakemap_log_std: float = Field(0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed")
     interpolation: Interpolation = Interpolation()

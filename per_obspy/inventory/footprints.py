@@ -25,7 +25,9 @@ OVERLAP = 0.02
 WIDEST = 6.0
 
 
-def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | None = None) -> pd.DataFrame:
+def pairs_from_footprints(
+    path: str | Path, distance: float = 3.0, layer: str | None = None, gap_std: float = 0.0
+) -> pd.DataFrame:
     """
     Find neighbouring buildings and what lies between them.
 
@@ -38,6 +40,8 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
         Largest gap of a pair, m.
     layer : str, optional
         Name of the layer, for files that have several.
+    gap_std : float, optional
+        Standard deviation of the gaps that outlines as they were drawn leave, m; party walls stay without.
 
     Returns
     -------
@@ -52,11 +56,12 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
     CatalogError
         If the file cannot be read, holds no polygons, spans more than 6 degrees of longitude, or has no neighbours.
     ValueError
-        If the distance is not positive or larger than any gap may be.
+        If the distance is not positive or larger than any gap may be, or the deviation is negative.
     """
     largest = checks.number("distance", distance, checks.positive)
     if largest > COLUMNS["gap"].high:
         raise ValueError(f"distance must not be above the largest gap, {COLUMNS['gap'].high:g} m, got {largest:g}")
+    drawn = checks.number("gap_std", gap_std, checks.not_negative)
     source = str(path)
     found = read_layer(path, layer)
     buildings = imported(found.attributes, source)
@@ -67,7 +72,7 @@ def pairs_from_footprints(path: str | Path, distance: float = 3.0, layer: str | 
     pairs, overlapping = _without_overlaps(table, source)
     rejected = (*found.rejected, *repeated, *overlapping)
     if not pairs.empty:
-        pairs = checked_pairs(pairs, source)
+        pairs = checked_pairs(pairs.assign(gap_std=np.where(pairs["gap"] > 0, drawn, 0.0)), source)
         rejected += tuple(one._replace(row=None) for one in pairs.attrs["rejected"])
         pairs = _with_floors(pairs)
     pairs.attrs["rejected"] = Rejections(rejected)

@@ -19,9 +19,9 @@ from .response import first_root
 
 #: Tiles kept at a time: memory stays the same however long the record is.
 TILES = 512
-#: What a displacement times omega² is expected to reach, of the record's peak. An oscillator that does not reach it is
-#: run again, through the whole record.
-EXPECTED = 0.1
+#: What a displacement times omega² is expected to reach, of the record's peak; less below a phase of a step, because
+#: soft oscillators stay behind. One that does not reach it is run again, through the whole record.
+EXPECTED, SOFT_PHASE = 0.1, 0.05
 
 
 @kernel
@@ -44,7 +44,7 @@ def largest_responses(stride, north, east, limits, groups, width, oscillators, o
             for lane in range(LANES):
                 phase, damping, to_north, to_east = oscillators[:, chosen[min(lane, chosen.size - 1)]]
                 pack_oscillator(stride, phase, damping, to_north, to_east, table, lane)
-                floors[lane] = expected * _peak(groups, to_north, to_east)
+                floors[lane] = expected * min(1.0, phase / SOFT_PHASE) * _peak(groups, to_north, to_east)
             _run(stride, north, east, limits, groups, width, table, kept, floors, bounds, best)
             for lane in range(chosen.size):
                 if best[1, lane] >= floors[lane]:

@@ -11,8 +11,8 @@ from ._jit import kernel
 from .between import (
     LONGEST_SPAN,
     dips,
+    find_wanted,
     largest_in_step,
-    may_exceed,
     may_vanish,
     radius_bound,
     rate_bounds,
@@ -74,7 +74,7 @@ def _thresholds(stride, limits, table, largest, threshold):
         for tile in range(limits.shape[1]):
             strongest[row, 0] = max(strongest[row, 0], limits[row, tile])
     for lane in range(LANES):
-        _, slack = _bounds(stride, strongest, 0, lane, table, largest[0, lane])
+        _, _, slack = _bounds(stride, strongest, 0, lane, table, largest[0, lane])
         for row in range(2):
             threshold[row, lane] = largest[row, lane] - stride * stride * slack[row]
 
@@ -92,19 +92,20 @@ def _beyond(kept, threshold, over):
 
 @kernel
 def _bounds(stride, limits, tile, lane, table, square):
-    """Return bounds of the rates in a tile, and by how much two samples may be exceeded between them."""
+    """Return bounds of the radius and the rates in a tile, and by how much two samples may be exceeded between them."""
     north, east = abs(table[WEIGHTS, lane]), abs(table[WEIGHTS + 1, lane])
     peak = north * limits[0, tile] + east * limits[1, tile]
     jump = north * limits[2, tile] + east * limits[3, tile]
     damping, phase = table[DAMPING, lane], table[PHASE, lane]
-    rates = rate_bounds(radius_bound(square, peak, damping, stride * phase), peak, jump, damping, phase)
-    return rates, slacks(rates, damping, phase)
+    radius = radius_bound(square, peak, damping, stride * phase)
+    rates = rate_bounds(radius, peak, jump, damping, phase)
+    return radius, rates, slacks(rates, damping, phase)
 
 
 @kernel
 def _walk(stride, north, east, limits, tile, lane, table, kept, motion, work, largest):
     """Raise the largest values of an oscillator to those in one tile, exact between the samples."""
-    rates, slack = _bounds(stride, limits, tile, lane, table, kept[tile, SQUARE, lane])
+    radius, rates, slack = _bounds(stride, limits, tile, lane, table, kept[tile, SQUARE, lane])
     square, displacement = kept[tile, SQUARE, lane], kept[tile, DISPLACEMENT, lane]
     wide = stride * stride
     if square + wide * slack[0] <= largest[0, lane] and displacement + wide * slack[1] <= largest[1, lane]:
@@ -116,7 +117,7 @@ def _walk(stride, north, east, limits, tile, lane, table, kept, motion, work, la
     best = np.array((max(largest[0, lane], square), max(largest[1, lane], displacement), np.inf, np.inf))
     if square + slack[0] > best[0] or displacement + slack[1] > best[1]:
         damping, phase = table[DAMPING, lane], table[PHASE, lane]
-        _search(motion, rates, slack, damping, phase, work, best)
+        _search(motion, radius, rates, slack, damping, phase, work, best)
     largest[0, lane], largest[1, lane] = best[0], best[1]
 
 
@@ -136,23 +137,20 @@ def _rerun(u, z, lane, table, motion):
 
 
 @kernel
-def _search(motion, rates, slack, damping, phase, work, best):
+def _search(motion, radius, rates, slack, damping, phase, work, best):
     """Raise the largest values to the stationary ones within the steps of a tile."""
     wanted, twice, terms = np.zeros(4, np.bool_), 2.0 * damping, series_terms(phase)
-    dip = dips(rates, damping, phase)
+    dip, short = dips(rates, damping, phase), phase <= LONGEST_SPAN
     for i in range(TILE):
         u, z, u_end, z_end = motion[0, i], motion[1, i], motion[0, i + 1], motion[1, i + 1]
         larger = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > best[0]
         if larger or max(abs(u), abs(u_end)) + slack[1] > best[1]:
             start, end = motion[2, i], motion[2, i + 1]
             ends = (u, z, start, u_end, z_end, end)
-            wanted[0] = larger and may_vanish(twice * z + start, twice * z_end + end, dip[0])
-            wanted[1] = may_vanish(z, z_end, dip[1])
-            if phase <= LONGEST_SPAN:
-                for number in range(2):
-                    if wanted[number]:
-                        wanted[number] = not raise_to_root(number, ends, rates, damping, phase, terms, work, best)
-            elif not may_exceed(u, z, start, end, damping, phase, best):
-                continue
-            if wanted[0] or wanted[1]:
+            doubtful = False
+            if larger and may_vanish(twice * z + start, twice * z_end + end, dip[0]):
+                doubtful = not (short and raise_to_root(0, ends, rates, damping, phase, terms, work, best))
+            if may_vanish(z, z_end, dip[1]):
+                doubtful |= not (short and raise_to_root(1, ends, rates, damping, phase, terms, work, best))
+            if doubtful and find_wanted(u, z, start, u_end, z_end, end, damping, phase, radius, 4, best, wanted):
                 largest_in_step(u, z, start, end, damping, phase, wanted, work, best)

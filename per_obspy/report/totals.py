@@ -1,6 +1,7 @@
 """What a region adds up to, as files: totals by area."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ class RegionTotals(NamedTuple):
     outlines: list[FloatArray] | None
 
 
-def region_totals(risk: Path, settings: Totals) -> RegionTotals:
+def region_totals(risk: Path, settings: Totals, classes: Sequence[str]) -> RegionTotals:
     """
     Count the pairs of every area.
 
@@ -44,12 +45,15 @@ def region_totals(risk: Path, settings: Totals) -> RegionTotals:
         Parquet file of the risk table, at least one row; it is read in pieces.
     settings : Totals
         Column of the pair table that names the area, or else what cells there are.
+    classes : sequence of str
+        Risk classes, each of which has a column even if no pair is of it.
     """
+    counted = partial(_counted, risk, classes)
     if settings.area:
-        return RegionTotals(_counted(risk, settings.area, lambda piece: _named(piece, str(settings.area))), None)
+        return RegionTotals(counted(settings.area, lambda piece: _named(piece, str(settings.area))), None)
     if settings.h3 is not None:
         resolution = settings.h3
-        table = _counted(risk, None, lambda piece: hexagons(piece["longitude"], piece["latitude"], resolution))
+        table = counted(None, lambda piece: hexagons(piece["longitude"], piece["latitude"], resolution))
         return RegionTotals(table, hexagon_outlines(table["area"]))
     boxes: dict[str, FloatArray] = {}
 
@@ -58,13 +62,15 @@ def region_totals(risk: Path, settings: Totals) -> RegionTotals:
         boxes.update(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
         return cells.cell
 
-    table = _counted(risk, None, in_grid)
+    table = counted(None, in_grid)
     return RegionTotals(table, [boxes[name] for name in table["area"]])
 
 
-def _counted(risk: Path, column: str | None, area: Callable[[pd.DataFrame], NDArray[np.object_]]) -> pd.DataFrame:
+def _counted(
+    risk: Path, classes: Sequence[str], column: str | None, area: Callable[[pd.DataFrame], NDArray[np.object_]]
+) -> pd.DataFrame:
     pieces = ranked(risk, [*COLUMNS, *([column] if column else [])])
-    return joined_totals([partial_totals(piece, area(piece)) for piece in pieces])
+    return joined_totals([partial_totals(piece, area(piece), classes) for piece in pieces])
 
 
 def _named(piece: pd.DataFrame, column: str) -> NDArray[np.object_]:

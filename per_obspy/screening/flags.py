@@ -18,8 +18,9 @@ UNRELIABLE_SINGLE_HIT = 0.6
 
 def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
     """Return which pairs have a period that was derived from height or storeys."""
-    derived = np.asarray(pairs["derived"], dtype=object)
-    return np.fromiter(("period_1" in names or "period_2" in names for names in derived), bool, derived.size)
+    derived = np.asarray(pairs["derived"], dtype=object).tolist()
+    told = {names: "period_1" in names or "period_2" in names for names in set(derived)}  # few, of many rows
+    return np.fromiter(map(told.__getitem__, derived), bool, len(derived))
 
 
 def joined_flags(raised: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]:

@@ -116,7 +116,7 @@ def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
     DataFrame
         One row an area, in the order of their names: the columns of ``TOTALS`` and ``class_...`` for every risk class.
     """
-    return joined_totals([partial_totals(table, area)])
+    return joined_totals([partial_totals(table, area, table["risk_class"].unique())])
 
 
 class PartialTotals(NamedTuple):
@@ -138,14 +138,14 @@ class PartialTotals(NamedTuple):
     chance: pd.DataFrame | None
 
 
-def partial_totals(table: pd.DataFrame, area: ArrayLike) -> PartialTotals:
+def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str]) -> PartialTotals:
     """Count a piece of a risk table, as :func:`totals` does; :func:`joined_totals` joins what pieces add."""
     rows = table.assign(area=np.asarray(area, dtype=object))
     east, north = np.radians(rows["longitude"]), np.radians(rows["latitude"])
     added = {
         "pairs": 1,
         **{state: rows["state"] == state for state in STATES},
-        **{f"class_{name}": rows["risk_class"] == name for name in rows["risk_class"].unique()},
+        **{f"class_{name}": rows["risk_class"] == name for name in classes},
         "x": np.cos(north) * np.cos(east),
         "y": np.cos(north) * np.sin(east),
         "z": np.sin(north),

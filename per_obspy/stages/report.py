@@ -56,7 +56,7 @@ def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Prog
         outputs.append(folder / "spectra.nc")
     if risk.exists():
         outputs += _figures(settings, risk, shards, folder) if shards else []
-        totals = region_totals(risk, settings.totals)
+        totals = region_totals(risk, settings.totals, list(settings.screening.classes))
         write_totals(totals.table, folder / "totals.csv")
         outputs += [folder / "totals.csv", *write_evaluation(risk, folder, settings.simulation is not None)]
         if settings.geopackage:

@@ -112,6 +112,15 @@ def test_azimuth_is_true_north_also_at_the_edge_of_the_layer(write):
         assert row.azimuth == pytest.approx(true, abs=0.02)
 
 
+def test_drawn_gaps_are_uncertain_and_party_walls_are_not(write):
+    pairs = pairs_from_footprints(write(ROW), gap_std=0.1)
+    # would catch a deviation of touching pairs, which a lognormal gap cannot have
+    assert dict(zip(pairs["gap"].round(6), pairs["gap_std"], strict=True)) == {0.25: 0.1, 0.0: 0.0}
+    assert (pairs_from_footprints(write(ROW, "other.gpkg"))["gap_std"] == 0.0).all()
+    with pytest.raises(ValueError, match="gap_std"):
+        pairs_from_footprints(write(ROW, "third.gpkg"), gap_std=-0.1)
+
+
 def test_floors_that_do_not_meet(write):
     pairs = pairs_from_footprints(write(ROW[:2], height=[12.0, 9.0], storeys=[3.0, 3.0]))
     assert pairs["floor_offset"][0] == 1.0  # floors of the taller one at 4, 8, 12 m; roof of the lower at 9 m

@@ -10,6 +10,7 @@ from per_obspy.report import ranked
 from per_obspy.report.totals import region_totals
 
 COUNT = 300
+CLASSES = ["severe", "moderate", "low"]
 
 
 @pytest.fixture
@@ -35,11 +36,15 @@ def risk(tmp_path):
 @pytest.mark.parametrize("kind", [{}, {"cell": 300.0}, {"area": "ward"}, {"h3": 9}])
 def test_pieces_do_not_change_totals(risk, monkeypatch, kind):
     # would catch outlines of the last piece only
-    whole = region_totals(risk, Totals(**kind))
+    whole = region_totals(risk, Totals(**kind), CLASSES)
     monkeypatch.setattr(ranked, "ROWS", 11)
-    pieces = region_totals(risk, Totals(**kind))
+    pieces = region_totals(risk, Totals(**kind), CLASSES)
     pd.testing.assert_frame_equal(pieces.table, whole.table, rtol=1e-12)  # sums in another order
     assert whole.table["pairs"].sum() == COUNT
+    # would catch columns that come and go with what a region happens to hold, and zeros where a piece lacks a class
+    counts = whole.table[[f"class_{name}" for name in CLASSES]].sum()
+    assert counts["class_moderate"] == 0
+    assert counts.sum() == COUNT
     if "area" in kind:
         assert whole.outlines is None
         assert whole.table["area"].tolist() == ["", "north", "south"]
