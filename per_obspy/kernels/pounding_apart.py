@@ -10,7 +10,7 @@ import math
 from ._jit import lean
 from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
 from .pounding_block import SETTLING_STEPS, prepare_block
-from .pounding_bounce import put
+from .pounding_bounce import opening, put
 from .pounding_events import find_event, finish_piece
 from .pounding_lanes import (
     EVENT,
@@ -121,12 +121,6 @@ def repeat_apart(row, log, segment):
 
 
 @lean
-def _parting(pair, left, right):
-    """Return the rate at which two structures part."""
-    return pair[STRUCTURE_ROWS + OMEGA] * right[1] - pair[OMEGA] * left[1]
-
-
-@lean
 def _may_part(pair, row, left, next_left, right, next_right):
     """
     Tell whether the relative displacement may pass its largest values where its rate has a root inside a step.
@@ -137,7 +131,7 @@ def _may_part(pair, row, left, next_left, right, next_right):
     second = STRUCTURE_ROWS
     strength, other = max(abs(left[2]), abs(next_left[2])), max(abs(right[2]), abs(next_right[2]))
     before, after = right[0] - left[0], next_right[0] - next_left[0]
-    rate, next_rate = _parting(pair, left, right), _parting(pair, next_left, next_right)
+    rate, next_rate = opening(pair, left, right), opening(pair, next_left, next_right)
     row[0, OPENING], row[1, OPENING] = max(row[0, OPENING], before), max(row[1, OPENING], -before)
     sag = pair[OMEGA] * pair[SPEED_SAG] * strength + pair[second + OMEGA] * pair[second + SPEED_SAG] * other
     turns = abs(rate + next_rate) <= abs(next_rate - rate) + 2.0 * sag

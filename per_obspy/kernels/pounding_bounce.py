@@ -31,7 +31,7 @@ def _clearance(pair, left, right):
 
 
 @inlined
-def _opening(pair, left, right):
+def opening(pair, left, right):
     """Return the rate at which the clearance grows, 1/s of a displacement."""
     return pair[STRUCTURE_ROWS + OMEGA] * right[1] - pair[OMEGA] * left[1]
 
@@ -52,7 +52,7 @@ def course(pair, left, right, next_left, next_right, share):
     change = other_omega * other_omega * right[2] - omega * omega * left[2]
     next_change = other_omega * other_omega * next_right[2] - omega * omega * next_left[2]
     hollow, grows = max(change, next_change) + bend < 0.0, min(change, next_change) - bend > 0.0
-    rate, next_rate = _opening(pair, left, right), _opening(pair, next_left, next_right)
+    rate, next_rate = opening(pair, left, right), opening(pair, next_left, next_right)
     rises = (min(rate, next_rate) > sag) | (grows & (rate > 0.0)) | (hollow & (next_rate > 0.0))
     falls = (max(rate, next_rate) < -sag) | (hollow & (rate < 0.0)) | (grows & (next_rate < 0.0))
     return rises, falls, hollow & (rate > 0.0)
@@ -125,7 +125,7 @@ def meeting(pair, row, left, right, next_left, next_right, share, segment):
     second, change = STRUCTURE_ROWS, segment.slope * segment.duration
     omega, other_omega = pair[OMEGA] * segment.duration, pair[second + OMEGA] * segment.duration
     start, end = _clearance(pair, left, right), _clearance(pair, next_left, next_right)
-    time = share * _first_guess(start, _opening(pair, left, right) * segment.duration * share, end)
+    time = share * _first_guess(start, opening(pair, left, right) * segment.duration * share, end)
     for _ in range(MOST_LOOKS):
         hit_left, hit_right = inside(pair, row, 0, left, change, time), inside(pair, row, 1, right, change, time)
         rate, other_rate = _rate(pair, 0, hit_left, change), _rate(pair, second, hit_right, change)
@@ -201,7 +201,7 @@ def bounce(pair, row, log, left, right, next_left, next_right, segment):
     while True:
         rest = 1.0 - elapsed
         share, next_left, next_right = next_impact(pair, row, left, right, next_left, next_right, rest, segment)
-        if share < 0.0 or (share <= rest and _opening(pair, next_left, next_right) >= -row[0, STILL]):
+        if share < 0.0 or (share <= rest and opening(pair, next_left, next_right) >= -row[0, STILL]):
             break
         _raise_both(pair, row, left, right, next_left, next_right, change, min(share, rest))
         if share > rest:
