@@ -87,7 +87,7 @@ _BUILDING = (
     Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0,
            hint="in milliseconds?"),
     Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period", low=0.0, high=2.0),
-    Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=1.0 - 1e-9,
+    Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=0.5,
            hint="a fraction is expected, not per cent"),
     Column("damping_log_std", "float64", "1", "logarithmic standard deviation of the damping", low=0.0, high=2.0),
     Column("mass", "float64", "kg", "total mass", low=1.0, high=1e12),
@@ -96,7 +96,7 @@ _BUILDING = (
            low=TINY, high=3.0),
     Column("yield_displacement", "float64", "m", "of the equivalent oscillator; infinite if it stays linear", low=TINY),
     Column("yield_coefficient", "float64", "1", "yield strength / weight", low=TINY, high=10.0),
-    Column("hardening", "float64", "1", "stiffness after yield / stiffness before", low=0.0, high=1.0),
+    Column("hardening", "float64", "1", "stiffness after yield / stiffness before", low=0.0, high=1.0 - 1e-9),
     Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),
     Column("importance", "float64", "1", "importance factor", low=0.0, high=10.0),
 )  # fmt: skip
