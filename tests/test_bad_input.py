@@ -267,7 +267,7 @@ ROWS = {
     "period in milliseconds": ({"period_2": 500}, "period_2 = 500 s is outside 0.01 to 20 s (in milliseconds?)"),
     "negative mass": ({"mass_1": -2e5}, "mass_1 = -200000 kg is outside"),
     "restitution": ({"restitution": 1.5}, "restitution = 1.5 is outside 0 to 1"),
-    "per cent": ({"damping_1": 5}, "damping_1 = 5 is outside 0 to 0.5 (a fraction is expected, not per cent)"),
+    "per cent": ({"damping_1": 5}, "damping_1 = 5 is outside 0 to 1 (a fraction is expected, not per cent)"),
     "28 m floor": ({"storeys_1": 1, "height_1": 28}, "makes floors of 28 m"),
     "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown"),
     "same name": ({"pair_id": "a"}, "pair_id = 'a' stands in an earlier row"),

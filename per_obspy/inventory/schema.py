@@ -87,7 +87,7 @@ _BUILDING = (
     Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0,
            hint="in milliseconds?"),
     Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period", low=0.0, high=2.0),
-    Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=0.5,
+    Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=1.0 - 1e-9,
            hint="a fraction is expected, not per cent"),
     Column("damping_log_std", "float64", "1", "logarithmic standard deviation of the damping", low=0.0, high=2.0),
     Column("mass", "float64", "kg", "total mass", low=1.0, high=1e12),

@@ -29,6 +29,9 @@ from per_obspy.screening.values import Columns, Table, both, chosen, components,
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
 PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
 
+#: What yielding adds to a building's damping ends here: an oscillator has less than the critical one.
+LARGEST_DAMPING = 0.99
+
 #: What an equivalent building has of its own.
 EQUIVALENT = ("period", "damping", "per")
 
@@ -126,9 +129,10 @@ def _equivalent(sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: T
     ductility, converged = elastic.copy(), np.ones(elastic.size, dtype=bool)
     ductility[yields], converged[yields] = _largest_ductility(sd, own, elastic[yields])
     longer, more = iwan(np.maximum(ductility, 1.0), 0.0)
+    damped = np.maximum(damping, np.minimum(damping + more, LARGEST_DAMPING))
     radius = values(table, f"per_{i}").copy()
     radius[yields] *= _change(per, own, ductility[yields, None])[:, 0]
-    return Equivalent(ductility, period * longer, damping + more, radius, converged)
+    return Equivalent(ductility, period * longer, damped, radius, converged)
 
 
 class _Building(NamedTuple):

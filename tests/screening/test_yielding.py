@@ -70,6 +70,15 @@ def test_yielding_begins_gradually(station, table):
     assert np.all(found["equivalent_damping_1"] > table["damping_1"])
 
 
+def test_a_building_of_large_damping_stays_an_oscillator_when_it_yields(station, table):
+    # would catch an equivalent damping above the critical one, of which the correlation knows nothing
+    damped = table.assign(damping_1=0.9, damping_2=0.999)
+    found = linearized_columns(station, weak(damped, 30.0, 30.0))
+    assert np.all((found["equivalent_damping_1"] > 0.9) & (found["equivalent_damping_1"] <= 0.99))
+    assert_array_equal(found["equivalent_damping_2"], 0.999)
+    assert np.isfinite(found["critical_gap_linearized"]).all()
+
+
 def test_the_equivalent_building_reaches_its_own_ductility(station, table):
     # catches: PER in place of SD, a ductility of the coarse scan, the wrong azimuth, a radius not scaled to the pair's
     yielding = weak(table, 1.1, 1.05)
