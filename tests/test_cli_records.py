@@ -199,6 +199,20 @@ def test_info_of_records_that_cannot_be_used(simulation, tmp_path, call):
     assert "XX.S001..HNN: there is no StationXML" in err
 
 
+@pytest.mark.parametrize("command", ["info", "process"])
+def test_a_record_without_samples_is_rejected(simulation, tmp_path, call, command):
+    write_simulation(simulation, tmp_path / "in")
+    for waveforms in (tmp_path / "in").glob("*.mseed"):
+        waveforms.unlink()
+    head = "TIMESERIES XX_S001__HNN_D, 0 samples, 100 sps, 2000-01-01T00:00:00.000000, SLIST, INTEGER, Counts"
+    (tmp_path / "in" / "S001.txt").write_text(f"{head}\n")
+    output = ("-o", tmp_path / "out") if command == "process" else ()
+    code, out, _ = call(command, tmp_path / "in", *output, "--json")
+    assert code == 3
+    (rejected,) = json.loads(out)["rejected"]
+    assert "no samples" in rejected["reasons"][0]
+
+
 @pytest.mark.real_data
 def test_info_of_a_workspace(real_data, call):
     code, out, _ = call("info", real_data / "records" / "asdf" / "nc72282711_workspace.h5", "--json")

@@ -1,6 +1,7 @@
 """Read a layer of building footprints: polygons in degrees, their attributes, and what is no polygon."""
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -108,8 +109,10 @@ def _read(file: Path, layer: str | None) -> _Raw:
 
 def _read_gdal(file: Path, layer: str | None) -> _Raw:
     try:
-        name = _layer_name(file, layer)
-        meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
+        # GDAL warns of what it repairs, such as rings that are not closed, and of what it then cannot read
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+            name = _layer_name(file, layer)
+            meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), told_apart(file, GDAL_KINDS[file.suffix.lower()], error)) from error
     attributes = pd.DataFrame(dict(zip(meta["fields"], fields, strict=True)), index=range(len(geometries)))
@@ -134,7 +137,7 @@ def _layer_name(file: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> _Raw:
     try:
         table = pa.parquet.read_table(file)
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), told_apart(file, "Parquet table", error)) from error
     described = (table.schema.metadata or {}).get(b"geo")
     if described is None:
@@ -143,13 +146,15 @@ def _read_geoparquet(file: Path) -> _Raw:
         geo = json.loads(described)
         name = geo["primary_column"]
         column = geo["columns"][name]
-        if column.get("encoding") != "WKB":
-            raise CatalogError(str(file), f"geometries are encoded as {column.get('encoding')!r}, expected WKB")
-        geometries = shapely.from_wkb(table[name].to_numpy(), on_invalid="ignore")
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
+        encoding = column.get("encoding")
+        geometries = shapely.from_wkb(table[name].to_numpy(), on_invalid="ignore") if encoding == "WKB" else None
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise CatalogError(str(file), f"wrong GeoParquet metadata: {type(error).__name__} {error}") from error
+    if geometries is None:
+        raise CatalogError(str(file), f"geometries are encoded as {encoding!r}, expected WKB")
     # a missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
-    return _Raw(geometries, table.drop_columns([name]).to_pandas(), column.get("crs", "OGC:CRS84"))
+    attributes = table.drop_columns([name]).replace_schema_metadata(None).to_pandas()
+    return _Raw(geometries, attributes, column.get("crs", "OGC:CRS84"))
 
 
 def _reference_system(file: Path, crs: Any) -> pyproj.CRS:

@@ -12,6 +12,10 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import told_apart
 from per_obspy.inventory.csv_rows import CsvFile
 from per_obspy.inventory.raw_rows import IDENTIFIER, PairFile, RawRows
+from per_obspy.inventory.schema import COLUMNS
+
+#: How pandas calls a column that only numbers the rows.
+INDEX = "__index_level_"
 
 
 class ParquetFile:
@@ -20,7 +24,8 @@ class ParquetFile:
     def __init__(self, file: Path) -> None:
         self.file = file
         with self._readable():
-            self.names: Sequence[str] = pa.parquet.read_schema(file).names
+            names = pa.parquet.read_schema(file).names
+        self.names: Sequence[str] = [name for name in names if not name.startswith(INDEX)]
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Give the names of the pairs, block by block."""
@@ -32,17 +37,25 @@ class ParquetFile:
         """Give the rows, so many at a time."""
         line = 2
         with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
-            for batch in stored.iter_batches(batch_size=size):
+            for batch in stored.iter_batches(batch_size=size, columns=self.names):
                 lines = np.arange(line, line + batch.num_rows)
-                yield RawRows(str(self.file), pa.Table.from_batches([batch]), lines, ())
+                yield RawRows(str(self.file), _with_numbers(pa.Table.from_batches([batch])), lines, ())
                 line += batch.num_rows
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
         try:
             yield
-        except (pa.ArrowInvalid, OSError) as error:
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise CatalogError(str(self.file), told_apart(self.file, "Parquet table", error)) from error
+
+
+def _with_numbers(table: pa.Table) -> pa.Table:
+    """Return the table with truth values as 0 and 1 where numbers belong, as some programs write what was observed."""
+    for i, column in enumerate(table.schema):
+        if pa.types.is_boolean(column.type) and column.name in COLUMNS and COLUMNS[column.name].dtype == "float64":
+            table = table.set_column(i, column.name, table[i].cast(pa.float64()))
+    return table
 
 
 #: What layers of footprints are called, which are no pairs yet.

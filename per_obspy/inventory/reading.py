@@ -132,7 +132,8 @@ def checked_chunk(chunk: PairChunk) -> pd.DataFrame:
 
 
 def _checked(rows: RawRows, repeated: NDArray[np.bool_] | None) -> pd.DataFrame:
-    table: pd.DataFrame = rows.table.to_pandas()
+    # what pandas once said of the table counts for nothing: it would take a column of names for the index
+    table: pd.DataFrame = rows.table.replace_schema_metadata(None).to_pandas()
     pairs = checked_pairs(table, rows.source, rows.lines, repeated)
     rejected: tuple[Rejection, ...] = (*pairs.attrs["rejected"], *rows.broken)
     pairs.attrs["rejected"] = Rejections(sorted(rejected, key=lambda rejection: rejection.row or 0))

@@ -11,3 +11,13 @@ kernel = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"cont
 lean = numba.njit(  # type: ignore[call-overload]  # Numba's stubs do not know _nrt
     _nrt=False, nogil=True, cache=True, error_model="numpy", fastmath={"contract", "nsz"}, boundscheck=False
 )
+#: The same for small ones of inner loops, which the compiler else leaves out of line as soon as their callers grow.
+inlined = numba.njit(  # type: ignore[call-overload]  # Numba's stubs do not know _nrt
+    _nrt=False,
+    forceinline=True,
+    nogil=True,
+    cache=True,
+    error_model="numpy",
+    fastmath={"contract", "nsz"},
+    boundscheck=False,
+)

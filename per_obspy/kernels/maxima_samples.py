@@ -3,7 +3,8 @@ Displacement and radius of a block of oscillators at every sample, every second 
 
 Over several steps of a piecewise-linear record the state is the power of the step's matrix times the state before,
 plus a weighted sum of the samples in between, so that slow oscillators need not be looked at after every step. Time
-runs outside, oscillators inside, four steps at a time. Displacements are counted in ``a / omega²``, time as phase.
+runs outside, oscillators inside, four or eight steps at a time: fewer take longer, more need more registers than there
+are. Displacements are counted in ``a / omega²``, time as phase.
 """
 
 from ._aligned import aligned
@@ -88,20 +89,31 @@ def _run_by_four(north, east, begin, starts, table, kept):
     t[:] = table[:LOCAL]
     for first in range(0, north.size - 1, TILE):
         _open_tile(north[first], east[first], begin + first // TILE, starts, t, kept[first // TILE])
-        for i in range(first + 1, first + TILE + 1, 4):
+        for i in range(first + 1, first + TILE + 1, 8):
             north_1, north_2, north_3, north_4 = north[i], north[i + 1], north[i + 2], north[i + 3]
+            north_5, north_6, north_7, north_8 = north[i + 4], north[i + 5], north[i + 6], north[i + 7]
             east_1, east_2, east_3, east_4 = east[i], east[i + 1], east[i + 2], east[i + 3]
+            east_5, east_6, east_7, east_8 = east[i + 4], east[i + 5], east[i + 6], east[i + 7]
             for lane in range(LANES):
-                u, z, p0 = t[0, lane], t[1, lane], t[2, lane]
                 p1, p2 = t[3, lane] * north_1 + t[4, lane] * east_1, t[3, lane] * north_2 + t[4, lane] * east_2
                 p3, p4 = t[3, lane] * north_3 + t[4, lane] * east_3, t[3, lane] * north_4 + t[4, lane] * east_4
-                f = (t[11, lane] * p0 + t[12, lane] * p1) + (t[13, lane] * p2 + (t[14, lane] * p3 + t[15, lane] * p4))
-                g = (t[16, lane] * p0 + t[17, lane] * p1) + (t[18, lane] * p2 + (t[19, lane] * p3 + t[20, lane] * p4))
-                u, z = t[7, lane] * u + (t[8, lane] * z + f), t[9, lane] * u + (t[10, lane] * z + g)
-                t[0, lane], t[1, lane], t[2, lane] = u, z, p4
-                t[5, lane], t[6, lane] = max(t[5, lane], u * u + z * z), max(t[6, lane], abs(u))
+                p5, p6 = t[3, lane] * north_5 + t[4, lane] * east_5, t[3, lane] * north_6 + t[4, lane] * east_6
+                p7, p8 = t[3, lane] * north_7 + t[4, lane] * east_7, t[3, lane] * north_8 + t[4, lane] * east_8
+                u4, z4 = _by_four(t, lane, t[0, lane], t[1, lane], t[2, lane], p1, p2, p3, p4)
+                u8, z8 = _by_four(t, lane, u4, z4, p4, p5, p6, p7, p8)
+                t[0, lane], t[1, lane], t[2, lane] = u8, z8, p8
+                t[5, lane] = max(t[5, lane], u4 * u4 + z4 * z4, u8 * u8 + z8 * z8)
+                t[6, lane] = max(t[6, lane], abs(u4), abs(u8))
         _close_tile(t, kept[first // TILE])
     table[:LOCAL] = t
+
+
+@kernel
+def _by_four(t, lane, u, z, p0, p1, p2, p3, p4):
+    """Return the state four steps later."""
+    f = (t[11, lane] * p0 + t[12, lane] * p1) + (t[13, lane] * p2 + (t[14, lane] * p3 + t[15, lane] * p4))
+    g = (t[16, lane] * p0 + t[17, lane] * p1) + (t[18, lane] * p2 + (t[19, lane] * p3 + t[20, lane] * p4))
+    return t[7, lane] * u + (t[8, lane] * z + f), t[9, lane] * u + (t[10, lane] * z + g)
 
 
 @kernel

@@ -5,9 +5,12 @@ The lanes of ``pounding_lanes`` with a gap that nothing closes. A lane is walked
 may yield or unload, or where the relative displacement may pass its largest value to either side.
 """
 
+import math
+
 from ._jit import lean
 from .polynomial_roots import first_fall, size_and_curvature, value_and_slope
-from .pounding_block import SETTLING_STEPS, fill_ground, prepare_block
+from .pounding_block import SETTLING_STEPS, prepare_block
+from .pounding_bounce import opening, put
 from .pounding_events import find_event, finish_piece
 from .pounding_lanes import (
     EVENT,
@@ -17,10 +20,7 @@ from .pounding_lanes import (
     PLACE_SAG,
     ROWS,
     SAG,
-    SPEED,
     SPEED_SAG,
-    START_PLACE,
-    START_SPEED,
     STRUCTURE_ROWS,
     TILE,
     advance_one,
@@ -28,20 +28,12 @@ from .pounding_lanes import (
     flag_tile,
     start_tile,
 )
-from .pounding_motion import CURVE, GUARD, OPENING, U
-from .pounding_pairs import read_state, rest
+from .pounding_motion import CURVE, GUARD, OPENING, YIELD, U
+from .pounding_pairs import load_pair, rest, store_pair
 from .pounding_rows import is_settled, reach_in_free_vibration
-from .pounding_search import along, may_rise, pull, raise_step, step
-from .pounding_walk import (
-    load_pair,
-    may_yield,
-    read_lane,
-    search_flagged,
-    segment_of,
-    store_pair,
-    write_back,
-    write_lane,
-)
+from .pounding_search import along, may_rise, may_yield, raise_inside, step
+from .pounding_waiting import fill_ground, find_maxima, read_lane, search_waiting, write_lane
+from .pounding_walk import at_start, present, segment_of, write_back
 
 #: Beyond the reach of any structure, m.
 FAR = 1e12
@@ -129,7 +121,7 @@ def repeat_apart(row, log, segment):
 
 
 @lean
-def _may_part(pair, row, before, after, rate, next_rate, strength_1, strength_2):
+def _may_part(pair, row, left, next_left, right, next_right):
     """
     Tell whether the relative displacement may pass its largest values where its rate has a root inside a step.
 
@@ -137,11 +129,13 @@ def _may_part(pair, row, before, after, rate, next_rate, strength_1, strength_2)
     branch. The rate leaves its chord by ``sag`` at most, so that it has no root where the sum of its ends is too large.
     """
     second = STRUCTURE_ROWS
-    row[0, OPENING] = max(row[0, OPENING], before)
-    row[1, OPENING] = max(row[1, OPENING], -before)
-    sag = pair[OMEGA] * pair[SPEED_SAG] * strength_1 + pair[second + OMEGA] * pair[second + SPEED_SAG] * strength_2
+    strength, other = max(abs(left[2]), abs(next_left[2])), max(abs(right[2]), abs(next_right[2]))
+    before, after = right[0] - left[0], next_right[0] - next_left[0]
+    rate, next_rate = opening(pair, left, right), opening(pair, next_left, next_right)
+    row[0, OPENING], row[1, OPENING] = max(row[0, OPENING], before), max(row[1, OPENING], -before)
+    sag = pair[OMEGA] * pair[SPEED_SAG] * strength + pair[second + OMEGA] * pair[second + SPEED_SAG] * other
     turns = abs(rate + next_rate) <= abs(next_rate - rate) + 2.0 * sag
-    margin = pair[PLACE_SAG] * strength_1 + pair[second + PLACE_SAG] * strength_2
+    margin = pair[PLACE_SAG] * strength + pair[second + PLACE_SAG] * other
     wider = max(before, after) + margin > row[0, OPENING]
     return turns & (wider | (margin - min(before, after) > row[1, OPENING]))
 
@@ -149,65 +143,60 @@ def _may_part(pair, row, before, after, rate, next_rate, strength_1, strength_2)
 @lean
 def walk_apart(pair, row, log, ground, count, duration):
     """Carry a pair through a tile in which something may happen; tell whether it got through."""
-    second, through = STRUCTURE_ROWS, True
+    second, through, bilinear = STRUCTURE_ROWS, True, min(row[0, YIELD], row[1, YIELD]) < math.inf
     here = along(pair, ground, 0)
-    u1, z1, u2, z2 = pair[START_PLACE], pair[START_SPEED], pair[second + START_PLACE], pair[second + START_SPEED]
-    y1, y2 = pull(pair, 0, u1, z1, here), pull(pair, second, u2, z2, here)
-    rate = pair[second + OMEGA] * z2 - pair[OMEGA] * z1
+    left, right = at_start(pair, 0, here), at_start(pair, second, here)
     for k in range(1, count + 1):
         there = along(pair, ground, k)
-        next_u1, next_z1, next_y1 = step(pair, 0, u1, z1, here, there)
-        next_u2, next_z2, next_y2 = step(pair, second, u2, z2, here, there)
-        strength_1, strength_2 = max(abs(y1), abs(next_y1)), max(abs(y2), abs(next_y2))
-        next_rate = pair[second + OMEGA] * next_z2 - pair[OMEGA] * next_z1
-        happens = _may_part(pair, row, u2 - u1, next_u2 - next_u1, rate, next_rate, strength_1, strength_2)
-        happens |= may_yield(pair, 0, u1, z1, next_u1, next_z1, strength_1)
-        happens |= may_yield(pair, second, u2, z2, next_u2, next_z2, strength_2)
+        next_left, next_right = step(pair, 0, left, here, there), step(pair, second, right, here, there)
+        happens = _may_part(pair, row, left, next_left, right, next_right)
+        if bilinear:
+            happens |= may_yield(pair, 0, left, next_left) | may_yield(pair, second, right, next_right)
         if happens:
-            pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED] = u1, z1, u2, z2
+            put(pair, left, right)
             load_pair(pair, row)
             through &= repeat_apart(row, log, segment_of(row, here, there, duration))
             store_pair(pair, row, duration)
-            next_u1, next_z1, next_u2, next_z2 = pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED]
-            next_y1, next_y2 = pull(pair, 0, next_u1, next_z1, there), pull(pair, second, next_u2, next_z2, there)
-            next_rate = pair[second + OMEGA] * next_z2 - pair[OMEGA] * next_z1
+            next_left, next_right = present(pair, 0, there), present(pair, second, there)
         else:
-            if may_rise(pair, row, 0, u1, z1, y1, next_u1, next_z1, next_y1, strength_1):
-                raise_step(pair, row, 0, u1, z1, y1, next_u1, next_z1, next_y1, here, there)
-            if may_rise(pair, row, 1, u2, z2, y2, next_u2, next_z2, next_y2, strength_2):
-                raise_step(pair, row, 1, u2, z2, y2, next_u2, next_z2, next_y2, here, there)
-        u1, z1, y1, u2, z2, y2 = next_u1, next_z1, next_y1, next_u2, next_z2, next_y2
-        rate, here = next_rate, there
-    pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED] = u1, z1, u2, z2
-    row[0, OPENING], row[1, OPENING] = max(row[0, OPENING], u2 - u1), max(row[1, OPENING], u1 - u2)
+            if may_rise(pair, row, 0, left, next_left):
+                raise_inside(pair, row, 0, left, next_left, there - here, 1.0)
+            if may_rise(pair, row, 1, right, next_right):
+                raise_inside(pair, row, 1, right, next_right, there - here, 1.0)
+        left, right, here = next_left, next_right, there
+    put(pair, left, right)
+    apart = right[0] - left[0]
+    row[0, OPENING], row[1, OPENING] = max(row[0, OPENING], apart), max(row[1, OPENING], -apart)
     return through
 
 
 @lean
-def _revisit(lanes, pair, row, log, lane, flag, ground, count, duration):
-    """Do for a flagged lane what the sweep cannot; tell whether it got through."""
-    through = True
+def _revisit(lanes, lane, flag, own, record, grounds, first, count):
+    """Do for a flagged lane what the sweep cannot, as ``revisit`` of ``pounding_walk``; tell whether it got through."""
+    pair, row, log, waiting = own
+    if not flag & EVENT:
+        find_maxima(lanes, lane, flag, pair, row, waiting, record, grounds[1], first, count)
+        return True
+    search_waiting(lanes, lane, pair, row, waiting, record, grounds[1])
     read_lane(lanes, lane, pair)
-    if flag & EVENT:
-        through = walk_apart(pair, row, log, ground, count, duration)
-        lanes[at(APART, lane)], lanes[at(APART + 1, lane)] = row[0, OPENING], row[1, OPENING]
-    else:
-        search_flagged(pair, row, flag, ground, count)
+    through = walk_apart(pair, row, log, grounds[0], count, record.duration)
+    lanes[at(APART, lane)], lanes[at(APART + 1, lane)] = row[0, OPENING], row[1, OPENING]
     write_back(lanes, lane, pair, row)
     return through
 
 
 @lean
-def _advance(lanes, flags, pair, rows, log, components, ground, dt, refinement, first, last):
+def _advance(lanes, flags, pair, rows, log, waiting, record, grounds, first, last):
     """Carry all lanes from a step to the last one; tell whether all got through."""
-    through, duration = True, dt / refinement
+    through = True
     while first < last:
-        fill_ground(components, refinement, first, ground)
+        fill_ground(record, first, grounds[0])
         count = min(TILE, last - first)
-        sweep_apart(lanes, flags, ground, count)
+        sweep_apart(lanes, flags, grounds[0], count)
         for lane in range(LANES):
             if flags[lane]:
-                through &= _revisit(lanes, pair, rows[lane], log, lane, flags[lane], ground, count, duration)
+                own = pair, rows[lane], log, waiting[lane]
+                through &= _revisit(lanes, lane, flags[lane], own, record, grounds, first, count)
         first += count
     return through
 
@@ -221,13 +210,14 @@ def _is_over(row):
 
 
 @lean
-def _retire(lanes, pair, rows, free_steps, free):
+def _retire(lanes, pair, rows, waiting, record, grounds, free_steps, free):
     """Rest the lanes in which nothing can happen any more after so many steps of free vibration; count the others."""
     active = 0
     for lane in range(LANES):
         if free_steps[lane] >= 0:
+            search_waiting(lanes, lane, pair, rows[lane], waiting[lane], record, grounds[1])
             read_lane(lanes, lane, pair)
-            read_state(pair, rows[lane])
+            load_pair(pair, rows[lane])
             if free >= free_steps[lane] or _is_over(rows[lane]):
                 free_steps[lane] = -1
                 rest(pair)
@@ -239,20 +229,20 @@ def _retire(lanes, pair, rows, free_steps, free):
 
 
 @lean
-def run_apart(components, dt, refinement, lanes, flags, ground, pair, rows, log, cosine, sine, free_steps):
+def run_apart(record, lanes, flags, grounds, pair, waiting, rows, log, cosine, sine, free_steps):
     """
     Run 32 pairs through a record and the free vibration after it; tell whether all got through.
 
     As ``run_block``; the gaps of ``rows`` are FAR, ``lanes`` have ROWS_APART rows.
     """
-    prepare_block(lanes, pair, rows, cosine, sine, free_steps, dt / refinement)
+    prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
     for lane in range(LANES):
         lanes[at(APART, lane)] = lanes[at(APART + 1, lane)] = 0.0 if free_steps[lane] >= 0 else FAR
-    last = (components.shape[1] - 1) * refinement
-    through = _advance(lanes, flags, pair, rows, log, components, ground, dt, refinement, 0, last)
+    last = (record.components.shape[1] - 1) * record.refinement
+    through = _advance(lanes, flags, pair, rows, log, waiting, record, grounds, 0, last)
     free = 0
-    while _retire(lanes, pair, rows, free_steps, free):
-        first, last = last, last + SETTLING_STEPS * refinement
-        through &= _advance(lanes, flags, pair, rows, log, components, ground, dt, refinement, first, last)
+    while _retire(lanes, pair, rows, waiting, record, grounds, free_steps, free):
+        first, last = last, last + SETTLING_STEPS * record.refinement
+        through &= _advance(lanes, flags, pair, rows, log, waiting, record, grounds, first, last)
         free += SETTLING_STEPS
     return through

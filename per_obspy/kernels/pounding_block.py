@@ -2,9 +2,10 @@
 
 from ._jit import lean
 from .pounding_lanes import LANES, TILE, sweep
-from .pounding_pairs import read_state, rest, write_constants, write_phase
+from .pounding_pairs import load_pair, rest, write_constants, write_phase
 from .pounding_rows import is_settled
-from .pounding_walk import read_lane, revisit, write_lane
+from .pounding_waiting import fill_ground, read_lane, search_waiting, write_lane
+from .pounding_walk import revisit
 
 #: Steps between two looks at whether a pair is settled after the record.
 SETTLING_STEPS = 16
@@ -23,43 +24,30 @@ def prepare_block(lanes, pair, rows, cosine, sine, free_steps, duration):
 
 
 @lean
-def fill_ground(components, refinement, step, ground):
-    """
-    Fill the north and east acceleration at a step and the TILE steps after it.
-
-    Steps count the parts of all sampling intervals; after the record the ground rests.
-    """
-    for place in range(TILE + 1):
-        k, part = (step + place) // refinement, (step + place) % refinement
-        for i in range(2):
-            here = components[i, k] if k < components.shape[1] else 0.0
-            after = components[i, k + 1] if k + 1 < components.shape[1] else 0.0
-            ground[i, place] = here + (after - here) * (part / refinement)
-
-
-@lean
-def advance_block(lanes, flags, pair, rows, log, components, ground, dt, refinement, step, last):
+def advance_block(lanes, flags, pair, rows, log, waiting, record, grounds, step, last):
     """Carry all lanes from a step to the last one; tell whether all got through."""
     through = True
     while step < last:
-        fill_ground(components, refinement, step, ground)
+        fill_ground(record, step, grounds[0])
         count = min(TILE, last - step)
-        if sweep(lanes, flags, ground, count):
+        if sweep(lanes, flags, grounds[0], count):
             for lane in range(LANES):
                 if flags[lane]:
-                    through &= revisit(lanes, pair, rows[lane], log, lane, flags[lane], ground, count, dt / refinement)
+                    own = pair, rows[lane], log, waiting[lane]
+                    through &= revisit(lanes, lane, flags[lane], own, record, grounds, step, count)
         step += count
     return through
 
 
 @lean
-def retire_lanes(lanes, pair, rows, free_steps, step):
+def retire_lanes(lanes, pair, rows, waiting, record, grounds, free_steps, step):
     """Rest the lanes in which nothing can happen any more after so many steps of free vibration; count the others."""
     active = 0
     for lane in range(LANES):
         if free_steps[lane] >= 0:
+            search_waiting(lanes, lane, pair, rows[lane], waiting[lane], record, grounds[1])
             read_lane(lanes, lane, pair)
-            read_state(pair, rows[lane])
+            load_pair(pair, rows[lane])
             if step >= free_steps[lane] or is_settled(rows[lane]):
                 free_steps[lane] = -1
                 rest(pair)
@@ -70,19 +58,19 @@ def retire_lanes(lanes, pair, rows, free_steps, step):
 
 
 @lean
-def run_block(components, dt, refinement, lanes, flags, ground, pair, rows, log, cosine, sine, free_steps):
+def run_block(record, lanes, flags, grounds, pair, waiting, rows, log, cosine, sine, free_steps):
     """
     Run 32 pairs through a record and the free vibration after it; tell whether all got through.
 
     ``free_steps`` is how many sampling intervals of free vibration each pair has at most, negative where there is no
     pair; it is used up.
     """
-    prepare_block(lanes, pair, rows, cosine, sine, free_steps, dt / refinement)
-    last = (components.shape[1] - 1) * refinement
-    through = advance_block(lanes, flags, pair, rows, log, components, ground, dt, refinement, 0, last)
+    prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
+    last = (record.components.shape[1] - 1) * record.refinement
+    through = advance_block(lanes, flags, pair, rows, log, waiting, record, grounds, 0, last)
     free = 0
-    while retire_lanes(lanes, pair, rows, free_steps, free):
-        step, last = last, last + SETTLING_STEPS * refinement
-        through &= advance_block(lanes, flags, pair, rows, log, components, ground, dt, refinement, step, last)
+    while retire_lanes(lanes, pair, rows, waiting, record, grounds, free_steps, free):
+        step, last = last, last + SETTLING_STEPS * record.refinement
+        through &= advance_block(lanes, flags, pair, rows, log, waiting, record, grounds, step, last)
         free += SETTLING_STEPS
     return through

@@ -41,16 +41,16 @@ LIMIT, CENTRE, SIDE = 23, 24, 25
 #: omega and angle of a step; what, times the larger acceleration at its ends, bounds how far displacement, speed and
 #: power leave their chords inside a step, and by how much the acceleration exceeds its ends.
 OMEGA, ANGLE, PLACE_SAG, SPEED_SAG, POWER_SAG, BEND = 26, 27, 28, 29, 30, 31
-#: The first two bounds in the tile.
-SAG, SAG_OF_SPEED = 32, 33
-STRUCTURE_ROWS = 34
+#: The first two bounds in the tile, and what the squared radius may be in it.
+SAG, SAG_OF_SPEED, WIDER = 32, 33, 34
+STRUCTURE_ROWS = 35
 # rows of the pair
-COSINE, SINE = 68, 69
+COSINE, SINE = 70, 71
 #: What stays positive until something happens, the clearance of a free pair and the contact force per unit mass of a
 #: touching one: from both places, speed 1, ground acceleration and a constant; how far below zero it is rounding, over
 #: displacement; its least value at the samples of the tile.
-GUARD, FLOOR, LEAST = 70, 75, 76
-ROWS = 77
+GUARD, FLOOR, LEAST = 72, 77, 78
+ROWS = 79
 
 
 @lean
@@ -161,7 +161,7 @@ def flag_structures(lanes, flags, i, peak, jump):
     Bound one structure of every lane between the samples, and flag where it may pass a maximum or its elastic range.
 
     ``peak`` and ``jump`` are the largest acceleration (north, east) in the tile, and its largest change over a step.
-    The radius grows inside a step only from an end to a root of the power (``may_rise`` in ``pounding_walk``).
+    The radius grows inside a step only from an end to a root of the power (``raise_maxima`` of ``pounding_search``).
     """
     first = i * STRUCTURE_ROWS
     for lane in range(LANES):
@@ -180,6 +180,7 @@ def flag_structures(lanes, flags, i, peak, jump):
         change = angle * (abs(1.0 + by_place) * (radius + 0.5 * angle * inside) + by_speed * inside)
         change += by_ground * (cosine * jump[0] + sine * jump[1])
         widest = radius + 0.125 * angle * (change + 8.0 * lanes[at(first + POWER_SAG, lane)] * strength)
+        lanes[at(first + WIDER, lane)] = widest * widest
         further = reach + sag > lanes[at(first + HIGHEST_PLACE, lane)]
         rises = further | (widest * widest > lanes[at(first + WIDEST_RADIUS, lane)])
         centre = lanes[at(first + CENTRE, lane)]

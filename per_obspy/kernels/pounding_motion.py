@@ -34,7 +34,9 @@ CURVE, GUARD = 26, 50
 TERMS, ELASTIC, YIELDED = 74, 75, 81
 #: interface: how far it opened at most, beyond its gap
 OPENING = 87
-COLUMNS = 88
+#: Taylor coefficients of the displacement over the share of a step whose acceleration starts at 0 and grows by 1 a step
+SHAPE = 88
+COLUMNS = 112
 
 #: Largest phase omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1 + xi)).
 LARGEST_PHASE = 0.7

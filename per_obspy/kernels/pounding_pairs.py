@@ -38,6 +38,8 @@ from .pounding_motion import (
     PHASE,
     PLASTIC,
     RATE,
+    RICHEST,
+    SHAPE,
     STIFFNESS,
     STUCK,
     TERMS,
@@ -108,6 +110,14 @@ def write_bounds(pair, first):
 
 
 @lean
+def fill_shape(pair, row, i):
+    """Fill the motion over the share of a step from rest, with an acceleration that is 0 and grows by 1 a step."""
+    first, angle = i * STRUCTURE_ROWS, pair[i * STRUCTURE_ROWS + ANGLE]
+    damping, stiffness = -angle * pair[first + PULL + 1], -angle * angle * pair[first + PULL]
+    fill_taylor(row, i, SHAPE, int(row[0, TERMS]), 0.0, damping, stiffness, 0.0, 1.0)
+
+
+@lean
 def equation_of(row, i):
     """Return damping, stiffness, drive and constant of ``u'' + damping u' + stiffness u = constant - drive a``."""
     first, last = (0, 1) if row[0, STUCK] else (i, i)
@@ -144,6 +154,7 @@ def write_phase(pair, row, duration):
         pair[first + CENTRE] = row[i, PLASTIC]
         pair[first + SIDE] = side
         write_bounds(pair, first)
+        fill_shape(pair, row, i)
     finite = 0 if row[0, MASS] < math.inf else 1
     write_guard(pair, row, finite, equation_of(row, finite))
 
@@ -173,12 +184,24 @@ def changes_phase(pair, row):
 
 
 @lean
-def read_state(pair, row):
-    """Copy displacements and velocities of a lane to the pair's row."""
+def load_pair(pair, row):
+    """Copy a pair's state to its row, on which the event code works."""
     for i in range(2):
         first = i * STRUCTURE_ROWS
-        row[i, U] = pair[first + PLACE]
-        row[i, V] = pair[first + OMEGA] * pair[first + SPEED]
+        row[i, U], row[i, V] = pair[first + PLACE], pair[first + SPEED] * pair[first + OMEGA]
+        if row[i, PHASE] != 0.0:
+            row[i, PLASTIC] = row[i, U] - row[i, PHASE] * row[i, YIELD]
+        row[i, RICHEST] = math.inf  # not asked for
+
+
+@lean
+def store_pair(pair, row, duration):
+    """Copy a pair's state back from its row, and what depends on its phase."""
+    if changes_phase(pair, row):
+        write_phase(pair, row, duration)
+    for i in range(2):
+        first = i * STRUCTURE_ROWS
+        pair[first + PLACE], pair[first + SPEED] = row[i, U], row[i, V] / pair[first + OMEGA]
 
 
 @lean

@@ -1,27 +1,21 @@
 """
 One pair through a tile of steps in which something may happen to it, one step after another.
 
-Steps inside which nothing can happen are the same formulas as in ``pounding_lanes``; the others are repeated event by
-event, by the code of single histories. The numbers of a lane are copied to one line, ``pair``, row for row.
+Steps inside which nothing can happen are the same formulas as in ``pounding_lanes``; the others are repeated: plain
+impacts by ``pounding_bounce``, and all else event by event, by the code of single histories.
 """
 
 import math
 
-from ._jit import lean
+from ._jit import inlined, lean
+from .pounding_bounce import bounce, put
 from .pounding_events import find_event, finish_piece
 from .pounding_lanes import (
-    CENTRE,
     EVENT,
     FLOOR,
     HIGHEST_PLACE,
-    LANES,
-    LIMIT,
-    OMEGA,
-    PEAK,
     PLACE,
     PLACE_SAG,
-    ROWS,
-    SIDE,
     SPEED,
     SPEED_SAG,
     START_PLACE,
@@ -30,45 +24,49 @@ from .pounding_lanes import (
     WIDEST_RADIUS,
 )
 from .pounding_lanes import GUARD as CLOSING
-from .pounding_motion import (
-    BOUNCES,
-    HIGHEST,
-    MOST_BOUNCES,
-    PHASE,
-    PLASTIC,
-    RICHEST,
-    TERMS,
-    WIDEST,
-    YIELD,
-    Segment,
-    U,
-    V,
-)
-from .pounding_pairs import changes_phase, write_phase
-from .pounding_search import along, may_rise, pull, raise_step, search, step
+from .pounding_motion import BOUNCES, HIGHEST, MOST_BOUNCES, STUCK, TERMS, WIDEST, YIELD, Segment
+from .pounding_pairs import load_pair, store_pair
+from .pounding_search import along, may_rise, may_yield, raise_inside, state, step
+from .pounding_waiting import find_maxima, read_lane, search_waiting, write_lane
+
+
+@inlined
+def present(pair, first, ground):
+    """Return the state of a structure of a pair."""
+    return state(pair, first, pair[first + PLACE], pair[first + SPEED], ground)
+
+
+@inlined
+def at_start(pair, first, ground):
+    """Return the state of a structure at the start of the tile."""
+    return state(pair, first, pair[first + START_PLACE], pair[first + START_SPEED], ground)
 
 
 @lean
-def may_yield(pair, first, u0, z0, u1, z1, strength):
-    """Tell whether a bilinear structure may yield or unload inside a step, with this acceleration at its ends."""
-    side, centre = pair[first + SIDE], pair[first + CENTRE]
-    if side != 0.0:
-        return min(side * z0, side * z1) < pair[first + SPEED_SAG] * strength
-    return max(abs(u0 - centre), abs(u1 - centre)) + pair[first + PLACE_SAG] * strength > pair[first + LIMIT]
+def segment_of(row, here, there, duration):
+    """Return the segment that a step is."""
+    return Segment(0.0, duration, here, (there - here) / duration, int(row[0, TERMS]))
 
 
-@lean
-def _guard(pair, left, right, speed, ground):
+@inlined
+def _guard(pair, left, right, ground):
     """Return what stays positive until the pair meets or parts."""
-    form = pair[CLOSING + 2] * speed + (pair[CLOSING + 3] * ground + pair[CLOSING + 4])
-    return pair[CLOSING] * left + (pair[CLOSING + 1] * right + form)
+    form = pair[CLOSING + 2] * left[1] + (pair[CLOSING + 3] * ground + pair[CLOSING + 4])
+    return pair[CLOSING] * left[0] + (pair[CLOSING + 1] * right[0] + form)
+
+
+@inlined
+def _may_meet_or_part(pair, row, least, left, next_left, right, next_right):
+    """Tell whether the guard, with this least value at the ends of a step, may fall through zero inside it."""
+    margin = abs(pair[CLOSING]) * pair[PLACE_SAG] + abs(pair[CLOSING + 2]) * pair[SPEED_SAG]
+    margin *= max(abs(left[2]), abs(next_left[2]))
+    other = abs(pair[CLOSING + 1]) * pair[STRUCTURE_ROWS + PLACE_SAG]
+    return least - margin - other * max(abs(right[2]), abs(next_right[2])) < -pair[FLOOR] * row[0, HIGHEST]
 
 
 @lean
-def repeat_step(row, log, segment):
-    """Carry a pair through one step, event by event; tell whether it got through."""
-    row[0, BOUNCES] = 0.0
-    elapsed = 0.0
+def repeat_step(row, log, segment, elapsed):
+    """Carry a pair through what is left of one step, event by event; tell whether it got through."""
     for _ in range(100 * int(row[0, MOST_BOUNCES])):
         span, kind, place = find_event(row, segment, elapsed)
         elapsed = elapsed + span if kind else segment.duration
@@ -79,88 +77,47 @@ def repeat_step(row, log, segment):
 
 
 @lean
-def load_pair(pair, row):
-    """Copy a pair's state to its row, on which the event code works."""
-    for i in range(2):
-        first = i * STRUCTURE_ROWS
-        row[i, U], row[i, V] = pair[first + PLACE], pair[first + SPEED] * pair[first + OMEGA]
-        if row[i, PHASE] != 0.0:
-            row[i, PLASTIC] = row[i, U] - row[i, PHASE] * row[i, YIELD]
-        row[i, RICHEST] = math.inf  # not asked for
-
-
-@lean
-def store_pair(pair, row, duration):
-    """Copy a pair's state back from its row, and what depends on its phase."""
-    if changes_phase(pair, row):
-        write_phase(pair, row, duration)
-    for i in range(2):
-        first = i * STRUCTURE_ROWS
-        pair[first + PLACE], pair[first + SPEED] = row[i, U], row[i, V] / pair[first + OMEGA]
-
-
-@lean
-def segment_of(row, here, there, duration):
-    """Return the segment that a step is."""
-    return Segment(0.0, duration, here, (there - here) / duration, int(row[0, TERMS]))
+def _repeat(pair, row, log, left, right, next_left, next_right, segment, yields):
+    """Carry a pair through a step in which it may meet or part, or one may yield; tell whether it got through."""
+    put(pair, left, right)
+    row[0, BOUNCES], elapsed = 0.0, -1.0
+    if not (yields or row[0, STUCK]):
+        elapsed = bounce(pair, row, log, left, right, next_left, next_right, segment)
+        if elapsed == segment.duration:
+            return True
+    if elapsed < 0.0:
+        load_pair(pair, row)
+    through = repeat_step(row, log, segment, max(elapsed, 0.0))
+    store_pair(pair, row, segment.duration)
+    return through
 
 
 @lean
 def walk(pair, row, log, ground, count, duration):
     """Carry a pair through a tile in which something may happen; tell whether it got through."""
-    second, through = STRUCTURE_ROWS, True
+    second, through, bilinear = STRUCTURE_ROWS, True, min(row[0, YIELD], row[1, YIELD]) < math.inf
     here = along(pair, ground, 0)
-    u1, z1, u2, z2 = pair[START_PLACE], pair[START_SPEED], pair[second + START_PLACE], pair[second + START_SPEED]
-    y1, y2, least = pull(pair, 0, u1, z1, here), pull(pair, second, u2, z2, here), _guard(pair, u1, u2, z1, here)
+    left, right = at_start(pair, 0, here), at_start(pair, second, here)
+    least = _guard(pair, left, right, here)
     for k in range(1, count + 1):
         there = along(pair, ground, k)
-        next_u1, next_z1, next_y1 = step(pair, 0, u1, z1, here, there)
-        next_u2, next_z2, next_y2 = step(pair, second, u2, z2, here, there)
-        next_least = _guard(pair, next_u1, next_u2, next_z1, there)
-        strength_1, strength_2 = max(abs(y1), abs(next_y1)), max(abs(y2), abs(next_y2))
-        margin = abs(pair[CLOSING]) * pair[PLACE_SAG] + abs(pair[CLOSING + 2]) * pair[SPEED_SAG]
-        margin = margin * strength_1 + abs(pair[CLOSING + 1]) * pair[second + PLACE_SAG] * strength_2
-        happens = min(least, next_least) - margin < -pair[FLOOR] * row[0, HIGHEST]
-        happens |= may_yield(pair, 0, u1, z1, next_u1, next_z1, strength_1)
-        happens |= may_yield(pair, second, u2, z2, next_u2, next_z2, strength_2)
-        if happens:
-            pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED] = u1, z1, u2, z2
-            load_pair(pair, row)
-            through &= repeat_step(row, log, segment_of(row, here, there, duration))
-            store_pair(pair, row, duration)
-            next_u1, next_z1, next_u2, next_z2 = pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED]
-            next_y1, next_y2 = pull(pair, 0, next_u1, next_z1, there), pull(pair, second, next_u2, next_z2, there)
-            next_least = _guard(pair, next_u1, next_u2, next_z1, there)
+        next_left, next_right = step(pair, 0, left, here, there), step(pair, second, right, here, there)
+        next_least = _guard(pair, next_left, next_right, there)
+        happens = _may_meet_or_part(pair, row, min(least, next_least), left, next_left, right, next_right)
+        yields = bilinear and (may_yield(pair, 0, left, next_left) or may_yield(pair, second, right, next_right))
+        if happens | yields:
+            segment = segment_of(row, here, there, duration)
+            through &= _repeat(pair, row, log, left, right, next_left, next_right, segment, yields)
+            next_left, next_right = present(pair, 0, there), present(pair, second, there)
+            next_least = _guard(pair, next_left, next_right, there)
         else:
-            if may_rise(pair, row, 0, u1, z1, y1, next_u1, next_z1, next_y1, strength_1):
-                raise_step(pair, row, 0, u1, z1, y1, next_u1, next_z1, next_y1, here, there)
-            if may_rise(pair, row, 1, u2, z2, y2, next_u2, next_z2, next_y2, strength_2):
-                raise_step(pair, row, 1, u2, z2, y2, next_u2, next_z2, next_y2, here, there)
-        u1, z1, y1, u2, z2, y2 = next_u1, next_z1, next_y1, next_u2, next_z2, next_y2
-        least, here = next_least, there
-    pair[PLACE], pair[SPEED], pair[second + PLACE], pair[second + SPEED] = u1, z1, u2, z2
+            if may_rise(pair, row, 0, left, next_left):
+                raise_inside(pair, row, 0, left, next_left, there - here, 1.0)
+            if may_rise(pair, row, 1, right, next_right):
+                raise_inside(pair, row, 1, right, next_right, there - here, 1.0)
+        left, right, least, here = next_left, next_right, next_least, there
+    put(pair, left, right)
     return through
-
-
-@lean
-def revisit(lanes, pair, row, log, lane, flag, ground, count, duration):
-    """Do for a flagged lane what the sweep cannot; tell whether it got through."""
-    through = True
-    read_lane(lanes, lane, pair)
-    if flag & EVENT:
-        through = walk(pair, row, log, ground, count, duration)
-    else:
-        search_flagged(pair, row, flag, ground, count)
-    write_back(lanes, lane, pair, row)
-    return through
-
-
-@lean
-def search_flagged(pair, row, flag, ground, count):
-    """Find the maxima of the structures that may pass them in a tile in which nothing else happens."""
-    for i in range(2):
-        if flag & PEAK[i]:
-            search(pair, row, i, ground, count)
 
 
 @lean
@@ -173,14 +130,18 @@ def write_back(lanes, lane, pair, row):
 
 
 @lean
-def read_lane(lanes, lane, pair):
-    """Copy the numbers of a lane to a line."""
-    for k in range(ROWS):
-        pair[k] = lanes[k * LANES + lane]
+def revisit(lanes, lane, flag, own, record, grounds, step, count):
+    """
+    Do for a flagged lane what the sweep cannot; tell whether it got through.
 
-
-@lean
-def write_lane(lanes, lane, pair):
-    """Copy a line to its lane."""
-    for k in range(ROWS):
-        lanes[k * LANES + lane] = pair[k]
+    ``own`` is room for its numbers, its row, the log and its waiting tiles.
+    """
+    pair, row, log, waiting = own
+    if not flag & EVENT:
+        find_maxima(lanes, lane, flag, pair, row, waiting, record, grounds[1], step, count)
+        return True
+    search_waiting(lanes, lane, pair, row, waiting, record, grounds[1])
+    read_lane(lanes, lane, pair)
+    through = walk(pair, row, log, grounds[0], count, record.duration)
+    write_back(lanes, lane, pair, row)
+    return through

@@ -1,8 +1,6 @@
 """Largest responses and impacts of many pairs against one record, by the exact history of each."""
 
 import math
-import os
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +10,10 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as columns
 from per_obspy.kernels.pounding_block import run_block
-from per_obspy.kernels.pounding_contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes import LANES, ROWS, TILE
+from per_obspy.kernels.pounding_lanes import ROWS
 from per_obspy.pounding.history import SPEED_SHARE
-from per_obspy.pounding.pair_blocks import aligned, pair_blocks, pair_table
-from per_obspy.pounding.rows import closed_record, free_samples, largest_ground_velocity, refinement, row_at_rest
+from per_obspy.pounding.pair_blocks import pair_table, refinements, run_blocks
+from per_obspy.pounding.rows import closed_record, free_samples, largest_ground_velocity, row_at_rest
 
 #: A bounce that lasts less than this share of a sampling interval ends in contact, and so does the 25th within one.
 SHORTEST_BOUNCE = 1e-3
@@ -162,29 +159,15 @@ def _maxima(
 ) -> PoundingMaxima:
     """Run the pairs in blocks of equal refinement, on all processors."""
     table = pair_table(fields)
-    frequencies = np.sqrt(table[:, :, 1].max(axis=1))
-    refinements = np.array([refinement(frequency, dt) for frequency in frequencies], dtype=np.int64)
+    parts = refinements(table, dt)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
     ground_velocity = sum(largest_ground_velocity(component, dt) for component in components)
     rows[:, 0, columns.STILL] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
-    rows[:, 0, columns.DELAY] = 0.5 * SHORTEST_BOUNCE * dt / refinements
+    rows[:, 0, columns.DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
     rows[:, 0, columns.MOST_BOUNCES] = MOST_BOUNCES
     longest = np.maximum(fields["period_1"], fields["period_2"])
     free_steps = np.array([free_samples(period, dt) * free_vibration for period in longest], dtype=np.int64)
-    azimuth = np.radians(fields["azimuth"])
-
-    def run(block: NDArray[np.int64]) -> None:
-        filled = np.resize(block, LANES)
-        own, parts = rows[filled], int(refinements[block[0]])
-        lanes, flags = aligned(ROWS * LANES), aligned(LANES).view(np.int64)
-        arrays = lanes, flags, np.empty((2, TILE + 1)), np.empty(ROWS), own, np.zeros((0, LOG_COLUMNS))
-        free = np.where(np.arange(LANES) < block.size, free_steps[filled], -1)
-        if not run_block(components, dt, parts, *arrays, np.cos(azimuth[filled]), np.sin(azimuth[filled]), free):
-            raise RuntimeError(f"no end of contacts among the pairs {block.tolist()}")
-        rows[block] = own[: block.size]
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, pair_blocks(refinements)))
+    run_blocks(run_block, ROWS, components, dt, rows, parts, free_steps, np.radians(fields["azimuth"]))
     return PoundingMaxima(
         per=np.sqrt(rows[:, :, columns.WIDEST]).T.reshape(2, *shape),
         displacement_maxima=rows[:, :, columns.HIGHEST].T.reshape(2, *shape),

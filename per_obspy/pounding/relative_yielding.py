@@ -1,21 +1,17 @@
 """Largest relative displacement of many pairs of bilinear structures in a record: exact, without contact."""
 
 import math
-import os
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels import pounding_motion as columns
 from per_obspy.kernels.pounding_apart import FAR, ROWS_APART, run_apart
-from per_obspy.kernels.pounding_contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes import LANES, ROWS, TILE
-from per_obspy.pounding.pair_blocks import aligned, pair_blocks, pair_table
-from per_obspy.pounding.rows import closed_record, free_samples, refinement, row_at_rest
+from per_obspy.pounding.pair_blocks import pair_table, refinements, run_blocks
+from per_obspy.pounding.rows import closed_record, free_samples, row_at_rest
 
 
 class YieldingRelativeDisplacement(NamedTuple):
@@ -133,22 +129,9 @@ def yielding_relative_displacement(
 def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> FloatArray:
     """Return the rows of all pairs after the record, run in blocks of equal refinement on all processors."""
     table = pair_table(fields)
-    refinements = np.array([refinement(one, dt) for one in np.sqrt(table[:, :, 1].max(axis=1))], dtype=np.int64)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], np.zeros((len(table), 1)))
     longest = np.maximum(fields["period_1"], fields["period_2"])
     free_steps = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
-    azimuth = np.radians(fields["azimuth"])
-
-    def run(block: NDArray[np.int64]) -> None:
-        filled = np.resize(block, LANES)
-        own, parts = rows[filled], int(refinements[block[0]])
-        lanes, flags = aligned(ROWS_APART * LANES), aligned(LANES).view(np.int64)
-        arrays = lanes, flags, np.empty((2, TILE + 1)), np.empty(ROWS), own, np.zeros((0, LOG_COLUMNS))
-        free = np.where(np.arange(LANES) < block.size, free_steps[filled], -1)
-        if not run_apart(components, dt, parts, *arrays, np.cos(azimuth[filled]), np.sin(azimuth[filled]), free):
-            raise RuntimeError(f"too many changes of stiffness in a step among the pairs {block.tolist()}")
-        rows[block] = own[: block.size]
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, pair_blocks(refinements)))
+    angles = np.radians(fields["azimuth"])
+    run_blocks(run_apart, ROWS_APART, components, dt, rows, refinements(table, dt), free_steps, angles)
     return rows

@@ -209,6 +209,8 @@ def _quakeml_row(event: Event) -> EventRow:
     if not event.origins:
         raise RecordRejected(str(event.resource_id), "has no origin")
     origin = event.preferred_origin() or event.origins[0]
+    if None in (origin.time, origin.latitude, origin.longitude):
+        raise RecordRejected(str(event.resource_id), "has an origin without time, latitude or longitude")
     size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
     return EventRow(
         str(event.resource_id).rpartition("/")[2],

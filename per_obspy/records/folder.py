@@ -144,6 +144,8 @@ def read_event(path: str | Path) -> Event:
         raise CatalogError(str(path), f"must hold one event, holds {len(events)}")
     if not events[0].origins:
         raise CatalogError(str(path), f"the event {events[0].resource_id} has no origin")
+    if (events[0].preferred_origin() or events[0].origins[0]).time is None:
+        raise CatalogError(str(path), f"the event {events[0].resource_id} has an origin without time")
     return events[0]
 
 

@@ -84,7 +84,12 @@ def describe_records(
     for name, paths in found.stations.items():
         stream, unread = reader(paths, found.inventory, name)
         rejected += unread
-        records += [_described(trace, given) for trace in stream]
+        records += [_described(trace, given) for trace in stream if trace.stats.npts]
+        rejected += [
+            Rejection("record", trace.id, str(trace.stats.source), None, ("it has no samples",))
+            for trace in stream
+            if not trace.stats.npts
+        ]
     return tuple(records), tuple(rejected)
 
 

@@ -19,6 +19,7 @@ from per_obspy.pounding.directional import directional_correlation
 from per_obspy.pounding.probability import pounding_probability
 from per_obspy.pounding.relative import critical_gap_surface, directional_relative_displacement
 from per_obspy.pounding.single_hit import single_hit
+from per_obspy.spectra.maxima import azimuth_maxima
 
 PAIRS, SAMPLES, DT = 100_000, 12_000, 0.01
 
@@ -98,8 +99,15 @@ def of_a_record(motion: np.ndarray) -> None:
         each = best(lambda c=chosen: directional_relative_displacement(motion, motion[::-1], DT, *c), 3)
         rate = 1e-3 * chosen.shape[1] / each
         print(f"relative displacement     {rate:8.1f} thousand pairs/s, {SAMPLES} samples, {name}")
-    each = best(lambda: directional_correlation(motion, motion[::-1], DT, *structures[:4], structures[4:].T), 3) / 2000
-    print(f"correlation               {1e-3 / each:8.1f} thousand pairs/s, {SAMPLES} samples")
+    pads = 1e-5 * rng.normal(size=(2, SAMPLES // 2))
+    padded = np.concatenate([pads[0], motion, pads[1]])
+    few = structures[[0, 1, 4], :800]  # so few that no thread is started
+    for record, name in ((motion, f"{SAMPLES} samples"), (padded, f"{2 * SAMPLES}, half of them pads")):
+        each = best(lambda r=record: azimuth_maxima(r, r[::-1], DT, *few), 9) / 800
+        print(f"PER and SD of a building  {1e-3 / each:8.1f} thousand/s, own azimuths, {name}")
+        pair = *structures[:4], structures[4:].T
+        each = best(lambda r=record, p=pair: directional_correlation(r, r[::-1], DT, *p), 5) / 2000
+        print(f"correlation               {1e-3 / each:8.1f} thousand pairs/s, {name}")
 
 
 def resampled_rate() -> float:

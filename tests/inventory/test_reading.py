@@ -7,6 +7,7 @@ from pandas.testing import assert_frame_equal
 
 from per_obspy import read_pairs
 from per_obspy.errors import CatalogError
+from per_obspy.inventory.reading import PairInventory
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note"
 GOOD = "007,0.05,-67.95,-20.35,12,-67.9501,-20.35,9.5,corner shop"
@@ -127,6 +128,30 @@ def test_a_damaged_parquet_table(write, tmp_path, damage):
     damaged = {"cut": whole[: len(whole) // 2], "zeroed": whole[:40] + bytes(300) + whole[340:]}[damage]
     with pytest.raises(CatalogError, match=r"damaged\.parquet: not a Parquet table"):
         read_pairs(write(damaged, "damaged.parquet"))
+
+
+def test_truth_values_are_observations(write, tmp_path):
+    # would catch a column with empty cells, which pandas gives as objects
+    table = read_pairs(write("\n".join([HEADER, GOOD, GOOD.replace("007", "008"), GOOD.replace("007", "009")])))
+    table.assign(observed=[True, False, None]).to_parquet(tmp_path / "seen.parquet")
+    assert_frame_equal(read_pairs(tmp_path / "seen.parquet")[["observed"]], pd.DataFrame({"observed": [1, 0, np.nan]}))
+
+
+def test_an_index_of_pandas_is_a_column_or_nothing(write, tmp_path):
+    # would catch names that become the index, and an index of numbers that becomes a column
+    table = read_pairs(write("\n".join([HEADER, GOOD, GOOD.replace("007", "008")])))
+    table.attrs = {}
+    table.set_index("pair_id").to_parquet(tmp_path / "named.parquet")
+    assert read_pairs(tmp_path / "named.parquet")["pair_id"].tolist() == ["007", "008"]
+    table.set_axis([5, 9]).to_parquet(tmp_path / "numbered.parquet")
+    assert_frame_equal(read_pairs(tmp_path / "numbered.parquet"), table)
+
+
+def test_names_that_are_no_text(write, tmp_path):
+    table = read_pairs(write(f"{HEADER}\n{GOOD}\n"))
+    table.assign(pair_id=[[1]]).to_parquet(tmp_path / "lists.parquet")
+    with pytest.raises(CatalogError, match=r"lists\.parquet: .*[Uu]nsupported cast from list"):
+        PairInventory([tmp_path / "lists.parquet"])
 
 
 def test_a_table_of_broken_lines_alone_says_so_line_by_line(write):

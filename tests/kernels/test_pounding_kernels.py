@@ -13,8 +13,8 @@ from per_obspy.kernels.polynomial_roots import first_fall, value_and_slope
 from per_obspy.kernels.pounding_lanes import sweep
 from per_obspy.kernels.pounding_motion import fill_taylor, taylor_terms
 from per_obspy.kernels.pounding_pairs import write_constants, write_phase
-from per_obspy.kernels.pounding_search import pull, step
-from per_obspy.kernels.pounding_walk import write_lane
+from per_obspy.kernels.pounding_search import state, step
+from per_obspy.kernels.pounding_waiting import write_lane
 from per_obspy.pounding.histories import pounding_histories
 from per_obspy.pounding.history import pounding_history
 from per_obspy.pounding.pair_blocks import pair_table
@@ -153,8 +153,8 @@ class TestBoundsInAStep:
         pair, _ = lane_of({**LINEAR, "period_1": period, "damping_1": damping}, 0.01)
         angle, worst = pair[lanes.ANGLE], np.zeros(3)
         for u, z, ground in np.random.default_rng(0).normal(size=(60, 3)):
-            start = u, z, pull(pair, 0, u, z, ground)
-            end = step(pair, 0, u, z, ground, 0.3 * ground)
+            start = state(pair, 0, u, z, ground)
+            end = step(pair, 0, start, ground, 0.3 * ground)
             strength, row = max(abs(start[2]), abs(end[2])), np.zeros((1, 30))
             row[0, 0] = u
             rate = 2.0 * damping
@@ -163,7 +163,7 @@ class TestBoundsInAStep:
             share = np.linspace(0.0, 1.0, 33)[1:-1]
             inside = np.array([value_and_slope(row, 0, 0, 22, s * angle) for s in share]).T
             here, there = (ground, 0.3 * ground)
-            pulls = np.array([pull(pair, 0, *inside[:, k], here + s * (there - here)) for k, s in enumerate(share)])
+            pulls = np.array([state(pair, 0, *inside[:, k], here + s * (there - here))[2] for k, s in enumerate(share)])
             powers = pulls + inside[0], (u + start[2], end[0] + end[2])
             for k, (motion, ends) in enumerate(((inside[0], (u, end[0])), (inside[1], (z, end[1])), powers)):
                 off = np.abs(motion - (ends[0] + share * (ends[1] - ends[0]))).max()

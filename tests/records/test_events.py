@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from fdsn_server import FdsnServer, content, serving, status
 from obspy import UTCDateTime
-from obspy.core.event import Catalog, Event
+from obspy.core.event import Catalog, Event, Origin
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.records.events import EventRow, find_events
+from per_obspy.records.events import EventRow, find_events, read_event
 from per_obspy.records.simulated import Simulation, simulate
 
 
@@ -92,6 +92,14 @@ def test_an_event_without_origin_is_refused(tmp_path: Path):
     Catalog([Event()]).write(str(tmp_path / "event.xml"), format="QUAKEML")
     with pytest.raises(CatalogError, match="has no origin"):
         find_events(str(tmp_path / "event.xml"), {})
+
+
+def test_an_origin_without_time_is_refused(tmp_path: Path):
+    Catalog([Event(origins=[Origin(latitude=1.0, longitude=2.0)])]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match="an origin without time"):
+        find_events(str(tmp_path / "event.xml"), {})
+    with pytest.raises(CatalogError, match="an origin without time"):
+        read_event(tmp_path / "event.xml")
 
 
 @pytest.mark.parametrize("wrong", [b"<html>", b"EventID\nxx", b"\xff\xfe", b"#EventID|Time\nxx|yesterday"])
