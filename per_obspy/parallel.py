@@ -6,12 +6,14 @@ its own, so that only the guilty one is lost; the rest goes on in a new pool. Fe
 were taken, so that a long row of them needs little memory.
 """
 
+import os
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from itertools import chain, islice
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import TypeVar
 
 from per_obspy.errors import PerError
@@ -100,7 +102,19 @@ def _alone(task: Task, do: Do[Task, Result], lost: Lost[Task, Result]) -> Result
 
 def _pool(workers: int) -> ProcessPoolExecutor:
     """Return fresh processes: a fork of a process that has threads can hang."""
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the one that started it has, even if that was killed: else it would wait for ever."""
+    parent = parent_process()
+    assert parent is not None  # a pool starts this process
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _caught(task: Task, work: Callable[[], Result], lost: Lost[Task, Result]) -> Result:

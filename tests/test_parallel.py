@@ -1,7 +1,12 @@
 """Tasks on processes: nothing is lost, none stops the others, and few are ahead of the results."""
 
+import os
+import subprocess
+import sys
+import time
 from concurrent.futures import Executor, Future
 from math import isqrt
+from pathlib import Path
 
 import pytest
 
@@ -48,6 +53,45 @@ def test_a_worker_that_dies_takes_only_its_task_with_it():
     found = list(results(tasks, eval, lost, 2, None))
     assert f"{DIES}: its worker process died" in found
     assert sorted(one for one in found if isinstance(one, int)) == [number for number in range(12) if number != 3]
+
+
+SLEEPS = """
+import os, sys, time
+from per_obspy.parallel import results
+task = f"open({sys.argv[1]!r} + str(__import__('os').getpid()), 'w').close() or __import__('time').sleep(100)"
+if __name__ == "__main__":
+    list(results([task, task], eval, lambda *_: None, 2, None))
+"""
+
+
+def _waited(condition):
+    for _ in range(300):
+        if condition():
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _is_running(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_workers_end_when_the_run_is_killed(tmp_path):
+    # would catch workers that wait for their next task for ever, with all their memory
+    script = tmp_path / "sleeps.py"
+    script.write_text(SLEEPS)
+    (tmp_path / "at_work").mkdir()
+    run = subprocess.Popen([sys.executable, str(script), str(tmp_path / "at_work") + os.sep])
+    assert _waited(lambda: len(list((tmp_path / "at_work").iterdir())) == 2)
+    workers = [int(file.name) for file in (tmp_path / "at_work").iterdir()]
+    assert all(map(_is_running, workers))
+    run.kill()
+    run.wait()
+    assert _waited(lambda: not any(map(_is_running, workers)))
 
 
 def test_an_executor_that_was_given_does_the_work():
