@@ -16,8 +16,8 @@ from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.assignment import assigned
-from per_obspy.screening.codes import code_columns
-from per_obspy.screening.columns import FLAGS, ORDER
+from per_obspy.screening.codes import code_columns, rule_columns
+from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
 from per_obspy.screening.demand import demand_ratio, pounding_state
 from per_obspy.screening.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.flags import joined_flags, period_is_derived, raised_by_pairs, raised_by_record
@@ -31,7 +31,7 @@ from per_obspy.screening.motion import (
     motion_of_one_horizontal,
 )
 from per_obspy.screening.probability import pair_probability
-from per_obspy.screening.ranking import risk_class
+from per_obspy.screening.ranking import KEYS, risk_class
 from per_obspy.screening.shakemap import shakemap_fallback
 from per_obspy.screening.site_motion import motion_at_pairs
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
@@ -58,7 +58,7 @@ def risk_rows(
     Parameters
     ----------
     pairs : DataFrame
-        From :func:`per_obspy.read_pairs`, or some rows of it.
+        From :func:`per_obspy.read_pairs`, or some rows of it; its columns named as results are replaced.
     ground : Ground
         The ground motion; only stations that serve a pair are read.
     building, screening : Building, Screening
@@ -71,7 +71,7 @@ def risk_rows(
     rejected : tuple of Rejection
         Pairs that neither a station nor the map serves.
     """
-    complete = completed_pairs(pairs, building)
+    complete = completed_pairs(_without_results(pairs), building)
     placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
     tables = [_of_stations(placed.reset_index(drop=True), ground, screening)] if len(placed) else []
     if ground.shakemap is not None and rejected:
@@ -79,6 +79,12 @@ def risk_rows(
         tables += [mapped] if len(mapped) else []
     rows = pd.concat(tables, ignore_index=True) if tables else placed.reindex(columns=[*ORDER])
     return _ordered(rows), rejected
+
+
+def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Return the pairs without columns named as those of this table: an earlier one may serve as a pair table."""
+    ours = {*RESULTS, *rule_columns(), *ON_THE_WAY, *KEYS, *(f"raised_{flag}" for flag in FLAGS)}
+    return pairs.drop(columns=[name for name in pairs if name in ours])
 
 
 def _of_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:

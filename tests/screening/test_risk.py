@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import per_obspy
 from per_obspy.config import Screening
-from per_obspy.screening.columns import ORDER
+from per_obspy.screening.columns import ORDER, RESULTS
 
 from .conftest import make_pairs, make_station
 
@@ -152,6 +152,16 @@ def test_rejections_of_the_reader_are_kept(station):
     pairs = make_pairs([{}, {"gap": -1.0}])
     table = per_obspy.risk_table(station, pairs)
     assert [lost.name for lost in table.attrs["rejected"]] == ["P1"]
+
+
+def test_results_of_an_earlier_table_are_not_taken_for_new_ones(station):
+    # would catch a computed column that gives way to one of the pair table, which is another event's
+    rows = [{"period_2": other, "gap": 0.01} for other in (0.7, 1.5)]
+    pairs, given = make_pairs(rows), make_pairs(rows).columns
+    fresh = per_obspy.risk_table(station, pairs)
+    numbers = [name for name in fresh if name not in given and pd.api.types.is_numeric_dtype(fresh[name])]
+    stale = pairs.assign(**dict.fromkeys([name for name in numbers if name in RESULTS], 7.0), raised_touching=1.0)
+    pd.testing.assert_frame_equal(per_obspy.risk_table(station, stale), fresh)
 
 
 def test_worst_first(station):
