@@ -1,8 +1,8 @@
 """
 Which neighbouring buildings hit each other in an earthquake, how hard, and what would have prevented it.
 
-Everything is SI: m, s, m/s², kg; damping as a fraction of critical; angles in degrees clockwise from north.
-The public names stand in ``__init__.pyi``; each is imported when it is first used.
+Everything is SI: m, s, m/s², kg; damping as a fraction of critical; angles in degrees clockwise
+from north. The public names stand in ``__init__.pyi``; each is imported when it is first used.
 """
 
 import lazy_loader

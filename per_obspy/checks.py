@@ -1,7 +1,8 @@
 """
 Checks of arguments: each returns a float64 array or raises ``ValueError`` naming argument and value.
 
-NaN and infinity are refused everywhere, because a running maximum hides a NaN behind an ordinary number.
+NaN and infinity are refused everywhere, because a running maximum hides a NaN behind an ordinary
+number.
 """
 
 from collections.abc import Callable

@@ -1,18 +1,19 @@
 """
 The command line: each command parses, calls one function, prints.
 
-Exit codes: 0 done, 2 wrong input (one line says what), 3 nothing usable was left, 75 a service is unavailable.
+Exit codes: 0 done, 2 wrong input (one line says what), 3 nothing usable was left, 75 a service is
+unavailable.
 """
 
 import sys
 
 import typer
 
-from per_obspy.commands.inventory import catalog, pairs
-from per_obspy.commands.outcome import SERVICE_UNAVAILABLE, WRONG_INPUT
+from per_obspy.commands.endings import SERVICE_UNAVAILABLE, WRONG_INPUT
+from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
+from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
-from per_obspy.commands.walk import process, report, run, simulate, spectra
 from per_obspy.errors import PerError, ServiceError
 
 app = typer.Typer(

@@ -3,13 +3,13 @@ The errors that a user can meet.
 
 ::
 
-    PerError
-    ├── RecordRejected   a record cannot be used; the run goes on without it
-    ├── CatalogError     a file that the run needs (configuration, table, folder) is wrong; the run stops
-    ├── MissingExtra     an optional library that was asked for is not installed
-    └── ServiceError     a service did not answer; try later
+    PerError ├── RecordRejected   a record cannot be used; the run goes on without it ├──
+    CatalogError     a file that the run needs (configuration, table, folder) is wrong; the run
+    stops ├── MissingExtra     an optional library that was asked for is not installed └──
+    ServiceError     a service did not answer; try later
 
-Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error it amounts to.
+Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error
+it amounts to.
 """
 
 from collections.abc import Iterable

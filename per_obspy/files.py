@@ -23,7 +23,15 @@ SIGNATURES = {
 }
 
 #: The disk or its rights stand against writing, which is no mistake of the program.
-UNWRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOTDIR, errno.EISDIR}
+UNWRITABLE = {
+    errno.EACCES,
+    errno.EPERM,
+    errno.EROFS,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.ENOTDIR,
+    errno.EISDIR,
+}
 
 
 def looks_like(path: Path) -> str:
@@ -84,7 +92,9 @@ def written_whole(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise CatalogError(str(path), f"cannot be written: {path.parent}: {error.strerror}") from error
+        raise CatalogError(
+            str(path), f"cannot be written: {path.parent}: {error.strerror}"
+        ) from error
     part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         yield part

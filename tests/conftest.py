@@ -9,8 +9,8 @@ from hypothesis import settings
 
 from per_obspy import cli
 
-# The first example of a test may compile a kernel, which takes seconds. In CI every run tries the same examples, so
-# that a change is judged by itself; elsewhere each run tries new ones.
+# The first example of a test may compile a kernel, which takes seconds. In CI every run tries the
+# same examples, so that a change is judged by itself; elsewhere each run tries new ones.
 settings.register_profile("compiling", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("compiling")
 

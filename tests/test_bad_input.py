@@ -1,8 +1,9 @@
 """
 Every kind of wrong file and value through the command line.
 
-What is wrong as a whole ends in exit code 2 and one line that names the file and what is wrong in it; a wrong row is
-told with its line and all its reasons, and the others go on. The rooms' own tests go into detail.
+What is wrong as a whole ends in exit code 2 and one line that names the file and what is wrong in
+it; a wrong row is told with its line and all its reasons, and the others go on. The rooms' own
+tests go into detail.
 """
 
 import json
@@ -16,7 +17,7 @@ import shapely
 
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
-from per_obspy.records.simulated import simulate, write_simulation
+from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
 ROW = {
     "pair_id": "a", "longitude_1": 0.3, "latitude_1": 0.1, "height_1": 10.0,
@@ -59,13 +60,21 @@ def _table(*rows):
 #: Content of files beside pairs.csv -> arguments -> what the line says.
 WHOLE = {
     # pair tables
-    "empty file": ({"pairs.csv": ""}, "pairs check pairs.csv", "pairs.csv: not a CSV table: it is an empty file"),
+    "empty file": (
+        {"pairs.csv": ""},
+        "pairs check pairs.csv",
+        "pairs.csv: not a CSV table: it is an empty file",
+    ),
     "header alone": (
         {"pairs.csv": _table().split("\n")[0] + "\n"},
         "pairs check pairs.csv",
         "pairs.csv: the table has no rows",
     ),
-    "PDF as CSV": ({"pairs.csv": PDF}, "pairs check pairs.csv", "pairs.csv: not a CSV table: it is a PDF document"),
+    "PDF as CSV": (
+        {"pairs.csv": PDF},
+        "pairs check pairs.csv",
+        "pairs.csv: not a CSV table: it is a PDF document",
+    ),
     "Excel as CSV": (
         {"pairs.csv": b"PK\x03\x04" + PDF},
         "pairs check pairs.csv",
@@ -91,17 +100,29 @@ WHOLE = {
         "run run.toml",
         "missing column gap (columns found: ",
     ),
-    "no such table": ({"run.toml": RUN.replace("pairs.csv", "absent.csv")}, "run run.toml", "absent.csv: no such file"),
+    "no such table": (
+        {"run.toml": RUN.replace("pairs.csv", "absent.csv")},
+        "run run.toml",
+        "absent.csv: no such file",
+    ),
     "folder as table": (
         {"run.toml": RUN.replace("pairs.csv", "records")},
         "run run.toml",
         "records: unknown suffix ''",
     ),
     # footprints
-    "PDF as footprints": ({"town.gpkg": PDF}, "pairs town.gpkg", "town.gpkg: not a GeoPackage: it is a PDF document"),
+    "PDF as footprints": (
+        {"town.gpkg": PDF},
+        "pairs town.gpkg",
+        "town.gpkg: not a GeoPackage: it is a PDF document",
+    ),
     "pairs as footprints": ({}, "pairs pairs.csv", "pairs.csv: a table has no walls"),
     "no such footprints": ({}, "pairs absent.csv", "absent.csv: no such file"),
-    "unknown output": ({"town.gpkg": PDF}, "pairs town.gpkg -o pairs.xlsx", "town.gpkg: not a GeoPackage"),
+    "unknown output": (
+        {"town.gpkg": PDF},
+        "pairs town.gpkg -o pairs.xlsx",
+        "town.gpkg: not a GeoPackage",
+    ),
     # configurations
     "mistyped key": (
         {"run.toml": f"{RUN}[processing]\nhighpas = 1\n"},
@@ -123,14 +144,26 @@ WHOLE = {
         "run run.toml",
         "spectra.count: Input should",
     ),
-    "no TOML": ({"run.toml": PDF}, "run run.toml", "run.toml: cannot be read as TOML: is a PDF document"),
-    "no such configuration": ({}, "run absent.toml", "absent.toml: cannot be read: No such file or directory"),
+    "no TOML": (
+        {"run.toml": PDF},
+        "run run.toml",
+        "run.toml: cannot be read as TOML: is a PDF document",
+    ),
+    "no such configuration": (
+        {},
+        "run absent.toml",
+        "absent.toml: cannot be read: No such file or directory",
+    ),
     "a key one level up": (
         {"s.toml": "magnitude = 7\n"},
         "simulate s.toml -o out",
         "magnitude: unknown key (got 7), it belongs",
     ),
-    "not in bar": ({"s.toml": "[scenario]\nstress_drop = 100\n"}, "simulate s.toml -o out", "(got 100), expected: Pa"),
+    "not in bar": (
+        {"s.toml": "[scenario]\nstress_drop = 100\n"},
+        "simulate s.toml -o out",
+        "(got 100), expected: Pa",
+    ),
     "no section": ({}, "fetch run.toml", "run.toml: has no section [records.fdsn]"),
     "no run yet": ({}, "report run.toml", "run.json: no finished run here"),
     "no stations yet": ({}, "screen run.toml", "stations: no stations here"),
@@ -159,23 +192,47 @@ WHOLE = {
         "screen design.toml",
         "sd = 400.0 m in row 3: in other",
     ),
-    "a period of 0": ({"code.csv": CURVE.replace("1.0,", "0.0,")}, "screen design.toml", "period = 0.0 s in row 2"),
+    "a period of 0": (
+        {"code.csv": CURVE.replace("1.0,", "0.0,")},
+        "screen design.toml",
+        "period = 0.0 s in row 2",
+    ),
     "a period twice": (
         {"code.csv": CURVE + "1.0,0.05,0.2\n"},
         "screen design.toml",
         "period = 1, damping = 0.05 stands twice",
     ),
-    "PDF as spectrum": ({"code.csv": PDF}, "screen design.toml", "code.csv: not a CSV table: it is a PDF document"),
-    "no such spectrum": ({}, "screen design.toml", "code.csv: cannot be read as CSV: No such file or directory"),
+    "PDF as spectrum": (
+        {"code.csv": PDF},
+        "screen design.toml",
+        "code.csv: not a CSV table: it is a PDF document",
+    ),
+    "no such spectrum": (
+        {},
+        "screen design.toml",
+        "code.csv: cannot be read as CSV: No such file or directory",
+    ),
     # ShakeMaps
-    "half a map": ({"run.toml": MAPPED, "grid.xml": MAP[:200]}, "run run.toml", "grid.xml: cannot be read as XML"),
+    "half a map": (
+        {"run.toml": MAPPED, "grid.xml": MAP[:200]},
+        "run run.toml",
+        "grid.xml: cannot be read as XML",
+    ),
     "a row short": (
         {"run.toml": MAPPED, "grid.xml": MAP.replace("1 0 20 10 3\n", "")},
         "run run.toml",
         "grid.xml: grid_data has 3 rows",
     ),
-    "negative PSA": ({"run.toml": MAPPED, "grid.xml": MAP.replace("10", "-10", 1)}, "run run.toml", "grid.xml: "),
-    "no such map": ({"run.toml": MAPPED}, "run run.toml", "grid.xml: cannot be read: No such file or directory"),
+    "negative PSA": (
+        {"run.toml": MAPPED, "grid.xml": MAP.replace("10", "-10", 1)},
+        "run run.toml",
+        "grid.xml: ",
+    ),
+    "no such map": (
+        {"run.toml": MAPPED},
+        "run run.toml",
+        "grid.xml: cannot be read: No such file or directory",
+    ),
     # ensembles
     "negative rate": (
         {"e.toml": f"{ENSEMBLE}rate = -1.0\n"},
@@ -208,14 +265,24 @@ WHOLE = {
         "catalog list --index catalog.toml",
         "catalog.toml: cannot be read as TOML",
     ),
-    "no index": ({}, "catalog find --bbox 0 0 1 1 --index absent.toml", "absent.toml: cannot be read: No such file"),
+    "no index": (
+        {},
+        "catalog find --bbox 0 0 1 1 --index absent.toml",
+        "absent.toml: cannot be read: No such file",
+    ),
     "no such name": (
-        {"run.toml": STORED.replace('toml"\n', 'toml"\nnames = ["new town"]\n'), "catalog.toml": INDEX},
+        {
+            "run.toml": STORED.replace('toml"\n', 'toml"\nnames = ["new town"]\n'),
+            "catalog.toml": INDEX,
+        },
         "run run.toml",
         "catalog.toml: names: 'new town' is not stored here",
     ),
     "a name whose file has changed": (
-        {"run.toml": STORED.replace('toml"\n', 'toml"\nnames = ["old town"]\n'), "catalog.toml": INDEX},
+        {
+            "run.toml": STORED.replace('toml"\n', 'toml"\nnames = ["old town"]\n'),
+            "catalog.toml": INDEX,
+        },
         "run run.toml",
         "pairs.csv: changed or damaged since it was stored as 'old town'",
     ),
@@ -228,16 +295,24 @@ def write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def write(files):
-        for name, content in {"pairs.csv": _table(), "run.toml": RUN, "design.toml": DESIGN, **files}.items():
+        for name, content in {
+            "pairs.csv": _table(),
+            "run.toml": RUN,
+            "design.toml": DESIGN,
+            **files,
+        }.items():
             (tmp_path / name).parent.mkdir(exist_ok=True)
-            (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+            (tmp_path / name).write_bytes(
+                content if isinstance(content, bytes) else content.encode()
+            )
 
     return write
 
 
 @pytest.mark.parametrize("fault", WHOLE)
 def test_a_wrong_file_ends_in_one_line(write, call, fault):
-    # would catch a traceback, a bare errno, a line that does not name the file, and a fault found only in the end
+    # would catch a traceback, a bare errno, a line that does not name the file, and a fault found
+    # only in the end
     files, arguments, message = WHOLE[fault]
     write(files)
     code, _, err = call(*arguments.split())
@@ -249,7 +324,10 @@ def test_a_wrong_file_ends_in_one_line(write, call, fault):
 
 
 ROWS = {
-    "swapped": ({"longitude_1": 19.4, "latitude_1": -99.1, "longitude_2": 19.4, "latitude_2": -99.1}, "swapped"),
+    "swapped": (
+        {"longitude_1": 19.4, "latitude_1": -99.1, "longitude_2": 19.4, "latitude_2": -99.1},
+        "swapped",
+    ),
     "metres": ({"longitude_1": 485000, "latitude_1": 2149000}, "metres of a projection?"),
     "at 0, 0": ({"longitude_1": 0, "latitude_1": 0}, "is a placeholder"),
     "far apart": ({"longitude_1": 5}, "km apart"),
@@ -264,14 +342,23 @@ ROWS = {
     "height of 0": ({"height_1": 0}, "height_1 = 0 m is outside"),
     "no height": ({"height_2": ""}, "none of height_2, storeys_2, period_2 is a number"),
     "period of 0": ({"period_1": 0}, "period_1 = 0 s is outside"),
-    "period in milliseconds": ({"period_2": 500}, "period_2 = 500 s is outside 0.01 to 20 s (in milliseconds?)"),
+    "period in milliseconds": (
+        {"period_2": 500},
+        "period_2 = 500 s is outside 0.01 to 20 s (in milliseconds?)",
+    ),
     "negative mass": ({"mass_1": -2e5}, "mass_1 = -200000 kg is outside"),
     "restitution": ({"restitution": 1.5}, "restitution = 1.5 is outside 0 to 1"),
-    "per cent": ({"damping_1": 5}, "damping_1 = 5 is outside 0 to 1 (a fraction is expected, not per cent)"),
+    "per cent": (
+        {"damping_1": 5},
+        "damping_1 = 5 is outside 0 to 1 (a fraction is expected, not per cent)",
+    ),
     "28 m floor": ({"storeys_1": 1, "height_1": 28}, "makes floors of 28 m"),
     "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown"),
     "same name": ({"pair_id": "a"}, "pair_id = 'a' stands in an earlier row"),
-    "same building": ({"building_id_1": "h", "building_id_2": "h"}, "a building has no gap to itself"),
+    "same building": (
+        {"building_id_1": "h", "building_id_2": "h"},
+        "a building has no gap to itself",
+    ),
     "half observed": ({"observed": 0.5}, "observed = 0.5 is neither 0 nor 1"),
     "torn row": ({"note": "a wall\nof two"}, "note has a line break"),
 }
@@ -303,14 +390,27 @@ def test_a_run_lists_every_wrong_row_and_judges_the_others(write, call, tmp_path
 
 
 def test_the_ends_of_every_range_can_be_computed(write, call, tmp_path):
-    # would catch a range of the schema that is wider than what the physics takes: a check of an argument deep inside
-    # would name a value that nobody gave
+    # would catch a range of the schema that is wider than what the physics takes: a check of an
+    # argument deep inside would name a value that nobody gave
     yielding = {"yield_displacement_1": 0.005, "yield_displacement_2": 0.01, "hardening_1": 0.05}
     numbers = {
-        name: one for name, one in COLUMNS.items() if one.dtype == "float64" and name[:4] not in ("long", "lati")
+        name: one
+        for name, one in COLUMNS.items()
+        if one.dtype == "float64" and name[:4] not in ("long", "lati")
     }
-    ends = [(name, end) for name, one in numbers.items() for end in (one.low, one.high) if np.isfinite(end)]
-    write({"pairs.csv": _table(*(yielding | {"pair_id": f"{name} {end}", name: end} for name, end in ends))})
+    ends = [
+        (name, end)
+        for name, one in numbers.items()
+        for end in (one.low, one.high)
+        if np.isfinite(end)
+    ]
+    write(
+        {
+            "pairs.csv": _table(
+                *(yielding | {"pair_id": f"{name} {end}", name: end} for name, end in ends)
+            )
+        }
+    )
     write_simulation(simulate(Scenario(stations=1, dt=0.02)), tmp_path / "records")
     code, out, _ = call("run", "run.toml", "--json")
     assert code == 0
@@ -323,7 +423,13 @@ def test_the_ends_of_every_range_can_be_computed(write, call, tmp_path):
 
 
 def test_every_fault_of_a_row_is_told(write, call):
-    write({"pairs.csv": _table({}, {"pair_id": "b", "gap": 50, "height_1": 0, "mass_2": -1, "restitution": 2})})
+    write(
+        {
+            "pairs.csv": _table(
+                {}, {"pair_id": "b", "gap": 50, "height_1": 0, "mass_2": -1, "restitution": 2}
+            )
+        }
+    )
     _, out, _ = call("pairs", "check", "pairs.csv")
     told = next(line for line in out.splitlines() if line.startswith("  line 3, b: "))
     assert [reason.split(" = ")[0] for reason in told.removeprefix("  line 3, b: ").split("; ")] == [
@@ -336,7 +442,8 @@ def test_swapped_coordinates_that_would_reach_the_stations_are_suspected(write, 
     write(
         {
             "pairs.csv": _table(
-                dict.fromkeys(("longitude_1", "longitude_2"), 0.0) | {"latitude_1": 0.3, "latitude_2": 0.3}
+                dict.fromkeys(("longitude_1", "longitude_2"), 0.0)
+                | {"latitude_1": 0.3, "latitude_2": 0.3}
             )
         }
     )
@@ -351,20 +458,34 @@ def test_swapped_coordinates_that_would_reach_the_stations_are_suspected(write, 
 
 def _write_layer(path, polygons, crs="EPSG:4326", kind="Polygon"):
     wkb = shapely.to_wkb(np.array(polygons, dtype=object), output_dimension=3)
-    pyogrio.raw.write(path, wkb, [np.full(len(polygons), 9.0)], ["height"], geometry_type=kind, crs=crs)
+    pyogrio.raw.write(
+        path, wkb, [np.full(len(polygons), 9.0)], ["height"], geometry_type=kind, crs=crs
+    )
 
 
 HOUSES = [shapely.box(0.3 + 1e-4 * i, 0.0, 0.3 + 1e-4 * (i + 1), 1e-4) for i in range(3)]
 LAYERS = {
     "empty layer": ([], {}, "town.gpkg: the layer has no features"),
-    "points": ([shapely.Point(0, 0)], {"kind": "Point"}, "town.gpkg: the layer holds points, not footprints"),
-    "swapped": ([shapely.box(19.4, -99.1, 19.5, -99.0)] * 2, {}, "feature 1: coordinates 19.4, -99.1 lie outside"),
+    "points": (
+        [shapely.Point(0, 0)],
+        {"kind": "Point"},
+        "town.gpkg: the layer holds points, not footprints",
+    ),
+    "swapped": (
+        [shapely.box(19.4, -99.1, 19.5, -99.0)] * 2,
+        {},
+        "feature 1: coordinates 19.4, -99.1 lie outside",
+    ),
     "metres as degrees": (
         [shapely.box(5e5, 2e6, 5e5 + 9, 2e6 + 9)] * 2,
         {},
         "feature 1: coordinates 500000, 2e+06 lie",
     ),
-    "degrees as metres": (HOUSES, {"crs": "EPSG:32631"}, "feature 1: coordinates 0.3, 0 are degrees"),
+    "degrees as metres": (
+        HOUSES,
+        {"crs": "EPSG:32631"},
+        "feature 1: coordinates 0.3, 0 are degrees",
+    ),
 }
 
 
@@ -380,7 +501,11 @@ def test_a_wrong_layer_ends_in_one_line(write, call, tmp_path, fault):
 
 def test_polygons_with_heights_are_footprints(write, call, tmp_path):
     write({})
-    _write_layer(tmp_path / "town.gpkg", [shapely.force_3d(house, 3700.0) for house in HOUSES], kind="Polygon Z")
+    _write_layer(
+        tmp_path / "town.gpkg",
+        [shapely.force_3d(house, 3700.0) for house in HOUSES],
+        kind="Polygon Z",
+    )
     code, out, _ = call("pairs", "town.gpkg", "-o", "found.csv")
     assert code == 0
     assert "2 pairs, 2 of them touching, 0 rejected" in out

@@ -17,7 +17,15 @@ def records(tmp_path_factory):
     """A folder of simulated records, made by the command."""
     folder = tmp_path_factory.mktemp("records")
     (folder / "scenario.toml").write_text("[scenario]\nstations = 2\ndt = 0.02\n")
-    command = [sys.executable, "-m", "per_obspy", "simulate", str(folder / "scenario.toml"), "-o", str(folder / "made")]
+    command = [
+        sys.executable,
+        "-m",
+        "per_obspy",
+        "simulate",
+        str(folder / "scenario.toml"),
+        "-o",
+        str(folder / "made"),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "6 simulated records" in done.stdout
     return folder / "made"
@@ -37,14 +45,20 @@ def configuration(records, tmp_path):
 
 def test_help_answers_at_once():
     start = time.perf_counter()
-    done = subprocess.run([sys.executable, "-m", "per_obspy", "--help"], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "per_obspy", "--help"], capture_output=True, text=True, check=True
+    )
     assert "run" in done.stdout
-    assert time.perf_counter() - start < 5.0  # 0.4 s measured; an import of obspy or numba alone takes longer
+    assert (
+        time.perf_counter() - start < 5.0
+    )  # 0.4 s measured; an import of obspy or numba alone takes longer
 
 
 def test_help_loads_nothing_heavy():
     code = "import sys, per_obspy.cli; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not {"numba", "pandas", "xarray", "obspy", "matplotlib", "numpy"} & set(loaded)
 
 
@@ -59,7 +73,9 @@ def test_a_run_prints_the_worst_pairs_and_where_everything_is(call, configuratio
 
 
 def test_what_was_seen_is_compared(call, configuration):
-    (configuration.parent / "pairs.csv").write_text(f"{HEADER},observed\n{ROW},0\nb{ROW[1:-4]}0,1\nc{ROW[1:]},\n")
+    (configuration.parent / "pairs.csv").write_text(
+        f"{HEADER},observed\n{ROW},0\nb{ROW[1:-4]}0,1\nc{ROW[1:]},\n"
+    )
     code, out, _ = call("run", configuration)
     assert code == 0
     # a touching pair pounds; the other has five times the gap that it needs

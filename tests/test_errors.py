@@ -4,10 +4,19 @@ import pickle
 
 import pytest
 
-from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, did_you_mean, reason_of
+from per_obspy.errors import (
+    CatalogError,
+    PerError,
+    RecordRejected,
+    ServiceError,
+    did_you_mean,
+    reason_of,
+)
 
 
-@pytest.mark.parametrize(("error", "built_in"), [(RecordRejected, ValueError), (CatalogError, ValueError)])
+@pytest.mark.parametrize(
+    ("error", "built_in"), [(RecordRejected, ValueError), (CatalogError, ValueError)]
+)
 def test_errors_are_also_built_in(error, built_in):
     assert issubclass(error, PerError)
     assert issubclass(error, built_in)
@@ -15,10 +24,15 @@ def test_errors_are_also_built_in(error, built_in):
 
 
 def test_every_reason_is_in_the_text():
-    assert str(RecordRejected("CI.CLC", "clipped at 2 g", "too short: 3 s")) == "CI.CLC: clipped at 2 g; too short: 3 s"
+    assert (
+        str(RecordRejected("CI.CLC", "clipped at 2 g", "too short: 3 s"))
+        == "CI.CLC: clipped at 2 g; too short: 3 s"
+    )
 
 
-@pytest.mark.parametrize("error", [RecordRejected("CI.CLC", "a", "b"), CatalogError("pairs.csv", "no column gap")])
+@pytest.mark.parametrize(
+    "error", [RecordRejected("CI.CLC", "a", "b"), CatalogError("pairs.csv", "no column gap")]
+)
 def test_errors_come_back_from_a_worker_process_as_they_left(error):
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
@@ -34,4 +48,6 @@ def test_what_an_error_says(tmp_path):
     with pytest.raises(FileNotFoundError) as error:
         (tmp_path / "absent").read_text()
     assert reason_of(error.value) == "No such file or directory"
-    assert reason_of(OSError("Corrupt snappy compressed data.")) == "Corrupt snappy compressed data."
+    assert (
+        reason_of(OSError("Corrupt snappy compressed data.")) == "Corrupt snappy compressed data."
+    )

@@ -36,7 +36,9 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
 
 def test_what_cannot_be_written_is_said_in_one_line(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(CatalogError, match=r"risk\.csv: cannot be written: .*file: (File exists|Not a directory)"):
+    with pytest.raises(
+        CatalogError, match=r"risk\.csv: cannot be written: .*file: (File exists|Not a directory)"
+    ):
         written_whole(tmp_path / "file" / "risk.csv").__enter__()
 
     def fill():

@@ -59,12 +59,18 @@ def test_every_public_name_is_there_and_documented():
 
 def test_import_is_lazy():
     code = "import sys, per_obspy; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not {"numba", "pandas", "xarray", "obspy", "scipy", "matplotlib"} & set(loaded)
 
 
 def test_a_format_plugin_loads_nothing_heavy():
     plugin = "import per_obspy.formats.peer_at2"
-    code = f"import sys, obspy; before = set(sys.modules); {plugin}; print(*set(sys.modules) - before)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    code = (
+        f"import sys, obspy; before = set(sys.modules); {plugin}; print(*set(sys.modules) - before)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert not {"numba", "pandas", "xarray", "matplotlib"} & set(loaded)

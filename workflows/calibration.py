@@ -1,8 +1,8 @@
 """
 How well the probability of pounding is calibrated: 100 000 pairs in simulated motion, predicted and as it turned out.
 
-Run: ``python workflows/calibration.py``; prints the tables of docs/calibration.md, writes them into it and draws its
-figures.
+Run: ``python workflows/calibration.py``; prints the tables of docs/calibration.md, writes them into
+it and draws its figures.
 """
 
 import argparse
@@ -22,8 +22,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=CHECKOUT / "docs" / "calibration.md")
     parser.add_argument("-e", "--events", type=int, default=20, help="simulated earthquakes")
-    parser.add_argument("-n", "--pairs", type=int, default=1700, help="an earthquake and place; there are three places")
-    parser.add_argument("-s", "--stations", type=int, default=8, help="of each earthquake; three times as many sites")
+    parser.add_argument(
+        "-n",
+        "--pairs",
+        type=int,
+        default=1700,
+        help="an earthquake and place; there are three places",
+    )
+    parser.add_argument(
+        "-s",
+        "--stations",
+        type=int,
+        default=8,
+        help="of each earthquake; three times as many sites",
+    )
     arguments = parser.parse_args()
     told = []
     for event in range(1, arguments.events + 1):

@@ -14,19 +14,20 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Interpolation, Scenario, Screening, Simulation, load
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.records.simulated import simulate
-from per_obspy.records.simulated_metadata import GAIN
-from per_obspy.screening.assignment import nearest_station, stations_of
-from per_obspy.screening.ground import Ground
+from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.records.simulation.metadata import GAIN
+from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
+from per_obspy.screening.ground_motion.region import Ground
+from per_obspy.screening.ground_motion.site_motion import Source, prepared_field
+from per_obspy.screening.ground_motion.spatial_correlation import great_circle, residual_correlation
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.site_motion import Source, prepared_field
-from per_obspy.screening.spatial import great_circle, residual_correlation
 from per_obspy.screening.values import both, values
 
 #: Magnitudes of the earthquakes, one after the other.
 MAGNITUDES = (6.5, 7.0, 7.5)
 
-#: Metres between a pair and its site, share of pairs that touch, share of pairs whose buildings yield.
+#: Metres between a pair and its site, share of pairs that touch, share of pairs whose buildings
+#: yield.
 NEAR, TOUCHING_SHARE, YIELDING_SHARE = 1.0, 0.1, 0.15
 
 #: Share of pairs whose gap was estimated only, and how well: standard deviation over mean.
@@ -51,7 +52,8 @@ KEPT = (
     "critical_gap_sd", "critical_gap_linearized",
 )  # fmt: skip
 
-#: Log-standard deviation of amplitudes that vary over the city, and the period (s) whose spatial correlation they have.
+#: Log-standard deviation of amplitudes that vary over the city, and the period (s) whose spatial
+#: correlation they have.
 AMPLITUDE, CORRELATED_AS = 0.5, 1.0
 
 
@@ -85,13 +87,14 @@ def cases(event: int, stations: int, hidden: int, count: int) -> pd.DataFrame:
     stations, hidden : int
         Number of places with a station and without.
     count : int
-        Number of pairs at the former, at the latter, and at the latter once more in motion that varies as assumed.
+        Number of pairs at the former, at the latter, and at the latter once more in motion that
+        varies as assumed.
 
     Returns
     -------
     DataFrame
-        ``event``, ``place`` (one of ``PLACES``), ``site`` (its number there), ``pounded``, the columns ``KEPT`` of the
-        risk table, and whether each pair is of each of the ``KINDS``.
+        ``event``, ``place`` (one of ``PLACES``), ``site`` (its number there), ``pounded``, the
+        columns ``KEPT`` of the risk table, and whether each pair is of each of the ``KINDS``.
     """
     plain, varied = (network(event, stations, hidden, varies) for varies in (False, True))
     places = ((plain, plain.recorded), (plain, plain.hidden), (varied, varied.hidden))
@@ -132,12 +135,14 @@ def network(event: int, stations: int, hidden: int, varied: bool) -> Network:
     stations, hidden : int
         Number of places with a station and without.
     varied : bool
-        Whether amplitudes vary over the city as the interpolation assumes; the simulation alone gives every place
-        noise of its own.
+        Whether amplitudes vary over the city as the interpolation assumes; the simulation alone
+        gives every place noise of its own.
     """
     magnitude = MAGNITUDES[event % len(MAGNITUDES)]
     demo = load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Simulation).scenario
-    scenario = demo.model_copy(update={"seed": event, "magnitude": magnitude, "stations": stations + hidden})
+    scenario = demo.model_copy(
+        update={"seed": event, "magnitude": magnitude, "stations": stations + hidden}
+    )
     stream = simulate(scenario).stream
     codes = [f"S{number + 1:03d}" for number in range(stations + hidden)]
     places = [stream.select(station=code) for code in codes]
@@ -159,7 +164,9 @@ def _site(place) -> Site:
 def _amplitudes(places: Sequence, seed: int) -> FloatArray:
     """Return one factor a place, lognormal with median 1, correlated in space."""
     where = [place[0].stats.coordinates for place in places]
-    east, north = (np.array([getattr(one, name) for one in where]) for name in ("longitude", "latitude"))
+    east, north = (
+        np.array([getattr(one, name) for one in where]) for name in ("longitude", "latitude")
+    )
     between = great_circle(east[:, None], north[:, None], east[None, :], north[None, :])
     root = np.linalg.cholesky(residual_correlation(between, CORRELATED_AS, vs30_clustered=False))
     return np.exp(AMPLITUDE * root @ np.random.default_rng([seed, 2]).standard_normal(len(places)))
@@ -167,10 +174,14 @@ def _amplitudes(places: Sequence, seed: int) -> FloatArray:
 
 def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> pd.DataFrame:
     """Return the risk table of pairs at sites, as a planner with the stations would have it, and their ``site``."""
-    east, north = (np.array([getattr(site, name) for site in sites]) for name in ("longitude", "latitude"))
+    east, north = (
+        np.array([getattr(site, name) for site in sites]) for name in ("longitude", "latitude")
+    )
     raw = simulated_pairs(east, north, count, seed, NEAR, TOUCHING_SHARE)
     site = nearest_station(values(raw, "longitude_1"), values(raw, "latitude_1"), east, north)[0]
-    raw = raw.assign(site=site, site_class=[sites[one].site_class for one in site], **_more(raw, seed))
+    raw = raw.assign(
+        site=site, site_class=[sites[one].site_class for one in site], **_more(raw, seed)
+    )
     pairs = checked_pairs(raw, "simulated pairs")
     stations, _ = stations_of(known.stations)
     source = Source(known.scenario.longitude, known.scenario.latitude, known.scenario.depth)
@@ -182,7 +193,10 @@ def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> p
 def _more(raw: pd.DataFrame, seed: int) -> dict[str, FloatArray]:
     """Return what the simulated inventory does not have: gaps that were estimated, buildings that yield."""
     generator = np.random.default_rng([seed, 3])
-    estimated, yields = generator.random(len(raw)) < ESTIMATED, generator.random(len(raw)) < YIELDING_SHARE
+    estimated, yields = (
+        generator.random(len(raw)) < ESTIMATED,
+        generator.random(len(raw)) < YIELDING_SHARE,
+    )
     strengths = np.where(yields, generator.uniform(*STRENGTHS, (2, len(raw))), np.nan)
     columns = {f"yield_coefficient_{i}": strengths[i - 1] for i in (1, 2)}
     columns |= {f"hardening_{i}": np.where(yields, HARDENING, np.nan) for i in (1, 2)}
@@ -223,4 +237,7 @@ def _arguments(pairs: pd.DataFrame) -> Iterator[FloatArray]:
     shares = both(pairs, "participation")
     yield from (*shares, values(pairs, "azimuth"))
     for i, share in enumerate(shares, start=1):
-        yield from (share * values(pairs, f"yield_displacement_{i}"), values(pairs, f"hardening_{i}"))
+        yield from (
+            share * values(pairs, f"yield_displacement_{i}"),
+            values(pairs, f"hardening_{i}"),
+        )

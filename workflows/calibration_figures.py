@@ -30,14 +30,24 @@ def draw_reliability(places: Sequence[tuple[str, pd.DataFrame]], path: Path) -> 
         PNG file.
     """
     figure = Figure(figsize=(5.0 * len(places), 7.0), layout="constrained")
-    panels = figure.subplots(2, len(places), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 1))
+    panels = figure.subplots(
+        2, len(places), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 1)
+    )
     for (place, pairs), axes, below in zip(places, *panels, strict=True):
         axes.plot([0, 1], [0, 1], color="#888888", linewidth=0.8)
-        for kind, colour in zip(KINDS, COLOURS, strict=False):  # the last, pairs that touch, have probability 1
+        for kind, colour in zip(
+            KINDS, COLOURS, strict=False
+        ):  # the last, pairs that touch, have probability 1
             _add_kind(axes, pairs[pairs[kind]], kind, colour)
         axes.set(title=f"{place}: {pairs[APART].sum()} pairs")
         axes.grid(alpha=0.25)
-        below.hist(pairs.loc[pairs[APART], "probability"], bins=20, range=(0.0, 1.0), color="#888888", log=True)
+        below.hist(
+            pairs.loc[pairs[APART], "probability"],
+            bins=20,
+            range=(0.0, 1.0),
+            color="#888888",
+            log=True,
+        )
         below.set_xlabel("predicted probability of pounding")
     panels[0, 0].set_ylabel("share that pounded")
     panels[1, 0].set_ylabel("pairs")
@@ -52,7 +62,17 @@ def _add_kind(axes: Axes, pairs: pd.DataFrame, kind: str, colour: str) -> None:
     told, share = ([some[name].mean() for some in groups] for name in ("probability", "pounded"))
     doubt = [2.0 * difference(some)[1] for some in groups]
     bars = doubt if kind == APART else None
-    axes.errorbar(told, share, yerr=bars, fmt="o-", color=colour, markersize=4, linewidth=1.2, capsize=2, label=kind)
+    axes.errorbar(
+        told,
+        share,
+        yerr=bars,
+        fmt="o-",
+        color=colour,
+        markersize=4,
+        linewidth=1.2,
+        capsize=2,
+        label=kind,
+    )
 
 
 def draw_demands(demands: Mapping[str, tuple[FloatArray, FloatArray]], path: Path) -> None:
@@ -68,12 +88,26 @@ def draw_demands(demands: Mapping[str, tuple[FloatArray, FloatArray]], path: Pat
     """
     figure = Figure(figsize=(10.0, 10.0), layout="constrained")
     ends = 1e-4, 10.0
-    for axes, (title, (simple, exact)) in zip(figure.subplots(2, 2).flat, demands.items(), strict=True):
-        places = {"gridsize": 70, "xscale": "log", "yscale": "log", "extent": np.log10([*ends, *ends]), "mincnt": 1}
+    for axes, (title, (simple, exact)) in zip(
+        figure.subplots(2, 2).flat, demands.items(), strict=True
+    ):
+        places = {
+            "gridsize": 70,
+            "xscale": "log",
+            "yscale": "log",
+            "extent": np.log10([*ends, *ends]),
+            "mincnt": 1,
+        }
         axes.hexbin(exact, simple, bins="log", cmap="viridis_r", linewidths=0.1, **places)
         axes.plot(ends, ends, color="black", linewidth=0.8)
         found = summary(simple / exact, (1.0,))
         text = f"estimate / exact: median {found.median:.2f}, σ of ln {found.log_std:.2f}, {found.below[0]:.0%} below 1"
         axes.set_title(f"{title}\n{text}", fontsize=9)
-        axes.set(xlim=ends, ylim=ends, box_aspect=1.0, xlabel="exact demand of 1 towards 2 (m)", ylabel="estimate (m)")
+        axes.set(
+            xlim=ends,
+            ylim=ends,
+            box_aspect=1.0,
+            xlabel="exact demand of 1 towards 2 (m)",
+            ylabel="estimate (m)",
+        )
     save(figure, path, simulated=True)

@@ -8,7 +8,7 @@ from calibration_cases import APART, KINDS, PLACES, YIELDING
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.reliability import summary
-from per_obspy.screening.evaluation import brier_score, reliability
+from per_obspy.screening.region.evaluation import brier_score, reliability
 
 #: A probability is sharp below it and above 1 - it.
 SHARP = 0.1
@@ -16,7 +16,8 @@ SHARP = 0.1
 #: Bins of the probability.
 BINS = 10
 
-#: Exact demands below it (m) are round-off of buildings that move as one: no ratio is formed with them.
+#: Exact demands below it (m) are round-off of buildings that move as one: no ratio is formed with
+#: them.
 LEAST = 1e-6
 
 
@@ -45,11 +46,17 @@ def bin_table(pairs: pd.DataFrame) -> Iterator[str]:
     """Yield one row a bin of the probability: mean probability, share that pounded, pairs; for every place."""
     yield "| probability | " + " | ".join(PLACES) + " |"
     yield "|---|" + "---|" * len(PLACES)
-    found = [reliability(some["pounded"], some["probability"], BINS) for _, some in by_place(pairs[pairs[APART]])]
+    found = [
+        reliability(some["pounded"], some["probability"], BINS)
+        for _, some in by_place(pairs[pairs[APART]])
+    ]
     for low in np.arange(BINS) / BINS:
         rows = [table[table["low"] == low] for table in found]
         cells = [
-            "".join(f"{row.mean_probability:.2f}: {row.observed_share:.2f} ({row.events})" for row in one.itertuples())
+            "".join(
+                f"{row.mean_probability:.2f}: {row.observed_share:.2f} ({row.events})"
+                for row in one.itertuples()
+            )
             for one in rows
         ]
         yield f"| {low:.1f} to {low + 1 / BINS:.1f} | {' | '.join(cells)} |"
@@ -69,10 +76,15 @@ def demands(pairs: pd.DataFrame, exact: str) -> dict[str, tuple[FloatArray, Floa
         "PER and eq. (16)": linear["critical_gap_per"],
         "larger of that and PER with the record's correlation": linear[by_per].max(axis=1),
         "SD and eq. (16)": linear["critical_gap_sd"],
-        "buildings that yield: largest of both and linearized": weak[[*by_per, "critical_gap_linearized"]].max(axis=1),
+        "buildings that yield: largest of both and linearized": weak[
+            [*by_per, "critical_gap_linearized"]
+        ].max(axis=1),
     }
     some = {name: estimate[estimate > 0] for name, estimate in estimates.items()}
-    return {name: (simple.to_numpy(), moves.loc[simple.index, exact].to_numpy()) for name, simple in some.items()}
+    return {
+        name: (simple.to_numpy(), moves.loc[simple.index, exact].to_numpy())
+        for name, simple in some.items()
+    }
 
 
 def demand_table(pairs: pd.DataFrame) -> Iterator[str]:
@@ -92,7 +104,13 @@ def page(pairs: pd.DataFrame) -> Iterator[str]:
     for place, some in by_place(pairs):
         yield from ("", f"### Pairs {place}", "")
         yield from kind_table(some)
-    yield from ("", "### Reliability of all that leave a gap", "", "Mean probability: share that pounded (pairs).", "")
+    yield from (
+        "",
+        "### Reliability of all that leave a gap",
+        "",
+        "Mean probability: share that pounded (pairs).",
+        "",
+    )
     yield from bin_table(pairs)
     yield from ("", "### Simple and exact demand", "", "Median, sigma of ln, share below 1.", "")
     yield from demand_table(pairs)

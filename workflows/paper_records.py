@@ -10,12 +10,13 @@ import obspy
 from per_obspy import process
 from per_obspy.checks import FloatArray
 from per_obspy.config import Simulation, load
-from per_obspy.records.columns import read_columns
-from per_obspy.records.simulated import simulate
+from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.records.text_table import read_columns
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
-#: Free-field horizontals processed by their agencies, high-pass at most 0.1 Hz where headers tell, PGA above 0.05 g
+#: Free-field horizontals processed by their agencies, high-pass at most 0.1 Hz where headers tell,
+#: PGA above 0.05 g
 BROAD_BAND = (
     "records/peer_at2/RSN15_KERN_TAF021.AT2",
     "records/peer_at2/RSN6_IMPVALL.I_I-ELC180.AT2",
@@ -53,7 +54,10 @@ def mexico_city_1985() -> list[Record]:
     path = data_folder() / "records" / "mexico1985_sct" / "sct190985.txt"
     place = {"network": "MX", "station": "SCT", "latitude": 19.393, "longitude": -99.147}
     stream = read_columns(path, **place, units="g", time_column=0, channels={"HNN": 1, "HNE": 2})
-    return [_record(trace, f"SCT 1985 {direction}") for trace, direction in zip(stream, ("NS", "EW"), strict=True)]
+    return [
+        _record(trace, f"SCT 1985 {direction}")
+        for trace, direction in zip(stream, ("NS", "EW"), strict=True)
+    ]
 
 
 def broad_band(files: tuple[str, ...] = BROAD_BAND) -> list[Record]:
@@ -70,10 +74,14 @@ def broad_band(files: tuple[str, ...] = BROAD_BAND) -> list[Record]:
 def simulated_lakebed() -> Record:
     """Return a processed horizontal of the demonstration's earthquake on its lakebed, where SCT 1985 is absent."""
     scenario = load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Simulation).scenario
-    stream = simulate(scenario.model_copy(update={"stations": 2})).stream  # the second stands on the lakebed
+    stream = simulate(
+        scenario.model_copy(update={"stations": 2})
+    ).stream  # the second stands on the lakebed
     trace = process(stream.select(station="S002")).select(component="N")[0]
     return _record(trace, "simulated lakebed", simulated=True)
 
 
 def _record(trace: obspy.Trace, name: str, simulated: bool = False) -> Record:
-    return Record(name, np.ascontiguousarray(trace.data, dtype=np.float64), trace.stats.delta, simulated)
+    return Record(
+        name, np.ascontiguousarray(trace.data, dtype=np.float64), trace.stats.delta, simulated
+    )

@@ -1,8 +1,8 @@
 """
 What is left of a known ground motion after noise, drifts and baseline shifts were added and processed away.
 
-Run: ``python workflows/processing_truth.py docs/figures/processing_truth.png``; prints the table of docs/processing.md
-and draws the figure.
+Run: ``python workflows/processing_truth.py docs/figures/processing_truth.png``; prints the table of
+docs/processing.md and draws the figure.
 """
 
 import sys
@@ -75,7 +75,9 @@ def outcome(kind: str, seed: int) -> Outcome:
     """Return what the processing recovers."""
     rng, truth = np.random.default_rng(100 + seed), ground(seed)
     recorded = truth + 1e-5 * rng.normal(size=COUNT) + ADDED[kind](rng)
-    done = process(Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})]))[0]
+    done = process(
+        Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})])
+    )[0]
     ratio = per_spectrum(done.data, 1 / RATE, PERIODS) / per_spectrum(truth, 1 / RATE, PERIODS)
     chosen = done.stats.per_obspy
     flagged = "baseline shifted" in chosen.get("warnings", "")
@@ -86,10 +88,19 @@ def row(kind: str, outcomes: list[Outcome]) -> str:
     """Return one row of the table."""
     errors = [np.abs(np.log(one.ratio)) for one in outcomes]
     inside = [error[one.usable] for error, one in zip(errors, outcomes, strict=True)]
-    outside = [error[2 * one.longest < PERIODS].max() for error, one in zip(errors, outcomes, strict=True)]
-    early = [error[one.usable & (PERIODS <= 1.6)].max() for error, one in zip(errors, outcomes, strict=True)]
+    outside = [
+        error[2 * one.longest < PERIODS].max() for error, one in zip(errors, outcomes, strict=True)
+    ]
+    early = [
+        error[one.usable & (PERIODS <= 1.6)].max()
+        for error, one in zip(errors, outcomes, strict=True)
+    ]
     longest = [one.longest for one in outcomes]
-    cells = [f"{np.median(np.concatenate(inside)):.1%}", f"{max(early):.1%}", f"{max(map(np.max, inside)):.1%}"]
+    cells = [
+        f"{np.median(np.concatenate(inside)):.1%}",
+        f"{max(early):.1%}",
+        f"{max(map(np.max, inside)):.1%}",
+    ]
     cells += [f"{max(outside):.0%}", f"{min(longest):.0f} to {max(longest):.0f}"]
     cells += [f"{sum(one.flagged for one in outcomes)} of {len(outcomes)}"]
     return f"| {kind} | {' | '.join(cells)} |"
@@ -101,12 +112,16 @@ def draw(table: dict[str, list[Outcome]], path: Path) -> None:
     panels = figure.subplots(3, 5, sharex=True, sharey=True)
     for axes, (kind, outcomes) in zip(panels.flat, table.items(), strict=False):
         for one in outcomes:
-            axes.semilogx(PERIODS, one.ratio, color="#D55E00" if one.flagged else "#0072B2", linewidth=1)
+            axes.semilogx(
+                PERIODS, one.ratio, color="#D55E00" if one.flagged else "#0072B2", linewidth=1
+            )
             axes.axvspan(one.shortest, one.longest, color="#009E73", alpha=0.06, linewidth=0)
         axes.set(title=kind, ylim=(0.5, 1.5))
         axes.grid(alpha=0.3)
     panels.flat[-1].set_axis_off()
-    panels.flat[-1].text(0, 0.5, "blue: no warning\nred: flagged\ngreen: usable periods", fontsize=11)
+    panels.flat[-1].text(
+        0, 0.5, "blue: no warning\nred: flagged\ngreen: usable periods", fontsize=11
+    )
     figure.supxlabel("natural period (s)")
     figure.supylabel("PER of the processed record / PER of the ground")
     figure.savefig(path, dpi=90)

@@ -40,18 +40,30 @@ def gap_table(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterator[st
         for name, records in groups.items()
     }
     for title, field in ESTIMATES.items():
-        ratios = [np.concatenate([getattr(one, field) / one.exact for one in all_]) for all_ in compared.values()]
+        ratios = [
+            np.concatenate([getattr(one, field) / one.exact for one in all_])
+            for all_ in compared.values()
+        ]
         yield f"| {title} | " + " | ".join(cell(ratio, (BELOW, 0.9)) for ratio in ratios) + " |"
 
 
 def hit_table(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterator[str]:
     """Yield the rows on the single hit: predicted over actual largest amplification of the pair."""
     columns = [(name, mass_ratio) for mass_ratio in MASS_RATIOS for name in groups]
-    yield "| gap / critical | " + " | ".join(f"{name}, m2 = {ratio:g} m1" for name, ratio in columns) + " |"
+    yield (
+        "| gap / critical | "
+        + " | ".join(f"{name}, m2 = {ratio:g} m1" for name, ratio in columns)
+        + " |"
+    )
     yield "|---|" + "---|" * len(columns)
     for gap_ratio in GAP_RATIOS:
-        compared = [list(both_ways(groups[name], pairs, gap_ratio, mass_ratio)) for name, mass_ratio in columns]
-        ratios = [np.concatenate([np.divide(*amplifications(one)) for one in all_]) for all_ in compared]
+        compared = [
+            list(both_ways(groups[name], pairs, gap_ratio, mass_ratio))
+            for name, mass_ratio in columns
+        ]
+        ratios = [
+            np.concatenate([np.divide(*amplifications(one)) for one in all_]) for all_ in compared
+        ]
         yield f"| {gap_ratio:g} | " + " | ".join(cell(ratio, (0.99,)) for ratio in ratios) + " |"
 
 
@@ -82,9 +94,19 @@ def page(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterable[str]:
     """Yield the measured part of the page."""
     yield from ("### Critical gap", "", "Median, sigma of ln, share below 1, share below 0.9.", "")
     yield from gap_table(groups, pairs)
-    yield from ("", "### Single hit", "", "Median, sigma of ln, share under-predicted by more than 1 %.", "")
+    yield from (
+        "",
+        "### Single hit",
+        "",
+        "Median, sigma of ln, share under-predicted by more than 1 %.",
+        "",
+    )
     yield from hit_table(groups, pairs)
-    yield from ("", "Left out, because the exact critical gap of the record allows no grazing state:", "")
+    yield from (
+        "",
+        "Left out, because the exact critical gap of the record allows no grazing state:",
+        "",
+    )
     yield from left_out(groups, pairs)
     yield from ("", "### Records", "")
     for name, records in groups.items():
@@ -95,7 +117,13 @@ def main() -> None:
     """Print the tables and write them into the page, below what is said there by hand."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=CHECKOUT / "docs" / "reliability.md")
-    parser.add_argument("-n", "--periods", type=int, default=14, help="all pairs of so many periods; 14 make 91 pairs")
+    parser.add_argument(
+        "-n",
+        "--periods",
+        type=int,
+        default=14,
+        help="all pairs of so many periods; 14 make 91 pairs",
+    )
     arguments = parser.parse_args()
     if not data_folder().is_dir():
         parser.exit(2, f"real records are not at {data_folder()}: set PER_OBSPY_DATA\n")

@@ -1,8 +1,9 @@
 """
 How far the estimates for pairs that yield are from the exact demand, in simulated motion and at SCT 1985.
 
-Run: ``python workflows/yielding_estimates.py``; prints the table of docs/screening.md: median of estimate / exact,
-sigma of its logarithm, share that is too small, and share where the linearization says that it found no ductility.
+Run: ``python workflows/yielding_estimates.py``; prints the table of docs/screening.md: median of
+estimate / exact, sigma of its logarithm, share that is too small, and share where the linearization
+says that it found no ductility.
 """
 
 import argparse
@@ -15,13 +16,14 @@ from paper_records import CHECKOUT, data_folder
 
 from per_obspy import process, station_spectra
 from per_obspy.config import Simulation, load
-from per_obspy.records.columns import read_columns
-from per_obspy.records.simulated import simulate
-from per_obspy.screening.judgement import judged
-from per_obspy.screening.motion import motion_along_azimuths
+from per_obspy.records.simulation.earthquake import simulate
+from per_obspy.records.text_table import read_columns
+from per_obspy.screening.by_record.estimates import judged
+from per_obspy.screening.by_record.pair_radii import motion_along_azimuths
 from per_obspy.screening.values import Columns
 
-#: Periods of the buildings, s; how many times weaker than elastic they are; slope after yielding / before.
+#: Periods of the buildings, s; how many times weaker than elastic they are; slope after yielding /
+#: before.
 PERIODS, WEAKNESS, HARDENING = (0.25, 3.0), (1.5, 6.0), 0.05
 ESTIMATES = {
     "elastic PER and eq. (16)": "critical_gap_per",
@@ -44,22 +46,33 @@ def mexico_city_1985() -> Iterator[tuple[str, xr.Dataset]]:
     path = data_folder() / "records" / "mexico1985_sct" / "sct190985.txt"
     if path.exists():
         place = {"network": "MX", "station": "SCT", "latitude": 19.393, "longitude": -99.147}
-        stream = read_columns(path, **place, units="g", time_column=0, channels={"HNN": 1, "HNE": 2})
+        stream = read_columns(
+            path, **place, units="g", time_column=0, channels={"HNN": 1, "HNE": 2}
+        )
         yield "SCT 1985", station_spectra(process(obspy.Stream(stream)))
 
 
 def yielding_pairs(station: xr.Dataset, count: int, draw: np.random.Generator) -> Columns:
     """Return random pairs at a station, in every one of which a building yields, with estimates and exact demand."""
     every = np.ones(count)
-    pairs: Columns = {"azimuth": draw.uniform(0.0, 180.0, count), "derived": np.full(count, "", dtype=object)}
+    pairs: Columns = {
+        "azimuth": draw.uniform(0.0, 180.0, count),
+        "derived": np.full(count, "", dtype=object),
+    }
     pairs |= {"gap": 0.02 * every, "restitution": 0.65 * every}
     for i in (1, 2):
         pairs[f"period_{i}"] = np.exp(draw.uniform(*np.log(PERIODS), count))
-        pairs |= {f"damping_{i}": 0.05 * every, f"participation_{i}": every, f"contact_mass_{i}": 1e6 * every}
+        pairs |= {
+            f"damping_{i}": 0.05 * every,
+            f"participation_{i}": every,
+            f"contact_mass_{i}": 1e6 * every,
+        }
         pairs[f"hardening_{i}"] = HARDENING * every
     motion = motion_along_azimuths(station, pairs, pairs["azimuth"])
     for i in (1, 2):
-        pairs[f"yield_displacement_{i}"] = motion.sd[i - 1][:, 0] / np.exp(draw.uniform(*np.log(WEAKNESS), count))
+        pairs[f"yield_displacement_{i}"] = motion.sd[i - 1][:, 0] / np.exp(
+            draw.uniform(*np.log(WEAKNESS), count)
+        )
     return judged(station, pairs, motion, "given", exact=True)
 
 
@@ -68,21 +81,31 @@ def row(name: str, estimate: str, tables: list[Columns]) -> str:
     ratio = np.concatenate([table[ESTIMATES[estimate]] / table["demand_exact"] for table in tables])
     failed = 1.0 - np.concatenate([table["linearized_converged"] for table in tables]).mean()
     spread = f"{np.median(ratio):.2f}, {np.log(ratio).std():.2f}, {(ratio < 1).mean():.0%}"
-    return f"| {name}, {ratio.size} pairs | {estimate} | {spread} | {ratio.min():.2f} | {failed:.0%} |"
+    return (
+        f"| {name}, {ratio.size} pairs | {estimate} | {spread} | {ratio.min():.2f} | {failed:.0%} |"
+    )
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-s", "--stations", type=int, default=24, help="of the simulated earthquake")
-    parser.add_argument("-n", "--pairs", type=int, default=50, help="a simulated station; ten times as many at SCT")
+    parser.add_argument(
+        "-s", "--stations", type=int, default=24, help="of the simulated earthquake"
+    )
+    parser.add_argument(
+        "-n", "--pairs", type=int, default=50, help="a simulated station; ten times as many at SCT"
+    )
     arguments = parser.parse_args()
     draw, groups = np.random.default_rng(5), dict[str, list[Columns]]()
     for name, station in simulated(arguments.stations):
-        groups.setdefault(f"simulated {name}", []).append(yielding_pairs(station, arguments.pairs, draw))
+        groups.setdefault(f"simulated {name}", []).append(
+            yielding_pairs(station, arguments.pairs, draw)
+        )
     for name, station in mexico_city_1985():
         groups.setdefault(name, []).append(yielding_pairs(station, 10 * arguments.pairs, draw))
-    print("| motion | estimate | median, σ_ln, too small | smallest | not converged |\n|---|---|---|---|---|")
+    print(
+        "| motion | estimate | median, σ_ln, too small | smallest | not converged |\n|---|---|---|---|---|"
+    )
     for name, tables in groups.items():
         print("\n".join(row(name, estimate, tables) for estimate in ESTIMATES))
 

@@ -7,26 +7,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.outcome import AsJson, end_if_nothing
+from per_obspy.commands.endings import AsJson, end_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
     from per_obspy.errors import Rejection
     from per_obspy.records.events import EventRow
-    from per_obspy.records.info import RecordInfo
+    from per_obspy.records.summary import RecordInfo
 
 #: What the table of records shows of each; JSON has everything.
 SHOWN = ("record", "format", "level", "start", "dt", "duration", "azimuth", "peak", "unit", "file")
 
 
 def events(
-    source: Annotated[str, typer.Argument(help="QuakeML or GeoJSON file, URL of a feed, FDSN service (URL or name).")],
+    source: Annotated[
+        str,
+        typer.Argument(help="QuakeML or GeoJSON file, URL of a feed, FDSN service (URL or name)."),
+    ],
     start: Annotated[str | None, typer.Option(help="Earliest origin time, ISO 8601, UTC.")] = None,
     end: Annotated[str | None, typer.Option(help="Latest origin time, ISO 8601, UTC.")] = None,
     magnitude: Annotated[float | None, typer.Option(help="Smallest magnitude.")] = None,
     latitude: Annotated[float | None, typer.Option(help="Centre, degrees north.")] = None,
     longitude: Annotated[float | None, typer.Option(help="Centre, degrees east.")] = None,
-    radius: Annotated[float | None, typer.Option(help="Of the circle around the centre, degrees.")] = None,
+    radius: Annotated[
+        float | None, typer.Option(help="Of the circle around the centre, degrees.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -38,18 +43,26 @@ def events(
 
     query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
     query |= {"latitude": latitude, "longitude": longitude, "maxradius": radius}
-    rows = find_events(source, {name: str(value) for name, value in query.items() if value is not None})
+    rows = find_events(
+        source, {name: str(value) for name, value in query.items() if value is not None}
+    )
     if as_json:
         print(json.dumps([row._asdict() for row in rows]))
     else:
         titles = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
-        print_table(f"{len(rows)} events, the latest first", titles, [_shown_event(row) for row in rows])
+        print_table(
+            f"{len(rows)} events, the latest first", titles, [_shown_event(row) for row in rows]
+        )
     end_if_nothing(len(rows))
 
 
 def fetch(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of a run with a section [records.fdsn].")],
-    again: Annotated[bool, typer.Option("--again", help="Ask again for stations that had no data.")] = False,
+    configuration: Annotated[
+        Path, typer.Argument(help="TOML file of a run with a section [records.fdsn].")
+    ],
+    again: Annotated[
+        bool, typer.Option("--again", help="Ask again for stations that had no data.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -57,7 +70,7 @@ def fetch(
 
     Example: per-obspy fetch run.toml
     """
-    from per_obspy.records.fetching import fetch_configured
+    from per_obspy.records.fdsn.fetch import fetch_configured
 
     with shown_progress() as progress:
         folder, stations, rejected = fetch_configured(configuration, again, progress)
@@ -72,7 +85,9 @@ def fetch(
 
 def info(
     path: Annotated[Path, typer.Argument(help="Folder, archive, waveform file or ASDF workspace.")],
-    stationxml: Annotated[Path | None, typer.Option(help="StationXML file or folder, if not beside.")] = None,
+    stationxml: Annotated[
+        Path | None, typer.Option(help="StationXML file or folder, if not beside.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -80,12 +95,14 @@ def info(
 
     Example: per-obspy info shared/records
     """
-    from per_obspy.records.info import describe_records
+    from per_obspy.records.summary import describe_records
 
     records, rejected = describe_records(path, stationxml)
     if as_json:
         useless = [one._asdict() for one in rejected]
-        print(json.dumps({"records": [record._asdict() for record in records], "rejected": useless}))
+        print(
+            json.dumps({"records": [record._asdict() for record in records], "rejected": useless})
+        )
     else:
         print_table(f"{len(records)} records", SHOWN, [_shown(record) for record in records])
         _print_rejected(rejected)

@@ -1,8 +1,8 @@
 """
 Every default of a run, with its unit and where it comes from; read from TOML.
 
-Only ``run.py`` and the commands see a configuration as a whole. Rooms below take plain arguments or one section.
-Paths in a configuration are relative to the folder of its file.
+Only ``run.py`` and the commands see a configuration as a whole. Rooms below take plain arguments or
+one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario

@@ -22,7 +22,9 @@ class Ensemble(Section):
     name: str = Field(min_length=1, description="title")
     output: RelativePath = Field(description="folder of the results; every run keeps its own")
     scenario: tuple[EnsembleScenario, ...] = Field(min_length=1)
-    csv_rows: int = Field(100_000, ge=1, description="largest number of rows in ensemble.csv, the worst")
+    csv_rows: int = Field(
+        100_000, ge=1, description="largest number of rows in ensemble.csv, the worst"
+    )
 
     @property
     def yearly(self) -> bool:
@@ -32,7 +34,10 @@ class Ensemble(Section):
     @property
     def weights(self) -> dict[str, float]:
         """Weight of each scenario, or its rate (1/year)."""
-        return {one.name: one.rate if one.rate is not None else one.weight or 0.0 for one in self.scenario}
+        return {
+            one.name: one.rate if one.rate is not None else one.weight or 0.0
+            for one in self.scenario
+        }
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:
@@ -47,7 +52,9 @@ class Ensemble(Section):
             if (one.weight is None) == (one.rate is None):
                 raise ValueError(f"{one.name!r} needs either a weight or a rate")
             if (one.rate is None) == self.yearly:
-                raise ValueError(f"{one.name!r} has a {'weight' if self.yearly else 'rate'}, others have the other one")
+                raise ValueError(
+                    f"{one.name!r} has a {'weight' if self.yearly else 'rate'}, others have the other one"
+                )
         if not sum(self.weights.values()) > 0.0:
             raise ValueError("weights or rates must have a positive sum, all are 0")
         return self

@@ -18,13 +18,21 @@ class Columns(Section):
     station: str = Field(description="SEED station code")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
     longitude: float = Field(ge=-180, le=180, description="degrees east")
-    units: str = Field(pattern="^(m/s2|cm/s2|gal|g)$", description="of the samples: m/s2, cm/s2, gal, g")
+    units: str = Field(
+        pattern="^(m/s2|cm/s2|gal|g)$", description="of the samples: m/s2, cm/s2, gal, g"
+    )
     channels: dict[str, int] = Field(description="channel code -> column, counted from 0")
-    azimuths: dict[str, float] = Field(default_factory=dict, description="channel code -> degrees from north")
+    azimuths: dict[str, float] = Field(
+        default_factory=dict, description="channel code -> degrees from north"
+    )
     separator: str | None = Field(None, description="between columns; white space if not given")
     skip: int = Field(0, ge=0, description="header lines")
-    time_column: int | None = Field(None, ge=0, description="column of time in s, checked for even spacing")
-    dt: float | None = Field(None, gt=0, description="sampling interval in s, where there is no time column")
+    time_column: int | None = Field(
+        None, ge=0, description="column of time in s, checked for even spacing"
+    )
+    dt: float | None = Field(
+        None, gt=0, description="sampling interval in s, where there is no time column"
+    )
     start: str | None = Field(None, description="time of the first sample, ISO 8601, UTC")
     raw: bool = Field(False, description="not corrected yet")
 
@@ -32,9 +40,13 @@ class Columns(Section):
 class Window(Section):
     """A time window; what is not given is seen from the origin time of the event."""
 
-    start: Moment | None = Field(None, description="ISO 8601, UTC; not given: before the origin time")
+    start: Moment | None = Field(
+        None, description="ISO 8601, UTC; not given: before the origin time"
+    )
     end: Moment | None = Field(None, description="ISO 8601, UTC; not given: after the origin time")
-    before: float = Field(30.0, ge=0, description="s from the start of the window to the origin time")
+    before: float = Field(
+        30.0, ge=0, description="s from the start of the window to the origin time"
+    )
     after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
 
 
@@ -42,23 +54,44 @@ class Fdsn(Window):
     """Records from FDSN web services around an epicentre; what was fetched stays in the cache."""
 
     providers: tuple[str, ...] = Field(
-        min_length=1, description="in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator"
+        min_length=1,
+        description="in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator",
     )
     cache: RelativePath = Field(description="folder that keeps what was fetched")
     event_id: str | None = Field(None, description="of the event service, instead of records.event")
     event_provider: str = Field("USGS", description="ObsPy's name or base URL of the event service")
-    latitude: float | None = Field(None, ge=-90, le=90, description="centre, degrees north; not given: epicentre")
-    longitude: float | None = Field(None, ge=-180, le=180, description="centre, degrees east; not given: epicentre")
-    radius: float = Field(100_000.0, gt=0, le=20_000_000, description="m, of the circle in which stations are wanted")
-    networks: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
-    stations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed")
-    locations: tuple[str, ...] = Field(("*",), min_length=1, description="SEED codes, * and ? allowed; empty: --")
+    latitude: float | None = Field(
+        None, ge=-90, le=90, description="centre, degrees north; not given: epicentre"
+    )
+    longitude: float | None = Field(
+        None, ge=-180, le=180, description="centre, degrees east; not given: epicentre"
+    )
+    radius: float = Field(
+        100_000.0, gt=0, le=20_000_000, description="m, of the circle in which stations are wanted"
+    )
+    networks: tuple[str, ...] = Field(
+        ("*",), min_length=1, description="SEED codes, * and ? allowed"
+    )
+    stations: tuple[str, ...] = Field(
+        ("*",), min_length=1, description="SEED codes, * and ? allowed"
+    )
+    locations: tuple[str, ...] = Field(
+        ("*",), min_length=1, description="SEED codes, * and ? allowed; empty: --"
+    )
     channels: tuple[str, ...] = Field(
-        ("HN?", "BN?", "CN?", "EN?"), min_length=1, description="SEED codes, * and ? allowed; accelerometers"
+        ("HN?", "BN?", "CN?", "EN?"),
+        min_length=1,
+        description="SEED codes, * and ? allowed; accelerometers",
     )
     timeout: float = Field(60.0, gt=0, description="s without an answer, or without more of it")
-    retries: int = Field(5, ge=0, description="after a fault that may pass (429, 5xx, time-out, cut answer)")
-    wait: float = Field(1.0, ge=0, description="s; the second retry waits twice as long, and so on; Retry-After counts")
+    retries: int = Field(
+        5, ge=0, description="after a fault that may pass (429, 5xx, time-out, cut answer)"
+    )
+    wait: float = Field(
+        1.0,
+        ge=0,
+        description="s; the second retry waits twice as long, and so on; Retry-After counts",
+    )
     connections: int = Field(3, ge=1, le=16, description="stations asked for at the same time")
 
     @property
@@ -77,23 +110,33 @@ class Asdf(Section):
     """A workspace of gmprocess, or another ASDF file."""
 
     file: RelativePath = Field(description="HDF5 file")
-    tag: str = Field("*_unprocessed", description="of the waveforms, * and ? allowed; *_default is gmprocess's result")
+    tag: str = Field(
+        "*_unprocessed",
+        description="of the waveforms, * and ? allowed; *_default is gmprocess's result",
+    )
 
 
 class Records(Section):
     """Where the records are; several sources may be given."""
 
-    folder: RelativePath | None = Field(None, description="folder of waveform files, with StationXML beside them")
-    stationxml: RelativePath | None = Field(None, description="StationXML file or folder, if not beside the records")
+    folder: RelativePath | None = Field(
+        None, description="folder of waveform files, with StationXML beside them"
+    )
+    stationxml: RelativePath | None = Field(
+        None, description="StationXML file or folder, if not beside the records"
+    )
     event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")
     sds: Sds | None = Field(None, description="SDS archive")
     asdf: Asdf | None = Field(None, description="ASDF workspace of gmprocess")
     shakemap: RelativePath | None = Field(
-        None, description="grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach"
+        None,
+        description="grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach",
     )
-    shakemap_uncertainty: RelativePath | None = Field(None, description="uncertainty.xml of the same ShakeMap")
+    shakemap_uncertainty: RelativePath | None = Field(
+        None, description="uncertainty.xml of the same ShakeMap"
+    )
 
     @model_validator(mode="after")
     def _any_source(self) -> Self:

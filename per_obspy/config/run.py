@@ -18,9 +18,15 @@ class Pairs(Section):
     """Where the pairs of buildings come from: a table, stored inventories, or simulated ones around the stations."""
 
     file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
-    catalog: RelativePath | None = Field(None, description="index of stored inventories, catalog.toml")
-    names: tuple[str, ...] = Field((), description="of stored inventories; none: all that the stations' region touches")
-    simulated: SimulatedPairs | None = Field(None, description="simulated inventory around the stations")
+    catalog: RelativePath | None = Field(
+        None, description="index of stored inventories, catalog.toml"
+    )
+    names: tuple[str, ...] = Field(
+        (), description="of stored inventories; none: all that the stations' region touches"
+    )
+    simulated: SimulatedPairs | None = Field(
+        None, description="simulated inventory around the stations"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -37,16 +43,24 @@ class Run(Section):
     name: str = Field(min_length=1, description="title of tables and figures")
     output: RelativePath = Field(description="folder of the results")
     workers: int = Field(0, ge=0, description="processes; 0: one a processor")
-    simulation: RelativePath | None = Field(None, description="TOML file of an event to simulate instead of records")
+    simulation: RelativePath | None = Field(
+        None, description="TOML file of an event to simulate instead of records"
+    )
     records: Records | None = Field(None, description="where the records are")
-    pairs: Pairs | None = Field(None, description="where the pairs come from, if not from the simulation")
+    pairs: Pairs | None = Field(
+        None, description="where the pairs come from, if not from the simulation"
+    )
     processing: Processing = Processing()
     spectra: Spectra = Spectra()
     building: Building = Building()
     screening: Screening = Screening()
     totals: Totals = Totals()
-    csv_rows: int = Field(100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all")
-    geopackage: bool = Field(False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]")
+    csv_rows: int = Field(
+        100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
+    )
+    geopackage: bool = Field(
+        False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

@@ -15,52 +15,94 @@ class Building(Section):
     """What is assumed of a building where the inventory is silent; each use is marked as derived."""
 
     damping: float = Field(0.05, ge=0, lt=1, description="fraction of critical")
-    damping_log_std: float = Field(0.3, ge=0, description="log-standard deviation of an assumed damping")
+    damping_log_std: float = Field(
+        0.3, ge=0, description="log-standard deviation of an assumed damping"
+    )
     storey_height: float = Field(3.0, ge=2, le=12, description="m")
     mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
-    area: float = Field(200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters")
+    area: float = Field(
+        200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters"
+    )
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
-    floor_tolerance: float = Field(0.61, ge=0, le=12, description="m; floors further apart misalign; 2 ft: FEMA P-154")
-    period_formula: str = Field("asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds")
+    floor_tolerance: float = Field(
+        0.61, ge=0, le=12, description="m; floors further apart misalign; 2 ft: FEMA P-154"
+    )
+    period_formula: str = Field(
+        "asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds"
+    )
 
 
 class Interpolation(Section):
     """How the motion between stations is estimated (``screening/interpolation.py``)."""
 
-    log_std: float = Field(0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7")
-    log_std_weight: float = Field(5.0, gt=0, description="number of stations that this value counts as")
-    vs30_clustered: bool = Field(False, description="Vs30 varies smoothly over the region (Jayaram & Baker, case 2)")
+    log_std: float = Field(
+        0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7"
+    )
+    log_std_weight: float = Field(
+        5.0, gt=0, description="number of stations that this value counts as"
+    )
+    vs30_clustered: bool = Field(
+        False, description="Vs30 varies smoothly over the region (Jayaram & Baker, case 2)"
+    )
 
 
 class Codes(Section):
     """What code rules ask of a region (``screening/codes.py``); a rule stays empty where its value is not given."""
 
-    ntc_zone: str | None = Field(None, pattern="^(I|II|III)$", description="NTC Mexico City 2004: I, II or III")
-    gb_intensity: int | None = Field(None, ge=6, le=9, description="GB 50011-2010: fortification intensity")
-    fema_seismicity: str | None = Field(
-        None, pattern="^(very_high|high|moderately_high|lower)$", description="FEMA P-154: of the region"
+    ntc_zone: str | None = Field(
+        None, pattern="^(I|II|III)$", description="NTC Mexico City 2004: I, II or III"
     )
-    floor_tolerance: float = Field(0.61, ge=0, le=12, description="m; floors no further apart align; 2 ft: FEMA P-154")
+    gb_intensity: int | None = Field(
+        None, ge=6, le=9, description="GB 50011-2010: fortification intensity"
+    )
+    fema_seismicity: str | None = Field(
+        None,
+        pattern="^(very_high|high|moderately_high|lower)$",
+        description="FEMA P-154: of the region",
+    )
+    floor_tolerance: float = Field(
+        0.61, ge=0, le=12, description="m; floors no further apart align; 2 ft: FEMA P-154"
+    )
 
 
 class Screening(Section):
     """How pairs find their ground motion and how risk is named."""
 
-    largest_distance: float = Field(20_000.0, gt=0, description="m from station to pair; pairs beyond are rejected")
+    largest_distance: float = Field(
+        20_000.0, gt=0, description="m from station to pair; pairs beyond are rejected"
+    )
     flag_distance: float = Field(5_000.0, gt=0, description="m, flagged beyond")
-    exact: bool = Field(True, description="exact demand and history of every pair; false: estimates only, faster")
-    model_median: float = Field(1.16, gt=0, description="median of critical gap by PER / exact (docs/reliability.md)")
-    model_dispersion: float = Field(0.35, ge=0, description="log-standard deviation of critical gap by PER / exact")
-    possible_from: float = Field(0.1, ge=0, le=1, description="probability from which pounding counts as possible")
-    per_to_sd: float = Field(1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large")
+    exact: bool = Field(
+        True, description="exact demand and history of every pair; false: estimates only, faster"
+    )
+    model_median: float = Field(
+        1.16, gt=0, description="median of critical gap by PER / exact (docs/reliability.md)"
+    )
+    model_dispersion: float = Field(
+        0.35, ge=0, description="log-standard deviation of critical gap by PER / exact"
+    )
+    possible_from: float = Field(
+        0.1, ge=0, le=1, description="probability from which pounding counts as possible"
+    )
+    per_to_sd: float = Field(
+        1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large"
+    )
     classes: dict[str, Annotated[float, Field(gt=0, allow_inf_nan=True)]] = Field(
         {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
         description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
     )
-    linearized_median: float = Field(2.7, gt=0, description="the same of the demand where the linearized gap decides")
-    linearized_dispersion: float = Field(0.65, ge=0, description="the same of the linearized gap of yielding pairs")
-    target_amplification: float = Field(1.25, ge=1, description="largest PER after / before that a bumper is to allow")
-    shakemap_log_std: float = Field(0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed")
+    linearized_median: float = Field(
+        2.7, gt=0, description="the same of the demand where the linearized gap decides"
+    )
+    linearized_dispersion: float = Field(
+        0.65, ge=0, description="the same of the linearized gap of yielding pairs"
+    )
+    target_amplification: float = Field(
+        1.25, ge=1, description="largest PER after / before that a bumper is to allow"
+    )
+    shakemap_log_std: float = Field(
+        0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed"
+    )
     interpolation: Interpolation = Interpolation()
     codes: Codes = Codes()
 
@@ -77,8 +119,12 @@ class Totals(Section):
     """How pairs are counted by area: one of these decides."""
 
     cell: float = Field(1000.0, gt=0, description="m, size of the cells of a grid")
-    area: str | None = Field(None, description="column of the pair table that names the area, instead of cells")
-    h3: int | None = Field(None, ge=0, le=15, description="resolution of H3 hexagons, instead; needs per_obspy[gis]")
+    area: str | None = Field(
+        None, description="column of the pair table that names the area, instead of cells"
+    )
+    h3: int | None = Field(
+        None, ge=0, le=15, description="resolution of H3 hexagons, instead; needs per_obspy[gis]"
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:

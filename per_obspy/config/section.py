@@ -46,7 +46,9 @@ RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to
 class Section(BaseModel):
     """A frozen group of settings; an unknown key is an error, and so is a number that is not finite."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="strings")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="strings"
+    )
 
 
 SectionType = TypeVar("SectionType", bound=Section)
@@ -66,7 +68,8 @@ def load(path: Path, section: type[SectionType]) -> SectionType:
     Raises
     ------
     CatalogError
-        If the file cannot be read, or naming every key that is unknown, missing or has a wrong value.
+        If the file cannot be read, or naming every key that is unknown, missing or has a wrong
+        value.
     """
     return checked(section, read_toml(path), str(path), path.resolve().parent)
 
@@ -86,11 +89,16 @@ def read_toml(path: Path) -> dict[str, object]:
         raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         kind = looks_like(path)
-        raise CatalogError(str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}") from error
+        raise CatalogError(
+            str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}"
+        ) from error
 
 
 def checked(
-    section: type[SectionType], content: dict[str, object], source: str = "command line", folder: Path | None = None
+    section: type[SectionType],
+    content: dict[str, object],
+    source: str = "command line",
+    folder: Path | None = None,
 ) -> SectionType:
     """
     Return the settings of a section.
@@ -121,7 +129,9 @@ def checked(
 def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
     """Return whether a list is too short only because what stands in it is wrong."""
     above = len(fault["loc"])
-    inside = [one for one in faults if len(one["loc"]) > above and one["loc"][:above] == fault["loc"]]
+    inside = [
+        one for one in faults if len(one["loc"]) > above and one["loc"][:above] == fault["loc"]
+    ]
     return fault["type"] == "too_short" and bool(inside)
 
 
@@ -140,11 +150,18 @@ def _fault(fault: ErrorDetails, section: type[Section]) -> str:
 
 def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
     """Return to which section beside it a key belongs, empty if to none."""
-    inside = (name for name, field in fields.items() for one in _sections(field.annotation) if key in one.model_fields)
+    inside = (
+        name
+        for name, field in fields.items()
+        for one in _sections(field.annotation)
+        if key in one.model_fields
+    )
     return next((f", it belongs to [{name}]" for name in inside), "")
 
 
-def _fields_at(section: type[Section], keys: Sequence[str | int]) -> tuple[dict[str, FieldInfo], str]:
+def _fields_at(
+    section: type[Section], keys: Sequence[str | int]
+) -> tuple[dict[str, FieldInfo], str]:
     """Return the last of some keys that is no place in a list or a table, and the fields beside it."""
     name = ""
     for key in keys:

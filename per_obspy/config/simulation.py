@@ -13,7 +13,9 @@ from per_obspy.config.section import Section
 class Scenario(Section):
     """A simulated earthquake and the stations that record it (stochastic method, Boore 2003)."""
 
-    seed: int = Field(20, ge=0, description="of every random number; the same seed gives the same samples")
+    seed: int = Field(
+        20, ge=0, description="of every random number; the same seed gives the same samples"
+    )
     name: str = Field("Simulated earthquake", description="of the event")
     magnitude: float = Field(7.0, ge=4, le=8.5, description="moment magnitude")
     origin_time: str = Field("2000-01-01T00:00:00", description="ISO 8601, UTC")
@@ -22,21 +24,41 @@ class Scenario(Section):
     depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
     stress_drop: float = Field(10e6, ge=1e5, le=1e9, description="Pa; 100 bar (Boore 2003)")
     density: float = Field(2800.0, ge=1000, le=5000, description="kg/m3 at the source (Boore 2003)")
-    shear_velocity: float = Field(3500.0, ge=100, le=6000, description="m/s at the source (Boore 2003)")
+    shear_velocity: float = Field(
+        3500.0, ge=100, le=6000, description="m/s at the source (Boore 2003)"
+    )
     quality: float = Field(180.0, gt=0, description="Q at 1 Hz (Raoof and others 1999)")
-    quality_exponent: float = Field(0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)")
+    quality_exponent: float = Field(
+        0.45, ge=0, le=1, description="of frequency in Q (Raoof and others 1999)"
+    )
     kappa: float = Field(0.035, ge=0, description="s; generic rock (Boore & Joyner 1997)")
     stations: int = Field(24, ge=1, le=999, description="number of stations")
-    city_latitude: float = Field(0.0, ge=-90, le=90, description="centre of the stations, degrees north")
-    city_longitude: float = Field(0.3, ge=-180, le=180, description="centre of the stations, degrees east")
+    city_latitude: float = Field(
+        0.0, ge=-90, le=90, description="centre of the stations, degrees north"
+    )
+    city_longitude: float = Field(
+        0.3, ge=-180, le=180, description="centre of the stations, degrees east"
+    )
     city_radius: float = Field(12_000.0, gt=0, description="m")
-    lakebed_latitude: float = Field(0.0, ge=-90, le=90, description="centre of the lakebed, degrees north")
-    lakebed_longitude: float = Field(0.3, ge=-180, le=180, description="centre of the lakebed, degrees east")
+    lakebed_latitude: float = Field(
+        0.0, ge=-90, le=90, description="centre of the lakebed, degrees north"
+    )
+    lakebed_longitude: float = Field(
+        0.3, ge=-180, le=180, description="centre of the lakebed, degrees east"
+    )
     lakebed_radius: float = Field(6_000.0, ge=0, description="m; 0: no lakebed")
-    lakebed_frequency: float = Field(0.5, gt=0, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6")
-    lakebed_damping: float = Field(0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical")
-    lakebed_scatter: float = Field(0.1, ge=0, description="log-standard deviation of its frequency between stations")
-    correlation: float = Field(0.3, ge=-1, le=1, description="between the north and east components")
+    lakebed_frequency: float = Field(
+        0.5, gt=0, description="Hz, of the Kanai-Tajimi filter; Mexico City 0.4-0.6"
+    )
+    lakebed_damping: float = Field(
+        0.1, gt=0, lt=1, description="of the Kanai-Tajimi filter, fraction of critical"
+    )
+    lakebed_scatter: float = Field(
+        0.1, ge=0, description="log-standard deviation of its frequency between stations"
+    )
+    correlation: float = Field(
+        0.3, ge=-1, le=1, description="between the north and east components"
+    )
     vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum on rock")
     noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
     pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
@@ -54,7 +76,9 @@ class SimulatedPairs(Section):
 
     count: int = Field(2000, ge=1, description="pairs")
     seed: int = Field(20, ge=0, description="of every random number")
-    radius: float = Field(2000.0, gt=0, description="m, largest distance of a pair from its station")
+    radius: float = Field(
+        2000.0, gt=0, description="m, largest distance of a pair from its station"
+    )
     touching: float = Field(0.5, ge=0, le=1, description="share of pairs without a gap")
 
 

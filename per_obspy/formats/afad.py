@@ -4,8 +4,8 @@ from typing import Any
 
 from obspy import Stream
 
-from per_obspy.formats._dyna_header import read_dyna_text
-from per_obspy.formats._text import WaveformFile, head, read_text
+from per_obspy.formats.text.dyna_header import read_dyna_text
+from per_obspy.formats.text.lines import WaveformFile, head, read_text
 
 
 def is_afad(file: WaveformFile) -> bool:

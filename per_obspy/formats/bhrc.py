@@ -5,7 +5,7 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
-from per_obspy.formats._text import (
+from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -19,16 +19,29 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import STANDARD_GRAVITY, coordinates, hemisphere, horizontal, trace, utc
+from per_obspy.formats.text.vocabulary import (
+    STANDARD_GRAVITY,
+    coordinates,
+    hemisphere,
+    horizontal,
+    trace,
+    utc,
+)
 
 _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _RATE_LINE = 27, 21
 _WIDTH, _PER_LINE = 13, 10
-_STATION = re.compile(rf"(.*?)\s+Station\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+Altitude\s*{DECIMAL})?")
+_STATION = re.compile(
+    rf"(.*?)\s+Station\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+Altitude\s*{DECIMAL})?"
+)
 _AZIMUTH = re.compile(r"\b([LT])\s*(\d{1,3})\b")
-_EPICENTRE = re.compile(rf"Epicenter\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+FD\s*{DECIMAL})?")
+_EPICENTRE = re.compile(
+    rf"Epicenter\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+FD\s*{DECIMAL})?"
+)
 _MAGNITUDE = re.compile(rf"\b(Mw|Ms|mb|ML|M)\s*{DECIMAL}")
-_TIME = re.compile(rf"Origin Time\s*:\s*(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})\s+(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
+_TIME = re.compile(
+    rf"Origin Time\s*:\s*(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})\s+(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}"
+)
 _POINTS = re.compile(rf"NO\. OF POINTS\s*=\s*(\S+)\s+DURATION\s*=\s*{DECIMAL}")
 _SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECIMAL}")
 
@@ -61,28 +74,45 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     line += block_lines(samples, _PER_LINE)
     if line_at(text, line, "end of component").strip() != "/&":
         refuse(
-            text, line, "end of component", f"expected '/&' after the samples, got {text.lines[line].strip()[:40]!r}"
+            text,
+            line,
+            "end of component",
+            f"expected '/&' after the samples, got {text.lines[line].strip()[:40]!r}",
         )
     words = {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
-    return trace(values, dt, words | _station(lines) | {"event": _event(text, first, lines)}), line + 1
+    return trace(
+        values, dt, words | _station(lines) | {"event": _event(text, first, lines)}
+    ), line + 1
 
 
 def _size(text: Text, first: int) -> tuple[int, float]:
     """Return samples and interval; the rate must fit the duration."""
     points = _POINTS.match(text.lines[first + 10].strip())
     if points is None:
-        refuse(text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none")
+        refuse(
+            text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none"
+        )
     samples = count(text, first + 10, "number of points", points[1])
-    rate = number(text, first + _RATE_LINE, "sampling rate", text.lines[first + _RATE_LINE][:_WIDTH])
+    rate = number(
+        text, first + _RATE_LINE, "sampling rate", text.lines[first + _RATE_LINE][:_WIDTH]
+    )
     if rate <= 0 or abs(samples / rate - float(points[2])) > 0.01 * float(points[2]):
-        refuse(text, first + _RATE_LINE, "sampling rate", f"{rate:g} Hz, but {samples} samples last {points[2]} s")
+        refuse(
+            text,
+            first + _RATE_LINE,
+            "sampling rate",
+            f"{rate:g} Hz, but {samples} samples last {points[2]} s",
+        )
     return samples, 1 / interval(text, first + _RATE_LINE, "sampling rate", rate)
 
 
 def _station(lines: list[str]) -> dict[str, Any]:
     station, sensor = _STATION.match(lines[7]), _SENSOR.match(lines[9])
     component = lines[6].removeprefix("COMP").strip()[:1].upper()
-    azimuths = {letter: float(azimuth) for letter, azimuth in _AZIMUTH.findall(lines[7].partition("Azimuth")[2])}
+    azimuths = {
+        letter: float(azimuth)
+        for letter, azimuth in _AZIMUTH.findall(lines[7].partition("Azimuth")[2])
+    }
     direction = {"sensor_dip": -90.0} if component == "V" else {}
     period = float(sensor[1]) if sensor else 0.0
     return {

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats._text import (
+from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -18,7 +18,15 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import (
+    GAL,
+    STANDARD_GRAVITY,
+    channel_code,
+    coordinates,
+    orientation,
+    trace,
+    utc,
+)
 
 _TITLE = re.compile(
     r"(Raw|Uncorrected|Corrected) (acceleration|velocity|displacement)\b.*\(Format v0?1\.\d+ with (\d+) text lines\)"
@@ -75,11 +83,21 @@ def read_cosmos(file: WaveformFile, **_unused: Any) -> Stream:
 def _channel(text: Text, first: int) -> tuple[Trace, int]:
     title = _TITLE.match(text.lines[first])
     if title is None:
-        refuse(text, first, "title", f"{text.lines[first].strip()[:60]!r} is not that of a COSMOS time series")
+        refuse(
+            text,
+            first,
+            "title",
+            f"{text.lines[first].strip()[:60]!r} is not that of a COSMOS time series",
+        )
     header = _header(text, first, count(text, first, "text lines", title[3]))
     unit, values, line = _samples(text, header.next_line)
     if not re.match(r"/&|End-of-data", line_at(text, line, "end of data")):
-        refuse(text, line, "end of data", f"expected it after the samples, got {text.lines[line].strip()[:40]!r}")
+        refuse(
+            text,
+            line,
+            "end of data",
+            f"expected it after the samples, got {text.lines[line].strip()[:40]!r}",
+        )
     dt = _interval(text, header, len(values))
     words = _words(header) | {"starttime": _start(text, header), "event": _event(header)}
     words |= {
@@ -90,7 +108,9 @@ def _channel(text: Text, first: int) -> tuple[Trace, int]:
     words.setdefault("channel", _channel_code(header, words, dt))
     words |= {"calib": _gain(text, header)} if unit == "counts" else {"corners": _corners(header)}
     peak = _real(header, 63)
-    words["header_peak"] = None if peak is None else abs(peak) * _UNITS[_unit_name(text, header.next_line)][1]
+    words["header_peak"] = (
+        None if peak is None else abs(peak) * _UNITS[_unit_name(text, header.next_line)][1]
+    )
     return trace(values, dt, words), line + 1
 
 
@@ -103,17 +123,34 @@ def _header(text: Text, first: int, text_lines: int) -> _Header:
     reals, line = _numbers(text, line, "Real")
     comments = _COMMENTS.match(line_at(text, line, "comments"))
     if comments is None:
-        refuse(text, line, "comments", f"{text.lines[line].strip()[:40]!r} does not say how many lines follow")
+        refuse(
+            text,
+            line,
+            "comments",
+            f"{text.lines[line].strip()[:40]!r} does not say how many lines follow",
+        )
     stop = line + 1 + int(comments[1])
     line_at(text, stop, "samples")
-    return _Header(first, text.lines[first : first + text_lines], integers, reals, text.lines[line + 1 : stop], stop)
+    return _Header(
+        first,
+        text.lines[first : first + text_lines],
+        integers,
+        reals,
+        text.lines[line + 1 : stop],
+        stop,
+    )
 
 
 def _numbers(text: Text, line: int, kind: str) -> tuple[FloatArray, int]:
     title = line_at(text, line, f"{kind.lower()} header")
     promised, layout = _HEADER_NUMBERS.match(title), _FORMAT.search(title)
     if promised is None or layout is None or promised[1] != kind:
-        refuse(text, line, f"{kind.lower()} header", f"{title.strip()[:60]!r} does not announce its values and format")
+        refuse(
+            text,
+            line,
+            f"{kind.lower()} header",
+            f"{title.strip()[:60]!r} does not announce its values and format",
+        )
     per_line, width = (count(text, line, "format", part) for part in (layout[1], layout[3]))
     values = fixed_block(text, line + 1, 100, width, per_line)
     return values, line + 1 + block_lines(100, per_line)
@@ -123,7 +160,9 @@ def _unit_name(text: Text, line: int) -> str:
     announced = _SAMPLES.match(text.lines[line])
     name = announced[3].lower() if announced else ""
     if name not in _UNITS:
-        refuse(text, line, "units", f"{text.lines[line].strip()[:70]!r} is none of {', '.join(_UNITS)}")
+        refuse(
+            text, line, "units", f"{text.lines[line].strip()[:70]!r} is none of {', '.join(_UNITS)}"
+        )
     return name
 
 
@@ -131,7 +170,12 @@ def _samples(text: Text, line: int) -> tuple[str, FloatArray, int]:
     unit, factor = _UNITS[_unit_name(text, line)]
     announced, layout = _SAMPLES.match(text.lines[line]), _FORMAT.search(text.lines[line])
     if announced is None or layout is None:
-        refuse(text, line, "samples", f"{text.lines[line].strip()[:70]!r} announces no number and format")
+        refuse(
+            text,
+            line,
+            "samples",
+            f"{text.lines[line].strip()[:70]!r} announces no number and format",
+        )
     samples = count(text, line, "number of samples", announced[1])
     per_line, width = (count(text, line, "format", part) for part in (layout[1], layout[3]))
     values = factor * fixed_block(text, line + 1, samples, width, per_line)
@@ -150,7 +194,12 @@ def _interval(text: Text, header: _Header, samples: int) -> float:
     announced = _SAMPLES.match(text.lines[header.next_line])
     seconds = float(announced[2]) if announced else 0.0
     if dt is None or not 1e-5 <= dt <= 1e5 or abs(samples * dt - seconds) > 1 + 0.05 * seconds:
-        refuse(text, header.next_line, "interval", f"{dt} s in the header, but {samples} samples last {seconds:g} s")
+        refuse(
+            text,
+            header.next_line,
+            "interval",
+            f"{dt} s in the header, but {samples} samples last {seconds:g} s",
+        )
     return dt
 
 
@@ -183,7 +232,12 @@ def _words(header: _Header) -> dict[str, Any]:
         },
     }
     if seed:
-        words |= {"network": seed[3], "station": seed[1], "channel": seed[2], "location": seed[4].replace("--", "")}
+        words |= {
+            "network": seed[3],
+            "station": seed[1],
+            "channel": seed[2],
+            "location": seed[4].replace("--", ""),
+        }
     direction = orientation(channel[1]) if channel else {}
     if not direction and seed and seed[2].endswith("Z"):
         direction = {"sensor_dip": -90.0}
@@ -200,7 +254,12 @@ def _gain(text: Text, header: _Header) -> float:
     """Return m/s2 a count: microvolts a count over volts a g of the sensor and the recorder's gain."""
     step, sensitivity, gain = _real(header, 21), _real(header, 41), _real(header, 46)
     if not step or not sensitivity:
-        refuse(text, header.first, "gain", f"unknown: {step} microvolts a count, sensor {sensitivity} V/g")
+        refuse(
+            text,
+            header.first,
+            "gain",
+            f"unknown: {step} microvolts a count, sensor {sensitivity} V/g",
+        )
     return 1e-6 * step / sensitivity * STANDARD_GRAVITY / (gain or 1.0)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats._blocks import is_title, titled_block
-from per_obspy.formats._csmip_header import Header, channel_name, known, read_header
-from per_obspy.formats._pairs import pair_lines, read_pairs
-from per_obspy.formats._text import (
+from per_obspy.formats.text.blocks import is_title, titled_block
+from per_obspy.formats.text.csmip_header import Header, channel_name, known, read_header
+from per_obspy.formats.text.film import pair_lines, read_pairs
+from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
     block_lines,
@@ -23,7 +23,7 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, trace
+from per_obspy.formats.text.vocabulary import GAL, STANDARD_GRAVITY, trace
 
 _INCH = 0.0254  # m
 _UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s+(G/10|G)\b")
@@ -38,14 +38,20 @@ _SLOTS = 100  # of every array of a volume 3, filled or not
 def is_volume_1(file: WaveformFile) -> bool:
     """Tell whether a file starts like CSMIP RAW or volume 1."""
     start = head(file, 1200).upper()
-    return start.startswith(b"UNCORRECTED ACCELEROGRAM DATA") and b"UNITS OF UNCOR" in start and b"RENADIC" not in start
+    return (
+        start.startswith(b"UNCORRECTED ACCELEROGRAM DATA")
+        and b"UNITS OF UNCOR" in start
+        and b"RENADIC" not in start
+    )
 
 
 def is_volume_2(file: WaveformFile) -> bool:
     """Tell whether a file starts like CSMIP volume 2."""
     lines = [line.upper() for line in head_lines(file, 200)]
     volumes = ("CORRECTED ACCELEROGRAM ", "UNCORRECTED ACCELEROGRAM DATA")
-    return len(lines) > 2 and all(line.startswith(volume) for line, volume in zip(lines, volumes, strict=False))
+    return len(lines) > 2 and all(
+        line.startswith(volume) for line, volume in zip(lines, volumes, strict=False)
+    )
 
 
 def read_volume_1(file: WaveformFile, **_unused: Any) -> Stream:
@@ -69,7 +75,12 @@ def _channels(text: Text, read_channel: Callable[[Text, int], tuple[Trace, int]]
 
 def _end_of_channel(text: Text, line: int) -> int:
     if not line_at(text, line, "end of channel").startswith("/&"):
-        refuse(text, line, "end of channel", f"expected '/&' after the samples, got {text.lines[line].strip()[:40]!r}")
+        refuse(
+            text,
+            line,
+            "end of channel",
+            f"expected '/&' after the samples, got {text.lines[line].strip()[:40]!r}",
+        )
     return line + 1
 
 
@@ -78,12 +89,19 @@ def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
     factor = _uncorrected_unit(text, first + 11)
     promised = _PROMISED.match(text.lines[first + 10].strip().upper())
     if promised is None:
-        refuse(text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none")
+        refuse(
+            text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none"
+        )
     samples = count(text, first + 10, "number of points", promised[1])
     if is_title(line_at(text, header.next_line, "samples")):
         values, dt, line = titled_block(text, header.next_line, "", 8, 9)
         if len(values) != samples:
-            refuse(text, header.next_line, "number of points", f"{len(values)}, but {samples} on line {first + 11}")
+            refuse(
+                text,
+                header.next_line,
+                "number of points",
+                f"{len(values)}, but {samples} on line {first + 11}",
+            )
     else:
         values, dt = read_pairs(text, header.next_line, samples)
         line = header.next_line + pair_lines(samples)
@@ -139,7 +157,8 @@ class OfficialSpectra(NamedTuple):
     damping : (n_damping,) ndarray
         Fractions of critical.
     sd, sv, sa, psv : (n_damping, n_periods) ndarray
-        Relative displacement, m; relative velocity, m/s; absolute acceleration, m/s2; pseudo velocity, m/s.
+        Relative displacement, m; relative velocity, m/s; absolute acceleration, m/s2; pseudo
+        velocity, m/s.
     """
 
     channel: int
@@ -176,7 +195,9 @@ def _spectra_channel(text: Text, first: int) -> tuple[OfficialSpectra, int]:
     integers = fixed_block(text, first + 2 + _VOLUME_3_LINES, 100, 5, 16)
     periods, dampings = int(integers[67]), int(integers[68])
     if not 0 < periods <= _SLOTS or not 0 < dampings <= 8:
-        refuse(text, first + 2 + _VOLUME_3_LINES + 4, "periods, dampings", f"{periods} and {dampings}")
+        refuse(
+            text, first + 2 + _VOLUME_3_LINES + 4, "periods, dampings", f"{periods} and {dampings}"
+        )
     damping = fixed_block(text, header.next_line, dampings, 10, 8)
     line = header.next_line + 1
     grid = fixed_block(text, line, _SLOTS, 10, 8)[:periods]
@@ -185,10 +206,20 @@ def _spectra_channel(text: Text, first: int) -> tuple[OfficialSpectra, int]:
     for index in range(dampings):
         title = line_at(text, line, "damping").upper()
         if not title.startswith("DAMPING"):
-            refuse(text, line, "damping", f"expected the spectra of {damping[index]:g}, got {title.strip()[:40]!r}")
+            refuse(
+                text,
+                line,
+                "damping",
+                f"expected the spectra of {damping[index]:g}, got {title.strip()[:40]!r}",
+            )
         for kind in range(7):
             values[kind, index] = fixed_block(text, line + 1, _SLOTS, 10, 8)[:periods]
             line += block_lines(_SLOTS, 8)
         line += 1
-    sd, sv, sa, psv = values[0] * _INCH, values[1] * _INCH, values[2] * STANDARD_GRAVITY, values[3] * _INCH
+    sd, sv, sa, psv = (
+        values[0] * _INCH,
+        values[1] * _INCH,
+        values[2] * STANDARD_GRAVITY,
+        values[3] * _INCH,
+    )
     return OfficialSpectra(header.channel, grid, damping, sd, sv, sa, psv), line

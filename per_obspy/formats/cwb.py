@@ -6,9 +6,25 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from per_obspy.formats._fields import Fields, field, interval_field, number_field, read_fields, word_field
-from per_obspy.formats._text import DECIMAL, Text, WaveformFile, count, free_block, head, read_text, refuse
-from per_obspy.formats.vocabulary import GAL, coordinates, orientation, trace, utc
+from per_obspy.formats.text.fields import (
+    Fields,
+    field,
+    interval_field,
+    number_field,
+    read_fields,
+    word_field,
+)
+from per_obspy.formats.text.lines import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    count,
+    free_block,
+    head,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.text.vocabulary import GAL, coordinates, orientation, trace, utc
 
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s+(\w)\(\+\);?\s*(\w)\(\+\);?\s*(\w)\(\+\)")
@@ -26,7 +42,10 @@ def is_cwb(file: WaveformFile) -> bool:
 def read_cwb(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a record of CWB: three components, m/s2."""
     text = read_text(file)
-    first = next((line for line, content in enumerate(text.lines) if content.strip() and content[0] != "#"), None)
+    first = next(
+        (line for line, content in enumerate(text.lines) if content.strip() and content[0] != "#"),
+        None,
+    )
     if first is None:
         refuse(text, len(text.lines) - 1, "samples", "the file ends after its header")
     fields = read_fields(text, first)
@@ -41,7 +60,11 @@ def read_cwb(file: WaveformFile, **_unused: Any) -> Stream:
     }
     common |= {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
     return Stream(
-        trace(np.ascontiguousarray(GAL * column), dt, common | orientation(name) | {"header_peak": _peak(fields, name)})
+        trace(
+            np.ascontiguousarray(GAL * column),
+            dt,
+            common | orientation(name) | {"header_peak": _peak(fields, name)},
+        )
         for name, column in zip(names, table.T[1:], strict=True)
     )
 
@@ -52,7 +75,12 @@ def _columns(text: Text, fields: Fields) -> tuple[str, ...]:
         refuse(text, unit.line, "AmplitudeUnit", f"{unit.value!r} is not gal")
     names = _COLUMNS.match(columns.value)
     if names is None or not all(orientation(name) for name in names.groups()):
-        refuse(text, columns.line, "DataSequence", f"{columns.value!r} is not time and three directions")
+        refuse(
+            text,
+            columns.line,
+            "DataSequence",
+            f"{columns.value!r} is not time and three directions",
+        )
     return names.groups()
 
 
@@ -76,7 +104,9 @@ def _peak(fields: Fields, name: str) -> float | None:
 
 
 def _station(text: Text, fields: Fields) -> dict[str, Any]:
-    latitude, longitude = (number_field(text, fields, f"Station{name}") for name in ("Latitude(N)", "Longitude(E)"))
+    latitude, longitude = (
+        number_field(text, fields, f"Station{name}") for name in ("Latitude(N)", "Longitude(E)")
+    )
     return {
         "network": "TW",
         "station": field(text, fields, "StationCode").value,

@@ -6,7 +6,7 @@ from typing import Any
 from obspy import Stream, Trace
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats._text import (
+from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -19,14 +19,16 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
 _WIDTH, _PER_LINE = 8, 10
 _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w+)\b")
 _ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
 _SITE = re.compile(rf"Site (\S+)\s+{_ANGLE}\s+{_ANGLE}")
-_EPICENTRE = re.compile(rf"Epicentre\s+{_ANGLE}\s+{_ANGLE}.*?(?:Depth\s*{DECIMAL}\s*km)?(?:\s+M\w?\s*{DECIMAL})?\s*")
+_EPICENTRE = re.compile(
+    rf"Epicentre\s+{_ANGLE}\s+{_ANGLE}.*?(?:Depth\s*{DECIMAL}\s*km)?(?:\s+M\w?\s*{DECIMAL})?\s*"
+)
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")
 _PEAK = re.compile(rf"Acceleration:\s*peak\s*{DECIMAL}\s*mm/s/s", re.IGNORECASE)
 _BANDS = re.compile(rf"bands are {DECIMAL}-{DECIMAL} Hz and {DECIMAL}-{DECIMAL} Hz")
@@ -63,9 +65,20 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     reals = fixed_block(text, numbers + _INTEGER_LINES, 60, _WIDTH, _PER_LINE)
     dt = interval(text, numbers + _INTEGER_LINES + 2, "interval", float(reals[25]))
     values, line = _samples(text, first, integers)
-    words = _station(text, first) | _source(lines) | orientation(lines[12].removeprefix("Component").split("  ")[0])
-    words |= {"starttime": _start(text, numbers, integers), "units": "m/s2", "quantity": "acceleration"}
-    words |= {"processing_level": "raw" if title[1] == "Uncorrected" else "processed", "location": title[3]}
+    words = (
+        _station(text, first)
+        | _source(lines)
+        | orientation(lines[12].removeprefix("Component").split("  ")[0])
+    )
+    words |= {
+        "starttime": _start(text, numbers, integers),
+        "units": "m/s2",
+        "quantity": "acceleration",
+    }
+    words |= {
+        "processing_level": "raw" if title[1] == "Uncorrected" else "processed",
+        "location": title[3],
+    }
     words["channel"] = channel_code(1 / dt, words)
     return trace(_unit(text, first, title[1]) * values, dt, words), line
 
@@ -78,7 +91,12 @@ def _samples(text: Text, first: int, integers: FloatArray) -> tuple[FloatArray, 
     samples = count(text, first + 9, "number of points", promised[1])
     sizes = [int(size) for size in integers[33:36]]
     if sizes[0] != samples:
-        refuse(text, first + _TEXT_LINES + 3, "number of points", f"{sizes[0]}, but {samples} on line {first + 10}")
+        refuse(
+            text,
+            first + _TEXT_LINES + 3,
+            "number of points",
+            f"{sizes[0]}, but {samples} on line {first + 10}",
+        )
     line = first + _HEADER_LINES
     blocks = []
     for size in sizes:
@@ -93,7 +111,12 @@ def _unit(text: Text, first: int, title: str) -> float:
         return _MILLIMETRE
     unit = _UNIT.search(text.lines[first + 10])
     if unit is None:
-        refuse(text, first + 10, "unit", f"{text.lines[first + 10].strip()!r} names no multiple of mm/s/s")
+        refuse(
+            text,
+            first + 10,
+            "unit",
+            f"{text.lines[first + 10].strip()!r} names no multiple of mm/s/s",
+        )
     return float(unit[1]) * _MILLIMETRE
 
 
@@ -106,7 +129,12 @@ def _degrees(degrees: str, minutes: str, seconds: str, letter: str) -> float:
 def _station(text: Text, first: int) -> dict[str, Any]:
     site = _SITE.match(text.lines[first + 1])
     if site is None:
-        refuse(text, first + 1, "site", f"{text.lines[first + 1].strip()!r} has no code and coordinates")
+        refuse(
+            text,
+            first + 1,
+            "site",
+            f"{text.lines[first + 1].strip()!r} has no code and coordinates",
+        )
     place = coordinates(_degrees(*site.groups()[1:5]), _degrees(*site.groups()[5:9]))
     return {
         "network": "NZ",
@@ -118,7 +146,11 @@ def _station(text: Text, first: int) -> dict[str, Any]:
 
 def _source(lines: list[str]) -> dict[str, Any]:
     """Event, instrument, corners and peak, as far as the text tells them."""
-    epicentre, bands, sensor = _EPICENTRE.match(lines[8]), _BANDS.search(lines[11]), _SENSOR.search(lines[4])
+    epicentre, bands, sensor = (
+        _EPICENTRE.match(lines[8]),
+        _BANDS.search(lines[11]),
+        _SENSOR.search(lines[4]),
+    )
     peak = _PEAK.match(lines[13])
     where = epicentre.groups() if epicentre else (None,) * 10
     period = float(sensor[1]) if sensor else 0.0
@@ -143,5 +175,7 @@ def _source(lines: list[str]) -> dict[str, Any]:
 
 
 def _start(text: Text, line: int, integers: FloatArray) -> Any:
-    year, month, day, hour, minute, milliseconds = (int(integers[index]) for index in (8, 9, 18, 19, 38, 39))
+    year, month, day, hour, minute, milliseconds = (
+        int(integers[index]) for index in (8, 9, 18, 19, 38, 39)
+    )
     return utc(text, line, "start", (year, month, day), (hour, minute, milliseconds / 1000))

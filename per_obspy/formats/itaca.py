@@ -5,8 +5,16 @@ from typing import Any
 
 from obspy import Stream, UTCDateTime
 
-from per_obspy.formats._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
-from per_obspy.formats._text import (
+from per_obspy.formats.text.fields import (
+    Fields,
+    count_field,
+    field,
+    interval_field,
+    number_field,
+    read_fields,
+    word_field,
+)
+from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -18,7 +26,7 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import orientation, trace, utc
+from per_obspy.formats.text.vocabulary import orientation, trace, utc
 
 _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5
@@ -38,7 +46,12 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     text = read_text(file)
     fields = read_fields(text, _HEADER_LINES - 1)
     if "m/s/s" not in line_at(text, _HEADER_LINES - 1, "unit"):
-        refuse(text, _HEADER_LINES - 1, "unit", f"{text.lines[_HEADER_LINES - 1].strip()!r} does not say m/s/s")
+        refuse(
+            text,
+            _HEADER_LINES - 1,
+            "unit",
+            f"{text.lines[_HEADER_LINES - 1].strip()!r} does not say m/s/s",
+        )
     samples = count_field(text, fields, "Number of Data")
     values = fixed_block(text, _HEADER_LINES, samples, _WIDTH, _PER_LINE)
     no_more(text, _HEADER_LINES + block_lines(samples, _PER_LINE), samples)
@@ -72,4 +85,6 @@ def _event_time(text: Text, fields: Fields) -> UTCDateTime | None:
     if time is None:
         return None
     year, month, day, hour, minute = (int(part) for part in time.groups()[:5])
-    return utc(text, found.line, "Event Date & Time", (year, month, day), (hour, minute, float(time[6])))
+    return utc(
+        text, found.line, "Event Date & Time", (year, month, day), (hour, minute, float(time[6]))
+    )

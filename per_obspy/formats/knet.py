@@ -3,7 +3,7 @@
 from obspy import Trace
 
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.vocabulary import coordinates, orientation
+from per_obspy.formats.text.vocabulary import coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
 _SENSORS = "12"
@@ -18,7 +18,9 @@ def with_knet_words(record: Trace) -> Trace:
     header = record.stats.knet
     seconds = record.stats.npts * record.stats.delta
     if seconds < header.duration - record.stats.delta:
-        raise RecordRejected(record.id, f"the header promises {header.duration:g} s, the file holds {seconds:g} s")
+        raise RecordRejected(
+            record.id, f"the header promises {header.duration:g} s, the file holds {seconds:g} s"
+        )
     result = record.copy()
     result.stats.update({"units": "counts", "quantity": "acceleration", "processing_level": "raw"})
     result.stats.update(orientation(record.stats.channel.rstrip(_SENSORS)))

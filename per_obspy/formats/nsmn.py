@@ -6,9 +6,26 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from per_obspy.formats._fields import Fields, count_field, field, interval_field, number_field, read_fields, word_field
-from per_obspy.formats._text import DECIMAL, Text, WaveformFile, free_block, head, line_at, read_text, refuse
-from per_obspy.formats.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats.text.fields import (
+    Fields,
+    count_field,
+    field,
+    interval_field,
+    number_field,
+    read_fields,
+    word_field,
+)
+from per_obspy.formats.text.lines import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    free_block,
+    head,
+    line_at,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.text.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
@@ -34,19 +51,29 @@ def read_nsmn(file: WaveformFile, **_unused: Any) -> Stream:
     values = free_block(text, _HEADER_LINES, None, 3 * samples).reshape(-1, 3)
     dt = interval_field(text, fields, "SAMPLING INTERVAL (sec)")
     peaks = {
-        name: abs(float(peak)) * GAL for name, peak in _PEAKS.findall(word_field(fields, "RAW PGA VALUES (gal)") or "")
+        name: abs(float(peak)) * GAL
+        for name, peak in _PEAKS.findall(word_field(fields, "RAW PGA VALUES (gal)") or "")
     }
-    common = _station(text, fields) | {"event": _event(text, fields), "starttime": _start(text, fields)}
+    common = _station(text, fields) | {
+        "event": _event(text, fields),
+        "starttime": _start(text, fields),
+    }
     common |= {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
     return Stream(
-        trace(np.ascontiguousarray(GAL * column), dt, common | orientation(name) | {"header_peak": peaks.get(name)})
+        trace(
+            np.ascontiguousarray(GAL * column),
+            dt,
+            common | orientation(name) | {"header_peak": peaks.get(name)},
+        )
         for name, column in zip(names, values.T, strict=True)
     )
 
 
 def _place(fields: Fields, name: str) -> tuple[float | None, float | None]:
     place = _PLACE.search(word_field(fields, name) or "")
-    return (hemisphere(place[1], place[2]), hemisphere(place[3], place[4])) if place else (None, None)
+    return (
+        (hemisphere(place[1], place[2]), hemisphere(place[3], place[4])) if place else (None, None)
+    )
 
 
 def _station(text: Text, fields: Fields) -> dict[str, Any]:

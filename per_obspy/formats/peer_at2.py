@@ -8,7 +8,7 @@ import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.trace import Stats
 
-from per_obspy.formats._text import (
+from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
     count,
@@ -19,16 +19,21 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
 
-_QUANTITY = re.compile(r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b")
+_QUANTITY = re.compile(
+    r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"
+)
 _NUMBER = r"([-+\d.Ee*]+)"
 _NAMED_SIZE = re.compile(rf"\s*NPTS\s*=\s*{_NUMBER}\s*,\s*DT\s*=\s*{_NUMBER}", re.IGNORECASE)
 _PLAIN_SIZE = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.IGNORECASE)
 #: event, date, perhaps a time of unknown zone, station, orientation
-_TITLE = re.compile(r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)")
+_TITLE = re.compile(
+    r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)"
+)
 _CORNERS = {
-    name: re.compile(rf"\b{word}\s*=\s*(\d*\.?\d+)\s*HZ") for name, word in (("highpass", "HP"), ("lowpass", "LP"))
+    name: re.compile(rf"\b{word}\s*=\s*(\d*\.?\d+)\s*HZ")
+    for name, word in (("highpass", "HP"), ("lowpass", "LP"))
 }
 
 #: quantity and unit of the header -> unit of the samples, factor to it
@@ -79,7 +84,11 @@ def _title(text: Text) -> dict[str, Any]:
         return {"station": _code(name), "station_name": name}
     event, month, day, year, station, component = title.groups()
     start = utc(text, 1, "date", (full_year(year), int(month), int(day)))
-    named = {"station": _code(station), "station_name": station.strip(), "event": {"name": event or None}}
+    named = {
+        "station": _code(station),
+        "station_name": station.strip(),
+        "event": {"name": event or None},
+    }
     return named | {"starttime": start} | orientation(component)
 
 
@@ -99,7 +108,8 @@ def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -
     Raises
     ------
     ValueError
-        If the stream has not exactly one trace, or it is not acceleration in m/s2 (``stats.units``).
+        If the stream has not exactly one trace, or it is not acceleration in m/s2
+        (``stats.units``).
     """
     if len(stream) != 1:
         raise ValueError(f"an AT2 file holds one trace, got {len(stream)}")
@@ -113,11 +123,17 @@ def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -
 def _at2_text(component: Trace) -> str:
     stats = component.stats
     if stats.get("units") != "m/s2":
-        raise ValueError(f"an AT2 file holds acceleration, stats.units must be 'm/s2', got {stats.get('units')!r}")
+        raise ValueError(
+            f"an AT2 file holds acceleration, stats.units must be 'm/s2', got {stats.get('units')!r}"
+        )
     if not np.isfinite(component.data).all():
         raise ValueError(f"{component.id} has samples that are not finite")
     station = stats.get("station_name", stats.station).replace(",", " ")
-    dated = "" if stats.starttime == UTCDateTime(0) else f"{stats.get('event', {}).get('name', '')}, {_date(stats)}, "
+    dated = (
+        ""
+        if stats.starttime == UTCDateTime(0)
+        else f"{stats.get('event', {}).get('name', '')}, {_date(stats)}, "
+    )
     values = [f"{value:15.7E}" for value in component.data / STANDARD_GRAVITY]
     rows = ["".join(values[first : first + 5]) for first in range(0, len(values), 5)]
     top = [

@@ -5,13 +5,17 @@ from typing import Any
 from obspy import Stream
 
 from per_obspy.formats import csmip
-from per_obspy.formats._text import WaveformFile, head
+from per_obspy.formats.text.lines import WaveformFile, head
 
 
 def is_renadic(file: WaveformFile) -> bool:
     """Tell whether a file starts like a record of RENADIC."""
     start = head(file, 1200).upper()
-    return start.startswith(b"UNCORRECTED ACCELEROGRAM DATA") and b"UNITS OF UNCOR" in start and b"RENADIC" in start
+    return (
+        start.startswith(b"UNCORRECTED ACCELEROGRAM DATA")
+        and b"UNITS OF UNCOR" in start
+        and b"RENADIC" in start
+    )
 
 
 def read_renadic(file: WaveformFile, **_unused: Any) -> Stream:

@@ -7,7 +7,7 @@ from typing import Any
 from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats._text import (
+from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
     block_lines,
@@ -20,12 +20,14 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 _TEXT_LINES = 11
 _INTEGERS, _REALS = 48, 50
 _NO_INTEGER, _NO_REAL = -32768, 1e38
-_TITLE = re.compile(r"[1-4] (UNCORRECTED ACCELEROGRAM|CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*")
+_TITLE = re.compile(
+    r"[1-4] (UNCORRECTED ACCELEROGRAM|CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*"
+)
 _QUANTITIES = {"VELOCITY": ("velocity", "m/s"), "DISPLACEMENT": ("displacement", "m")}
 _STATION = re.compile(r"station = (.*?)\s*component=")
 _MODEL = re.compile(r"inst type=(.*?)\s+data source = (.*)")
@@ -54,7 +56,12 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     no_more(text, first + block_lines(samples, 8), samples)
     quantity, unit = _QUANTITIES.get(title[1], ("acceleration", "m/s2"))
     level = "raw" if title[1].startswith("UNCORRECTED") else "processed"
-    words = {"quantity": quantity, "units": unit, "processing_level": level, "starttime": _start(text, integers)}
+    words = {
+        "quantity": quantity,
+        "units": unit,
+        "processing_level": level,
+        "starttime": _start(text, integers),
+    }
     words |= _station(text, integers, reals) | _numbers(reals) | _direction(integers)
     return Stream([trace(values, 1 / rate, words)])
 
@@ -106,7 +113,9 @@ def _numbers(reals: FloatArray) -> dict[str, Any]:
             "latitude": _real(reals, 2),
             "longitude": _real(reals, 3),
             "depth": None if depth is None else 1000 * depth,
-            "magnitude": next((magnitude for magnitude in magnitudes if magnitude is not None), None),
+            "magnitude": next(
+                (magnitude for magnitude in magnitudes if magnitude is not None), None
+            ),
         },
     }
 

@@ -6,8 +6,15 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
-from per_obspy.formats._fields import Field, Fields, count_field, field, number_field, word_field
-from per_obspy.formats._text import (
+from per_obspy.formats.text.fields import (
+    Field,
+    Fields,
+    count_field,
+    field,
+    number_field,
+    word_field,
+)
+from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
@@ -20,7 +27,7 @@ from per_obspy.formats._text import (
     read_text,
     refuse,
 )
-from per_obspy.formats.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
 
 _MARK = b"ARCHIVO ESTANDAR DE ACELERACION"
 _WIDTH = 10
@@ -47,18 +54,39 @@ def read_unam(file: WaveformFile, **_unused: Any) -> Stream:
     fields = _fields(text, first)
     _gal(text, fields)
     channels = count_field(text, fields, "NUMERO DE CANALES")
-    sizes = [count(text, *found) for found in _values(text, fields, "NUM. TOTAL DE MUESTRAS, C1-C6", channels)]
-    steps = [interval(text, *found) for found in _values(text, fields, "INTERVALO DE MUESTREO, C1-C6 (s)", channels)]
+    sizes = [
+        count(text, *found)
+        for found in _values(text, fields, "NUM. TOTAL DE MUESTRAS, C1-C6", channels)
+    ]
+    steps = [
+        interval(text, *found)
+        for found in _values(text, fields, "INTERVALO DE MUESTREO, C1-C6 (s)", channels)
+    ]
     if len(set(sizes)) > 1 or len(set(steps)) > 1:
-        refuse(text, 0, "NUM. TOTAL DE MUESTRAS", f"channels must share length and interval, got {sizes}, {steps}")
+        refuse(
+            text,
+            0,
+            "NUM. TOTAL DE MUESTRAS",
+            f"channels must share length and interval, got {sizes}, {steps}",
+        )
     values = fixed_block(text, first, sizes[0] * channels, _WIDTH, channels).reshape(-1, channels)
     _only_padding(text, first + sizes[0], sizes[0])
-    names = [found[2] for found in _values(text, fields, "ORIENTACION C1-C6 (rumbo;orientacion)", channels)]
-    peaks = [abs(number(text, *found)) for found in _values(text, fields, "ACEL. MAX.(Gal), C1-C6", channels)]
+    names = [
+        found[2]
+        for found in _values(text, fields, "ORIENTACION C1-C6 (rumbo;orientacion)", channels)
+    ]
+    peaks = [
+        abs(number(text, *found))
+        for found in _values(text, fields, "ACEL. MAX.(Gal), C1-C6", channels)
+    ]
     common = _station(text, fields) | _times(text, fields)
     common |= {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
     return Stream(
-        trace(np.ascontiguousarray(GAL * column), steps[0], common | _direction(name) | {"header_peak": GAL * peak})
+        trace(
+            np.ascontiguousarray(GAL * column),
+            steps[0],
+            common | _direction(name) | {"header_peak": GAL * peak},
+        )
         for name, column, peak in zip(names, values.T, peaks, strict=True)
     )
 
@@ -95,14 +123,22 @@ def _lines(text: Text, stop: int) -> list[tuple[str, Field]]:
     for line, content in enumerate(text.lines[:stop]):
         if len(content) > 39 and content[39] == ":":
             name = re.sub(r"\s+", " ", content[:39].strip()).replace("[", "(").replace("]", ")")
-            named.append((name.replace(". (", ".(").replace("C6, (", "C6 ("), Field(line, content[40:].strip())))
+            named.append(
+                (
+                    name.replace(". (", ".(").replace("C6, (", "C6 ("),
+                    Field(line, content[40:].strip()),
+                )
+            )
     return named
 
 
 def _values(text: Text, fields: Fields, name: str, channels: int) -> list[tuple[int, str, str]]:
     """Return the values of all channels, which stand between slashes in two fields of six."""
     second = name.replace("C1-C6", "C7-C12")
-    parts = field(text, fields, name).value.split("/")[1:] + (word_field(fields, second) or "").split("/")[1:]
+    parts = (
+        field(text, fields, name).value.split("/")[1:]
+        + (word_field(fields, second) or "").split("/")[1:]
+    )
     if len(parts) < channels:
         refuse(text, fields[name].line, name, f"{len(parts)} values for {channels} channels")
     return [(fields[name].line, name, part) for part in parts[:channels]]
@@ -149,12 +185,17 @@ def _times(text: Text, fields: Fields) -> dict[str, Any]:
     """Return event and start; the date is the event's, and the record may begin on the other side of midnight."""
     latitude, longitude = _place(fields, "COORDENADAS DEL EPICENTRO")
     depth = number_field(
-        text, fields, "PROFUNDIDAD FOCAL (Km)" if "PROFUNDIDAD FOCAL (Km)" in fields else "PROFUNDIDAD FOCAL (km)"
+        text,
+        fields,
+        "PROFUNDIDAD FOCAL (Km)"
+        if "PROFUNDIDAD FOCAL (Km)" in fields
+        else "PROFUNDIDAD FOCAL (km)",
     )
     magnitudes = re.findall(rf"(M\w?)={DECIMAL}", word_field(fields, "MAGNITUD(ES)") or "")
     best = dict(reversed(magnitudes)).get("Mw", magnitudes[0][1] if magnitudes else None)
     event, start = (
-        _moment(text, fields, name) for name in ("HORA EPICENTRO (GMT)", "HORA DE LA PRIMERA MUESTRA (GMT)")
+        _moment(text, fields, name)
+        for name in ("HORA EPICENTRO (GMT)", "HORA DE LA PRIMERA MUESTRA (GMT)")
     )
     if event is not None and start is not None and abs(start - event) > _HALF_DAY:
         start += 86400 if start < event else -86400
@@ -177,4 +218,6 @@ def _moment(text: Text, fields: Fields, name: str) -> UTCDateTime | None:
         day = (int(date[6]), _MONTHS.index(date[5]) + 1, int(date[4]))
     else:
         day = (int(date[1]), int(date[2]), int(date[3]))
-    return utc(text, fields[name].line, name, day, (float(clock[1]), float(clock[2]), float(clock[3])))
+    return utc(
+        text, fields[name].line, name, day, (float(clock[1]), float(clock[2]), float(clock[3]))
+    )

@@ -5,10 +5,27 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
-from per_obspy.formats._blocks import titled_block
-from per_obspy.formats._pairs import pair_lines, read_pairs
-from per_obspy.formats._text import DECIMAL, Text, WaveformFile, count, head_lines, line_at, read_text, refuse
-from per_obspy.formats.vocabulary import GAL, STANDARD_GRAVITY, channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats.text.blocks import titled_block
+from per_obspy.formats.text.film import pair_lines, read_pairs
+from per_obspy.formats.text.lines import (
+    DECIMAL,
+    Text,
+    WaveformFile,
+    count,
+    head_lines,
+    line_at,
+    read_text,
+    refuse,
+)
+from per_obspy.formats.text.vocabulary import (
+    GAL,
+    STANDARD_GRAVITY,
+    channel_code,
+    coordinates,
+    orientation,
+    trace,
+    utc,
+)
 
 _VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
 _VOLUME_1_LINES, _VOLUME_2_LINES = 27, 45
@@ -48,11 +65,15 @@ def _volume_1(text: Text, first: int) -> tuple[Trace, int]:
         refuse(text, first + 11, "unit", f"{text.lines[first + 11].strip()[:40]!r} is not g/10")
     points = _POINTS.match(text.lines[first + 10])
     if points is None:
-        refuse(text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none")
+        refuse(
+            text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none"
+        )
     samples = count(text, first + 10, "number of points", points[1])
     values, dt = read_pairs(_shifted(text), first + _VOLUME_1_LINES, samples)
     words |= {"processing_level": "raw"}
-    return trace(STANDARD_GRAVITY / 10 * values, dt, words), first + _VOLUME_1_LINES + pair_lines(samples)
+    return trace(STANDARD_GRAVITY / 10 * values, dt, words), first + _VOLUME_1_LINES + pair_lines(
+        samples
+    )
 
 
 def _shifted(text: Text) -> Text:
@@ -103,7 +124,10 @@ def _words(text: Text, first: int) -> dict[str, Any]:
 
 
 def _angles(parts: tuple[str, ...]) -> tuple[float, float]:
-    sizes = [int(parts[first]) + int(parts[first + 1]) / 60 + int(parts[first + 2]) / 3600 for first in (0, 4)]
+    sizes = [
+        int(parts[first]) + int(parts[first + 1]) / 60 + int(parts[first + 2]) / 3600
+        for first in (0, 4)
+    ]
     return sizes[0] * (-1 if parts[3] == "S" else 1), sizes[1] * (-1 if parts[7] == "W" else 1)
 
 

@@ -1,8 +1,9 @@
 """
 The index of stored pair inventories: a TOML file beside them that says what each holds and whether it is unchanged.
 
-A file is used only after its hash was compared (:func:`verified_file`), so that a changed or damaged inventory is
-noticed before any number is made of it. Positions are longitude and latitude (WGS 84), as in every pair table.
+A file is used only after its hash was compared (:func:`verified_file`), so that a changed or
+damaged inventory is noticed before any number is made of it. Positions are longitude and latitude
+(WGS 84), as in every pair table.
 """
 
 import datetime
@@ -19,7 +20,7 @@ from per_obspy import config
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.checking import METRES_PER_DEGREE
-from per_obspy.inventory.reading import read_pairs
+from per_obspy.inventory.files.reading import read_pairs
 
 CRS = "OGC:CRS84"
 
@@ -42,9 +43,15 @@ class StoredInventory(config.Section):
     """One entry of the index."""
 
     name: str = Field(min_length=1, description="unique in the index")
-    file: config.RelativePath = Field(description="CSV or Parquet pair table, relative to the index")
-    bounding_box: Box = Field(description="west, south, east, north, degrees; west above east crosses the date line")
-    crs: str = Field(CRS, pattern=f"^{CRS}$", description="of the bounding box and of every pair table")
+    file: config.RelativePath = Field(
+        description="CSV or Parquet pair table, relative to the index"
+    )
+    bounding_box: Box = Field(
+        description="west, south, east, north, degrees; west above east crosses the date line"
+    )
+    crs: str = Field(
+        CRS, pattern=f"^{CRS}$", description="of the bounding box and of every pair table"
+    )
     sha256: str = Field(pattern="^[0-9a-f]{64}$", description="of the file's bytes")
     pairs: int = Field(ge=1, description="usable rows")
     source: str = Field(min_length=1, description="where the data come from")
@@ -79,7 +86,8 @@ def stored_inventories(index: str | Path) -> tuple[StoredInventory, ...]:
     Raises
     ------
     CatalogError
-        If the index cannot be read, an entry lacks a key, has a wrong value, or two have the same name.
+        If the index cannot be read, an entry lacks a key, has a wrong value, or two have the same
+        name.
     """
     entries = config.load(Path(index), Catalogue).inventory
     names = [entry.name for entry in entries]
@@ -121,7 +129,9 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
         raise CatalogError(str(target), f"{empty[0]} of the inventory {str(file)!r} is empty")
     pairs = read_pairs(file)
     if pairs.empty:
-        raise CatalogError(str(file), f"no usable row: {'; '.join(pairs.attrs['rejected'][0].reasons)}")
+        raise CatalogError(
+            str(file), f"no usable row: {'; '.join(pairs.attrs['rejected'][0].reasons)}"
+        )
     entry = StoredInventory(
         name=origin.name,
         file=Path(file).resolve(),
@@ -151,14 +161,20 @@ def bounding_box(pairs: pd.DataFrame) -> Box:
 def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach: float) -> Box:
     """Return the box around some places, widened by a distance in m; the whole earth's width near a pole."""
     places = pd.DataFrame(
-        {f"{name}_{i}": column for name, column in (("longitude", longitudes), ("latitude", latitudes)) for i in (1, 2)}
+        {
+            f"{name}_{i}": column
+            for name, column in (("longitude", longitudes), ("latitude", latitudes))
+            for i in (1, 2)
+        }
     )
     box, degrees = bounding_box(places), reach / METRES_PER_DEGREE
     south, north = max(box.south - degrees, -90.0), min(box.north + degrees, 90.0)
     widened = degrees / max(float(np.cos(np.radians(max(abs(south), abs(north))))), 1e-6)
     if _width(box) + 2.0 * widened >= 360.0:
         return Box(-180.0, south, 180.0, north)
-    west, east = ((edge + 540.0) % 360.0 - 180.0 for edge in (box.west - widened, box.east + widened))
+    west, east = (
+        (edge + 540.0) % 360.0 - 180.0 for edge in (box.west - widened, box.east + widened)
+    )
     return Box(west, south, east, north)
 
 
@@ -199,7 +215,9 @@ def find_inventories(index: str | Path, region: Box) -> tuple[StoredInventory, .
 def _check(region: Box) -> None:
     values = np.abs(np.array(region, dtype=np.float64))
     if not (values <= [180.0, 90.0, 180.0, 90.0]).all() or region.south > region.north:
-        raise ValueError(f"region must be west, south, east, north in degrees, got {', '.join(map(str, region))}")
+        raise ValueError(
+            f"region must be west, south, east, north in degrees, got {', '.join(map(str, region))}"
+        )
 
 
 def verified_file(entry: StoredInventory) -> Path:
@@ -234,7 +252,9 @@ def check_inventories(index: str | Path) -> tuple[Rejection, ...]:
 def _write(index: Path, entries: tuple[StoredInventory, ...]) -> None:
     folder = index.resolve().parent
     with written_whole(index) as part:
-        part.write_text("\n".join([HEADER, *(_toml(entry, folder) for entry in entries)]), encoding="utf-8")
+        part.write_text(
+            "\n".join([HEADER, *(_toml(entry, folder) for entry in entries)]), encoding="utf-8"
+        )
 
 
 def _toml(entry: StoredInventory, folder: Path) -> str:

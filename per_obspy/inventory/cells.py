@@ -8,4 +8,8 @@ from per_obspy.checks import FloatArray
 
 def numbers_in(pairs: pd.DataFrame, name: str) -> FloatArray:
     """Return a column of numbers, NaN where the table is silent."""
-    return pairs[name].to_numpy(dtype=np.float64) if name in pairs.columns else np.full(len(pairs), np.nan)
+    return (
+        pairs[name].to_numpy(dtype=np.float64)
+        if name in pairs.columns
+        else np.full(len(pairs), np.nan)
+    )

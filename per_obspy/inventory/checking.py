@@ -17,7 +17,8 @@ from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
 
-#: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or storeys.
+#: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or
+#: storeys.
 STOREY_HEIGHTS = (2.0, 12.0)
 
 #: Largest distance between the two positions of a pair, m; neighbours' centres lie closer.
@@ -33,8 +34,8 @@ class Rejections(tuple[Rejection, ...]):
     """
     Rejected rows as ``attrs`` of a table carry them.
 
-    pandas deep-copies ``attrs`` in every operation: half a second each for 1e5 rejections. Nothing in here can change,
-    so that copies may share it.
+    pandas deep-copies ``attrs`` in every operation: half a second each for 1e5 rejections. Nothing
+    in here can change, so that copies may share it.
     """
 
     __slots__ = ()
@@ -61,12 +62,14 @@ def checked_pairs(
     lines : (n_rows,) ndarray of int, optional
         Line of each row in its file; if not given, rows follow a header in line 1.
     repeated : (n_rows,) ndarray of bool, optional
-        Whether the row's ``pair_id`` stands in an earlier row of the inventory; if not given, the table is all of it.
+        Whether the row's ``pair_id`` stands in an earlier row of the inventory; if not given, the
+        table is all of it.
 
     Returns
     -------
     pairs : DataFrame
-        Accepted rows; ``pairs.attrs["rejected"]`` is a tuple of :class:`~per_obspy.errors.Rejection`.
+        Accepted rows; ``pairs.attrs["rejected"]`` is a tuple of
+        :class:`~per_obspy.errors.Rejection`.
 
     Raises
     ------
@@ -79,7 +82,9 @@ def checked_pairs(
     if lines is None:
         lines = np.arange(2, len(table) + 2)
     pairs, faults = _converted(table)
-    faults += _duplicates(pairs["pair_id"], pairs["pair_id"].duplicated() if repeated is None else repeated)
+    faults += _duplicates(
+        pairs["pair_id"], pairs["pair_id"].duplicated() if repeated is None else repeated
+    )
     faults += [fault for check in _CHECKS for fault in check(pairs)]
     rejected = _rejections(pairs["pair_id"], faults, source, lines)
     bad = np.zeros(len(pairs), dtype=bool)
@@ -101,12 +106,16 @@ def check_columns(names: Sequence[str], source: str) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise CatalogError(source, f"column {twice[0]} stands more than once")
-    missing = [column.name for column in COLUMNS.values() if column.required and column.name not in names]
+    missing = [
+        column.name for column in COLUMNS.values() if column.required and column.name not in names
+    ]
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
         found = ", ".join(names)
         asked = "".join(did_you_mean(name, set(names) - set(COLUMNS)) for name in missing[:1])
-        raise CatalogError(source, f"missing column {', '.join(missing)} (columns found: {found:.200}){asked}")
+        raise CatalogError(
+            source, f"missing column {', '.join(missing)} (columns found: {found:.200}){asked}"
+        )
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -129,7 +138,9 @@ def _rows(mask: ArrayLike) -> list[int]:
 
 
 def _is_empty(values: pd.Series) -> NDArray[np.bool_]:
-    return np.asarray(values.isna() | values.astype(str).str.strip().str.lower().isin(EMPTY), dtype=bool)
+    return np.asarray(
+        values.isna() | values.astype(str).str.strip().str.lower().isin(EMPTY), dtype=bool
+    )
 
 
 def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
@@ -139,7 +150,9 @@ def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
     if column.choices:
         wrong = _rows(~text.isin([*column.choices, ""]))
         allowed = ", ".join(column.choices)
-        faults += [(i, f"{column.name} = {text.iloc[i]!r} is unknown, expected {allowed}") for i in wrong]
+        faults += [
+            (i, f"{column.name} = {text.iloc[i]!r} is unknown, expected {allowed}") for i in wrong
+        ]
     return text, faults
 
 
@@ -148,7 +161,9 @@ def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
     empty = _is_empty(values)
-    number = pd.to_numeric(values.astype(str).mask(empty), errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+    number = pd.to_numeric(values.astype(str).mask(empty), errors="coerce").to_numpy(
+        dtype=np.float64, na_value=np.nan
+    )
     wrong = _rows(np.isnan(number) & ~empty)
     faults = [(i, f"{column.name} = {str(values.iloc[i])!r:.40} is not a number") for i in wrong]
     return number, faults + _missing(column, empty) + _out_of_range(column, number)
@@ -161,7 +176,9 @@ def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:
 def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
     unit = "" if column.unit == "1" else f" {column.unit}"
     allowed = (
-        f"{column.low:.6g} to {column.high:.6g}{unit}" if column.high < np.inf else f"{column.low:g}{unit} or more"
+        f"{column.low:.6g} to {column.high:.6g}{unit}"
+        if column.high < np.inf
+        else f"{column.low:g}{unit} or more"
     )
     faults = []
     for i in _rows((number < column.low) | (number > column.high)):
@@ -186,7 +203,10 @@ def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
 def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
     low, high = STOREY_HEIGHTS
     for index in (1, 2):
-        height, storeys = numbers_in(pairs, f"height_{index}"), numbers_in(pairs, f"storeys_{index}")
+        height, storeys = (
+            numbers_in(pairs, f"height_{index}"),
+            numbers_in(pairs, f"storeys_{index}"),
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             storey = height / storeys
         for i in _rows((height > 0) & (storeys > 0) & ((storey < low) | (storey > high))):
@@ -207,7 +227,10 @@ def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
 
 def _positions(pairs: pd.DataFrame) -> Iterator[Fault]:
     """Yield rows whose buildings are no neighbours, or stand where a missing position is written as 0, 0."""
-    place = {name: numbers_in(pairs, name) for name in ("longitude_1", "latitude_1", "longitude_2", "latitude_2")}
+    place = {
+        name: numbers_in(pairs, name)
+        for name in ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
+    }
     for index in (1, 2):
         nowhere = (place[f"longitude_{index}"] == 0.0) & (place[f"latitude_{index}"] == 0.0)
         for i in _rows(nowhere):
@@ -244,11 +267,15 @@ def _observations(pairs: pd.DataFrame) -> Iterator[Fault]:
 _CHECKS = (_sizes, _storey_heights, _contact_heights, _positions, _same_building, _observations)
 
 
-def _rejections(names: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]) -> tuple[Rejection, ...]:
+def _rejections(
+    names: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]
+) -> tuple[Rejection, ...]:
     reasons: dict[int, list[str]] = defaultdict(list)
     for position, reason in faults:
         reasons[int(position)].append(reason)
     return tuple(
-        Rejection("pair", names.iloc[position], source, int(lines[position]), tuple(reasons[position]))
+        Rejection(
+            "pair", names.iloc[position], source, int(lines[position]), tuple(reasons[position])
+        )
         for position in sorted(reasons)
     )

@@ -1,8 +1,8 @@
 """
 From a building to its oscillator at contact height: participation, generalised mass, misaligned floors.
 
-Equal floor masses and a first mode that grows linearly with height are assumed; for a building with a model of its
-own use ``shear_building.equivalent_sdof``.
+Equal floor masses and a first mode that grows linearly with height are assumed; for a building with
+a model of its own use ``shear_building.equivalent_sdof``.
 """
 
 import numpy as np
@@ -17,11 +17,15 @@ def _ratio(contact_height: ArrayLike, height: ArrayLike) -> FloatArray:
     total = checks.positive("height", height)
     ratio: FloatArray = np.asarray(contact / total)
     if np.any(ratio > 1.0):
-        raise ValueError(f"contact_height must not be above the building, got {ratio.max():.6g} times its height")
+        raise ValueError(
+            f"contact_height must not be above the building, got {ratio.max():.6g} times its height"
+        )
     return ratio
 
 
-def contact_participation(storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike) -> FloatArray:
+def contact_participation(
+    storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike
+) -> FloatArray:
     """
     Displacement at contact height over that of the oscillator, ``q = 3N/(2N+1) z_c/H``.
 
@@ -46,8 +50,8 @@ def contact_participation(storeys: ArrayLike, height: ArrayLike, contact_height:
 
     Notes
     -----
-    First-mode participation factor times mode shape at the contact, ``sum(m phi) / sum(m phi**2) * phi_c``, for N
-    equal masses and ``phi = z/H``. It is 1 for one storey and tends to 1.5.
+    First-mode participation factor times mode shape at the contact, ``sum(m phi) / sum(m phi**2) *
+    phi_c``, for N equal masses and ``phi = z/H``. It is 1 for one storey and tends to 1.5.
 
     Examples
     --------
@@ -59,12 +63,14 @@ def contact_participation(storeys: ArrayLike, height: ArrayLike, contact_height:
     return participation
 
 
-def contact_mass(mass: ArrayLike, storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike) -> FloatArray:
+def contact_mass(
+    mass: ArrayLike, storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike
+) -> FloatArray:
     """
     Generalised first-mode mass at contact height, ``m*_c = M (N+1)(2N+1)/(6 N**2) (H/z_c)**2``.
 
-    It is ``sum(m phi**2) / phi_c**2`` with the assumptions of :func:`contact_participation`: the mass that takes part
-    in an impact, neither the effective modal mass nor the mass of a floor.
+    It is ``sum(m phi**2) / phi_c**2`` with the assumptions of :func:`contact_participation`: the
+    mass that takes part in an impact, neither the effective modal mass nor the mass of a floor.
 
     Parameters
     ----------
@@ -94,15 +100,20 @@ def contact_mass(mass: ArrayLike, storeys: ArrayLike, height: ArrayLike, contact
     """
     total, count = checks.positive("mass", mass), checks.positive("storeys", storeys)
     ratio = _ratio(contact_height, height)
-    generalised: FloatArray = total * (count + 1.0) * (2.0 * count + 1.0) / (6.0 * count**2) / ratio**2
+    generalised: FloatArray = (
+        total * (count + 1.0) * (2.0 * count + 1.0) / (6.0 * count**2) / ratio**2
+    )
     return generalised
 
 
-def floor_offset(height_1: ArrayLike, storeys_1: ArrayLike, height_2: ArrayLike, storeys_2: ArrayLike) -> FloatArray:
+def floor_offset(
+    height_1: ArrayLike, storeys_1: ArrayLike, height_2: ArrayLike, storeys_2: ArrayLike
+) -> FloatArray:
     """
     Height between the roof of the lower building and the nearest floor of the taller one, in m.
 
-    Floors are taken as equally high within a building. Every argument may be an array (m and numbers of storeys).
+    Floors are taken as equally high within a building. Every argument may be an array (m and
+    numbers of storeys).
 
     Examples
     --------

@@ -10,7 +10,11 @@ from per_obspy.spectra.bilinear import bilinear_response
 
 
 def modal_history(
-    acceleration: ArrayLike, dt: float, masses: ArrayLike, stiffnesses: ArrayLike, damping: float = 0.05
+    acceleration: ArrayLike,
+    dt: float,
+    masses: ArrayLike,
+    stiffnesses: ArrayLike,
+    damping: float = 0.05,
 ) -> FloatArray:
     """
     Displacement of every floor of a linear shear building, all modes superposed.
@@ -40,8 +44,8 @@ def modal_history(
 
     Notes
     -----
-    ``u(t) = sum(phi_k Gamma_k D_k(t))`` with the participation factors ``Gamma_k = sum(m phi_k) / sum(m phi_k**2)`` and
-    the response D_k of an oscillator with the period of mode k.
+    ``u(t) = sum(phi_k Gamma_k D_k(t))`` with the participation factors ``Gamma_k = sum(m phi_k) /
+    sum(m phi_k**2)`` and the response D_k of an oscillator with the period of mode k.
 
     References
     ----------
@@ -58,6 +62,8 @@ def modal_history(
     displacement = np.zeros((mass.size, ground.size))
     for period, shape in zip(building.periods, building.shapes.T, strict=True):
         factor = (mass @ shape) / (mass @ shape**2)
-        response = bilinear_response(ground, dt, float(period), damping, np.inf, 0.0).displacement[: ground.size]
+        response = bilinear_response(ground, dt, float(period), damping, np.inf, 0.0).displacement[
+            : ground.size
+        ]
         displacement += factor * np.outer(shape, response)
     return displacement

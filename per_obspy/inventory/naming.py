@@ -22,8 +22,12 @@ def joined_names(rows: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]:
     >>> joined_names({"a": np.array([True, False, True]), "b": np.array([True, False, False])}).tolist()
     ['a b', '', 'a']
     """
-    code = sum((true.astype(np.int64) << bit for bit, true in enumerate(rows.values())), start=np.int64(0))
+    code = sum(
+        (true.astype(np.int64) << bit for bit, true in enumerate(rows.values())), start=np.int64(0)
+    )
     codes, inverse = np.unique(code, return_inverse=True)
-    texts = [" ".join(name for bit, name in enumerate(rows) if one >> bit & 1) for one in codes.tolist()]
+    texts = [
+        " ".join(name for bit, name in enumerate(rows) if one >> bit & 1) for one in codes.tolist()
+    ]
     chosen: NDArray[np.object_] = np.array(texts, dtype=object)[inverse]
     return chosen

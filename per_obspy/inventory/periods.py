@@ -1,9 +1,10 @@
 """
 First natural periods from height and structural system, where nothing better is known.
 
-A code's period formula is calibrated as a *lower bound*, because a short period gives a large design force. For
-pounding that is the unsafe side: displacements grow with the period. The functions here return medians (best fits)
-where the literature has them, and each value carries a logarithmic standard deviation, ``period_log_std``.
+A code's period formula is calibrated as a *lower bound*, because a short period gives a large
+design force. For pounding that is the unsafe side: displacements grow with the period. The
+functions here return medians (best fits) where the literature has them, and each value carries a
+logarithmic standard deviation, ``period_log_std``.
 """
 
 import numpy as np
@@ -13,9 +14,9 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.schema import SYSTEMS
 
-#: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent); ASCE 7, table 12.8-2,
-#: metric. The two ratios are those of Goel & Chopra (1997). No best fit is known to us for the other two systems:
-#: their lower bound stands in for a median, unverified.
+#: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);
+#: ASCE 7, table 12.8-2, metric. The two ratios are those of Goel & Chopra (1997). No best fit is
+#: known to us for the other two systems: their lower bound stands in for a median, unverified.
 ASCE7 = {
     "steel_mrf": (1.25, 0.0724, 0.80),
     "concrete_mrf": (1.13, 0.0466, 0.90),
@@ -27,7 +28,8 @@ ASCE7 = {
 EC8 = {"steel_mrf": 0.085, "concrete_mrf": 0.075, "ebf_brbf": 0.075, "other": 0.050}
 EC8_HEIGHT = 40.0
 
-#: Logarithmic standard deviation of a period derived by either formula: 0.4 for masonry and unknown systems.
+#: Logarithmic standard deviation of a period derived by either formula: 0.4 for masonry and unknown
+#: systems.
 LOG_STD = {"steel_mrf": 0.3, "concrete_mrf": 0.3, "ebf_brbf": 0.3, "other": 0.4}
 
 
@@ -50,8 +52,9 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     """
     Median period ``ratio * C h**x`` with the coefficients of ASCE 7.
 
-    For moment frames this is the best fit of Goel & Chopra (1.25 and 1.13 times the code's lower bound). For
-    ``ebf_brbf`` and ``other`` it is the code's own value, which is a lower bound (unverified as a median).
+    For moment frames this is the best fit of Goel & Chopra (1.25 and 1.13 times the code's lower
+    bound). For ``ebf_brbf`` and ``other`` it is the code's own value, which is a lower bound
+    (unverified as a median).
 
     Parameters
     ----------
@@ -80,7 +83,9 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     array([0.42, 1.12])
     """
     names, tall = np.broadcast_arrays(_known(system), checks.positive("height", height))
-    factor = _by_system(names, {name: ratio * coefficient for name, (ratio, coefficient, _) in ASCE7.items()})
+    factor = _by_system(
+        names, {name: ratio * coefficient for name, (ratio, coefficient, _) in ASCE7.items()}
+    )
     exponent = _by_system(names, {name: exponent for name, (_, _, exponent) in ASCE7.items()})
     period: FloatArray = factor * tall**exponent
     return period
@@ -90,8 +95,8 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     """
     Period ``C_t h**0.75`` of Eurocode 8 up to 40 m; above, the form of :func:`asce7_period`.
 
-    The code gives one approximate value and does not say whether it is a bound; it is used as the median. The two
-    forms do not meet at 40 m.
+    The code gives one approximate value and does not say whether it is a bound; it is used as the
+    median. The two forms do not meet at 40 m.
 
     Parameters
     ----------
@@ -120,7 +125,9 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     0.6
     """
     names, tall = np.broadcast_arrays(_known(system), checks.positive("height", height))
-    period: FloatArray = np.where(tall <= EC8_HEIGHT, _by_system(names, EC8) * tall**0.75, asce7_period(tall, names))
+    period: FloatArray = np.where(
+        tall <= EC8_HEIGHT, _by_system(names, EC8) * tall**0.75, asce7_period(tall, names)
+    )
     return period
 
 

@@ -10,7 +10,8 @@ from per_obspy.errors import Rejection, did_you_mean
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.schema import COLUMNS
 
-#: Gaps are looked for within some 3 m; where most of them are wider, they may be in another unit, m.
+#: Gaps are looked for within some 3 m; where most of them are wider, they may be in another unit,
+#: m.
 WIDE = 3.0
 
 
@@ -21,14 +22,14 @@ def inventory_profile(pairs: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     pairs : DataFrame
-        As :func:`~per_obspy.inventory.reading.read_pairs` gives them.
+        As :func:`~per_obspy.inventory.files.reading.read_pairs` gives them.
 
     Returns
     -------
     profile : DataFrame
-        One row a column of the schema that the table has: ``column, unit, given`` (rows with a value), ``smallest,
-        median, largest`` (in the column's unit, NaN for text) and ``most_frequent`` (as text, empty if nothing is
-        given).
+        One row a column of the schema that the table has: ``column, unit, given`` (rows with a
+        value), ``smallest, median, largest`` (in the column's unit, NaN for text) and
+        ``most_frequent`` (as text, empty if nothing is given).
     """
     return pd.DataFrame([_described(name, pairs[name]) for name in COLUMNS if name in pairs])
 
@@ -71,5 +72,7 @@ def suspicions(pairs: pd.DataFrame) -> list[str]:
     """Return what is possible row by row, but odd of the table as a whole."""
     apart = pairs["gap"][pairs["gap"] > 0.0]
     if apart.median() > WIDE:
-        return [f"the median of the gaps above 0 is {apart.median():g} m: given in millimetres or centimetres?"]
+        return [
+            f"the median of the gaps above 0 is {apart.median():g} m: given in millimetres or centimetres?"
+        ]
     return []

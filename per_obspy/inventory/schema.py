@@ -1,8 +1,9 @@
 """
 The one schema of the pair table: every column with its kind, unit, meaning and allowed range.
 
-Readers check against it, writers order by it, simulated inventories obey it and the documentation prints it.
-One row is one pair of neighbouring buildings; ``_1`` and ``_2`` are the two, and the axis points from 1 to 2.
+Readers check against it, writers order by it, simulated inventories obey it and the documentation
+prints it. One row is one pair of neighbouring buildings; ``_1`` and ``_2`` are the two, and the
+axis points from 1 to 2.
 """
 
 from math import inf
@@ -103,10 +104,13 @@ _BUILDING = (
 
 
 def _of_building(column: Column, index: int) -> Column:
-    return column._replace(name=f"{column.name}_{index}", meaning=f"building {index}: {column.meaning}")
+    return column._replace(
+        name=f"{column.name}_{index}", meaning=f"building {index}: {column.meaning}"
+    )
 
 
-#: Every column that a pair table may have with a meaning of ours, by name; others are carried through.
+#: Every column that a pair table may have with a meaning of ours, by name; others are carried
+#: through.
 COLUMNS: dict[str, Column] = {
     column.name: column
     for column in (
@@ -126,11 +130,19 @@ COMPLETED: dict[str, Column] = {
         Column("longitude", "float64", "degrees", "of the middle between the two buildings, east"),
         Column("latitude", "float64", "degrees", "of the middle between the two buildings, north"),
         *(
-            Column(f"contact_mass_{i}", "float64", "kg", f"building {i}: generalised first-mode mass at contact height")
+            Column(
+                f"contact_mass_{i}",
+                "float64",
+                "kg",
+                f"building {i}: generalised first-mode mass at contact height",
+            )
             for i in (1, 2)
         ),
         Column(
-            "floors_misaligned", "bool", "", "floors of one building may hit columns of the other: outside the method"
+            "floors_misaligned",
+            "bool",
+            "",
+            "floors of one building may hit columns of the other: outside the method",
         ),
         Column("derived", "str", "", "columns of this row that were derived or assumed, not given"),
     )

@@ -48,7 +48,9 @@ class EquivalentSDOF(NamedTuple):
 def _floors(masses: ArrayLike, stiffnesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     mass, stiffness = checks.positive("masses", masses), checks.positive("stiffnesses", stiffnesses)
     if mass.ndim != 1 or mass.size == 0 or mass.shape != stiffness.shape:
-        raise ValueError(f"masses and stiffnesses must be rows of equal length, got {mass.shape} and {stiffness.shape}")
+        raise ValueError(
+            f"masses and stiffnesses must be rows of equal length, got {mass.shape} and {stiffness.shape}"
+        )
     return mass, stiffness
 
 
@@ -75,7 +77,8 @@ def shear_building(masses: ArrayLike, stiffnesses: ArrayLike) -> ShearBuilding:
 
     Notes
     -----
-    The eigenproblem ``K phi = omega**2 M phi`` in the coordinates ``sqrt(m) u``, where it is symmetric and tridiagonal.
+    The eigenproblem ``K phi = omega**2 M phi`` in the coordinates ``sqrt(m) u``, where it is
+    symmetric and tridiagonal.
 
     References
     ----------
@@ -88,7 +91,9 @@ def shear_building(masses: ArrayLike, stiffnesses: ArrayLike) -> ShearBuilding:
     """
     mass, stiffness = _floors(masses, stiffnesses)
     above = np.append(stiffness[1:], 0.0)
-    eigenvalues, vectors = eigh_tridiagonal((stiffness + above) / mass, -stiffness[1:] / np.sqrt(mass[:-1] * mass[1:]))
+    eigenvalues, vectors = eigh_tridiagonal(
+        (stiffness + above) / mass, -stiffness[1:] / np.sqrt(mass[:-1] * mass[1:])
+    )
     shapes = vectors / np.sqrt(mass)[:, None]
     return ShearBuilding(2.0 * np.pi / np.sqrt(eigenvalues), shapes / shapes[-1])
 
@@ -104,12 +109,14 @@ def equivalent_sdof(masses: ArrayLike, stiffnesses: ArrayLike, level: int) -> Eq
     stiffnesses : (n_floors,) array_like
         Stiffness of the storey below each floor, N/m.
     level : int
-        The floor at which the buildings meet, counted from 0 (the lowest floor above ground); -1 is the roof.
+        The floor at which the buildings meet, counted from 0 (the lowest floor above ground); -1 is
+        the roof.
 
     Returns
     -------
     oscillator : EquivalentSDOF
-        Period in s, participation ``sum(m phi) phi_c / sum(m phi**2)`` and mass ``sum(m phi**2) / phi_c**2`` in kg.
+        Period in s, participation ``sum(m phi) phi_c / sum(m phi**2)`` and mass ``sum(m phi**2) /
+        phi_c**2`` in kg.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import kernel
+from per_obspy.kernels._jit import kernel
 
 #: Bytes of a number and numbers of a cache line.
 SIZE, LINE = 8, 8

@@ -1,7 +1,8 @@
 """
 Exponential, logarithm and normal tail of rows of numbers, in place: without branches, so that they become vectors.
 
-A library call a number takes several times as long. Relative errors stay below 1e-15, of a normal tail below 1e-14.
+A library call a number takes several times as long. Relative errors stay below 1e-15, of a normal
+tail below 1e-14.
 """
 
 import math
@@ -14,9 +15,14 @@ from per_obspy.kernels._jit import kernel
 #: Added to and taken from a number below 2**51 this leaves the nearest integer.
 TO_INTEGER = 1.5 * 2.0**52
 #: ln 2 in two parts; an exponent times the first is exact.
-LN_2, LN_2_HIGH, LN_2_LOW = math.log(2.0), math.floor(math.log(2.0) * 2.0**32) / 2.0**32, 1.9082149292705877e-10
+LN_2, LN_2_HIGH, LN_2_LOW = (
+    math.log(2.0),
+    math.floor(math.log(2.0) * 2.0**32) / 2.0**32,
+    1.9082149292705877e-10,
+)
 PER_LN_2 = 1.0 / LN_2
-#: Taylor series, highest power first: of exp up to ln 2 / 2, of (exp - 1) / x, of artanh(s) / s in s² to s = 0.172.
+#: Taylor series, highest power first: of exp up to ln 2 / 2, of (exp - 1) / x, of artanh(s) / s in
+#: s² to s = 0.172.
 EXPONENTIAL = tuple(1.0 / math.factorial(n) for n in range(13, -1, -1))
 LESS_ONE = EXPONENTIAL[:-1]
 ARTANH = tuple(1.0 / (2 * n + 1) for n in range(10, -1, -1))
@@ -25,13 +31,17 @@ LOWEST, HIGHEST = -708.0, 709.0
 #: Bits of the square root of one half, where the mantissa is made to begin.
 FIRST_MANTISSA = int(np.array(math.sqrt(0.5)).view(np.int64))
 MANTISSA_BITS, EXPONENT_BIAS = 52, 1023
-#: ``(1 + 2 z) exp(z²) erfc(z)`` is a polynomial in ``t = (z - CENTRE) / (z + CENTRE)`` to 4e-15, highest first.
+#: ``(1 + 2 z) exp(z²) erfc(z)`` is a polynomial in ``t = (z - CENTRE) / (z + CENTRE)`` to 4e-15,
+#: highest first.
 CENTRE = 3.75
 _T = np.polynomial.chebyshev.chebpts1(21)
 _Z = CENTRE * (1.0 + _T) / (1.0 - _T)
 _SERIES = np.polynomial.chebyshev.chebfit(_T, (1.0 + 2.0 * _Z) * erfcx(_Z), 20)
 TAIL = np.polynomial.chebyshev.cheb2poly(_SERIES)[::-1]
-EVEN, ODD = tuple(TAIL[::2].tolist()), tuple(TAIL[1::2].tolist())  # a longer loop would not be unrolled
+EVEN, ODD = (
+    tuple(TAIL[::2].tolist()),
+    tuple(TAIL[1::2].tolist()),
+)  # a longer loop would not be unrolled
 
 
 @kernel

@@ -1,7 +1,8 @@
 """
 Simple kriging of residuals about a fitted trend, places side by side, each from its nearest stations that know.
 
-A place's numbers depend on nothing but the place: its company shares the operations, not the numbers.
+A place's numbers depend on nothing but the place: its company shares the operations, not the
+numbers.
 """
 
 import math
@@ -20,12 +21,13 @@ def kriged(stations, trend, places, diameter, neighbours, out):
     """
     Fill ``out`` (m, 2) with median and standard deviation at every place; it is left as it is where no station knows.
 
-    ``stations``: unit vectors (n, 3), distances between them (n, n) m, first and last known period (n, 2) s, features
-    (n, f), residuals (n, k) on a grid of periods. ``trend``, on the same grid: coefficients (k, 1 + f), their
-    covariance for a deviation of 1 (k, 1 + f, 1 + f), middles of the features (k, f), NaN for one that is not used,
-    deviation of the residual (k). ``places``: unit vectors (m, 3), features (m, f), period (m) s, its lower neighbour
-    on the grid (m), part of the way to the next (m), decay length of the correlation (m) m. ``diameter``: of the
-    sphere, m. ``neighbours``: largest number of stations that serve a place.
+    ``stations``: unit vectors (n, 3), distances between them (n, n) m, first and last known period
+    (n, 2) s, features (n, f), residuals (n, k) on a grid of periods. ``trend``, on the same grid:
+    coefficients (k, 1 + f), their covariance for a deviation of 1 (k, 1 + f, 1 + f), middles of the
+    features (k, f), NaN for one that is not used, deviation of the residual (k). ``places``: unit
+    vectors (m, 3), features (m, f), period (m) s, its lower neighbour on the grid (m), part of the
+    way to the next (m), decay length of the correlation (m) m. ``diameter``: of the sphere, m.
+    ``neighbours``: largest number of stations that serve a place.
     """
     nearest, counts = np.empty((LANES, neighbours), dtype=np.int64), np.empty(LANES, dtype=np.int64)
     room = _row(neighbours + 1, 0)
@@ -39,7 +41,16 @@ def kriged(stations, trend, places, diameter, neighbours, out):
             if counts[lane] > 0:
                 weights[:] = table[room : room + neighbours, lane]
                 told = nearest[lane, : counts[lane]]
-                _estimate(stations, trend, places, first + lane, told, weights, max(left[lane], 0.0), out[first + lane])
+                _estimate(
+                    stations,
+                    trend,
+                    places,
+                    first + lane,
+                    told,
+                    weights,
+                    max(left[lane], 0.0),
+                    out[first + lane],
+                )
 
 
 @kernel
@@ -62,7 +73,9 @@ def _estimate(stations, trend, places, row, nearest, weights, left, out):
             _unmatched(features, wanted[row], trend[2][column], nearest, weights, unmatched)
             estimate = _trend(trend[0][column], wanted[row], trend[2][column])
             median += share * (estimate + _weighted(weights, residuals, nearest, column))
-            variance += share * trend[3][column] ** 2 * (left + _square(trend[1][column], unmatched))
+            variance += (
+                share * trend[3][column] ** 2 * (left + _square(trend[1][column], unmatched))
+            )
     out[0], out[1] = median, math.sqrt(variance)
 
 
@@ -101,7 +114,8 @@ def _correlations(stations, places, diameter, first, nearest, counts, table, int
     """
     Fill the correlations of places with their nearest stations and between these; return how many serve one at most.
 
-    Each place is followed by its stations as the lower triangle of one matrix; a station too few is unlike all others.
+    Each place is followed by its stations as the lower triangle of one matrix; a station too few is
+    unlike all others.
     """
     position, between, known, _, _ = stations
     vectors, _, periods, _, _, lengths = places
@@ -111,7 +125,15 @@ def _correlations(stations, places, diameter, first, nearest, counts, table, int
         row = min(first + lane, periods.size - 1)
         counts[lane] = _nearest(position, known, vectors[row], periods[row], nearest[lane], chord)
         most = max(most, counts[lane])
-        _fill_distances(between, nearest[lane], counts[lane], chord, diameter, -1.0 / lengths[row], table[:, lane])
+        _fill_distances(
+            between,
+            nearest[lane],
+            counts[lane],
+            chord,
+            diameter,
+            -1.0 / lengths[row],
+            table[:, lane],
+        )
     used = _row(most + 1, 0)
     exponentials(table[:used].reshape(used * LANES), integers[:used].reshape(used * LANES))
     for lane in range(LANES):
@@ -145,7 +167,9 @@ def _factorise(t, count):
                 for lane in range(LANES):
                     t[entry, lane] -= t[one, lane] * t[other, lane]
             for lane in range(LANES):
-                t[entry, lane] = t[entry, lane] * t[diagonal, lane] if j < i else 1.0 / math.sqrt(t[entry, lane])
+                t[entry, lane] = (
+                    t[entry, lane] * t[diagonal, lane] if j < i else 1.0 / math.sqrt(t[entry, lane])
+                )
 
 
 @kernel

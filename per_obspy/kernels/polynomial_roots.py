@@ -1,13 +1,13 @@
 """
 First root of a polynomial, found so that no earlier root can be passed.
 
-A polynomial is a stretch of a table's line: its coefficients, lowest first, start at a column. (Passing views instead
-costs more in reference counts than the arithmetic.)
+A polynomial is a stretch of a table's line: its coefficients, lowest first, start at a column.
+(Passing views instead costs more in reference counts than the arithmetic.)
 """
 
 import math
 
-from ._jit import lean
+from per_obspy.kernels._jit import lean
 
 #: A polynomial below this share of its own terms is zero.
 ROUNDING = 1e-15
@@ -45,8 +45,9 @@ def first_fall(table, line, column, terms, sign, start, end, rounding):
     """
     Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, or -1 if it does not.
 
-    With K >= -p'' the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends like Newton's.
-    A start at zero that rises is not a fall: the same step, written for c < 0, leaves it by 2 p' / K at least.
+    With K >= -p'' the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends
+    like Newton's. A start at zero that rises is not a fall: the same step, written for c < 0,
+    leaves it by 2 p' / K at least.
     """
     size, curvature = size_and_curvature(table, line, column, terms, end)
     return fall_within(table, line, column, terms, sign, start, end, rounding, size, curvature)

@@ -1,5 +1,6 @@
 """
 The physics of a pair of buildings.
 
-Correlation, critical gap, impact, single hit, exact histories, linearization, mitigation, probability.
+Correlation, critical gap, impact, single hit, exact histories, linearization, mitigation,
+probability.
 """

@@ -26,7 +26,9 @@ def combined_dispersion(dispersions: ArrayLike) -> FloatArray:
     ValueError
         If a dispersion is negative.
     """
-    total: FloatArray = np.sqrt(np.sum(checks.not_negative("dispersions", dispersions) ** 2, axis=-1))
+    total: FloatArray = np.sqrt(
+        np.sum(checks.not_negative("dispersions", dispersions) ** 2, axis=-1)
+    )
     return total
 
 
@@ -41,8 +43,8 @@ def combined_dispersion_correlation(
     dispersions_1, dispersions_2 : (..., n_sources) array_like
         Dispersion of each radius that each source alone causes, dimensionless.
     correlations : (..., n_sources) array_like
-        Of each source between the two structures: shared ground motion near 1 (the correlation of spectral ordinates
-        at two periods), own periods and dampings 0; dimensionless.
+        Of each source between the two structures: shared ground motion near 1 (the correlation of
+        spectral ordinates at two periods), own periods and dampings 0; dimensionless.
 
     Returns
     -------
@@ -56,9 +58,13 @@ def combined_dispersion_correlation(
     """
     first = checks.not_negative("dispersions_1", dispersions_1)
     second = checks.not_negative("dispersions_2", dispersions_2)
-    covariance = np.sum(checks.between("correlations", correlations, -1.0, 1.0) * first * second, axis=-1)
+    covariance = np.sum(
+        checks.between("correlations", correlations, -1.0, 1.0) * first * second, axis=-1
+    )
     product = combined_dispersion(first) * combined_dispersion(second)
-    correlation: FloatArray = np.where(product > 0, covariance / np.where(product > 0, product, 1.0), 0.0)
+    correlation: FloatArray = np.where(
+        product > 0, covariance / np.where(product > 0, product, 1.0), 0.0
+    )
     return np.minimum(np.maximum(correlation, -1.0), 1.0)
 
 
@@ -83,12 +89,16 @@ def lognormal_dispersion(mean: ArrayLike, standard_deviation: ArrayLike) -> Floa
     ValueError
         If the mean is not positive or the standard deviation negative.
     """
-    ratio = checks.not_negative("standard_deviation", standard_deviation) / checks.positive("mean", mean)
+    ratio = checks.not_negative("standard_deviation", standard_deviation) / checks.positive(
+        "mean", mean
+    )
     dispersion: FloatArray = np.sqrt(np.log1p(ratio**2))
     return dispersion
 
 
-def period_dispersion(periods: ArrayLike, per: ArrayLike, period: ArrayLike, dispersion: ArrayLike) -> FloatArray:
+def period_dispersion(
+    periods: ArrayLike, per: ArrayLike, period: ArrayLike, dispersion: ArrayLike
+) -> FloatArray:
     """
     Dispersion of a radius from an uncertain period: the slope of the spectrum over plus and minus one dispersion.
 
@@ -112,7 +122,10 @@ def period_dispersion(periods: ArrayLike, per: ArrayLike, period: ArrayLike, dis
         If an argument is not positive or the spectrum does not cover the periods.
     """
     grid, radii = np.log(checks.positive("periods", periods)), np.log(checks.positive("per", per))
-    middle, spread = np.log(checks.positive("period", period)), checks.not_negative("dispersion", dispersion)
+    middle, spread = (
+        np.log(checks.positive("period", period)),
+        checks.not_negative("dispersion", dispersion),
+    )
     if np.any(middle - spread < grid[0]) or np.any(middle + spread > grid[-1]):
         raise ValueError(
             f"periods from {np.exp(grid[0]):.3g} to {np.exp(grid[-1]):.3g} s do not cover the uncertain one"

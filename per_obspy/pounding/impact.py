@@ -24,7 +24,11 @@ class TransferEnergies(NamedTuple):
 
 
 def post_impact_velocities(
-    velocity_1: ArrayLike, velocity_2: ArrayLike, mass_1: ArrayLike, mass_2: ArrayLike, restitution: ArrayLike
+    velocity_1: ArrayLike,
+    velocity_2: ArrayLike,
+    mass_1: ArrayLike,
+    mass_2: ArrayLike,
+    restitution: ArrayLike,
 ) -> ImpactVelocities:
     """
     Velocities after a stereomechanical impact.
@@ -32,7 +36,8 @@ def post_impact_velocities(
     Parameters
     ----------
     velocity_1, velocity_2 : array_like
-        Velocities before the impact, m/s; an impact needs ``velocity_1 > velocity_2`` (structure 1 stands left).
+        Velocities before the impact, m/s; an impact needs ``velocity_1 > velocity_2`` (structure 1
+        stands left).
     mass_1, mass_2 : array_like
         Impact masses, kg; one of the two may be infinite (a wall).
     restitution : array_like
@@ -62,14 +67,23 @@ def post_impact_velocities(
     >>> print(velocity_1, velocity_2)
     0.25 0.75
     """
-    velocity_1, velocity_2 = checks.finite("velocity_1", velocity_1), checks.finite("velocity_2", velocity_2)
+    velocity_1, velocity_2 = (
+        checks.finite("velocity_1", velocity_1),
+        checks.finite("velocity_2", velocity_2),
+    )
     share_1, share_2, _ = mass_shares(mass_1, mass_2)
-    change = (1.0 + checks.between("restitution", restitution, 0.0, 1.0)) * (velocity_1 - velocity_2)
+    change = (1.0 + checks.between("restitution", restitution, 0.0, 1.0)) * (
+        velocity_1 - velocity_2
+    )
     return ImpactVelocities(velocity_1 - share_2 * change, velocity_2 + share_1 * change)
 
 
 def transfer_energies(
-    velocity_1: ArrayLike, velocity_2: ArrayLike, mass_1: ArrayLike, mass_2: ArrayLike, restitution: ArrayLike
+    velocity_1: ArrayLike,
+    velocity_2: ArrayLike,
+    mass_1: ArrayLike,
+    mass_2: ArrayLike,
+    restitution: ArrayLike,
 ) -> TransferEnergies:
     """
     Energy that leaves each structure in one impact.
@@ -86,8 +100,9 @@ def transfer_energies(
     Returns
     -------
     TransferEnergies
-        ``transfer_energy_1`` (the paper's E_Tr12) and ``transfer_energy_2`` (E_Tr21): broadcast shape, J. Positive
-        energy leaves the structure; their sum is the loss ``½ (1 - e²) m1 m2/(m1 + m2) (v1 - v2)²``.
+        ``transfer_energy_1`` (the paper's E_Tr12) and ``transfer_energy_2`` (E_Tr21): broadcast
+        shape, J. Positive energy leaves the structure; their sum is the loss ``½ (1 - e²) m1 m2/(m1
+        + m2) (v1 - v2)²``.
 
     Raises
     ------
@@ -97,9 +112,9 @@ def transfer_energies(
     Notes
     -----
     With the impulse ``J = (1 + e) m1 m2/(m1 + m2) (v1 - v2)``: ``E_Tr12 = J (v1 + v1')/2`` and
-    ``E_Tr21 = -J (v2 + v2')/2``.
-    The printed (9) and (10) have the opposite sign: they are the kinetic energies that the structures gain, which
-    contradicts the paper's own energy balance (3), (4).
+    ``E_Tr21 = -J (v2 + v2')/2``. The printed (9) and (10) have the opposite sign: they are the
+    kinetic energies that the structures gain, which contradicts the paper's own energy balance (3),
+    (4).
 
     References
     ----------
@@ -111,10 +126,17 @@ def transfer_energies(
     1.0 -1.0
     """
     after_1, after_2 = post_impact_velocities(velocity_1, velocity_2, mass_1, mass_2, restitution)
-    velocity_1, velocity_2 = np.asarray(velocity_1, dtype=np.float64), np.asarray(velocity_2, dtype=np.float64)
+    velocity_1, velocity_2 = (
+        np.asarray(velocity_1, dtype=np.float64),
+        np.asarray(velocity_2, dtype=np.float64),
+    )
     reduced_mass = mass_shares(mass_1, mass_2)[2]
-    impulse = (1.0 + np.asarray(restitution, dtype=np.float64)) * reduced_mass * (velocity_1 - velocity_2)
-    return TransferEnergies(impulse * (velocity_1 + after_1) / 2.0, -impulse * (velocity_2 + after_2) / 2.0)
+    impulse = (
+        (1.0 + np.asarray(restitution, dtype=np.float64)) * reduced_mass * (velocity_1 - velocity_2)
+    )
+    return TransferEnergies(
+        impulse * (velocity_1 + after_1) / 2.0, -impulse * (velocity_2 + after_2) / 2.0
+    )
 
 
 def mass_shares(mass_1: ArrayLike, mass_2: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -8,8 +8,8 @@ from scipy.special import ndtr
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.probability import probabilities
-from per_obspy.pounding.gap import critical_gap
+from per_obspy.kernels.pairs.probability import probabilities
+from per_obspy.pounding.critical_gap import critical_gap
 
 
 def pounding_probability(
@@ -35,10 +35,11 @@ def pounding_probability(
     gap : array_like
         Median gap, m.
     dispersion_1, dispersion_2 : array_like
-        Standard deviations of the logarithms of the radii; see :mod:`per_obspy.pounding.dispersion`.
+        Standard deviations of the logarithms of the radii; see
+        :mod:`per_obspy.pounding.dispersion`.
     dispersion_correlation : array_like
-        Correlation of the logarithms of the two radii, from -1 to 1, dimensionless. It has no default: the ground
-        motion is shared, the periods are not; see the same module.
+        Correlation of the logarithms of the two radii, from -1 to 1, dimensionless. It has no
+        default: the ground motion is shared, the periods are not; see the same module.
     model_dispersion, gap_dispersion : array_like, optional
         Standard deviations of the logarithms of the critical gap's model error and of the gap
         (see ``lognormal_dispersion`` there), dimensionless.
@@ -55,8 +56,9 @@ def pounding_probability(
 
     Notes
     -----
-    With ``D = ln(r2/r1)``, normal, the logarithm of the critical gap given D is ``ln r1 + ½ ln(1 + e^2D - 2 rho e^D)``,
-    normal: ``P = ∫ φ(d) Φ((E[ln r1|d] + ψ(d) - ln g)/sqrt(Var[ln r1|D] + βm² + βg²)) dd``.
+    With ``D = ln(r2/r1)``, normal, the logarithm of the critical gap given D is ``ln r1 + ½ ln(1 +
+    e^2D - 2 rho e^D)``, normal: ``P = ∫ φ(d) Φ((E[ln r1|d] + ψ(d) - ln g)/sqrt(Var[ln r1|D] + βm² +
+    βg²)) dd``.
 
     Examples
     --------
@@ -70,7 +72,8 @@ def pounding_probability(
     beta_2 = checks.not_negative("dispersion_2", dispersion_2)
     shared = checks.between("dispersion_correlation", dispersion_correlation, -1.0, 1.0)
     rest = np.hypot(
-        checks.not_negative("model_dispersion", model_dispersion), checks.not_negative("gap_dispersion", gap_dispersion)
+        checks.not_negative("model_dispersion", model_dispersion),
+        checks.not_negative("gap_dispersion", gap_dispersion),
     )
     broadcast = np.broadcast_arrays(per_1, per_2, correlation, gap, beta_1, beta_2, shared, rest)
     flat = [array.ravel() for array in broadcast]
@@ -83,7 +86,9 @@ def pounding_probability(
     return shaped
 
 
-def _certain(per_1: FloatArray, per_2: FloatArray, correlation: FloatArray, gap: FloatArray) -> FloatArray:
+def _certain(
+    per_1: FloatArray, per_2: FloatArray, correlation: FloatArray, gap: FloatArray
+) -> FloatArray:
     """Return 1 where the median critical gap exceeds the gap."""
     return (critical_gap(per_1, per_2, correlation) > gap).astype(np.float64)
 
@@ -101,7 +106,12 @@ def _replace_simple(probability: FloatArray, flat: list[FloatArray]) -> None:
     beta = np.where(per_1 == 0, np.where(per_2 == 0, 0.0, beta_2), beta_1)
     spread = np.hypot(beta, rest)
     demand = critical_gap(per_1, per_2, correlation)
-    simple = (alone | (_ratio_dispersion(beta_1, beta_2, shared) == 0)) & (spread > 0) & (demand > 0) & (gap > 0)
+    simple = (
+        (alone | (_ratio_dispersion(beta_1, beta_2, shared) == 0))
+        & (spread > 0)
+        & (demand > 0)
+        & (gap > 0)
+    )
     probability[simple] = ndtr(np.log(demand[simple] / gap[simple]) / spread[simple])
 
 
@@ -120,7 +130,14 @@ def _integrals(
     slope = beta_1 * (shared * beta_2 - beta_1) / spread**2
     left = beta_1 * beta_2 * np.sqrt((1.0 - shared) * (1.0 + shared)) / spread
     parameters = np.stack(
-        [np.log(per_2 / per_1), spread, np.log(per_1 / gap), slope, np.hypot(left, rest), correlation]
+        [
+            np.log(per_2 / per_1),
+            spread,
+            np.log(per_1 / gap),
+            slope,
+            np.hypot(left, rest),
+            correlation,
+        ]
     )
     out = np.empty(per_1.size)
     probabilities(parameters, out)
@@ -138,7 +155,8 @@ def demand_probability(demand: ArrayLike, gap: ArrayLike, dispersion: ArrayLike)
     gap : array_like
         Median gap, m.
     dispersion : array_like
-        Standard deviation of the logarithm of demand over gap (all sources together), dimensionless.
+        Standard deviation of the logarithm of demand over gap (all sources together),
+        dimensionless.
 
     Returns
     -------
@@ -156,9 +174,13 @@ def demand_probability(demand: ArrayLike, gap: ArrayLike, dispersion: ArrayLike)
     [0.5 1. ]
     """
     demand, gap = checks.not_negative("demand", demand), checks.not_negative("gap", gap)
-    demand, gap, spread = np.broadcast_arrays(demand, gap, checks.not_negative("dispersion", dispersion))
+    demand, gap, spread = np.broadcast_arrays(
+        demand, gap, checks.not_negative("dispersion", dispersion)
+    )
     known = (demand > 0) & (gap > 0) & (spread > 0)
-    margin = np.log(np.where(known, demand, 1.0) / np.where(known, gap, 1.0)) / np.where(known, spread, 1.0)
+    margin = np.log(np.where(known, demand, 1.0) / np.where(known, gap, 1.0)) / np.where(
+        known, spread, 1.0
+    )
     probability: FloatArray = np.where(known, ndtr(margin), demand > gap)
     return probability
 
@@ -201,10 +223,17 @@ def simulated_probability(
         If a radius, the correlation or the gap is out of range.
     """
     normal = np.random.default_rng(seed).standard_normal((3, count))
-    normal[1] = dispersion_correlation * normal[0] + np.sqrt(1.0 - dispersion_correlation**2) * normal[1]
+    normal[1] = (
+        dispersion_correlation * normal[0] + np.sqrt(1.0 - dispersion_correlation**2) * normal[1]
+    )
     radii = per_1 * np.exp(dispersion_1 * normal[0]), per_2 * np.exp(dispersion_2 * normal[1])
     rest = np.exp(np.hypot(model_dispersion, gap_dispersion) * normal[2])
-    return float(np.mean(critical_gap(*radii, correlation) * rest > checks.number("gap", gap, checks.not_negative)))
+    return float(
+        np.mean(
+            critical_gap(*radii, correlation) * rest
+            > checks.number("gap", gap, checks.not_negative)
+        )
+    )
 
 
 def first_order_probability(
@@ -231,8 +260,8 @@ def first_order_probability(
     Returns
     -------
     probability : ndarray
-        Broadcast shape, from 0 to 1. Typically wrong by 0.03; for nearly equal radii and a correlation near 1 useless
-        (0.49 in place of 0.88).
+        Broadcast shape, from 0 to 1. Typically wrong by 0.03; for nearly equal radii and a
+        correlation near 1 useless (0.49 in place of 0.88).
 
     Raises
     ------
@@ -249,7 +278,14 @@ def first_order_probability(
     demand = critical_gap(per_1, per_2, correlation)
     square = np.where(demand > 0, demand, 1.0) ** 2
     r1, r2, rho = (np.asarray(value, dtype=np.float64) for value in (per_1, per_2, correlation))
-    parts = r1 * (r1 - rho * r2) / square * dispersion_1, r2 * (r2 - rho * r1) / square * dispersion_2
-    variance = parts[0] ** 2 + parts[1] ** 2 + 2.0 * np.asarray(dispersion_correlation) * parts[0] * parts[1]
+    parts = (
+        r1 * (r1 - rho * r2) / square * dispersion_1,
+        r2 * (r2 - rho * r1) / square * dispersion_2,
+    )
+    variance = (
+        parts[0] ** 2
+        + parts[1] ** 2
+        + 2.0 * np.asarray(dispersion_correlation) * parts[0] * parts[1]
+    )
     rest = np.hypot(model_dispersion, gap_dispersion)
     return demand_probability(demand, gap, np.hypot(np.sqrt(np.maximum(variance, 0.0)), rest))

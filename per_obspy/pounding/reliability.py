@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation import ddc_correlation
-from per_obspy.pounding.gap import absolute_gap, critical_gap, srss_gap
-from per_obspy.pounding.histories import pounding_histories
-from per_obspy.pounding.record_correlation import record_correlation
-from per_obspy.pounding.relative import relative_displacement
+from per_obspy.pounding.correlation.record import record_correlation
+from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
+from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.history.relative import relative_displacement
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.spectra.elastic import response_spectra
 
@@ -20,9 +20,9 @@ class GapComparison(NamedTuple):
     """
     Critical gaps of each pair for either order of the structures, each (n_pairs,), m.
 
-    ``exact`` is the largest ``|u1 - u2|`` of the record. The estimates combine peak displacements (``sd``) or radii
-    (``per``) with the correlation (16) (``ddc``) or that of the record (``record``); ``larger_per`` is the larger of
-    the two estimates with radii.
+    ``exact`` is the largest ``|u1 - u2|`` of the record. The estimates combine peak displacements
+    (``sd``) or radii (``per``) with the correlation (16) (``ddc``) or that of the record
+    (``record``); ``larger_per`` is the larger of the two estimates with radii.
     """
 
     exact: FloatArray
@@ -38,9 +38,9 @@ class SingleHitComparison(NamedTuple):
     """
     Single hit and exact history of each pair at the same gap.
 
-    ``status`` (n_pairs,) is that of the single hit; ``per`` are the radii without pounding, ``predicted`` and
-    ``actual`` the largest radii with pounding, (2, n_pairs), m, predicted NaN unless the status is ``ok``; ``impacts``
-    (n_pairs,) counts those of the history.
+    ``status`` (n_pairs,) is that of the single hit; ``per`` are the radii without pounding,
+    ``predicted`` and ``actual`` the largest radii with pounding, (2, n_pairs), m, predicted NaN
+    unless the status is ``ok``; ``impacts`` (n_pairs,) counts those of the history.
     """
 
     status: NDArray[np.str_]
@@ -60,7 +60,11 @@ class Summary(NamedTuple):
 
 
 def compare_gaps(
-    acceleration: ArrayLike, dt: float, period_1: ArrayLike, period_2: ArrayLike, damping: float = 0.05
+    acceleration: ArrayLike,
+    dt: float,
+    period_1: ArrayLike,
+    period_2: ArrayLike,
+    damping: float = 0.05,
 ) -> GapComparison:
     """
     Estimates of the critical gap beside the exact one.
@@ -156,7 +160,9 @@ def compare_single_hit(
     """
     period_1, period_2 = _pairs(period_1, period_2)
     (per_1, per_2), _ = _spectra(acceleration, dt, period_1, period_2, damping)
-    critical = relative_displacement(acceleration, dt, period_1, damping, period_2, damping).one_before_two
+    critical = relative_displacement(
+        acceleration, dt, period_1, damping, period_2, damping
+    ).one_before_two
     gap = critical * checks.not_negative("gap_ratio", gap_ratio)
     hit = single_hit(per_1, per_2, period_1, period_2, 1.0, mass_ratio, restitution, critical, gap)
     exact = pounding_histories(
@@ -175,7 +181,9 @@ def _pairs(period_1: ArrayLike, period_2: ArrayLike) -> tuple[FloatArray, FloatA
     """Return checked periods, one of each a pair."""
     first, second = checks.positive("period_1", period_1), checks.positive("period_2", period_2)
     if first.ndim != 1 or first.shape != second.shape:
-        raise ValueError(f"period_1 and period_2 must be one row each, got shapes {first.shape} and {second.shape}")
+        raise ValueError(
+            f"period_1 and period_2 must be one row each, got shapes {first.shape} and {second.shape}"
+        )
     return first, second
 
 
@@ -201,11 +209,13 @@ def amplifications(compared: SingleHitComparison) -> tuple[FloatArray, FloatArra
     Returns
     -------
     predicted, actual : (n_ok,) ndarray
-        Radius with pounding over radius without, of the structure that is amplified most, dimensionless.
+        Radius with pounding over radius without, of the structure that is amplified most,
+        dimensionless.
     """
     known = compared.status == "ok"
     predicted, actual = (
-        (radii[:, known] / compared.per[:, known]).max(axis=0) for radii in (compared.predicted, compared.actual)
+        (radii[:, known] / compared.per[:, known]).max(axis=0)
+        for radii in (compared.predicted, compared.actual)
     )
     return predicted, actual
 

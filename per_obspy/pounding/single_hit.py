@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.single_hit import NO_POUNDING, PAIRS, estimate
+from per_obspy.kernels.pairs.single_hit import NO_POUNDING, PAIRS, estimate
 from per_obspy.pounding.impact import mass_shares
 
-#: gap/critical gap below which several impacts make the estimate unreliable (see the table of `single_hit`)
+#: gap/critical gap below which several impacts make the estimate unreliable (see the table of
+#: `single_hit`)
 RELIABLE_GAP_RATIO = 0.6
 
 #: Pairs that a thread takes at a time; a whole number of the kernel's blocks.
@@ -26,8 +27,9 @@ class SingleHitBranches(NamedTuple):
     """
     Both possible impacts; first axis: both structures move towards 2 at the grazing state (+), then towards 1 (-).
 
-    ``time_before`` is the time from the actual contact to the grazing state, s. Displacements and radii are in m,
-    velocities in m/s, transfer energies in J (positive leaves the structure), amplifications dimensionless.
+    ``time_before`` is the time from the actual contact to the grazing state, s. Displacements and
+    radii are in m, velocities in m/s, transfer energies in J (positive leaves the structure),
+    amplifications dimensionless.
     """
 
     time_before: FloatArray
@@ -49,12 +51,14 @@ class SingleHit(NamedTuple):
     """
     Single-hit estimate of each pair.
 
-    ``status`` is ``"ok"``, ``"no_pounding"`` (gap at least critical), ``"no_grazing_state"`` (this critical gap is no
-    distance at which the two radii only just touch) or ``"inconsistent_critical_gap"`` (larger than the sum of the
-    radii). ``amplification_i`` is the radius after impact over the radius before, never below 1 because the radius
-    before was reached anyway; ``per_after_i`` (m) and ``impact_velocity`` (v1 - v2, m/s) are the largest of the two
-    branches. They are NaN unless the status is ``ok``, and 1, the radius before, and 0 for ``no_pounding``.
-    ``envelope_i`` (m) bounds the radius after impact over all phases of both structures and is never NaN.
+    ``status`` is ``"ok"``, ``"no_pounding"`` (gap at least critical), ``"no_grazing_state"`` (this
+    critical gap is no distance at which the two radii only just touch) or
+    ``"inconsistent_critical_gap"`` (larger than the sum of the radii). ``amplification_i`` is the
+    radius after impact over the radius before, never below 1 because the radius before was reached
+    anyway; ``per_after_i`` (m) and ``impact_velocity`` (v1 - v2, m/s) are the largest of the two
+    branches. They are NaN unless the status is ``ok``, and 1, the radius before, and 0 for
+    ``no_pounding``. ``envelope_i`` (m) bounds the radius after impact over all phases of both
+    structures and is never NaN.
     """
 
     status: NDArray[np.str_]
@@ -85,7 +89,8 @@ def single_hit(
     Parameters
     ----------
     per_1, per_2 : array_like
-        Pseudo Energy Radius of each structure at contact level, m; 0 is a wall or a structure at rest.
+        Pseudo Energy Radius of each structure at contact level, m; 0 is a wall or a structure at
+        rest.
     period_1, period_2 : array_like
         Undamped periods, s.
     mass_1, mass_2 : array_like
@@ -100,24 +105,29 @@ def single_hit(
     Returns
     -------
     SingleHit
-        Arrays of the broadcast shape; those of ``branches`` have the branch as an additional first axis.
+        Arrays of the broadcast shape; those of ``branches`` have the branch as an additional first
+        axis.
 
     Raises
     ------
     ValueError
-        If a radius or gap is negative, a period or mass is not positive, or the restitution is outside [0, 1].
+        If a radius or gap is negative, a period or mass is not positive, or the restitution is
+        outside [0, 1].
 
     Notes
     -----
-    At the grazing state both structures have the same velocity v, lie on their energy circles and stand at x and
-    x - g_cr: with ``A = w2² - w1²``, ``B = w2² g_cr``, ``C = w1² r1² - w2² r2² + w2² g_cr²`` the only root at which the
-    gap is smallest is ``x = C/(B + sqrt(B² - A C))``. The sign of v is not determined, so both branches are followed
-    back along their circles to the first contact at the actual gap, where the impact takes place.
+    At the grazing state both structures have the same velocity v, lie on their energy circles and
+    stand at x and x - g_cr: with ``A = w2² - w1²``, ``B = w2² g_cr``, ``C = w1² r1² - w2² r2² + w2²
+    g_cr²`` the only root at which the gap is smallest is ``x = C/(B + sqrt(B² - A C))``. The sign
+    of v is not determined, so both branches are followed back along their circles to the first
+    contact at the actual gap, where the impact takes place.
 
-    Largest amplification of either structure, predicted over actual: median, standard deviation of the logarithm, share
-    of cases under-predicted by more than 1 %. Measured on 16 broad-band components and the 2 of SCT 1985, 91 pairs from
-    0.3 s to 4 s either way round, damping 5 %, restitution 0.65, exact critical gap (``docs/reliability.md``, repeated
-    by ``workflows/reliability_tables.py``); cases without a grazing state, 10 % and 39 %, are left out:
+    Largest amplification of either structure, predicted over actual: median, standard deviation of
+    the logarithm, share of cases under-predicted by more than 1 %. Measured on 16 broad-band
+    components and the 2 of SCT 1985, 91 pairs from 0.3 s to 4 s either way round, damping 5 %,
+    restitution 0.65, exact critical gap (``docs/reliability.md``, repeated by
+    ``workflows/reliability_tables.py``); cases without a grazing state, 10 % and 39 %, are left
+    out:
 
     ========  ====================  ====================  ===================  ===================
     g/g_cr    broad band, m2 = m1   Mexico City, m2 = m1  broad, m2 = 5 m1     broad, m2 = 0.2 m1
@@ -128,8 +138,9 @@ def single_hit(
     0.05      1.03, 0.26, 0.44      1.24, 0.31, 0.13      1.23, 0.20, 0.15     1.16, 0.21, 0.18
     ========  ====================  ====================  ===================  ===================
 
-    Near the critical gap the estimate is conservative, not accurate; below 0.6 of it several impacts make it
-    unreliable, and a small change of the gap can change it by a jump. A light structure 2 is the least favourable.
+    Near the critical gap the estimate is conservative, not accurate; below 0.6 of it several
+    impacts make it unreliable, and a small change of the gap can change it by a jump. A light
+    structure 2 is the least favourable.
 
     References
     ----------
@@ -144,7 +155,10 @@ def single_hit(
     ok 0.3
     """
     radii = checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)
-    frequencies = 2 * np.pi / checks.positive("period_1", period_1), 2 * np.pi / checks.positive("period_2", period_2)
+    frequencies = (
+        2 * np.pi / checks.positive("period_1", period_1),
+        2 * np.pi / checks.positive("period_2", period_2),
+    )
     share_1, share_2, reduced_mass = mass_shares(mass_1, mass_2)
     impulse = 1.0 + checks.between("restitution", restitution, 0.0, 1.0)
     gaps = checks.not_negative("critical_gap", critical_gap), checks.not_negative("gap", gap)
@@ -166,7 +180,9 @@ def _estimate(arguments: FloatArray, shape: tuple[int, ...]) -> SingleHit:
     whole = np.pad(arguments, ((0, 0), (0, -count % PAIRS)), mode="edge") if count else arguments
     status = np.empty(whole.shape[1], dtype=np.int8)
     fields, envelope = np.empty((2, 13, status.size)), np.empty((2, status.size))
-    _in_threads(lambda begin, end: estimate(whole, begin, end, status, fields, envelope), status.size)
+    _in_threads(
+        lambda begin, end: estimate(whole, begin, end, status, fields, envelope), status.size
+    )
     status, fields, envelope = status[:count], fields[..., :count], envelope[:, :count]
     branches = SingleHitBranches(*(fields[:, field].reshape(2, *shape) for field in range(13)))
     velocity = np.max(branches.velocity_1 - branches.velocity_2, axis=0)

@@ -24,8 +24,8 @@ class Structure:
     hardening : float
         Stiffness after yielding over elastic stiffness, at least 0 and below 1.
     participation : float
-        The contact level is driven by ``participation`` times the ground acceleration, dimensionless;
-        0 for a wall that moves with the ground.
+        The contact level is driven by ``participation`` times the ground acceleration,
+        dimensionless; 0 for a wall that moves with the ground.
 
     Raises
     ------

@@ -8,12 +8,12 @@ from obspy.core.event import Event
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.gathering import instruments, is_horizontal, oriented
 from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.merging import merged
-from per_obspy.processing.provenance import rejection
-from per_obspy.processing.structures import kept_apart
-from per_obspy.processing.windows import source_of
+from per_obspy.processing.noise.windows import source_of
+from per_obspy.processing.notes import rejection
+from per_obspy.processing.station.components import instruments, is_horizontal, oriented
+from per_obspy.processing.station.merging import merged
+from per_obspy.processing.station.structures import kept_apart
 
 DEFAULTS = Processing()
 log = logging.getLogger(__name__)
@@ -35,9 +35,10 @@ def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None
     Returns
     -------
     obspy Stream
-        Acceleration, m/s2, of one instrument a station: at most two horizontals, with equal times, and a vertical.
-        Filtered records keep the zero pads that hold the transients of the filter. ``stats.processing`` lists the
-        steps, ``stats.per_obspy`` the numbers chosen: corners, usable periods and so on.
+        Acceleration, m/s2, of one instrument a station: at most two horizontals, with equal times,
+        and a vertical. Filtered records keep the zero pads that hold the transients of the filter.
+        ``stats.processing`` lists the steps, ``stats.per_obspy`` the numbers chosen: corners,
+        usable periods and so on.
 
     Raises
     ------
@@ -53,7 +54,9 @@ def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None
         out += kept
         reasons += [f"{row.name}: {reason}" for row in rejected for reason in row.reasons]
     if not out:
-        raise RecordRejected(", ".join(map(".".join, stations)) or "empty stream", *(reasons or ["no traces"]))
+        raise RecordRejected(
+            ", ".join(map(".".join, stations)) or "empty stream", *(reasons or ["no traces"])
+        )
     for reason in reasons:
         log.warning("left out: %s", reason)
     return out
@@ -79,18 +82,24 @@ def process_station(
     kept : obspy Stream
         Empty if no horizontal survived.
     rejected : tuple of Rejection
-        One row a trace; one bad trace never loses the others. Sensors in structures are among them: they recorded the
-        structure, not the ground; `process_instruments` processes them.
+        One row a trace; one bad trace never loses the others. Sensors in structures are among them:
+        they recorded the structure, not the ground; `process_instruments` processes them.
     """
     ground, structure = kept_apart(stream)
     candidates, rejected = process_instruments(ground, settings, event)
     best = max(candidates, key=lambda traces: sum(map(is_horizontal, traces)), default=Stream())
     others = (trace for traces in candidates if traces is not best for trace in traces)
-    beside = [rejection(trace, f"the instrument of {best[0].id} at the same station goes first") for trace in others]
+    beside = [
+        rejection(trace, f"the instrument of {best[0].id} at the same station goes first")
+        for trace in others
+    ]
     if not any(map(is_horizontal, best)):
         beside += [rejection(trace, "no horizontal of its instrument is usable") for trace in best]
         best = Stream()
-    beside += [rejection(trace, f"in a structure ({trace.stats.sensor_location}): kept apart") for trace in structure]
+    beside += [
+        rejection(trace, f"in a structure ({trace.stats.sensor_location}): kept apart")
+        for trace in structure
+    ]
     return best, (*rejected, *beside)
 
 
@@ -100,7 +109,8 @@ def process_instruments(
     """
     Return the processed traces of every instrument of a station apart, the preferred instrument first.
 
-    For arrays in structures, boreholes and co-located sensors, whose instruments see different motion.
+    For arrays in structures, boreholes and co-located sensors, whose instruments see different
+    motion.
 
     Parameters
     ----------

@@ -21,7 +21,11 @@ def copied(stream: Stream) -> Stream:
 
 
 def _copied(trace: Trace) -> Trace:
-    own = {name: deepcopy(value) for name, value in trace.stats.items() if name not in ("response", "endtime")}
+    own = {
+        name: deepcopy(value)
+        for name, value in trace.stats.items()
+        if name not in ("response", "endtime")
+    }
     out = Trace(trace.data.copy(), own)
     if "response" in trace.stats:
         out.stats.response = trace.stats.response

@@ -8,18 +8,18 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
-from per_obspy.processing.automatic import corners_noted, offset_kept
-from per_obspy.processing.corners import corners_shared
-from per_obspy.processing.filtering import filtered, padded
-from per_obspy.processing.findings import Finding, judged, surviving
-from per_obspy.processing.gathering import is_horizontal, paired
-from per_obspy.processing.outcome import final_findings
-from per_obspy.processing.passing import passed_through
-from per_obspy.processing.physical import in_acceleration
-from per_obspy.processing.provenance import is_processed
-from per_obspy.processing.quality import outlier_findings, raw_findings
-from per_obspy.processing.usable import usable_periods_noted
-from per_obspy.processing.windows import Source, noise_window_noted, trimmed
+from per_obspy.processing.already_processed import passed_through
+from per_obspy.processing.filter.automatic import corners_noted, offset_kept
+from per_obspy.processing.filter.butterworth import filtered, padded
+from per_obspy.processing.filter.corners import corners_shared
+from per_obspy.processing.instrument_response import in_acceleration
+from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
+from per_obspy.processing.notes import is_processed
+from per_obspy.processing.quality.final_checks import final_findings
+from per_obspy.processing.quality.findings import Finding, judged, surviving
+from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
+from per_obspy.processing.station.components import is_horizontal, paired
+from per_obspy.processing.usable_periods import usable_periods_noted
 
 Step = Callable[[Stream], Stream]
 
@@ -58,8 +58,14 @@ def process_instrument(
 
 
 def _windowed(stream: Stream, settings: Processing, source: Source | None) -> Stream:
-    margin, shortest, tolerance = settings.onset_margin, settings.shortest_noise, settings.pick_tolerance
-    noted_windows = noise_window_noted(stream, margin, shortest, tolerance, source, settings.pre_event)
+    margin, shortest, tolerance = (
+        settings.onset_margin,
+        settings.shortest_noise,
+        settings.pick_tolerance,
+    )
+    noted_windows = noise_window_noted(
+        stream, margin, shortest, tolerance, source, settings.pre_event
+    )
     return trimmed(noted_windows, settings.longest_noise, settings.longest_signal)
 
 
@@ -93,7 +99,9 @@ def _before(settings: Processing) -> tuple[Step, ...]:
 
 def _after(settings: Processing) -> tuple[Step, ...]:
     return (
-        partial(_low_passed if settings.permanent_offset else _padded_and_filtered, order=settings.order),
+        partial(
+            _low_passed if settings.permanent_offset else _padded_and_filtered, order=settings.order
+        ),
         partial(usable_periods_noted, usable=settings.usable),
         lambda stream: judged(stream[0], _final_findings(stream[0], settings)),
         _marked,
@@ -102,7 +110,9 @@ def _after(settings: Processing) -> tuple[Step, ...]:
 
 def _padded_and_filtered(stream: Stream, order: int) -> Stream:
     corners = stream[0].stats.per_obspy
-    return filtered(padded(stream, corners.highpass, order), corners.highpass, corners.lowpass, order)
+    return filtered(
+        padded(stream, corners.highpass, order), corners.highpass, corners.lowpass, order
+    )
 
 
 def _low_passed(stream: Stream, order: int) -> Stream:

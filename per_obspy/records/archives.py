@@ -13,7 +13,16 @@ from per_obspy.errors import RecordRejected, reason_of
 _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
 #: what the standard library raises for damaged, encrypted or cut archives
-_DAMAGES = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, KeyError)
+_DAMAGES = (
+    zipfile.BadZipFile,
+    tarfile.TarError,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    OSError,
+    RuntimeError,
+    KeyError,
+)
 
 
 def is_archive(path: Path) -> bool:
@@ -51,9 +60,15 @@ def open_file(path: Path) -> BinaryIO:
     RecordRejected
         If it cannot be read.
     """
-    archive = next((parent for parent in path.parents if is_archive(parent) and parent.is_file()), None)
+    archive = next(
+        (parent for parent in path.parents if is_archive(parent) and parent.is_file()), None
+    )
     try:
-        return path.open("rb") if archive is None else _member(archive, path.relative_to(archive).as_posix())
+        return (
+            path.open("rb")
+            if archive is None
+            else _member(archive, path.relative_to(archive).as_posix())
+        )
     except _DAMAGES as error:
         raise RecordRejected(str(path), f"cannot be read: {reason_of(error)}") from error
 

@@ -1,7 +1,8 @@
 """
 Workspaces of gmprocess, which are ASDF files (HDF5): raw or processed waveforms, StationXML and the event.
 
-ASDF keeps a waveform as ``Waveforms/NET.STA/ID__START__END__TAG``, with the sampling rate (Hz) and the start (ns since
+ASDF keeps a waveform as ``Waveforms/NET.STA/ID__START__END__TAG``, with the sampling rate (Hz) and
+the start (ns since
 1970) as attributes (Krischer and others 2016). gmprocess adds what it did in ``AuxiliaryData`` and ``Provenance``.
 netCDF4, which reads HDF5, is enough for that.
 """
@@ -23,8 +24,8 @@ from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.folder import FolderContents
-from per_obspy.records.foreign import foreign_bytes
 from per_obspy.records.metadata import with_metadata
+from per_obspy.records.obspy_readers import foreign_bytes
 
 #: unit that the provenance says the samples have -> m/s2
 _UNITS = {"cm/s^2": 0.01, "m/s^2": 1.0, "g": 9.80665}
@@ -47,7 +48,8 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> FolderCo
     path : str or Path
         ASDF file.
     tag : str
-        With ``*`` and ``?``; gmprocess calls raw records ``EVENT_unprocessed`` and its results ``EVENT_default``.
+        With ``*`` and ``?``; gmprocess calls raw records ``EVENT_unprocessed`` and its results
+        ``EVENT_default``.
 
     Raises
     ------
@@ -61,14 +63,18 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> FolderCo
         }
         if not stations:
             tags = sorted({_tag(name) for group in groups.values() for name in _names(group, "*")})
-            raise CatalogError(str(path), f"has no waveform of tag {tag}, only of {', '.join(tags) or 'none'}")
+            raise CatalogError(
+                str(path), f"has no waveform of tag {tag}, only of {', '.join(tags) or 'none'}"
+            )
         inventories, rejected = [], []
         for name in stations:
             try:
                 inventories += _inventories(groups[name], f"{path}/{name}")
             except RecordRejected as rejection:
                 rejected.append(Rejection("file", name, str(path), None, rejection.reasons))
-    return FolderContents(stations, reduce(add, inventories) if inventories else None, tuple(rejected))
+    return FolderContents(
+        stations, reduce(add, inventories) if inventories else None, tuple(rejected)
+    )
 
 
 def read_asdf_station(
@@ -84,7 +90,9 @@ def read_asdf_station(
                     stream += with_metadata(_trace(file, group.variables[name]), inventory)
                     stream[-1].stats.source = str(path)
                 except RecordRejected as rejection:
-                    rejected.append(Rejection("record", name.split("__")[0], str(path), None, rejection.reasons))
+                    rejected.append(
+                        Rejection("record", name.split("__")[0], str(path), None, rejection.reasons)
+                    )
     return stream, tuple(rejected)
 
 
@@ -104,7 +112,9 @@ def read_asdf_event(path: Path) -> Event:
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1 or not events[0].origins:
-        raise CatalogError(str(path), f"must hold one event with an origin, holds {len(events)} events")
+        raise CatalogError(
+            str(path), f"must hold one event with an origin, holds {len(events)} events"
+        )
     return events[0]
 
 
@@ -128,7 +138,9 @@ def _opened(path: Path) -> netCDF4.Dataset:
 
 def _names(group: Any, tag: str) -> list[str]:
     """Return the names of the waveforms of a tag, each channel's in the order of time."""
-    return sorted(name for name in group.variables if name != "StationXML" and fnmatchcase(_tag(name), tag))
+    return sorted(
+        name for name in group.variables if name != "StationXML" and fnmatchcase(_tag(name), tag)
+    )
 
 
 def _tag(name: str) -> str:
@@ -149,22 +161,30 @@ def _trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
     trace.stats.sampling_rate = float(waveform.sampling_rate)
     trace.stats.starttime = UTCDateTime(ns=int(waveform.starttime))
     stream_name = f"{identifier[:-1]}_{tag}"
-    if "corrected physical" in _said(file, "StreamSupplementalStats", stream_name).get("standard", {}).get(
-        "process_level", ""
-    ):
+    if "corrected physical" in _said(file, "StreamSupplementalStats", stream_name).get(
+        "standard", {}
+    ).get("process_level", ""):
         _describe_processed(file, trace, f"{identifier}_{tag}")
     return trace
 
 
 def _describe_processed(file: netCDF4.Dataset, trace: Trace, name: str) -> None:
     provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
-    units = _OUTPUT_UNITS.findall("" if provenance is None else provenance[:].tobytes().decode("utf-8", "replace"))
+    units = _OUTPUT_UNITS.findall(
+        "" if provenance is None else provenance[:].tobytes().decode("utf-8", "replace")
+    )
     if not units or units[-1] not in _UNITS:
-        raise RecordRejected(trace.id, f"its provenance gives {units[-1] if units else 'no unit'} as output_units")
+        raise RecordRejected(
+            trace.id, f"its provenance gives {units[-1] if units else 'no unit'} as output_units"
+        )
     trace.data = trace.data * _UNITS[units[-1]]
-    trace.stats.update({"units": "m/s2", "quantity": "acceleration", "processing_level": "processed"})
+    trace.stats.update(
+        {"units": "m/s2", "quantity": "acceleration", "processing_level": "processed"}
+    )
     corners = _said(file, "TraceProcessingParameters", name).get("corner_frequencies", {})
-    trace.stats.corners = AttribDict({key: corners[key] for key in ("highpass", "lowpass") if key in corners})
+    trace.stats.corners = AttribDict(
+        {key: corners[key] for key in ("highpass", "lowpass") if key in corners}
+    )
 
 
 def _said(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:

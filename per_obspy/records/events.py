@@ -14,9 +14,9 @@ from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceErro
 from per_obspy.files import written_whole
 from per_obspy.records import folder
 from per_obspy.records.asdf import is_asdf, read_asdf_event
-from per_obspy.records.foreign import foreign
-from per_obspy.records.providers import base_url
-from per_obspy.records.web import NotFound, answer, web_pool
+from per_obspy.records.fdsn.providers import base_url
+from per_obspy.records.fdsn.web import NotFound, answer, web_pool
+from per_obspy.records.obspy_readers import foreign
 
 #: how patiently a list of events is asked for: s, retries, s
 _PATIENCE = (60.0, 3, 1.0)
@@ -62,10 +62,11 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     Parameters
     ----------
     source : str
-        A file (QuakeML or GeoJSON), the URL of a GeoJSON feed, or an FDSN event service (base URL or ObsPy's name).
+        A file (QuakeML or GeoJSON), the URL of a GeoJSON feed, or an FDSN event service (base URL
+        or ObsPy's name).
     query : mapping
-        Parameters of the FDSN event service, such as ``starttime`` and ``minmagnitude``; files and feeds, which are
-        not asked, are listed whole.
+        Parameters of the FDSN event service, such as ``starttime`` and ``minmagnitude``; files and
+        feeds, which are not asked, are listed whole.
 
     Raises
     ------
@@ -82,7 +83,9 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         raise CatalogError(source, "no such file")
     else:
         url = f"{base_url(source)}/fdsnws/event/1/query"
-        rows = _rows_of_answer(url, _text_rows, answer(web_pool(*_PATIENCE), url, {**query, "format": "text"}))
+        rows = _rows_of_answer(
+            url, _text_rows, answer(web_pool(*_PATIENCE), url, {**query, "format": "text"})
+        )
     return sorted(rows, key=lambda row: row.time, reverse=True)
 
 
@@ -105,7 +108,7 @@ def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:
     Parameters
     ----------
     pool : urllib3.PoolManager
-        From :func:`per_obspy.records.web.web_pool`.
+        From :func:`per_obspy.records.fdsn.web.web_pool`.
     provider : str
         FDSN event service.
     event_id : str
@@ -120,7 +123,9 @@ def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:
     ServiceError
         If the service does not answer, or with something else.
     """
-    path = cache / f"event-{''.join(letter if letter.isalnum() else '-' for letter in event_id)}.xml"
+    path = (
+        cache / f"event-{''.join(letter if letter.isalnum() else '-' for letter in event_id)}.xml"
+    )
     if path.is_file():
         return path
     url = f"{base_url(provider)}/fdsnws/event/1/query"
@@ -135,7 +140,9 @@ def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:
         try:
             folder.read_event(part)
         except CatalogError as error:
-            raise ServiceError(f"{url}: answers with something else than the event: {error.problem}") from error
+            raise ServiceError(
+                f"{url}: answers with something else than the event: {error.problem}"
+            ) from error
     return path
 
 
@@ -153,7 +160,9 @@ def _rows_of_answer(url: str, rows: Any, content: bytes) -> list[EventRow]:
     try:
         found: list[EventRow] = rows(content)
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise ServiceError(f"{url}: answers with something else than a list of events: {_said(error)}") from error
+        raise ServiceError(
+            f"{url}: answers with something else than a list of events: {_said(error)}"
+        ) from error
     return found
 
 
@@ -165,7 +174,10 @@ def _feed_rows(content: bytes) -> list[EventRow]:
     """Return the rows of a GeoJSON feed: time in ms, depth in km."""
     rows = []
     for feature in json.loads(content)["features"]:
-        known, (longitude, latitude, *depth) = feature["properties"], feature["geometry"]["coordinates"]
+        known, (longitude, latitude, *depth) = (
+            feature["properties"],
+            feature["geometry"]["coordinates"],
+        )
         row = EventRow(
             event_id=feature["id"],
             time=_iso(UTCDateTime(known["time"] / 1000)),
@@ -184,7 +196,9 @@ def _text_rows(content: bytes) -> list[EventRow]:
     """Return the rows of the text format of fdsnws-event 1.2: depth in km, 13 columns and perhaps more."""
     if not content:
         return []
-    header, *lines = csv.reader(content.decode("utf-8").splitlines(), delimiter="|", quoting=csv.QUOTE_NONE)
+    header, *lines = csv.reader(
+        content.decode("utf-8").splitlines(), delimiter="|", quoting=csv.QUOTE_NONE
+    )
     if not header[0].lstrip("# ").startswith("EventID"):
         raise ValueError(f"the first line is {'|'.join(header):.80}")
     return [_text_row([cell.strip() for cell in line]) for line in lines if line]
@@ -210,7 +224,9 @@ def _quakeml_row(event: Event) -> EventRow:
         raise RecordRejected(str(event.resource_id), "has no origin")
     origin = event.preferred_origin() or event.origins[0]
     if None in (origin.time, origin.latitude, origin.longitude):
-        raise RecordRejected(str(event.resource_id), "has an origin without time, latitude or longitude")
+        raise RecordRejected(
+            str(event.resource_id), "has an origin without time, latitude or longitude"
+        )
     size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
     return EventRow(
         str(event.resource_id).rpartition("/")[2],

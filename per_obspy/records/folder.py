@@ -13,12 +13,17 @@ from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.archives import is_archive, members, open_file
-from per_obspy.records.foreign import foreign
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.processed import described
+from per_obspy.records.obspy_readers import foreign
+from per_obspy.records.processed_files import described
 
 #: what StationXML, FDSN station text, QuakeML and descriptions of processed records begin with
-_MARKS = {b"<FDSNStationXML": "inventory", b"#Network": "inventory", b"quakeml": "event", b'"shard": ': "description"}
+_MARKS = {
+    b"<FDSNStationXML": "inventory",
+    b"#Network": "inventory",
+    b"quakeml": "event",
+    b'"shard": ': "description",
+}
 
 
 class FolderContents(NamedTuple):
@@ -28,8 +33,8 @@ class FolderContents(NamedTuple):
     Attributes
     ----------
     stations : dict
-        ``"NET.STA"`` -> the files that hold records of the station, sorted; files in an archive as if it were a
-        folder.
+        ``"NET.STA"`` -> the files that hold records of the station, sorted; files in an archive as
+        if it were a folder.
     inventory : Inventory or None
         All StationXML, merged; None if there is none.
     rejected : tuple of Rejection
@@ -48,15 +53,17 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     Parameters
     ----------
     folder : str or Path
-        Any mixture of waveform files, in archives too, or a single file; StationXML among them is used, QuakeML is
-        passed over.
+        Any mixture of waveform files, in archives too, or a single file; StationXML among them is
+        used, QuakeML is passed over.
     stationxml : str or Path, optional
-        A StationXML file, or a folder of them, in addition. FDSN station text does where only coordinates are missing.
+        A StationXML file, or a folder of them, in addition. FDSN station text does where only
+        coordinates are missing.
 
     Raises
     ------
     CatalogError
-        If the folder is missing, empty or without any record, or the named StationXML cannot be read.
+        If the folder is missing, empty or without any record, or the named StationXML cannot be
+        read.
     """
     files, rejected = _files(Path(folder))
     kinds = {path: _kind(path) for path in files}
@@ -64,7 +71,10 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     for path in (path for path in files if kinds[path] == "record"):
         try:
             for station in sorted(
-                {f"{trace.stats.network}.{trace.stats.station}" for trace in _read(path, headonly=True)}
+                {
+                    f"{trace.stats.network}.{trace.stats.station}"
+                    for trace in _read(path, headonly=True)
+                }
             ):
                 stations[station].append(path)
         except RecordRejected as rejection:
@@ -105,7 +115,8 @@ def read_station(
     Returns
     -------
     stream : Stream
-        Traces in the words of ``formats/vocabulary.py``; each remembers its file in ``stats.source``.
+        Traces in the words of ``formats/vocabulary.py``; each remembers its file in
+        ``stats.source``.
     rejected : tuple of Rejection
         Files that cannot be read and traces whose metadata is insufficient; the rest goes on.
     """
@@ -145,7 +156,9 @@ def read_event(path: str | Path) -> Event:
     if not events[0].origins:
         raise CatalogError(str(path), f"the event {events[0].resource_id} has no origin")
     if (events[0].preferred_origin() or events[0].origins[0]).time is None:
-        raise CatalogError(str(path), f"the event {events[0].resource_id} has an origin without time")
+        raise CatalogError(
+            str(path), f"the event {events[0].resource_id} has an origin without time"
+        )
     return events[0]
 
 
@@ -154,7 +167,11 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     if not folder.exists():
         raise CatalogError(str(folder), "no such folder or file")
     files, rejected = [], []
-    for path in [folder] if folder.is_file() else sorted(path for path in folder.rglob("*") if path.is_file()):
+    for path in (
+        [folder]
+        if folder.is_file()
+        else sorted(path for path in folder.rglob("*") if path.is_file())
+    ):
         try:
             files += members(path) if is_archive(path) else [path]
         except RecordRejected as rejection:
@@ -197,7 +214,9 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
     try:
         return [_read_inventory(path) for path in paths]
     except RecordRejected as rejection:
-        raise CatalogError(rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}") from rejection
+        raise CatalogError(
+            rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}"
+        ) from rejection
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:

@@ -13,7 +13,7 @@ from obspy.core.inventory import Channel, Response, Station
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
-from per_obspy.formats.vocabulary import horizontal
+from per_obspy.formats.text.vocabulary import horizontal
 
 #: input unit of a response -> what the samples measure
 _QUANTITIES = {
@@ -32,7 +32,8 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     Parameters
     ----------
     trace : Trace
-        Read from a file. Header words that a format plugin filled are kept; gaps are filled from StationXML.
+        Read from a file. Header words that a format plugin filled are kept; gaps are filled from
+        StationXML.
     inventory : Inventory or None
         All the StationXML there is.
 
@@ -46,7 +47,9 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     if channel is not None:
         _describe(result, channel)
     elif "units" not in result.stats:
-        raise RecordRejected(trace.id, f"{_missing(trace, inventory)}, so what its samples measure is unknown")
+        raise RecordRejected(
+            trace.id, f"{_missing(trace, inventory)}, so what its samples measure is unknown"
+        )
     if not result.stats.get("coordinates"):
         _place_station(result, inventory)
     result.stats.update(_ground(result, inventory))
@@ -59,7 +62,9 @@ def _samples(trace: Trace) -> FloatArray:
     finite = np.isfinite(samples)
     if not finite.all():
         first = int(np.argmin(finite))
-        raise RecordRejected(trace.id, f"{np.sum(~finite)} samples are not finite, the first is sample {first + 1}")
+        raise RecordRejected(
+            trace.id, f"{np.sum(~finite)} samples are not finite, the first is sample {first + 1}"
+        )
     return samples
 
 
@@ -86,7 +91,9 @@ def _stations(trace: Trace, inventory: Inventory | None) -> Iterator[Station]:
     for network in inventory or ():
         if network.code == stats.network:
             yield from (
-                station for station in network if station.code == stats.station and station.is_active(stats.starttime)
+                station
+                for station in network
+                if station.code == stats.station and station.is_active(stats.starttime)
             )
 
 
@@ -109,7 +116,10 @@ def _station_facts(station: Station) -> dict[str, Any]:
 
 
 def _channel_facts(channel: Channel) -> dict[str, Any]:
-    facts = {name: getattr(channel, name) for name in ("latitude", "longitude", "elevation", "azimuth", "dip")}
+    facts = {
+        name: getattr(channel, name)
+        for name in ("latitude", "longitude", "elevation", "azimuth", "dip")
+    }
     return facts | {"sensitivity": _sensitivity(channel)}
 
 
@@ -127,11 +137,17 @@ def _describe(trace: Trace, channel: Channel) -> None:
     if stats.get("units", "counts") == "counts" and (stats.calib == 1 or _sensitivity(channel)):
         stats.response = _response(trace, channel)
         unit = stats.response.instrument_sensitivity.input_units
-        stats.update({"units": "counts", "quantity": _quantity(trace, unit), "processing_level": "raw"})
+        stats.update(
+            {"units": "counts", "quantity": _quantity(trace, unit), "processing_level": "raw"}
+        )
 
 
 def _place(site: Channel | Station) -> AttribDict:
-    return AttribDict(latitude=float(site.latitude), longitude=float(site.longitude), elevation=float(site.elevation))
+    return AttribDict(
+        latitude=float(site.latitude),
+        longitude=float(site.longitude),
+        elevation=float(site.elevation),
+    )
 
 
 def _direction(channel: Channel) -> dict[str, float]:
@@ -146,13 +162,17 @@ def _direction(channel: Channel) -> dict[str, float]:
 
 def _response(trace: Trace, channel: Channel) -> Response:
     if not _sensitivity(channel):
-        raise RecordRejected(trace.id, f"StationXML gives no sensitivity at {trace.stats.starttime}")
+        raise RecordRejected(
+            trace.id, f"StationXML gives no sensitivity at {trace.stats.starttime}"
+        )
     return channel.response
 
 
 def _quantity(trace: Trace, unit: str | None) -> str:
     if str(unit).upper() not in _QUANTITIES:
-        raise RecordRejected(trace.id, f"StationXML says that the instrument measures {unit!r}, not ground motion")
+        raise RecordRejected(
+            trace.id, f"StationXML says that the instrument measures {unit!r}, not ground motion"
+        )
     return _QUANTITIES[str(unit).upper()]
 
 
@@ -166,18 +186,30 @@ def _place_station(trace: Trace, inventory: Inventory | None) -> None:
 
 def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]:
     """Return what comments of the station say of its ground: ``site_class=`` any word, ``vs30=`` m/s."""
-    comments = (comment.value or "" for station in _stations(trace, inventory) for comment in station.comments)
-    said = {name.strip(): value.strip() for name, _, value in (text.partition("=") for text in comments)}
-    ground: dict[str, str | float] = {"site_class": said["site_class"]} if said.get("site_class") else {}
+    comments = (
+        comment.value or ""
+        for station in _stations(trace, inventory)
+        for comment in station.comments
+    )
+    said = {
+        name.strip(): value.strip() for name, _, value in (text.partition("=") for text in comments)
+    }
+    ground: dict[str, str | float] = (
+        {"site_class": said["site_class"]} if said.get("site_class") else {}
+    )
     if "vs30" not in said:
         return ground
     if not said["vs30"].replace(".", "", 1).isdecimal() or not float(said["vs30"]):
-        raise RecordRejected(trace.id, f"StationXML says vs30={said['vs30']}, which is no velocity in m/s")
+        raise RecordRejected(
+            trace.id, f"StationXML says vs30={said['vs30']}, which is no velocity in m/s"
+        )
     return ground | {"vs30": float(said["vs30"])}
 
 
 def metadata_text(inventory: Inventory) -> bytes:
     """Return the metadata as StationXML that is the same whenever and wherever it is written."""
     text = BytesIO()
-    Inventory(networks=inventory.networks, source="", created=UTCDateTime(0)).write(text, format="STATIONXML")
+    Inventory(networks=inventory.networks, source="", created=UTCDateTime(0)).write(
+        text, format="STATIONXML"
+    )
     return text.getvalue()

@@ -7,7 +7,12 @@ from pathlib import Path
 from obspy import Inventory, Stream, UTCDateTime
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.records.folder import FolderContents, merged_inventory, read_inventories, read_station
+from per_obspy.records.folder import (
+    FolderContents,
+    merged_inventory,
+    read_inventories,
+    read_station,
+)
 
 _DAY = 86400.0  # s
 
@@ -23,7 +28,8 @@ def find_sds_stations(
     archive : str or Path
         Folder with ``YEAR/NET/STA/CHAN.D/NET.STA.LOC.CHAN.D.YEAR.DAY`` below it.
     start, end : UTCDateTime
-        Time window, UTC. The day before it counts too, because a last block may reach over midnight.
+        Time window, UTC. The day before it counts too, because a last block may reach over
+        midnight.
     stationxml : str or Path, optional
         A StationXML file or a folder of them.
 
@@ -44,9 +50,13 @@ def find_sds_stations(
         network, station = path.name.split(".")[:2]
         stations[f"{network}.{station}"].append(path)
     if not stations:
-        raise CatalogError(str(folder), f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}")
+        raise CatalogError(
+            str(folder), f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}"
+        )
     inventory = merged_inventory([] if stationxml is None else read_inventories(Path(stationxml)))
-    return FolderContents({name: tuple(paths) for name, paths in sorted(stations.items())}, inventory, ())
+    return FolderContents(
+        {name: tuple(paths) for name, paths in sorted(stations.items())}, inventory, ()
+    )
 
 
 def _day_files(folder: Path, start: UTCDateTime, end: UTCDateTime) -> list[Path]:
@@ -57,7 +67,11 @@ def _day_files(folder: Path, start: UTCDateTime, end: UTCDateTime) -> list[Path]
 
 
 def read_sds_station(
-    paths: Iterable[Path], inventory: Inventory | None, station: str, start: UTCDateTime, end: UTCDateTime
+    paths: Iterable[Path],
+    inventory: Inventory | None,
+    station: str,
+    start: UTCDateTime,
+    end: UTCDateTime,
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Read one station's part of the window, as ``records.folder.read_station`` does.
@@ -66,5 +80,7 @@ def read_sds_station(
     """
     stream, rejected = read_station(paths, inventory, station, start, end)
     if not stream and not rejected:
-        rejected = (Rejection("station", station, "", None, (f"no samples from {start} to {end}",)),)
+        rejected = (
+            Rejection("station", station, "", None, (f"no samples from {start} to {end}",)),
+        )
     return stream, rejected

@@ -12,12 +12,12 @@ from per_obspy import config
 from per_obspy.errors import Rejection
 from per_obspy.progress import Progress, silent
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.columns import read_columns
 from per_obspy.records.events import read_event
-from per_obspy.records.fdsn import Fetched, fetch, fetched_stations
+from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
+from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import FolderContents, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
-from per_obspy.records.wanted import window
+from per_obspy.records.text_table import read_columns
 
 #: reads a station from its files, metadata and name, as ``records.folder.read_station`` does
 Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
@@ -92,7 +92,9 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
         for name, paths in found.stations.items():
             if name in stations:
                 reason = f"is also in {os.path.commonpath(stations[name].files)}, which comes first"
-                rejected.append(Rejection("station", name, os.path.commonpath(paths), None, (reason,)))
+                rejected.append(
+                    Rejection("station", name, os.path.commonpath(paths), None, (reason,))
+                )
                 continue
             stations[name] = Source(paths, _known(found.inventory, name), reader)
     return Sources(stations, event, tuple(rejected))
@@ -102,11 +104,18 @@ def input_files(records: config.Records | None, fetched: Fetched | None) -> list
     """Return every file that the result may depend on; of an SDS archive the day files of the window."""
     if records is None:
         return []
-    given = [records.folder, records.stationxml, records.event, *(table.file for table in records.columns)]
+    given = [
+        records.folder,
+        records.stationxml,
+        records.event,
+        *(table.file for table in records.columns),
+    ]
     given += [fetched.folder, fetched.event] if fetched else []
     given += [records.asdf.file] if records.asdf else []
     given += [records.shakemap, records.shakemap_uncertainty]
-    files = [path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])]
+    files = [
+        path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])
+    ]
     if records.sds:
         found, _ = _sds(records, records.sds, records.event)
         files += [path for paths in found.stations.values() for path in paths]
@@ -141,7 +150,9 @@ def _contents(
         yield fetched_stations(fetched), partial(read_station)
 
 
-def _sds(records: config.Records, sds: config.Sds, event: Path | None) -> tuple[FolderContents, Reader]:
+def _sds(
+    records: config.Records, sds: config.Sds, event: Path | None
+) -> tuple[FolderContents, Reader]:
     start, end = window(sds, read_event(event) if event else None)
     found = find_sds_stations(sds.folder, start, end, records.stationxml)
     return found, partial(read_sds_station, start=start, end=end)

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from scipy.stats import binom
 
 from per_obspy.files import written_whole
-from per_obspy.report.ranked import ranked
 from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, save
-from per_obspy.screening.evaluation import Evaluation, evaluation
+from per_obspy.screening.region.evaluation import Evaluation, evaluation
+from per_obspy.tables.risk import ranked
 
 
 def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
@@ -24,7 +24,8 @@ def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
     Parameters
     ----------
     risk : Path
-        Parquet file of the risk table; only with a column ``observed`` there is something to compare.
+        Parquet file of the risk table; only with a column ``observed`` there is something to
+        compare.
     folder : Path
         For ``evaluation.json`` and, where there are probabilities, ``figures/reliability.png``.
     simulated : bool
@@ -55,14 +56,18 @@ def _observed(risk: Path) -> pd.DataFrame:
     names = ["observed", "state", "probability"]
     if "observed" not in pq.read_schema(risk).names:
         return pd.DataFrame(columns=names)
-    return pd.concat([piece[piece["observed"].notna()] for piece in ranked(risk, names)], ignore_index=True)
+    return pd.concat(
+        [piece[piece["observed"].notna()] for piece in ranked(risk, names)], ignore_index=True
+    )
 
 
 def _plain(found: Evaluation) -> dict[str, Any]:
     """Return the numbers as JSON knows them: null for a share of nothing."""
     values = found._asdict()
     bins = values.pop("reliability").to_dict("records")
-    return {name: None if math.isnan(value) else value for name, value in values.items()} | {"reliability": bins}
+    return {name: None if math.isnan(value) else value for name, value in values.items()} | {
+        "reliability": bins
+    }
 
 
 def draw_reliability(found: Evaluation, path: Path, simulated: bool) -> None:
@@ -92,17 +97,34 @@ def _draw_shares(axes: Axes, found: Evaluation) -> None:
     mean, events = bins["mean_probability"].to_numpy(), bins["events"].to_numpy()
     low, high = binom.interval(0.95, events, mean) / events
     axes.plot([0.0, 1.0], [0.0, 1.0], color=MOTION_COLOUR, linewidth=0.8, label="as predicted")
-    axes.vlines(mean, low, high, color="#BBBBBB", linewidth=6.0, label="19 of 20, if true and independent")
+    axes.vlines(
+        mean, low, high, color="#BBBBBB", linewidth=6.0, label="19 of 20, if true and independent"
+    )
     share = found.pounded / found.pairs
-    axes.axhline(share, color=MOTION_COLOUR, linewidth=0.8, linestyle=":", label=f"observed share, {share:.2f}")
+    axes.axhline(
+        share,
+        color=MOTION_COLOUR,
+        linewidth=0.8,
+        linestyle=":",
+        label=f"observed share, {share:.2f}",
+    )
     axes.plot(mean, bins["observed_share"], "o", color=BUILDING_COLOURS[0], label="observed")
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), ylabel="observed share of pounding")
-    scores = f"Brier score {found.brier_score:.3f} (share alone {found.brier_score_of_the_share:.3f})"
+    scores = (
+        f"Brier score {found.brier_score:.3f} (share alone {found.brier_score_of_the_share:.3f})"
+    )
     axes.set_title(f"{found.pairs} pairs looked at, {found.pounded} pounded\n{scores}", fontsize=11)
 
 
 def _draw_counts(axes: Axes, bins: pd.DataFrame) -> None:
     axes.bar(
-        bins["low"], bins["events"], width=bins["high"] - bins["low"], align="edge", color="#BBBBBB", edgecolor="white"
+        bins["low"],
+        bins["events"],
+        width=bins["high"] - bins["low"],
+        align="edge",
+        color="#BBBBBB",
+        edgecolor="white",
     )
-    axes.set(xlabel="predicted probability of pounding", ylabel="pairs", yscale="log", ylim=(0.5, None))
+    axes.set(
+        xlabel="predicted probability of pounding", ylabel="pairs", yscale="log", ylim=(0.5, None)
+    )

@@ -76,7 +76,9 @@ def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
 def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     """Draw the largest energy circle of each building, their centres separated by the gap (the paper's Fig. 4)."""
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    drawn = zip(BUILDING_COLOURS, (0.0, pair["gap"]), ("-", "--"), strict=True)  # dashes: equal ones touch all around
+    drawn = zip(
+        BUILDING_COLOURS, (0.0, pair["gap"]), ("-", "--"), strict=True
+    )  # dashes: equal ones touch all around
     for i, (colour, centre, line) in enumerate(drawn, start=1):
         radius = pair[f"participation_{i}"] * pair[f"per_{i}"]
         x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
@@ -118,8 +120,12 @@ def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     for state in ("no", "possible", "yes"):
         chosen = table[table["state"] == state]
         label = f"{len(chosen)} pairs: {state}"
-        axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=STATE_COLOURS[state], label=label)
-    axes.scatter(spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations")
+        axes.scatter(
+            chosen["longitude"], chosen["latitude"], s=5, color=STATE_COLOURS[state], label=label
+        )
+    axes.scatter(
+        spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations"
+    )
     axes.set_aspect(1.0 / np.cos(np.radians(float(table["latitude"].mean()))))
     axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)", title="pounding")
     axes.locator_params(nbins=6)
@@ -139,7 +145,9 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
     axes.legend(fontsize=8)
 
 
-def _from_zero(set_scale: Callable[..., object], set_limits: Callable[..., object], axis: Axis, largest: float) -> None:
+def _from_zero(
+    set_scale: Callable[..., object], set_limits: Callable[..., object], axis: Axis, largest: float
+) -> None:
     """Make an axis linear up to 1, or a tenth of what is largest on it if that is less, and logarithmic beyond."""
     linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
     set_scale("symlog", linthresh=linear)

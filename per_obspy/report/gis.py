@@ -36,7 +36,8 @@ def write_pairs_layer(
     Parameters
     ----------
     tables : iterable of DataFrame
-        The risk table, in one piece or in several with the same columns; only one is held at a time.
+        The risk table, in one piece or in several with the same columns; only one is held at a
+        time.
     classes : sequence of str
         Names of the risk classes, worst first.
     path : Path
@@ -52,7 +53,10 @@ def write_pairs_layer(
 
 
 def write_totals_layer(
-    totals: pd.DataFrame, outlines: Sequence[FloatArray] | None, path: Path, facts: Mapping[str, str]
+    totals: pd.DataFrame,
+    outlines: Sequence[FloatArray] | None,
+    path: Path,
+    facts: Mapping[str, str],
 ) -> None:
     """
     Write totals as the polygons of their cells, or as points in the middle of their pairs; whole or not at all.
@@ -60,10 +64,10 @@ def write_totals_layer(
     Parameters
     ----------
     totals : DataFrame
-        From :func:`per_obspy.screening.totals.totals`.
+        From :func:`per_obspy.screening.region.totals.totals`.
     outlines : sequence of ndarray, or None
-        Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None for areas whose
-        outline nobody gave.
+        Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
+        for areas whose outline nobody gave.
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
@@ -78,7 +82,12 @@ def write_totals_layer(
 
 
 def _write(
-    path: Path, layer: str, shapes: NDArray[np.object_], table: pd.DataFrame, append: bool, facts: Mapping[str, str]
+    path: Path,
+    layer: str,
+    shapes: NDArray[np.object_],
+    table: pd.DataFrame,
+    append: bool,
+    facts: Mapping[str, str],
 ) -> None:
     polygons = (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any()
     pyogrio.raw.write_arrow(
@@ -90,7 +99,10 @@ def _write(
         layer=layer,
         append=append,
         driver="GPKG",
-        layer_options={"GEOMETRY_NAME": GEOMETRY, "DESCRIPTION": "; ".join(f"{k}: {v}" for k, v in facts.items())},
+        layer_options={
+            "GEOMETRY_NAME": GEOMETRY,
+            "DESCRIPTION": "; ".join(f"{k}: {v}" for k, v in facts.items()),
+        },
     )
 
 
@@ -99,8 +111,13 @@ def _with_shapes(table: pd.DataFrame, shapes: NDArray[np.object_]) -> pa.Table:
     plain = table.copy(deep=False)
     plain.attrs = {}
     arrow = pa.Table.from_pandas(plain, preserve_index=False)
-    kinds = [pa.field(one.name, pa.string()) if pa.types.is_null(one.type) else one for one in arrow.schema]
-    return arrow.cast(pa.schema(kinds)).append_column(GEOMETRY, pa.array(shapely.to_wkb(shapes), pa.binary()))
+    kinds = [
+        pa.field(one.name, pa.string()) if pa.types.is_null(one.type) else one
+        for one in arrow.schema
+    ]
+    return arrow.cast(pa.schema(kinds)).append_column(
+        GEOMETRY, pa.array(shapely.to_wkb(shapes), pa.binary())
+    )
 
 
 def _write_style(path: Path, layer: str, style: str) -> None:
@@ -110,9 +127,13 @@ def _write_style(path: Path, layer: str, style: str) -> None:
         "styleName": "risk class", "styleQML": style, "styleSLD": "", "description": "colour by risk class",
         "owner": "", "ui": "",
     }  # fmt: skip
-    columns: dict[str, NDArray[Any]] = {name: np.array([text], dtype=object) for name, text in texts.items()}
+    columns: dict[str, NDArray[Any]] = {
+        name: np.array([text], dtype=object) for name, text in texts.items()
+    }
     columns["useAsDefault"] = np.array([True])
-    columns["update_time"] = np.array([datetime.now(UTC).replace(tzinfo=None)], dtype="datetime64[ms]")
+    columns["update_time"] = np.array(
+        [datetime.now(UTC).replace(tzinfo=None)], dtype="datetime64[ms]"
+    )
     pyogrio.raw.write(
         path,
         None,
@@ -130,13 +151,22 @@ def class_style(classes: Sequence[str]) -> str:
     """Return a QGIS style (QML): one mark a risk class, the worst largest, and the worst pairs drawn on top."""
     root = ElementTree.Element("qgis", version="3.28.0", styleCategories="Symbology")
     renderer = ElementTree.SubElement(
-        root, "renderer-v2", type="categorizedSymbol", attr="risk_class", enableorderby="1", symbollevels="0"
+        root,
+        "renderer-v2",
+        type="categorizedSymbol",
+        attr="risk_class",
+        enableorderby="1",
+        symbollevels="0",
     )
-    categories, symbols = (ElementTree.SubElement(renderer, name) for name in ("categories", "symbols"))
+    categories, symbols = (
+        ElementTree.SubElement(renderer, name) for name in ("categories", "symbols")
+    )
     colours = LinearSegmentedColormap.from_list("risk", list(STATE_COLOURS.values()))
     for number, name in enumerate(classes):
         share = number / max(len(classes) - 1, 1)
-        ElementTree.SubElement(categories, "category", value=name, label=name, symbol=str(number), render="true")
+        ElementTree.SubElement(
+            categories, "category", value=name, label=name, symbol=str(number), render="true"
+        )
         _add_mark(symbols, number, to_hex(colours(share)), LARGEST + share * (SMALLEST - LARGEST))
     order = ElementTree.SubElement(
         ElementTree.SubElement(renderer, "orderby"), "orderByClause", asc="0", nullsFirst="0"
@@ -150,7 +180,9 @@ def class_style(classes: Sequence[str]) -> str:
 
 def _add_mark(symbols: ElementTree.Element, number: int, colour: str, size: float) -> None:
     red, green, blue = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
-    symbol = ElementTree.SubElement(symbols, "symbol", type="marker", name=str(number), alpha="1", clip_to_extent="1")
+    symbol = ElementTree.SubElement(
+        symbols, "symbol", type="marker", name=str(number), alpha="1", clip_to_extent="1"
+    )
     layer = ElementTree.SubElement(
         symbol, "layer", {"class": "SimpleMarker", "enabled": "1", "locked": "0", "pass": "0"}
     )

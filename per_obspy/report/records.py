@@ -14,9 +14,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.checks import FloatArray
 from per_obspy.files import written_whole
-from per_obspy.processing.noise import noise_spectra
-from per_obspy.report.processed import COLUMNS
+from per_obspy.processing.noise.signal_to_noise import noise_spectra
 from per_obspy.report.style import BUILDING_COLOURS, DOTS_PER_INCH, MOTION_COLOUR, STATE_COLOURS
+from per_obspy.tables.processed import COLUMNS
 
 BEFORE_COLOUR = "#BBBBBB"
 PAGE = (11.7, 8.3)  # inches: A4, landscape
@@ -81,11 +81,26 @@ def _draw_motion(figure: Any, processed: Any, before: Any) -> None:
         shown = _without_pads(processed, after)
         if was is not None:
             axes.plot(
-                np.arange(was.size) * dt, was, color=BEFORE_COLOUR, label="before", linewidth=0.7, rasterized=True
+                np.arange(was.size) * dt,
+                was,
+                color=BEFORE_COLOUR,
+                label="before",
+                linewidth=0.7,
+                rasterized=True,
             )
-        axes.plot(np.arange(shown.size) * dt, shown, color=BUILDING_COLOURS[0], linewidth=0.7, rasterized=True)
+        axes.plot(
+            np.arange(shown.size) * dt,
+            shown,
+            color=BUILDING_COLOURS[0],
+            linewidth=0.7,
+            rasterized=True,
+        )
         peak = float(np.abs(shown).max())
-        axes.set(ylim=(-ROOM * peak, ROOM * peak), ylabel=f"{name} ({unit})", title=f"peak {peak:.3g} {unit}")
+        axes.set(
+            ylim=(-ROOM * peak, ROOM * peak),
+            ylabel=f"{name} ({unit})",
+            title=f"peak {peak:.3g} {unit}",
+        )
         axes.axvspan(0.0, onset, color=STATE_COLOURS["possible"], alpha=0.15, linewidth=0)
         axes.grid(alpha=0.25)
         after = cumulative_trapezoid(after, dx=dt, initial=0)
@@ -98,18 +113,40 @@ def _draw_amplitudes(axes: Axes, processed: Any, before: Any) -> None:
     record = _without_pads(processed, processed.data)
     length = next_fast_len(record.size, real=True)
     lines = rfftfreq(length, dt)[1:]
-    axes.loglog(lines, dt * np.abs(rfft(record, length))[1:], color=BEFORE_COLOUR, linewidth=0.4, rasterized=True)
+    axes.loglog(
+        lines,
+        dt * np.abs(rfft(record, length))[1:],
+        color=BEFORE_COLOUR,
+        linewidth=0.4,
+        rasterized=True,
+    )
     if before is not None and chosen.get("noise"):
         spectra = noise_spectra(before.data, dt, float(chosen.noise))
         known = spectra.frequencies >= 1 / (record.size * dt)
         frequencies = spectra.frequencies[known]
-        axes.loglog(frequencies, spectra.signal[known], color=BUILDING_COLOURS[0], label="signal before the filter")
-        axes.loglog(frequencies, spectra.noise[known], color=STATE_COLOURS["possible"], label="noise")
+        axes.loglog(
+            frequencies,
+            spectra.signal[known],
+            color=BUILDING_COLOURS[0],
+            label="signal before the filter",
+        )
+        axes.loglog(
+            frequencies, spectra.noise[known], color=STATE_COLOURS["possible"], label="noise"
+        )
     for name in ("highpass", "lowpass"):
-        axes.axvline(chosen[name], color=STATE_COLOURS["yes"], linestyle="--", label=f"{name} {chosen[name]:.3g} Hz")
+        axes.axvline(
+            chosen[name],
+            color=STATE_COLOURS["yes"],
+            linestyle="--",
+            label=f"{name} {chosen[name]:.3g} Hz",
+        )
     usable = 1 / chosen.longest_period, 1 / chosen.shortest_period
     axes.axvspan(*usable, color=STATE_COLOURS["no"], alpha=0.1, linewidth=0, label="usable")
-    axes.set(xlabel="frequency (Hz)", ylabel="Fourier amplitude (m/s)", xlim=(1 / (record.size * dt), 0.5 / dt))
+    axes.set(
+        xlabel="frequency (Hz)",
+        ylabel="Fourier amplitude (m/s)",
+        xlim=(1 / (record.size * dt), 0.5 / dt),
+    )
     axes.grid(which="both", alpha=0.2)
     axes.legend(fontsize=7, loc="lower center")
 
@@ -122,4 +159,6 @@ def _write_numbers(axes: Axes, processed: Any) -> None:
         text = f"{value:.4g} {unit}" if isinstance(value, float) else str(value)
         lines += textwrap.wrap(f"{name.replace('_', ' ')}: {text}", 68, subsequent_indent="    ")
     axes.set_axis_off()
-    axes.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8, family="monospace", color=MOTION_COLOUR)
+    axes.text(
+        0.0, 1.0, "\n".join(lines), va="top", fontsize=8, family="monospace", color=MOTION_COLOUR
+    )

@@ -48,12 +48,16 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         axes.set_xlabel("natural period (s)")
         axes.grid(which="both", alpha=0.25)
         axes.legend(fontsize=8)
-    title = f"{station['station'].item()}, damping {float(chosen['damping']):.0%}, usable periods only"
+    title = (
+        f"{station['station'].item()}, damping {float(chosen['damping']):.0%}, usable periods only"
+    )
     figure.suptitle(title)
     save(figure, path, station.attrs["simulated"] == "true")
 
 
-def draw_state_space(acceleration: ArrayLike, dt: float, period: float, damping: float, path: Path) -> None:
+def draw_state_space(
+    acceleration: ArrayLike, dt: float, period: float, damping: float, path: Path
+) -> None:
     """
     Draw the motion of one oscillator in the plane of displacement and velocity over frequency, and its PER circle.
 
@@ -81,7 +85,9 @@ def draw_state_space(acceleration: ArrayLike, dt: float, period: float, damping:
     save(figure, path, simulated=False)
 
 
-def add_state_space(axes: Axes, displacement: FloatArray, velocity: FloatArray, period: float) -> None:
+def add_state_space(
+    axes: Axes, displacement: FloatArray, velocity: FloatArray, period: float
+) -> None:
     """
     Add the motion of one oscillator in the state space, and its PER circle.
 
@@ -102,7 +108,9 @@ def add_state_space(axes: Axes, displacement: FloatArray, velocity: FloatArray, 
     axes.set(xlabel="displacement (m)", ylabel="velocity / frequency (m)")
 
 
-def add_circle(axes: Axes, radius: float, colour: str, label: str, centre: float = 0.0, style: str = "-") -> None:
+def add_circle(
+    axes: Axes, radius: float, colour: str, label: str, centre: float = 0.0, style: str = "-"
+) -> None:
     """
     Add a circle of constant energy to a state space.
 
@@ -116,4 +124,10 @@ def add_circle(axes: Axes, radius: float, colour: str, label: str, centre: float
         Of its line.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    axes.plot(centre + radius * np.cos(angle), radius * np.sin(angle), color=colour, linestyle=style, label=label)
+    axes.plot(
+        centre + radius * np.cos(angle),
+        radius * np.sin(angle),
+        color=colour,
+        linestyle=style,
+        label=label,
+    )

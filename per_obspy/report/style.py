@@ -20,6 +20,14 @@ def save(figure: Figure, path: Path, simulated: bool) -> None:
     """Write a figure as PNG, whole or not at all; simulated motion is said on it."""
     if simulated:
         figure.set_layout_engine("constrained", rect=(0.0, 0.05, 1.0, 0.95))
-        figure.text(0.99, 0.01, "simulated ground motion", ha="right", va="bottom", fontsize=9, color="#AA0000")
+        figure.text(
+            0.99,
+            0.01,
+            "simulated ground motion",
+            ha="right",
+            va="bottom",
+            fontsize=9,
+            color="#AA0000",
+        )
     with written_whole(path) as part:
         figure.savefig(part, dpi=DOTS_PER_INCH)

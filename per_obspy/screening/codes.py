@@ -1,10 +1,11 @@
 """
 What building codes and screening procedures ask of a gap, beside the estimate.
 
-Clause, edition, inputs and source of every rule stand in ``code_rules.csv``, and whether its form was verified against
-a page that quotes it; the names of the others end in ``_unverified``. No rule here was compared with the code's own
-printed text. A code means its own inelastic design displacement; where the displacement of an event's elastic spectrum
-stands in for it, the name of the column says ``event_based``. A cell is empty where the rule lacks an input.
+Clause, edition, inputs and source of every rule stand in ``code_rules.csv``, and whether its form
+was verified against a page that quotes it; the names of the others end in ``_unverified``. No rule
+here was compared with the code's own printed text. A code means its own inelastic design
+displacement; where the displacement of an event's elastic spectrum stands in for it, the name of
+the column says ``event_based``. A cell is empty where the rule lacks an input.
 """
 
 from importlib.resources import files
@@ -29,7 +30,12 @@ NTC_SHARE = {"I": 0.001, "II": 0.003, "III": 0.006}
 GB_STEP = {6: 5.0, 7: 4.0, 8: 3.0, 9: 2.0}
 
 #: Gap for every storey of the shorter building, m, by seismicity (FEMA P-154, level 1; unverified).
-FEMA_GAP = {"very_high": 2.0 * INCH, "high": 1.5 * INCH, "moderately_high": 1.0 * INCH, "lower": 0.5 * INCH}
+FEMA_GAP = {
+    "very_high": 2.0 * INCH,
+    "high": 1.5 * INCH,
+    "moderately_high": 1.0 * INCH,
+    "lower": 0.5 * INCH,
+}
 
 #: Heights closer than this count as equal, m.
 SAME_HEIGHT = 0.01
@@ -75,7 +81,8 @@ def code_columns(
     Parameters
     ----------
     pairs : DataFrame
-        Completed pair table; a column ``ntc_zone`` (I, II, III) goes before the setting of that name.
+        Completed pair table; a column ``ntc_zone`` (I, II, III) goes before the setting of that
+        name.
     displacement_1, displacement_2 : (n_pairs,) array_like
         Elastic displacement of each building at contact height in the event, m.
     codes : Codes
@@ -98,8 +105,10 @@ def code_columns(
         "required_gap_gb50011_2010": _gb50011(pair, codes),
         "required_gap_gem": 0.04 * pair.lower_height,
         "required_gap_tbdy2018_event_based_unverified": _tbdy2018(pair),
-        "required_gap_ec8_event_based_unverified": np.hypot(*pair.displacement) * np.where(pair.aligned, 0.7, 1.0),
-        "required_gap_is1893_event_based_unverified": np.add(*pair.displacement) * np.where(pair.aligned, 0.5, 1.0),
+        "required_gap_ec8_event_based_unverified": np.hypot(*pair.displacement)
+        * np.where(pair.aligned, 0.7, 1.0),
+        "required_gap_is1893_event_based_unverified": np.add(*pair.displacement)
+        * np.where(pair.aligned, 0.5, 1.0),
         "required_gap_e030_unverified": np.maximum(0.006 * pair.lower_height, 0.03),
         "required_gap_fema_p154_unverified": _fema_gap(pair, codes),
         "fema_p154_flags_unverified": _fema_flags(pair, codes),
@@ -108,14 +117,24 @@ def code_columns(
     return pd.DataFrame(columns, index=pairs.index)
 
 
-def _pair(pairs: pd.DataFrame, displacement_1: ArrayLike, displacement_2: ArrayLike, codes: Codes) -> _Pair:
+def _pair(
+    pairs: pd.DataFrame, displacement_1: ArrayLike, displacement_2: ArrayLike, codes: Codes
+) -> _Pair:
     displacement = (
         checks.not_negative("displacement_1", displacement_1),
         checks.not_negative("displacement_2", displacement_2),
     )
     height_1, height_2, storeys_1, storeys_2, gap, contact_height, floors = (
         pairs[name].to_numpy(np.float64)
-        for name in ("height_1", "height_2", "storeys_1", "storeys_2", "gap", "contact_height", "floor_offset")
+        for name in (
+            "height_1",
+            "height_2",
+            "storeys_1",
+            "storeys_2",
+            "gap",
+            "contact_height",
+            "floor_offset",
+        )
     )
     aligned = np.abs(floors) <= codes.floor_tolerance
     system_1, system_2 = pairs["system_1"].to_numpy(object), pairs["system_2"].to_numpy(object)
@@ -139,12 +158,18 @@ def _pair(pairs: pd.DataFrame, displacement_1: ArrayLike, displacement_2: ArrayL
 def _zone_share(pairs: pd.DataFrame, codes: Codes) -> FloatArray:
     """Return the share of the height that NTC 2004 adds in the pair's zone, NaN where the zone is unknown."""
     region = pd.Series(codes.ntc_zone, index=pairs.index, dtype=object)
-    zone = pairs["ntc_zone"].where(pairs["ntc_zone"].isin(list(NTC_SHARE)), region) if "ntc_zone" in pairs else region
+    zone = (
+        pairs["ntc_zone"].where(pairs["ntc_zone"].isin(list(NTC_SHARE)), region)
+        if "ntc_zone" in pairs
+        else region
+    )
     return np.asarray(zone.map(NTC_SHARE), dtype=np.float64)
 
 
 def _ntc2004(pair: _Pair, share: FloatArray) -> FloatArray:
-    first, second = (np.maximum(0.05, side + share * pair.contact_height) for side in pair.displacement)
+    first, second = (
+        np.maximum(0.05, side + share * pair.contact_height) for side in pair.displacement
+    )
     gap: FloatArray = np.where(pair.alike, 0.5, 1.0) * (first + second)
     return gap
 
@@ -157,7 +182,9 @@ def _gb50011(pair: _Pair, codes: Codes) -> FloatArray:
 
 def _tbdy2018(pair: _Pair) -> FloatArray:
     least = 0.03 + 0.01 * _started(pair.lower_height - 6.0, 3.0)
-    gap: FloatArray = np.maximum(least, np.where(pair.aligned, 0.25, 0.5) * np.add(*pair.displacement))
+    gap: FloatArray = np.maximum(
+        least, np.where(pair.aligned, 0.25, 0.5) * np.add(*pair.displacement)
+    )
     return gap
 
 

@@ -10,7 +10,9 @@ from per_obspy.screening.codes import rule_columns
 
 
 def _both(name: str, unit: str, meaning: str) -> tuple[Column, Column]:
-    first, second = (Column(f"{name}_{i}", "float64", unit, f"building {i}: {meaning}") for i in (1, 2))
+    first, second = (
+        Column(f"{name}_{i}", "float64", unit, f"building {i}: {meaning}") for i in (1, 2)
+    )
     return first, second
 
 

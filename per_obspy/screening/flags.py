@@ -11,15 +11,18 @@ from per_obspy.inventory.naming import joined_names
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.values import Table, both, number, values
 
-#: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it under-predicts
-#: by more than 1 % in up to 43 % of the cases at small gaps, equal masses, broad-band records.
+#: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it
+#: under-predicts by more than 1 % in up to 43 % of the cases at small gaps, equal masses,
+#: broad-band records.
 UNRELIABLE_SINGLE_HIT = 0.6
 
 
 def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
     """Return which pairs have a period that was derived from height or storeys."""
     derived = np.asarray(pairs["derived"], dtype=object).tolist()
-    told = {names: "period_1" in names or "period_2" in names for names in set(derived)}  # few, of many rows
+    told = {
+        names: "period_1" in names or "period_2" in names for names in set(derived)
+    }  # few, of many rows
     return np.fromiter(map(told.__getitem__, derived), bool, len(derived))
 
 
@@ -40,10 +43,15 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def raised_by_record(table: Table, station: xr.Dataset, screening: Screening) -> dict[str, NDArray[np.bool_]]:
+def raised_by_record(
+    table: Table, station: xr.Dataset, screening: Screening
+) -> dict[str, NDArray[np.bool_]]:
     """Return for every flag of the record the rows that raise it."""
     periods, per, sd = (np.stack(both(table, name)) for name in ("period", "per", "sd"))
-    shortest, longest = number(station, "shortest_usable_period"), number(station, "longest_usable_period")
+    shortest, longest = (
+        number(station, "shortest_usable_period"),
+        number(station, "longest_usable_period"),
+    )
     every = np.ones(periods.shape[1], dtype=bool)
     crossed = "motion_from_other_site_class"
     return {

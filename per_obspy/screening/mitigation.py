@@ -1,27 +1,29 @@
 """
 What would have kept a pair from pounding, or from harm: more gap, more damping, or a softer contact.
 
-Added damping and bumpers are estimates. The critical gap, eq. (15) and (16), follows the added damping on the station's
-stored spectra, scaled to the pair's own radii, and above the stored dampings on their last slope; it is scaled to the
-demand that decides, so that a pair whose gap is enough needs nothing. A bumper is judged by the single hit. A building
-that yields is its equivalent linear one, whose period and damping are not followed as damping is added.
+Added damping and bumpers are estimates. The critical gap, eq. (15) and (16), follows the added
+damping on the station's stored spectra, scaled to the pair's own radii, and above the stored
+dampings on their last slope; it is scaled to the demand that decides, so that a pair whose gap is
+enough needs nothing. A bumper is judged by the single hit. A building that yields is its equivalent
+linear one, whose period and damping are not followed as damping is added.
 """
 
 import numpy as np
 import xarray as xr
 
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.added_damping import least_dampings
-from per_obspy.pounding.correlation import ddc_correlation
-from per_obspy.pounding.gap import critical_gap, srss_gap
-from per_obspy.pounding.restitution import required_restitution
+from per_obspy.kernels.pairs.added_damping import least_dampings
+from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.critical_gap import critical_gap, srss_gap
+from per_obspy.pounding.mitigation.bumpers import required_restitution
+from per_obspy.screening.by_record.stored_spectra import azimuth_row, log_spectra, stored_log
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.stored import azimuth_row, log_spectra, stored_log
 from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, values
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4
-#: Critical gap / sum of the radii below which it is the difference of equal numbers: then they count as uncorrelated.
+#: Critical gap / sum of the radii below which it is the difference of equal numbers: then they
+#: count as uncorrelated.
 ROUND_OFF = 1e-12
 
 
@@ -34,7 +36,8 @@ def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: 
     station : Dataset
         The record, with its stored spectra.
     table : Table
-        Rows of the risk table with demand, radii and the columns of :func:`~.yielding.linearized_columns`.
+        Rows of the risk table with demand, radii and the columns of
+        :func:`~.yielding.linearized_columns`.
     target_amplification : float
         Largest admissible PER after a single hit / before, at least 1, dimensionless.
 
@@ -69,7 +72,10 @@ def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: 
 
 def _supplemental_damping(station: xr.Dataset, table: Table) -> FloatArray:
     """Return the least equal damping to add to pairs that pound and do not touch; NaN where none is enough."""
-    (period_1, period_2), (damping_1, damping_2) = both(table, "equivalent_period"), both(table, "equivalent_damping")
+    (period_1, period_2), (damping_1, damping_2) = (
+        both(table, "equivalent_period"),
+        both(table, "equivalent_damping"),
+    )
     radii = at_contact(table, "equivalent_per")
     correlated = critical_gap(*radii, ddc_correlation(period_1, damping_1, period_2, damping_2))
     alone = np.asarray(table["demand_rule"] == "srss") | (correlated <= ROUND_OFF * np.add(*radii))
@@ -85,7 +91,10 @@ def _supplemental_damping(station: xr.Dataset, table: Table) -> FloatArray:
         axis=1,
     )
     spectra, row = log_spectra(station), azimuth_row(station, table)[:, None]
-    stored = [stored_log(spectra, row, np.log(period)[:, None], spectra.dampings) for period in (period_1, period_2)]
+    stored = [
+        stored_log(spectra, row, np.log(period)[:, None], spectra.dampings)
+        for period in (period_1, period_2)
+    ]
     added = np.empty(len(pairs))
     least_dampings(spectra.dampings, np.stack(stored, axis=1), pairs, LARGEST_DAMPING, added)
     return added
@@ -95,11 +104,14 @@ def _bumper_restitution(table: Table, target_amplification: float) -> FloatArray
     """
     Return the largest restitution that keeps the amplifications of pairs that pound within the target.
 
-    The critical gap of the single hit is the larger of the estimated demand and the one that decides.
+    The critical gap of the single hit is the larger of the estimated demand and the one that
+    decides.
     """
     names = ["demand", "critical_gap_per", "critical_gap_record", "critical_gap_linearized"]
     critical = np.max([*(values(table, name) for name in names)], axis=0)
-    critical = np.where(period_is_derived(table), np.maximum(critical, values(table, "srss_gap")), critical)
+    critical = np.where(
+        period_is_derived(table), np.maximum(critical, values(table, "srss_gap")), critical
+    )
     return required_restitution(
         *at_contact(table, "equivalent_per"),
         *both(table, "equivalent_period"),

@@ -10,7 +10,14 @@ from per_obspy.checks import FloatArray
 STATES = {"yes": 0, "possible": 1, "no": 2}
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
-KEYS = ("order_state", "order_probability", "order_velocity", "order_ratio", "order_importance", "order_occupants")
+KEYS = (
+    "order_state",
+    "order_probability",
+    "order_velocity",
+    "order_ratio",
+    "order_importance",
+    "order_occupants",
+)
 
 
 def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
@@ -23,7 +30,9 @@ def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.objec
     ['high', 'high', 'low', 'low']
     """
     names = np.array(list(classes), dtype=object)
-    index = np.searchsorted(np.array(list(classes.values())), np.nan_to_num(ratio, nan=np.inf), side="left")
+    index = np.searchsorted(
+        np.array(list(classes.values())), np.nan_to_num(ratio, nan=np.inf), side="left"
+    )
     chosen: NDArray[np.object_] = names[np.minimum(index, names.size - 1)]
     return chosen
 
@@ -41,8 +50,9 @@ def in_order(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
 
     Notes
     -----
-    The order is by state, probability, impact velocity and ratio gap / demand; ties are broken by importance,
-    occupants and at last the name, so that it does not depend on the order in which pairs were computed.
+    The order is by state, probability, impact velocity and ratio gap / demand; ties are broken by
+    importance, occupants and at last the name, so that it does not depend on the order in which
+    pairs were computed.
     """
     keys = _order_keys(table, velocity)
     worst = np.stack(list(keys.values()))
@@ -68,10 +78,14 @@ def _order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArra
     return dict(zip(KEYS, keys, strict=True))
 
 
-def _ties_by_name(order: NDArray[np.intp], worst: FloatArray, names: NDArray[np.object_]) -> NDArray[np.intp]:
+def _ties_by_name(
+    order: NDArray[np.intp], worst: FloatArray, names: NDArray[np.object_]
+) -> NDArray[np.intp]:
     """Return the order with rows that are equally bad by name; names are compared only there, which takes time."""
     as_before = (
-        np.concatenate([[False], (worst[:, 1:] == worst[:, :-1]).all(axis=0)]) if order.size else np.zeros(0, bool)
+        np.concatenate([[False], (worst[:, 1:] == worst[:, :-1]).all(axis=0)])
+        if order.size
+        else np.zeros(0, bool)
     )
     tied = as_before | np.append(as_before[1:], False)[: order.size]
     group, rows = np.cumsum(~as_before)[tied], order[tied]

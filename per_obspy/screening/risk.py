@@ -6,12 +6,12 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Building, Screening
-from per_obspy.screening.assignment import stations_of
-from per_obspy.screening.ground import Ground
-from per_obspy.screening.judgement import impact_velocity_that_counts
+from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
+from per_obspy.screening.ground_motion.assignment import stations_of
+from per_obspy.screening.ground_motion.region import Ground
+from per_obspy.screening.ground_motion.site_motion import prepared_field
 from per_obspy.screening.ranking import worst_first
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.site_motion import prepared_field
 
 #: Defaults of the configuration.
 BUILDING, SCREENING = Building(), Screening()
@@ -40,8 +40,9 @@ def risk_table(
     Returns
     -------
     DataFrame
-        Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair table.
-        ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair without a station in reach.
+        Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair
+        table. ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair
+        without a station in reach.
     """
     stations, nowhere = stations_of([spectra] if isinstance(spectra, xr.Dataset) else list(spectra))
     located = [stations.read(index) for index in range(stations.names.size)]

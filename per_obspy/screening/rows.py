@@ -15,25 +15,30 @@ from pandas.api.types import is_numeric_dtype
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.assignment import assigned
-from per_obspy.screening.codes import code_columns, rule_columns
-from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
-from per_obspy.screening.demand import demand_ratio, pounding_state
-from per_obspy.screening.exact import exact_decides, furthest_azimuth
-from per_obspy.screening.flags import joined_flags, period_is_derived, raised_by_pairs, raised_by_record
-from per_obspy.screening.ground import Ground
-from per_obspy.screening.judgement import judged
-from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.motion import (
+from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
+from per_obspy.screening.by_record.estimates import judged
+from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
+from per_obspy.screening.by_record.pair_radii import (
     PairMotion,
     motion_along_azimuths,
     motion_along_every_azimuth,
     motion_of_one_horizontal,
 )
-from per_obspy.screening.probability import pair_probability
+from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback
+from per_obspy.screening.codes import code_columns, rule_columns
+from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
+from per_obspy.screening.flags import (
+    joined_flags,
+    period_is_derived,
+    raised_by_pairs,
+    raised_by_record,
+)
+from per_obspy.screening.ground_motion.assignment import assigned
+from per_obspy.screening.ground_motion.region import Ground
+from per_obspy.screening.ground_motion.site_motion import motion_at_pairs
+from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, risk_class
-from per_obspy.screening.shakemap import shakemap_fallback
-from per_obspy.screening.site_motion import motion_at_pairs
+from per_obspy.screening.uncertainty.probability import pair_probability
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Needed on the way only; flags tell what is to be known of them.
@@ -45,7 +50,8 @@ ON_THE_WAY = (
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
 
-#: Pairs of unknown azimuth that are judged together: at 180 azimuths every array of theirs stays below 3 MB.
+#: Pairs of unknown azimuth that are judged together: at 180 azimuths every array of theirs stays
+#: below 3 MB.
 BLOCK = 2000
 
 
@@ -58,7 +64,8 @@ def risk_rows(
     Parameters
     ----------
     pairs : DataFrame
-        From :func:`per_obspy.read_pairs`, or some rows of it; its columns named as results are replaced.
+        From :func:`per_obspy.read_pairs`, or some rows of it; its columns named as results are
+        replaced.
     ground : Ground
         The ground motion; only stations that serve a pair are read.
     building, screening : Building, Screening
@@ -67,7 +74,8 @@ def risk_rows(
     Returns
     -------
     rows : DataFrame
-        Columns in the order of ``screening.columns.ORDER`` without ``rank``, then the other columns of the pair table.
+        Columns in the order of ``screening.columns.ORDER`` without ``rank``, then the other columns
+        of the pair table.
     rejected : tuple of Rejection
         Pairs that neither a station nor the map serves.
     """
@@ -90,11 +98,20 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
 def _of_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:
     """Return the rows of pairs that have a station."""
     if ground.field is not None:
-        pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, pairs["station_index"].to_numpy()))
+        pairs = pairs.assign(
+            **motion_at_pairs(ground.field, pairs, pairs["station_index"].to_numpy())
+        )
     index = pairs["station_index"].to_numpy(np.int64)
-    known = {name: pairs[name].to_numpy() for name in pairs if name == "derived" or is_numeric_dtype(pairs[name])}
+    known = {
+        name: pairs[name].to_numpy()
+        for name in pairs
+        if name == "derived" or is_numeric_dtype(pairs[name])
+    }
     blocks = [(station, np.flatnonzero(index == station)) for station in np.unique(index).tolist()]
-    told = [(rows, _told(ground.stations.read(one), chosen(known, rows), screening)) for one, rows in blocks]
+    told = [
+        (rows, _told(ground.stations.read(one), chosen(known, rows), screening))
+        for one, rows in blocks
+    ]
     return _judged_as_a_whole(pairs.assign(**joined(told)), screening)
 
 
@@ -107,7 +124,9 @@ def _told(station: xr.Dataset, block: Columns, screening: Screening) -> Columns:
         ]
     )
     table |= mitigation_columns(station, table, screening.target_amplification)
-    raised = {f"raised_{name}": rows for name, rows in raised_by_record(table, station, screening).items()}
+    raised = {
+        f"raised_{name}": rows for name, rows in raised_by_record(table, station, screening).items()
+    }
     table |= {"probability": pair_probability(station, table, screening), **raised}
     return {name: column for name, column in table.items() if name not in block}
 
@@ -132,7 +151,9 @@ def _ordered(table: pd.DataFrame) -> pd.DataFrame:
     return table[[*first, *(name for name in table if name not in ORDER)]]
 
 
-def _motions(station: xr.Dataset, block: Columns, exact: bool) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
+def _motions(
+    station: xr.Dataset, block: Columns, exact: bool
+) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
     """Give the rows of a block by how their azimuth is found, with their motion and the name of that way."""
     azimuth = values(block, "azimuth")
     if station.sizes["horizontal"] == 1:
@@ -143,7 +164,11 @@ def _motions(station: xr.Dataset, block: Columns, exact: bool) -> Iterator[tuple
         yield given, motion_along_azimuths(station, chosen(block, given), azimuth[given]), "given"
     if (worst := np.flatnonzero(unknown & decides)).size:
         pairs = chosen(block, worst)
-        yield worst, motion_along_azimuths(station, pairs, furthest_azimuth(station, pairs)), "worst"
+        yield (
+            worst,
+            motion_along_azimuths(station, pairs, furthest_azimuth(station, pairs)),
+            "worst",
+        )
     worst = np.flatnonzero(unknown & ~decides)
     for some in (worst[first : first + BLOCK] for first in range(0, worst.size, BLOCK)):
         yield some, motion_along_every_azimuth(station, chosen(block, some)), "worst"

@@ -7,7 +7,8 @@ import xarray as xr
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.screening.risk import risk_table
 
-#: Two oscillators that touch, two whose periods nobody gave, and one that could yield: together they call every kernel.
+#: Two oscillators that touch, two whose periods nobody gave, and one that could yield: together
+#: they call every kernel.
 PAIRS = pd.DataFrame(
     {
         "pair_id": ["given", "derived", "yielding"],
@@ -33,7 +34,10 @@ def compile_screening() -> None:
     station = xr.Dataset(
         {
             "acceleration": (("horizontal", "time"), np.stack([pulse, pulse])),
-            **{name: (tuple(reversed(grid)), np.ones((2, 2, 2), dtype=np.float32)) for name in AZIMUTHAL},
+            **{
+                name: (tuple(reversed(grid)), np.ones((2, 2, 2), dtype=np.float32))
+                for name in AZIMUTHAL
+            },
             "per_rotd50": (("damping", "period"), np.ones((2, 2), dtype=np.float32)),
             "sampling_interval": 0.01,
             "shortest_usable_period": 0.01,

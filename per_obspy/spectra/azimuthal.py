@@ -7,14 +7,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels import azimuth_steps, blocks
-from per_obspy.kernels import azimuths as kernels
-from per_obspy.spectra.blocks import Ground, Oscillators, over_blocks, prepare_ground, prepare_oscillators, stretches
+from per_obspy.kernels.spectra import azimuth_steps, blocks
+from per_obspy.kernels.spectra import azimuths as kernels
 from per_obspy.spectra.elastic import grid_of, row_of, two_components
+from per_obspy.spectra.oscillator_blocks import (
+    Ground,
+    Oscillators,
+    over_blocks,
+    prepare_ground,
+    prepare_oscillators,
+    stretches,
+)
 
-#: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times the pass over them.
+#: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times
+#: the pass over them.
 LONGEST_PHASE = 0.5
-#: A step is cut into 64 parts at most (T = dt / 3.6); shorter periods are exact as well, only slower.
+#: A step is cut into 64 parts at most (T = dt / 3.6); shorter periods are exact as well, only
+#: slower.
 MOST_DOUBLINGS = 6
 
 #: Every whole degree of a half turn; the other half repeats it.
@@ -57,8 +66,8 @@ def azimuthal_per_spectrum(
 
     Notes
     -----
-    Exact, between samples too, along each azimuth given, so that every percentile of `rotd` is exact for these
-    azimuths. Nothing is interpolated between azimuths.
+    Exact, between samples too, along each azimuth given, so that every percentile of `rotd` is
+    exact for these azimuths. Nothing is interpolated between azimuths.
 
     Examples
     --------
@@ -118,7 +127,9 @@ def _spectrum(
     components = two_components(north, east)
     dt = checks.number("dt", dt, checks.positive)
     (periods, dampings), shape = grid_of(periods, damping)
-    given = row_of("azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths))))
+    given = row_of(
+        "azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths)))
+    )
     ascending = np.argsort(given % 180.0)
     fan = _fan(np.radians(given[ascending] % 180.0))
     lengths = np.empty((given.size, periods.size))
@@ -129,7 +140,9 @@ def _spectrum(
         oscillators = prepare_oscillators(dt / count, periods[some], dampings[some])
         work = partial(_block_squares, ground, share=share, fan=fan, exact=exact)
         squares = over_blocks(work, oscillators, ground)
-        lengths[np.ix_(ascending, some)] = np.sqrt(squares[: given.size]) / oscillators.omegas**2 * ground.scale
+        lengths[np.ix_(ascending, some)] = (
+            np.sqrt(squares[: given.size]) / oscillators.omegas**2 * ground.scale
+        )
     return lengths.T.reshape(*shape, given.size)
 
 
@@ -144,7 +157,9 @@ def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:
     if count == 1:
         return acceleration
     closed = np.append(acceleration, 0.0)
-    cut: FloatArray = np.interp(np.arange(count * acceleration.size + 1) / count, np.arange(closed.size), closed)
+    cut: FloatArray = np.interp(
+        np.arange(count * acceleration.size + 1) / count, np.arange(closed.size), closed
+    )
     return cut
 
 
@@ -160,7 +175,12 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _block_squares(
-    ground: Ground, block: Oscillators, *, share: float, fan: tuple[FloatArray, FloatArray], exact: bool
+    ground: Ground,
+    block: Oscillators,
+    *,
+    share: float,
+    fan: tuple[FloatArray, FloatArray],
+    exact: bool,
 ) -> FloatArray:
     """Return the largest squares of one block, (azimuths, lanes), in units of the scaled acceleration / omega²."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
@@ -171,10 +191,14 @@ def _block_squares(
     for stretch in stretches(ground):
         kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
         for lane in range(block.wanted):
-            oscillator = kernels.Oscillator(lane, float(block.phases[lane]), float(block.dampings[lane]), share)
+            oscillator = kernels.Oscillator(
+                lane, float(block.phases[lane]), float(block.dampings[lane]), share
+            )
             kernels.raise_azimuths_to_samples(*stretch[:2], kept, oscillator, fan[0], largest[lane])
             if exact:
-                count = azimuth_steps.list_steps(*stretch[:4], kept, oscillator, fan[0], largest[lane], steps)
+                count = azimuth_steps.list_steps(
+                    *stretch[:4], kept, oscillator, fan[0], largest[lane], steps
+                )
                 azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest[lane])
     if share == 0.0:
         kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
@@ -204,8 +228,8 @@ def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:
 
     References
     ----------
-    Boore, D. M. (2010), Orientation-independent, nongeometric-mean measures of seismic intensity from two horizontal
-    components of motion, BSSA 100(4), 1830-1835.
+    Boore, D. M. (2010), Orientation-independent, nongeometric-mean measures of seismic intensity
+    from two horizontal components of motion, BSSA 100(4), 1830-1835.
 
     Examples
     --------
@@ -214,6 +238,10 @@ def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:
     """
     values = checks.finite("spectrum", spectrum)
     if values.ndim == 0 or values.shape[-1] == 0:
-        raise ValueError(f"spectrum must have azimuths on its last axis, got the shape {values.shape}")
-    share = checks.number("percentile", percentile, lambda name, given: checks.between(name, given, 0.0, 100.0))
+        raise ValueError(
+            f"spectrum must have azimuths on its last axis, got the shape {values.shape}"
+        )
+    share = checks.number(
+        "percentile", percentile, lambda name, given: checks.between(name, given, 0.0, 100.0)
+    )
     return np.asarray(np.percentile(values, share, axis=-1))

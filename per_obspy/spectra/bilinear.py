@@ -8,12 +8,13 @@ from scipy.optimize import brentq
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels import bilinear as kernels
+from per_obspy.kernels.oscillator.exact_step import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
 
 #: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.
 GRAVITY = 9.80665
-#: Ratio of neighbouring yield displacements in the search for the largest one that gives a ductility.
+#: Ratio of neighbouring yield displacements in the search for the largest one that gives a
+#: ductility.
 SCAN_RATIO = 0.97
 #: Yield displacements below this part of the elastic displacement are not tried.
 SMALLEST_YIELD = 1e-4
@@ -36,10 +37,11 @@ class BilinearResponse(NamedTuple):
     residual : float
         Displacement at which the oscillator comes to rest, m.
     displacement_radius : float
-        Largest ``sqrt(u² + (v / omega0)²)`` with the total displacement; it bounds the displacement, m.
+        Largest ``sqrt(u² + (v / omega0)²)`` with the total displacement; it bounds the
+        displacement, m.
     energy_radius : float
-        Largest ``sqrt(alpha u² + (1 - alpha) y² + (v / omega0)²)`` with the elastic part ``y`` of the displacement:
-        the radius of the recoverable energy, m.
+        Largest ``sqrt(alpha u² + (1 - alpha) y² + (v / omega0)²)`` with the elastic part ``y`` of
+        the displacement: the radius of the recoverable energy, m.
     """
 
     displacement: FloatArray
@@ -60,7 +62,8 @@ class InelasticSpectra(NamedTuple):
     Attributes
     ----------
     displacement_radius, energy_radius : ndarray
-        Inelastic PER of the total displacement and of the recoverable energy, as in `BilinearResponse`, m.
+        Inelastic PER of the total displacement and of the recoverable energy, as in
+        `BilinearResponse`, m.
     sd : ndarray
         Largest displacement, m.
     ductility : ndarray
@@ -83,7 +86,12 @@ class InelasticSpectra(NamedTuple):
 
 
 def bilinear_response(
-    acceleration: ArrayLike, dt: float, period: float, damping: float, yield_displacement: float, hardening: float
+    acceleration: ArrayLike,
+    dt: float,
+    period: float,
+    damping: float,
+    yield_displacement: float,
+    hardening: float,
 ) -> BilinearResponse:
     """
     Response of a bilinear oscillator with kinematic hardening, exact between the samples and at its events.
@@ -97,7 +105,8 @@ def bilinear_response(
     period : float
         Undamped elastic period, s.
     damping : float
-        Fraction of critical of the elastic oscillator; the damping coefficient stays the same while yielding.
+        Fraction of critical of the elastic oscillator; the damping coefficient stays the same while
+        yielding.
     yield_displacement : float
         m; infinity for a linear oscillator.
     hardening : float
@@ -115,8 +124,8 @@ def bilinear_response(
 
     Notes
     -----
-    ``u'' + 2 xi omega0 u' + omega0² [alpha u + (1 - alpha) y] = -a`` with ``y`` the elastic part of the displacement,
-    never beyond the yield displacement.
+    ``u'' + 2 xi omega0 u' + omega0² [alpha u + (1 - alpha) y] = -a`` with ``y`` the elastic part of
+    the displacement, never beyond the yield displacement.
 
     Examples
     --------
@@ -163,14 +172,24 @@ def constant_yield_spectra(
         Arrays (n_periods,).
     """
     record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
-    coefficients = np.broadcast_to(checks.positive("yield_coefficients", yield_coefficients), omegas.shape)
+    coefficients = np.broadcast_to(
+        checks.positive("yield_coefficients", yield_coefficients), omegas.shape
+    )
     limits = coefficients * GRAVITY / omegas**2
-    rows = [_response(record, dt, omega, ratio, limit, alpha) for omega, limit in zip(omegas, limits, strict=True)]
+    rows = [
+        _response(record, dt, omega, ratio, limit, alpha)
+        for omega, limit in zip(omegas, limits, strict=True)
+    ]
     return _spectra(rows, coefficients.copy())
 
 
 def constant_ductility_spectra(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, ductility: float, hardening: float
+    acceleration: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: float,
+    ductility: float,
+    hardening: float,
 ) -> InelasticSpectra:
     """
     Inelastic spectra of oscillators that are just strong enough not to exceed a ductility.
@@ -191,13 +210,14 @@ def constant_ductility_spectra(
     Returns
     -------
     InelasticSpectra
-        Arrays (n_periods,); NaN where the ductility is not reached down to 1e-4 of the elastic displacement.
+        Arrays (n_periods,); NaN where the ductility is not reached down to 1e-4 of the elastic
+        displacement.
 
     Notes
     -----
-    Several strengths can give the same ductility. The largest is returned: the yield displacement is lowered from the
-    elastic displacement in steps of 3 % until the ductility is exceeded, and the root in that step is found by Brent's
-    method (two roots within one step can be missed).
+    Several strengths can give the same ductility. The largest is returned: the yield displacement
+    is lowered from the elastic displacement in steps of 3 % until the ductility is exceeded, and
+    the root in that step is found by Brent's method (two roots within one step can be missed).
     """
     record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
     target = checks.number("ductility", ductility, checks.finite)
@@ -214,16 +234,26 @@ def constant_ductility_spectra(
 
 
 def _hardening(hardening: float) -> float:
-    return checks.number("hardening", hardening, lambda name, value: checks.between(name, value, 0.0, 1.0))
+    return checks.number(
+        "hardening", hardening, lambda name, value: checks.between(name, value, 0.0, 1.0)
+    )
 
 
 def _arguments(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, hardening: float
 ) -> tuple[FloatArray, float, FloatArray, float, float]:
     record = checks.record("acceleration", acceleration)
-    row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
+    row = row_of(
+        "periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods)))
+    )
     ratio = checks.number("damping", damping, checks.fraction_of_critical)
-    return record, checks.number("dt", dt, checks.positive), 2.0 * np.pi / row, ratio, _hardening(hardening)
+    return (
+        record,
+        checks.number("dt", dt, checks.positive),
+        2.0 * np.pi / row,
+        ratio,
+        _hardening(hardening),
+    )
 
 
 def _response(
@@ -231,7 +261,9 @@ def _response(
 ) -> BilinearResponse:
     strength = np.append(record, 0.0) / omega**2
     history, state, largest = np.empty((3, record.size)), np.zeros(4), np.zeros(4)
-    kernels.bilinear_history(strength, omega * dt, damping, limit, hardening, history, state, largest)
+    kernels.bilinear_history(
+        strength, omega * dt, damping, limit, hardening, history, state, largest
+    )
     farthest, square, energy, path = largest
     # an infinite yield displacement is never reached: its path is zero
     work = (1.0 - hardening) * omega**2 * limit * path if path > 0.0 else 0.0
@@ -239,7 +271,14 @@ def _response(
     radii = float(np.sqrt(square)), float(np.sqrt(energy))
     ductility = float(farthest / limit)
     return BilinearResponse(
-        history[0], history[1] * omega, history[2], ductility, float(work), float(farthest), float(residual), *radii
+        history[0],
+        history[1] * omega,
+        history[2],
+        ductility,
+        float(work),
+        float(farthest),
+        float(residual),
+        *radii,
     )
 
 

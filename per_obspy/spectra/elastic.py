@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels import blocks, radius, response
-from per_obspy.spectra.blocks import (
+from per_obspy.kernels.spectra import blocks, radius, response
+from per_obspy.spectra.oscillator_blocks import (
     Ground,
     Oscillators,
     choose,
@@ -49,15 +49,17 @@ class ResponseSpectra(NamedTuple):
     psa: FloatArray
 
 
-def per_spectrum(acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05) -> FloatArray:
+def per_spectrum(
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+) -> FloatArray:
     """
     Pseudo energy radius spectrum of one component of ground acceleration.
 
     Parameters
     ----------
     acceleration : (n_samples,) array_like
-        Ground acceleration, m/s², linear between samples; the structure is at rest at the first sample, and a last
-        sample that is not zero is followed by a ramp of one ``dt`` to zero.
+        Ground acceleration, m/s², linear between samples; the structure is at rest at the first
+        sample, and a last sample that is not zero is followed by a ramp of one ``dt`` to zero.
     dt : float
         Time between samples, s.
     periods : (n_periods,) array_like
@@ -77,15 +79,15 @@ def per_spectrum(acceleration: ArrayLike, dt: float, periods: ArrayLike, damping
 
     Notes
     -----
-    ``u`` and ``v`` are displacement and velocity relative to the ground (Valles-Mattox & Reinhorn 1996, eq. (11) and
-    (12)). In the free vibration after the record the radius never grows, so that none is added. Bounds of the second
-    derivative of ``r²`` tell in which steps a maximum between samples can lie; there it is found from the roots of
-    ``v`` and of ``2 xi omega v + a``.
+    ``u`` and ``v`` are displacement and velocity relative to the ground (Valles-Mattox & Reinhorn
+    1996, eq. (11) and (12)). In the free vibration after the record the radius never grows, so that
+    none is added. Bounds of the second derivative of ``r²`` tell in which steps a maximum between
+    samples can lie; there it is found from the roots of ``v`` and of ``2 xi omega v + a``.
 
     References
     ----------
-    Nigam, N. C. & Jennings, P. C. (1969), Calculation of response spectra from strong-motion earthquake records,
-    BSSA 59(2), 909-922.
+    Nigam, N. C. & Jennings, P. C. (1969), Calculation of response spectra from strong-motion
+    earthquake records, BSSA 59(2), 909-922.
 
     Examples
     --------
@@ -118,8 +120,8 @@ def response_spectra(
     Returns
     -------
     ResponseSpectra
-        Six arrays (n_periods,) or (n_damping, n_periods): m, m, m/s, m/s², m/s, m/s². Between samples as well as at
-        them; SD, SV and SA include the free vibration after the record.
+        Six arrays (n_periods,) or (n_damping, n_periods): m, m, m/s, m/s², m/s, m/s². Between
+        samples as well as at them; SD, SV and SA include the free vibration after the record.
 
     Raises
     ------
@@ -142,7 +144,9 @@ def sampled_per_spectrum(
 ) -> FloatArray:
     """Return what `per_spectrum` would if only the samples were looked at, for comparison with other programs, m."""
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=False).reshape(shape)
+    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=False).reshape(
+        shape
+    )
 
 
 def sampled_response_spectra(
@@ -151,7 +155,9 @@ def sampled_response_spectra(
     """Return what `response_spectra` would if only the samples were looked at, for comparison with official tables."""
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
     oscillators = prepare_oscillators(dt, *grid)
-    return _spectra(_responses(prepare_ground(record), oscillators, exact=False), oscillators, shape)
+    return _spectra(
+        _responses(prepare_ground(record), oscillators, exact=False), oscillators, shape
+    )
 
 
 def _arguments(
@@ -162,12 +168,18 @@ def _arguments(
     return record, checks.number("dt", dt, checks.positive), *grid_of(periods, damping)
 
 
-def grid_of(periods: ArrayLike, damping: ArrayLike) -> tuple[tuple[FloatArray, FloatArray], tuple[int, ...]]:
+def grid_of(
+    periods: ArrayLike, damping: ArrayLike
+) -> tuple[tuple[FloatArray, FloatArray], tuple[int, ...]]:
     """Return every damping with every period as paired rows, and the shape of the grid."""
-    row = row_of("periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))))
+    row = row_of(
+        "periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods)))
+    )
     dampings = checks.fraction_of_critical("damping", damping)
     if dampings.ndim > 1 or dampings.size == 0:
-        raise ValueError(f"damping must be a number or one row of numbers, got the shape {dampings.shape}")
+        raise ValueError(
+            f"damping must be a number or one row of numbers, got the shape {dampings.shape}"
+        )
     grid = np.broadcast_arrays(row, np.atleast_1d(dampings)[:, np.newaxis])
     return (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
 
@@ -176,14 +188,18 @@ def two_components(north: ArrayLike, east: ArrayLike) -> tuple[FloatArray, Float
     """Return two components of the same length."""
     components = checks.record("north", north), checks.record("east", east)
     if components[0].size != components[1].size:
-        raise ValueError(f"north and east must be equally long, got {components[0].size} and {components[1].size}")
+        raise ValueError(
+            f"north and east must be equally long, got {components[0].size} and {components[1].size}"
+        )
     return components
 
 
 def row_of(name: str, values: FloatArray) -> FloatArray:
     """Return one row of at least one value."""
     if values.ndim != 1 or values.size == 0:
-        raise ValueError(f"{name} must be one row of at least one value, got the shape {values.shape}")
+        raise ValueError(
+            f"{name} must be one row of at least one value, got the shape {values.shape}"
+        )
     return values
 
 
@@ -235,7 +251,9 @@ def _responses(ground: Ground, oscillators: Oscillators, exact: bool) -> FloatAr
     return np.asarray(largest / oscillators.omegas**2 * ground.scale)
 
 
-def _spectra(lengths: FloatArray, oscillators: Oscillators, shape: tuple[int, ...]) -> ResponseSpectra:
+def _spectra(
+    lengths: FloatArray, oscillators: Oscillators, shape: tuple[int, ...]
+) -> ResponseSpectra:
     omegas = oscillators.omegas
     per, sd, sv, sa = lengths
     spectra = per, sd, sv * omegas, sa * omegas**2, sd * omegas, sd * omegas**2

@@ -4,8 +4,8 @@ import numpy as np
 
 from per_obspy.checks import FloatArray
 
-#: Sensors closer than this to the same line do not resolve the plane; degrees. A choice: the error of the
-#: resolved motion grows like 1/sin of the angle between them, here by a factor of 3.
+#: Sensors closer than this to the same line do not resolve the plane; degrees. A choice: the error
+#: of the resolved motion grows like 1/sin of the angle between them, here by a factor of 3.
 SMALLEST_ANGLE = 20.0
 
 
@@ -15,8 +15,8 @@ def north_and_east(
     """
     Return north and east components of two horizontal sensors.
 
-    A sensor at azimuth θ records a_N cos θ + a_E sin θ; two of them are solved for a_N and a_E. The sensors need not
-    be orthogonal.
+    A sensor at azimuth θ records a_N cos θ + a_E sin θ; two of them are solved for a_N and a_E. The
+    sensors need not be orthogonal.
 
     Parameters
     ----------
@@ -45,7 +45,9 @@ def north_and_east(
     cosine_2, sine_2 = _direction(azimuth_2)
     determinant = cosine_1 * sine_2 - cosine_2 * sine_1
     if abs(determinant) < np.sin(np.radians(SMALLEST_ANGLE)):
-        raise ValueError(f"sensor azimuths {azimuth_1:g} and {azimuth_2:g} degrees are too close to the same line")
+        raise ValueError(
+            f"sensor azimuths {azimuth_1:g} and {azimuth_2:g} degrees are too close to the same line"
+        )
     north = (sine_2 * first - sine_1 * second) / determinant
     east = (cosine_1 * second - cosine_2 * first) / determinant
     return north, east

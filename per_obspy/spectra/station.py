@@ -1,8 +1,9 @@
 """
 The spectra of one station: from its processed Stream to a Dataset.
 
-The Dataset holds what is stored of a station: the spectra of every component, of the two horizontals by azimuth, and
-the processed horizontal motion itself, from which pairs of buildings are computed at their own periods.
+The Dataset holds what is stored of a station: the spectra of every component, of the two
+horizontals by azimuth, and the processed horizontal motion itself, from which pairs of buildings
+are computed at their own periods.
 """
 
 import json
@@ -40,29 +41,35 @@ def station_spectra(
     Parameters
     ----------
     stream : Stream
-        Processed acceleration of one station, m/s², one trace a component, as :func:`per_obspy.process` returns it.
-        Two horizontals share their start, interval and length.
+        Processed acceleration of one station, m/s², one trace a component, as
+        :func:`per_obspy.process` returns it. Two horizontals share their start, interval and
+        length.
     periods : (n_periods,) array_like, optional
         Natural periods, s; 100 from 0.05 to 10 s, logarithmically spaced, if not given.
     dampings : sequence of float
         Fractions of critical.
     azimuth_step : int
-        Degrees between the azimuths that are stored; RotD50 and RotD100 always come from every degree.
+        Degrees between the azimuths that are stored; RotD50 and RotD100 always come from every
+        degree.
 
     Returns
     -------
     Dataset
-        Dimensions ``component`` (their names, horizontal_1, horizontal_2, vertical, as far as there are, stand in
-        ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and ``time``. Spectra are float32, m;
-        ``acceleration`` is float64, m/s². With one horizontal there are no spectra by azimuth: the station serves its
-        own azimuth only.
+        Dimensions ``component`` (their names, horizontal_1, horizontal_2, vertical, as far as there
+        are, stand in ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and
+        ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one horizontal
+        there are no spectra by azimuth: the station serves its own azimuth only.
 
     Raises
     ------
     RecordRejected
         If there is no horizontal, no acceleration in m/s², or the horizontals do not match.
     """
-    grid = np.geomspace(0.05, 10.0, 100) if periods is None else np.atleast_1d(checks.positive("periods", periods))
+    grid = (
+        np.geomspace(0.05, 10.0, 100)
+        if periods is None
+        else np.atleast_1d(checks.positive("periods", periods))
+    )
     damping = np.atleast_1d(checks.fraction_of_critical("dampings", dampings))
     traces = _components(stream)
     horizontals = [trace for name, trace in traces.items() if name != "vertical"]
@@ -85,9 +92,15 @@ def _components(stream: Stream) -> dict[str, Trace]:
     station = stream[0].id if stream else "an empty stream"
     horizontals = sorted((trace for trace in stream if not _is_vertical(trace)), key=_azimuth)
     verticals = [trace for trace in stream if _is_vertical(trace)]
-    reasons = [f"{t.id} is in {t.stats.get('units')!r}, not m/s2" for t in stream if t.stats.get("units") != "m/s2"]
+    reasons = [
+        f"{t.id} is in {t.stats.get('units')!r}, not m/s2"
+        for t in stream
+        if t.stats.get("units") != "m/s2"
+    ]
     if not 1 <= len(horizontals) <= 2 or len(verticals) > 1:
-        reasons.append(f"has {len(horizontals)} horizontal and {len(verticals)} vertical components")
+        reasons.append(
+            f"has {len(horizontals)} horizontal and {len(verticals)} vertical components"
+        )
     if reasons:
         raise RecordRejected(station, *reasons)
     named = {f"horizontal_{i}": trace for i, trace in enumerate(horizontals, start=1)}
@@ -111,10 +124,15 @@ def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float
         return np.array([first.data], dtype=np.float64), azimuths
     second = horizontals[1]
     if not np.isfinite(azimuths).all():
-        raise RecordRejected(first.id, f"sensor azimuths of {first.id} and {second.id} are unknown: {azimuths}")
+        raise RecordRejected(
+            first.id, f"sensor azimuths of {first.id} and {second.id} are unknown: {azimuths}"
+        )
     for field in ("starttime", "delta", "npts"):
         if first.stats[field] != second.stats[field]:
-            raise RecordRejected(first.id, f"{field} is {first.stats[field]}, but {second.stats[field]} of {second.id}")
+            raise RecordRejected(
+                first.id,
+                f"{field} is {first.stats[field]}, but {second.stats[field]} of {second.id}",
+            )
     try:
         pair = north_and_east(first.data, second.data, *azimuths)
     except ValueError as error:
@@ -122,9 +140,14 @@ def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float
     return np.array(pair), [0.0, 90.0]
 
 
-def _component_spectra(traces: dict[str, Trace], periods: FloatArray, dampings: FloatArray) -> xr.Dataset:
+def _component_spectra(
+    traces: dict[str, Trace], periods: FloatArray, dampings: FloatArray
+) -> xr.Dataset:
     """Return PER, SD and absolute SA of every component."""
-    spectra = [response_spectra(trace.data, trace.stats.delta, periods, dampings) for trace in traces.values()]
+    spectra = [
+        response_spectra(trace.data, trace.stats.delta, periods, dampings)
+        for trace in traces.values()
+    ]
     dimensions = ("component", "damping", "period")
 
     def stacked(name: str) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -134,17 +157,35 @@ def _component_spectra(traces: dict[str, Trace], periods: FloatArray, dampings: 
         {
             "per": (dimensions, stacked("per"), _RADIUS | {"long_name": "pseudo energy radius"}),
             "sd": (dimensions, stacked("sd"), _RADIUS | {"long_name": "spectral displacement"}),
-            "sa": (dimensions, stacked("sa"), {"units": "m s-2", "long_name": "absolute spectral acceleration"}),
-            "channel": ("component", [t.stats.channel for t in traces.values()], {"long_name": "SEED channel code"}),
+            "sa": (
+                dimensions,
+                stacked("sa"),
+                {"units": "m s-2", "long_name": "absolute spectral acceleration"},
+            ),
+            "channel": (
+                "component",
+                [t.stats.channel for t in traces.values()],
+                {"long_name": "SEED channel code"},
+            ),
             "processing": (
                 "component",
                 [_processing_record(trace) for trace in traces.values()],
-                {"long_name": "what was done to the record and every number chosen for it, as JSON"},
+                {
+                    "long_name": "what was done to the record and every number chosen for it, as JSON"
+                },
             ),
         },
         coords={
-            "component_name": ("component", list(traces), {"long_name": "horizontal_1, horizontal_2, vertical"}),
-            "damping": ("damping", dampings, {"units": "1", "long_name": "damping ratio, fraction of critical"}),
+            "component_name": (
+                "component",
+                list(traces),
+                {"long_name": "horizontal_1, horizontal_2, vertical"},
+            ),
+            "damping": (
+                "damping",
+                dampings,
+                {"units": "1", "long_name": "damping ratio, fraction of critical"},
+            ),
             "period": ("period", periods, {"units": "s", "long_name": "natural period"}),
         },
     )
@@ -153,7 +194,9 @@ def _component_spectra(traces: dict[str, Trace], periods: FloatArray, dampings: 
 def _processing_record(trace: Trace) -> str:
     """Return the steps and numbers of one trace as JSON."""
     steps = list(trace.stats.get("processing", []))
-    return json.dumps({"steps": steps, **dict(trace.stats.get("per_obspy", {}))}, default=str, sort_keys=True)
+    return json.dumps(
+        {"steps": steps, **dict(trace.stats.get("per_obspy", {}))}, default=str, sort_keys=True
+    )
 
 
 def _azimuthal_spectra(
@@ -164,8 +207,14 @@ def _azimuthal_spectra(
         return xr.Dataset()
     north, east = motion
     spectra = {
-        "per": ("pseudo energy radius", azimuthal_per_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)),
-        "sd": ("spectral displacement", azimuthal_sd_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)),
+        "per": (
+            "pseudo energy radius",
+            azimuthal_per_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH),
+        ),
+        "sd": (
+            "spectral displacement",
+            azimuthal_sd_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH),
+        ),
     }
     dimensions = ("damping", "period")
     variables: dict[str, Any] = {}
@@ -182,7 +231,11 @@ def _azimuthal_spectra(
                 rotd(values, percentile).astype(np.float32),
                 _RADIUS | {"long_name": f"{title}, percentile {percentile} over azimuth"},
             )
-    azimuth = ("azimuth", EVERY_AZIMUTH[::step], {"units": "degree", "long_name": "azimuth, clockwise from north"})
+    azimuth = (
+        "azimuth",
+        EVERY_AZIMUTH[::step],
+        {"units": "degree", "long_name": "azimuth, clockwise from north"},
+    )
     return xr.Dataset(variables, coords={"azimuth": azimuth})
 
 
@@ -199,9 +252,16 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
             "horizontal_azimuth": (
                 "horizontal",
                 azimuths,
-                {"units": "degree", "long_name": "azimuth of the motion, clockwise from north; missing if unknown"},
+                {
+                    "units": "degree",
+                    "long_name": "azimuth of the motion, clockwise from north; missing if unknown",
+                },
             ),
-            "sampling_interval": ((), trace.stats.delta, {"units": "s", "long_name": "sampling interval"}),
+            "sampling_interval": (
+                (),
+                trace.stats.delta,
+                {"units": "s", "long_name": "sampling interval"},
+            ),
         },
         coords={
             "time": (
@@ -224,16 +284,40 @@ def _place(trace: Trace) -> dict[str, Any]:
     """Return name, coordinates and ground of the station; missing (NaN, no text) where they are not known."""
     known = trace.stats.get("coordinates", {})
     described = {
-        "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
-        "longitude": {"units": "degrees_east", "standard_name": "longitude", "long_name": "longitude"},
-        "elevation": {"units": "m", "standard_name": "surface_altitude", "long_name": "elevation", "positive": "up"},
+        "latitude": {
+            "units": "degrees_north",
+            "standard_name": "latitude",
+            "long_name": "latitude",
+        },
+        "longitude": {
+            "units": "degrees_east",
+            "standard_name": "longitude",
+            "long_name": "longitude",
+        },
+        "elevation": {
+            "units": "m",
+            "standard_name": "surface_altitude",
+            "long_name": "elevation",
+            "positive": "up",
+        },
     }
     station = f"{trace.stats.network}.{trace.stats.station}"
-    names: dict[str, Any] = {"station": ((), station, {"cf_role": "timeseries_id", "long_name": "station"})}
-    names["site_class"] = ((), str(trace.stats.get("site_class", "")), {"long_name": "site class; empty if unknown"})
-    velocity = {"units": "m s-1", "long_name": "mean shear-wave velocity of the upper 30 m of ground"}
+    names: dict[str, Any] = {
+        "station": ((), station, {"cf_role": "timeseries_id", "long_name": "station"})
+    }
+    names["site_class"] = (
+        (),
+        str(trace.stats.get("site_class", "")),
+        {"long_name": "site class; empty if unknown"},
+    )
+    velocity = {
+        "units": "m s-1",
+        "long_name": "mean shear-wave velocity of the upper 30 m of ground",
+    }
     names["vs30"] = ((), float(trace.stats.get("vs30", np.nan)), velocity)
-    return names | {name: ((), float(known.get(name, np.nan)), text) for name, text in described.items()}
+    return names | {
+        name: ((), float(known.get(name, np.nan)), text) for name, text in described.items()
+    }
 
 
 def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
@@ -245,9 +329,21 @@ def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
     flags = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "not_usable usable"}
     return xr.Dataset(
         {
-            "usable": ("period", usable, {"long_name": "whether the processing leaves the period usable"} | flags),
-            "shortest_usable_period": ((), shortest, {"units": "s", "long_name": "shortest usable period"}),
-            "longest_usable_period": ((), longest, {"units": "s", "long_name": "longest usable period"}),
+            "usable": (
+                "period",
+                usable,
+                {"long_name": "whether the processing leaves the period usable"} | flags,
+            ),
+            "shortest_usable_period": (
+                (),
+                shortest,
+                {"units": "s", "long_name": "shortest usable period"},
+            ),
+            "longest_usable_period": (
+                (),
+                longest,
+                {"units": "s", "long_name": "longest usable period"},
+            ),
         }
     )
 

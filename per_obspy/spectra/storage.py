@@ -1,8 +1,8 @@
 """
 Spectra on disk: one netCDF shard a station, and one file for the region.
 
-A shard holds everything of a station, its processed motion included. ``spectra.nc`` of a region holds the spectra of
-all stations along the dimension ``station`` without the motion.
+A shard holds everything of a station, its processed motion included. ``spectra.nc`` of a region
+holds the spectra of all stations along the dimension ``station`` without the motion.
 """
 
 from collections.abc import Hashable, Iterable
@@ -28,7 +28,9 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     path : Path
         Where to; folders are made.
     """
-    encoding: dict[Hashable, dict[str, object]] = {name: {"_FillValue": None} for name in dataset.coords}
+    encoding: dict[Hashable, dict[str, object]] = {
+        name: {"_FillValue": None} for name in dataset.coords
+    }
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f":
             encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}
@@ -46,11 +48,15 @@ def read_spectra(path: Path) -> xr.Dataset:
         If the file is missing, damaged or of another kind.
     """
     try:
-        dataset = xr.load_dataset(path, engine="netcdf4", decode_times=False, decode_timedelta=False)
+        dataset = xr.load_dataset(
+            path, engine="netcdf4", decode_times=False, decode_timedelta=False
+        )
     except (OSError, ValueError) as error:
         raise CatalogError(str(path), f"cannot be read as netCDF: {error}") from error
     if "per" not in dataset:
-        raise CatalogError(str(path), f"has no variable 'per', only {sorted(map(str, dataset.variables))}")
+        raise CatalogError(
+            str(path), f"has no variable 'per', only {sorted(map(str, dataset.variables))}"
+        )
     return dataset
 
 
@@ -86,16 +92,24 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
         combine_attrs="drop_conflicts",
     )
     for axis in ("period", "damping", "azimuth"):
-        if axis in joined.sizes and joined.sizes[axis] != max(one.sizes.get(axis, 0) for one in spectra):
-            raise ValueError(f"{axis} differs between the stations: the spectra are not on one grid")
-    named = _unlabelled(joined).assign_attrs(title="Pseudo energy radius spectra of a region", id="region")
+        if axis in joined.sizes and joined.sizes[axis] != max(
+            one.sizes.get(axis, 0) for one in spectra
+        ):
+            raise ValueError(
+                f"{axis} differs between the stations: the spectra are not on one grid"
+            )
+    named = _unlabelled(joined).assign_attrs(
+        title="Pseudo energy radius spectra of a region", id="region"
+    )
     return named.assign_attrs(_box(named))
 
 
 def _without_motion(station: xr.Dataset) -> xr.Dataset:
     """Return the spectra with what has to be told apart by station as variables."""
     spectra = station.drop_vars([*MOTION, "time"]).rename(station="station_name").drop_encoding()
-    spectra = spectra.assign_coords(component=spectra["component_name"].values).drop_vars("component_name")
+    spectra = spectra.assign_coords(component=spectra["component_name"].values).drop_vars(
+        "component_name"
+    )
     horizontals = (
         (),
         int(station.attrs["horizontals"]),
@@ -106,7 +120,11 @@ def _without_motion(station: xr.Dataset) -> xr.Dataset:
 
 def _unlabelled(joined: xr.Dataset) -> xr.Dataset:
     """Return the components' names as CF wants them: text beside the dimension, which has no coordinate."""
-    names = ("component", joined["component"].values, {"long_name": "horizontal_1, horizontal_2, vertical"})
+    names = (
+        "component",
+        joined["component"].values,
+        {"long_name": "horizontal_1, horizontal_2, vertical"},
+    )
     return joined.drop_vars("component").assign_coords(component_name=names)
 
 

@@ -13,8 +13,9 @@ LOCAL = "+proj=tmerc +lon_0=-67.95 +lat_0=-20.35 +datum=WGS84"
 #: Houses of a block: two rows back to back; blocks of a row of blocks; width of a street, m.
 ROW, ACROSS, STREET = 20, 25, 12.0
 
-#: Shares of houses: walls shared with the next one, courtyards, sheds in them, wings; and of features by mistake:
-#: walls that cross the next house by a metre, outlines that cross themselves, outlines twice, no outline.
+#: Shares of houses: walls shared with the next one, courtyards, sheds in them, wings; and of
+#: features by mistake: walls that cross the next house by a metre, outlines that cross themselves,
+#: outlines twice, no outline.
 TOUCHING, COURTYARD, SHED, WING = 0.55, 0.08, 0.3, 0.15
 CROSSING, INVALID, TWICE, MISSING = 0.01, 0.003, 0.002, 0.001
 
@@ -78,7 +79,11 @@ def _house(random: np.random.Generator, plot: shapely.Polygon) -> list[shapely.P
         shed = shapely.box(x + 2.5 + random.uniform(0.0, 0.5), y + 4.0, x + 4.5, y + 6.0)
         sheds = [shed] if random.random() < SHED and shapely.contains(yard, shed) else []
         return [plot - yard, *sheds] if far_x - x > 6.0 else [plot]
-    return [plot - shapely.box(x, y, x + (far_x - x) / 2.0, y + 4.0)] if kind < COURTYARD + WING else [plot]
+    return (
+        [plot - shapely.box(x, y, x + (far_x - x) / 2.0, y + 4.0)]
+        if kind < COURTYARD + WING
+        else [plot]
+    )
 
 
 def _with_mistakes(random: np.random.Generator, houses: NDArray[np.object_]) -> NDArray[np.object_]:

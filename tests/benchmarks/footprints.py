@@ -1,8 +1,8 @@
 """
 Time and memory of ``pairs_from_footprints`` for a made-up city with party walls, courtyards and mistakes.
 
-Run: ``python tests/benchmarks/footprints.py [houses]``; prints features, pairs, rejections by kind, seconds of
-processor and clock, and the largest memory (of the whole process, and before the call).
+Run: ``python tests/benchmarks/footprints.py [houses]``; prints features, pairs, rejections by kind,
+seconds of processor and clock, and the largest memory (of the whole process, and before the call).
 """
 
 import resource

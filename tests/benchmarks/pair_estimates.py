@@ -3,8 +3,9 @@ Speed of what is estimated for a pair, beside plain NumPy and pandas in one proc
 
     python tests/benchmarks/pair_estimates.py
 
-Times are processor time of this thread, the best of several. The peers do the three steps of the single hit for one
-branch, without status, envelope and energies: less than what they are compared with.
+Times are processor time of this thread, the best of several. The peers do the three steps of the
+single hit for one branch, without status, envelope and energies: less than what they are compared
+with.
 """
 
 import time
@@ -14,12 +15,15 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from per_obspy.kernels.resampling import resampled_probabilities
-from per_obspy.pounding.directional import directional_correlation
+from per_obspy.kernels.pairs.resampling import resampled_probabilities
+from per_obspy.pounding.correlation.azimuths import directional_correlation
+from per_obspy.pounding.history.relative import (
+    critical_gap_surface,
+    directional_relative_displacement,
+)
 from per_obspy.pounding.probability import pounding_probability
-from per_obspy.pounding.relative import critical_gap_surface, directional_relative_displacement
 from per_obspy.pounding.single_hit import single_hit
-from per_obspy.spectra.maxima import azimuth_maxima
+from per_obspy.spectra.per_pair import azimuth_maxima
 
 PAIRS, SAMPLES, DT = 100_000, 12_000, 0.01
 
@@ -43,7 +47,17 @@ def random_pairs(count: int) -> dict[str, np.ndarray]:
     t1, t2 = rng.uniform(0.3, 3.0, (2, count))
     m1, m2 = rng.uniform(1.0, 5.0, (2, count))
     e, gap = rng.uniform(0.0, 1.0, count), critical * rng.uniform(0.0, 1.0, count)
-    return {"r1": r1, "r2": r2, "t1": t1, "t2": t2, "m1": m1, "m2": m2, "e": e, "critical": critical, "gap": gap}
+    return {
+        "r1": r1,
+        "r2": r2,
+        "t1": t1,
+        "t2": t2,
+        "m1": m1,
+        "m2": m2,
+        "e": e,
+        "critical": critical,
+        "gap": gap,
+    }
 
 
 def numpy_single_hit(r1, r2, t1, t2, m1, m2, e, critical, gap):
@@ -60,7 +74,9 @@ def numpy_single_hit(r1, r2, t1, t2, m1, m2, e, critical, gap):
         v1, v2 = v * c1 + w1 * x * s1, v * c2 + w2 * (x - critical) * s2
         distance, closing = np.maximum(u1 - u2 - gap, 0), v1 - v2
         root = np.sqrt(closing**2 + 2 * bound * distance)
-        t = t + np.where(closing > 0, 2 * distance / np.maximum(closing + root, 1e-300), (root - closing) / bound)
+        t = t + np.where(
+            closing > 0, 2 * distance / np.maximum(closing + root, 1e-300), (root - closing) / bound
+        )
     return np.hypot(u1, (v1 - (1 + e) * m2 / (m1 + m2) * closing) / w1) / r1
 
 
@@ -78,13 +94,22 @@ def main() -> None:
     few = pd.DataFrame(pairs).head(300)
     rows = best(lambda: few.apply(lambda row: numpy_single_hit(*row), axis=1), 1) / len(few)
     print(f"single_hit                {1e-6 / ours:8.3f} million pairs/s")
-    print(f"  plain NumPy, one branch {1e-6 / plain:8.3f} million pairs/s  {plain / ours:8.1f} times the time")
-    print(f"  pandas apply            {1e-6 / rows:8.3f} million pairs/s  {rows / ours:8.0f} times the time")
+    print(
+        f"  plain NumPy, one branch {1e-6 / plain:8.3f} million pairs/s  {plain / ours:8.1f} times the time"
+    )
+    print(
+        f"  pandas apply            {1e-6 / rows:8.3f} million pairs/s  {rows / ours:8.0f} times the time"
+    )
     motion, periods = ground_motion(), np.geomspace(0.1, 5.0, 100)
     surface = best(lambda: critical_gap_surface(motion, DT, periods, periods), 3)
     print(f"critical_gap_surface      {surface:8.3f} s for 100 x 100 periods, {SAMPLES} samples")
     of_a_record(motion)
-    chance = best(lambda: pounding_probability(pairs["r1"][:5000], pairs["r2"][:5000], 0.3, 0.2, 0.4, 0.4, 0.8, 0.2), 3)
+    chance = best(
+        lambda: pounding_probability(
+            pairs["r1"][:5000], pairs["r2"][:5000], 0.3, 0.2, 0.4, 0.4, 0.8, 0.2
+        ),
+        3,
+    )
     print(f"pounding_probability      {5 / chance:8.1f} thousand pairs/s")
     print(f"resampled, 128 nodes      {resampled_rate() / 1e3:8.1f} thousand pairs/s")
 
@@ -95,14 +120,23 @@ def of_a_record(motion: np.ndarray) -> None:
     structures = rng.uniform([0.2, 0.02, 0.2, 0.02, 0.0], [3.0, 0.1, 3.0, 0.1, 360.0], (2000, 5)).T
     alike = structures.copy()
     alike[2:4] = structures[:2] * (1.0 + 1e-9)
-    for name, chosen in (("own azimuths", structures), ("alike to 1e-9", alike), ("a call of 64", structures[:, :64])):
-        each = best(lambda c=chosen: directional_relative_displacement(motion, motion[::-1], DT, *c), 3)
+    for name, chosen in (
+        ("own azimuths", structures),
+        ("alike to 1e-9", alike),
+        ("a call of 64", structures[:, :64]),
+    ):
+        each = best(
+            lambda c=chosen: directional_relative_displacement(motion, motion[::-1], DT, *c), 3
+        )
         rate = 1e-3 * chosen.shape[1] / each
         print(f"relative displacement     {rate:8.1f} thousand pairs/s, {SAMPLES} samples, {name}")
     pads = 1e-5 * rng.normal(size=(2, SAMPLES // 2))
     padded = np.concatenate([pads[0], motion, pads[1]])
     few = structures[[0, 1, 4], :800]  # so few that no thread is started
-    for record, name in ((motion, f"{SAMPLES} samples"), (padded, f"{2 * SAMPLES}, half of them pads")):
+    for record, name in (
+        (motion, f"{SAMPLES} samples"),
+        (padded, f"{2 * SAMPLES}, half of them pads"),
+    ):
         each = best(lambda r=record: azimuth_maxima(r, r[::-1], DT, *few), 9) / 800
         print(f"PER and SD of a building  {1e-3 / each:8.1f} thousand/s, own azimuths, {name}")
         pair = *structures[:4], structures[4:].T
@@ -113,7 +147,11 @@ def of_a_record(motion: np.ndarray) -> None:
 def resampled_rate() -> float:
     """Return pairs a second of the probability over 128 nodes of period and damping of both buildings."""
     rng = np.random.default_rng(3)
-    grid = np.log(np.geomspace(0.05, 10.0, 100)), np.log([0.01, 0.02, 0.05, 0.1, 0.2]), rng.normal(size=(36, 5, 100))
+    grid = (
+        np.log(np.geomspace(0.05, 10.0, 100)),
+        np.log([0.01, 0.02, 0.05, 0.1, 0.2]),
+        rng.normal(size=(36, 5, 100)),
+    )
     building = np.log([0.5, 0.05]), np.full(2, 0.3), np.log([0.1])
     pairs = np.concatenate([[3.0], *building, *building, [0.1, 0.35]]) * np.ones((4000, 1))
     nodes, chance = rng.normal(size=(128, 4)), np.empty(4000)

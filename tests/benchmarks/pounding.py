@@ -1,8 +1,9 @@
 """
 Pairs a second of ``pounding_histories`` on one core, beside OpenSeesPy on the same pairs.
 
-Run as ``python tests/benchmarks/pounding.py``. OpenSees integrates with the record's own step, contact by a stiff
-no-tension gap; its cost is what is compared, not its accuracy. On a busy machine compare the ratios and the yardstick.
+Run as ``python tests/benchmarks/pounding.py``. OpenSees integrates with the record's own step,
+contact by a stiff no-tension gap; its cost is what is compared, not its accuracy. On a busy machine
+compare the ratios and the yardstick.
 """
 
 import importlib
@@ -10,11 +11,16 @@ import time
 
 import numpy as np
 
-from per_obspy.pounding.histories import pounding_histories
+from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.spectra.elastic import per_spectrum
 
 DT, SAMPLES, PAIRS, PEER_PAIRS = 0.01, 12_000, 1024, 4
-YIELDING = {"yield_displacement_1": 0.03, "hardening_1": 0.05, "yield_displacement_2": 0.03, "hardening_2": 0.05}
+YIELDING = {
+    "yield_displacement_1": 0.03,
+    "hardening_1": 0.05,
+    "yield_displacement_2": 0.03,
+    "hardening_2": 0.05,
+}
 
 
 def record():
@@ -112,12 +118,18 @@ def main():
     peer, ops = None, opensees()
     if ops is not None:
         peer = opensees_rate(ops, acceleration, pairs, PEER_PAIRS)
-        print(f"OpenSeesPy, linear, {SAMPLES} samples, record's step: {peer:.1f} pairs/s on one core")
-    print(f"per_spectrum, the yardstick: {yardstick(acceleration) / 1e9:.2f} billion oscillator-steps/s on one core")
+        print(
+            f"OpenSeesPy, linear, {SAMPLES} samples, record's step: {peer:.1f} pairs/s on one core"
+        )
+    print(
+        f"per_spectrum, the yardstick: {yardstick(acceleration) / 1e9:.2f} billion oscillator-steps/s on one core"
+    )
     print(f"{'case':>12} {'pairs/s core':>13} {'impacts':>8} {'x OpenSees':>11}")
     for name, fields in cases.items():
         speed, impacts = rate(acceleration, fields)
-        print(f"{name:>12} {speed:13.0f} {impacts:8.1f} {speed / peer if peer else float('nan'):11.0f}")
+        print(
+            f"{name:>12} {speed:13.0f} {impacts:8.1f} {speed / peer if peer else float('nan'):11.0f}"
+        )
 
 
 if __name__ == "__main__":

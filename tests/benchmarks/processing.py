@@ -1,9 +1,10 @@
 """
 Time of the processing of the eleven Ridgecrest stations, step by step, and of gmprocess on the same files.
 
-Run: ``python tests/benchmarks/processing.py FOLDER [PYTHON]``, where FOLDER holds MiniSEED and StationXML, and PYTHON
-is the interpreter of an environment of its own with gmprocess 2.x in it (``python -m venv E; E/bin/pip install
-gmprocess``). Prints seconds of processor time: the clock depends on who else uses the machine.
+Run: ``python tests/benchmarks/processing.py FOLDER [PYTHON]``, where FOLDER holds MiniSEED and
+StationXML, and PYTHON is the interpreter of an environment of its own with gmprocess 2.x in it
+(``python -m venv E; E/bin/pip install gmprocess``). Prints seconds of processor time: the clock
+depends on who else uses the machine.
 """
 
 import cProfile
@@ -88,10 +89,14 @@ def main(folder: Path, python: str | None) -> None:
     work(folder)  # imports, caches
     seconds = seconds_of(folder)
     stations, kept = work(folder)
-    print(f"per_obspy: {stations} stations, {kept} kept, {seconds:.2f} s: {stations / seconds:.1f} stations a second")
+    print(
+        f"per_obspy: {stations} stations, {kept} kept, {seconds:.2f} s: {stations / seconds:.1f} stations a second"
+    )
     print_steps(folder)
     if python:
-        done = subprocess.run([python, "-c", PEER, str(folder)], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [python, "-c", PEER, str(folder)], capture_output=True, text=True, check=True
+        )
         number, passed, read, processed = map(float, done.stdout.split()[-4:])
         print(
             f"gmprocess: {number:.0f} stations, {passed:.0f} kept, {read:.2f} s to read, {processed:.2f} s to process"

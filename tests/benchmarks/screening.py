@@ -1,11 +1,12 @@
 """
 Time and memory of the whole command as inventories grow.
 
-Run: ``python tests/benchmarks/screening.py [PAIRS...]``, 10 000 to 1 000 000 if none are given; Linux. The pairs stand
-around the 24 simulated stations of the demonstration, whose records are made first. Each inventory is screened with
-estimates only, and up to a million pairs with the exact demand and history of each. Seconds are by the clock, of
-screening with ranking, of the report, and of the whole command from its start; processor time is that of all processes;
-memory is the largest sum over all processes (proportional set size: what they share counts once).
+Run: ``python tests/benchmarks/screening.py [PAIRS...]``, 10 000 to 1 000 000 if none are given;
+Linux. The pairs stand around the 24 simulated stations of the demonstration, whose records are made
+first. Each inventory is screened with estimates only, and up to a million pairs with the exact
+demand and history of each. Seconds are by the clock, of screening with ranking, of the report, and
+of the whole command from its start; processor time is that of all processes; memory is the largest
+sum over all processes (proportional set size: what they share counts once).
 """
 
 import json
@@ -49,13 +50,17 @@ HEADER = f"{'pairs':>10} {'way':9} {'screening':>9} {'report':>7} {'whole':>7} {
 def write_inventory(path: Path, count: int, stations: Path) -> None:
     """Write so many pairs around the stations, a part at a time."""
     shards = [read_spectra(shard) for shard in sorted(stations.glob("*.nc"))]
-    longitude, latitude = (np.array([one[name].item() for one in shards]) for name in ("longitude", "latitude"))
+    longitude, latitude = (
+        np.array([one[name].item() for one in shards]) for name in ("longitude", "latitude")
+    )
     wanted = load(SCENARIO, Simulation).pairs
     writer = None
     for seed, first in enumerate(range(0, count, TOGETHER)):
         settings = wanted.model_copy(update={"count": min(TOGETHER, count - first), "seed": seed})
         table = simulated_pairs(longitude, latitude, **settings.model_dump())
-        rows = pa.Table.from_pandas(table.assign(pair_id=f"{seed}-" + table["pair_id"]), preserve_index=False)
+        rows = pa.Table.from_pandas(
+            table.assign(pair_id=f"{seed}-" + table["pair_id"]), preserve_index=False
+        )
         writer = writer or pq.ParquetWriter(path, rows.schema)
         writer.write_table(rows)
     assert writer is not None
@@ -66,8 +71,12 @@ def memory(process: int) -> int:
     """Return the memory of a process and its descendants, bytes; 0 for those that have ended meanwhile."""
     try:
         rollup = Path(f"/proc/{process}/smaps_rollup").read_text()
-        own = next(int(line.split()[1]) * 1024 for line in rollup.splitlines() if line.startswith("Pss:"))
-        children = [one.read_text().split() for one in Path(f"/proc/{process}/task").glob("*/children")]
+        own = next(
+            int(line.split()[1]) * 1024 for line in rollup.splitlines() if line.startswith("Pss:")
+        )
+        children = [
+            one.read_text().split() for one in Path(f"/proc/{process}/task").glob("*/children")
+        ]
     except OSError:
         return 0
     return own + sum(memory(int(child)) for some in children for child in some)
@@ -94,7 +103,9 @@ def main(sizes: list[int]) -> None:
     """Print a row for every inventory and way."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room)
-        output, pairs, configuration = (folder / name for name in ("output", "pairs.parquet", "run.toml"))
+        output, pairs, configuration = (
+            folder / name for name in ("output", "pairs.parquet", "run.toml")
+        )
         configuration.write_text(RECORDS)
         measured(configuration)  # makes the records and their spectra
         print(HEADER)

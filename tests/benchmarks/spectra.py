@@ -3,9 +3,10 @@ Speed and agreement of the spectra, beside other programs, in one process on one
 
     OPENBLAS_NUM_THREADS=1 python tests/benchmarks/spectra.py
 
-Every time is the best of several: processor time, on which ratios rest, and time by the clock. "exact" finds peaks
-between the samples too, "at samples" takes them at samples only, as all peers do. Peers that are not installed are
-named and left out (``pip install per_obspy[benchmark]`` brings them).
+Every time is the best of several: processor time, on which ratios rest, and time by the clock.
+"exact" finds peaks between the samples too, "at samples" takes them at samples only, as all peers
+do. Peers that are not installed are named and left out (``pip install per_obspy[benchmark]`` brings
+them).
 """
 
 import importlib
@@ -95,7 +96,9 @@ def ratio(seconds: Seconds, ours: Seconds) -> str:
 def error(ours: np.ndarray, theirs: np.ndarray) -> str:
     """Return median and largest relative difference in words."""
     differences = np.abs(np.asarray(theirs) / ours - 1)
-    return f"differs by {100 * np.median(differences):.2g} %, at most {100 * differences.max():.2g} %"
+    return (
+        f"differs by {100 * np.median(differences):.2g} %, at most {100 * differences.max():.2g} %"
+    )
 
 
 def module(name: str, install: str) -> Any:
@@ -111,7 +114,8 @@ def pyrotd_sd_sv(pyrotd: Any, motion: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Displacement and velocity spectra by FFT, each its own pass; the record is padded to twice its length."""
     padded = np.concatenate([motion, np.zeros(motion.size)])
     sd, sv = (
-        pyrotd.calc_spec_accels(DT, padded, 1 / PERIODS, DAMPING, osc_type=kind)["spec_accel"] for kind in ("sd", "sv")
+        pyrotd.calc_spec_accels(DT, padded, 1 / PERIODS, DAMPING, osc_type=kind)["spec_accel"]
+        for kind in ("sd", "sv")
     )
     return sd, sv
 
@@ -126,7 +130,9 @@ def esi_per(oscillators: Any, motion: np.ndarray) -> np.ndarray:
     """PER from the histories of gmprocess' C code, one period after the other."""
     per = []
     for period in PERIODS:
-        _, v, u, *_ = oscillators.calculate_spectrals(motion, motion.size, DT, 1 / DT, period, DAMPING)
+        _, v, u, *_ = oscillators.calculate_spectrals(
+            motion, motion.size, DT, 1 / DT, period, DAMPING
+        )
         per.append(np.sqrt((u**2 + (v * period / (2 * np.pi)) ** 2).max()))
     return np.array(per)
 
@@ -144,24 +150,37 @@ def lsim_per(motion: np.ndarray) -> np.ndarray:
 def obspy_psa(motion: np.ndarray) -> np.ndarray:
     """PSA from ObsPy, which wants the ground displacement and simulates a seismometer of each frequency."""
     displacement = DT**2 * np.cumsum(np.cumsum(motion))
-    return np.array([peak_ground_motion(displacement, DT, 1 / period, DAMPING)[0] for period in PERIODS])
+    return np.array(
+        [peak_ground_motion(displacement, DT, 1 / period, DAMPING)[0] for period in PERIODS]
+    )
 
 
 def one_component() -> None:
     """One record, 100 periods."""
     motion = ground_motion(SAMPLES)
-    print(f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, damping {DAMPING}")
+    print(
+        f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, damping {DAMPING}"
+    )
     print(f"{'':<56}{'processor':>14} {'clock':>14}")
     for count in (SAMPLES, 4 * SAMPLES):
         share_of_peak(count)
     sampled, sampled_per = best(lambda: sampled_per_spectrum(motion, DT, PERIODS))
     row("PER at samples", sampled)
     seconds, exact_per = best(lambda: per_spectrum(motion, DT, PERIODS))
-    row("PER exact", seconds, ratio(seconds, sampled), f"samples alone: {error(exact_per, sampled_per)}")
+    row(
+        "PER exact",
+        seconds,
+        ratio(seconds, sampled),
+        f"samples alone: {error(exact_per, sampled_per)}",
+    )
     several, at_samples = best(lambda: sampled_response_spectra(motion, DT, PERIODS))
     row("PER, SD, SV, SA at samples", several)
     seconds, _ = best(lambda: response_spectra(motion, DT, PERIODS))
-    row("PER, SD, SV, SA exact, with free vibration", seconds, f"{seconds.processor / several.processor:.3g} times")
+    row(
+        "PER, SD, SV, SA exact, with free vibration",
+        seconds,
+        f"{seconds.processor / several.processor:.3g} times",
+    )
     peers_of_one_component(motion, sampled, sampled_per, at_samples)
 
 
@@ -171,7 +190,10 @@ def share_of_peak(samples: int) -> None:
     rounds = best(lambda: multiply_add(PEAK_ROUNDS))[0].processor
     seconds, _ = best(lambda: sampled_per_spectrum(motion, DT, periods))
     rounds = min(rounds, best(lambda: multiply_add(PEAK_ROUNDS))[0].processor)
-    peak, rate = PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds, samples * periods.size / seconds.processor
+    peak, rate = (
+        PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds,
+        samples * periods.size / seconds.processor,
+    )
     share = f"{rate / 1e9:.2f} billion steps/s, {100 * PER_STEP * rate / peak:.0f} % of {peak / 1e9:.0f} billion FMA/s"
     row(f"PER at samples, {samples} samples, 128 periods", seconds, share)
 
@@ -184,19 +206,32 @@ def peers_of_one_component(motion, sampled, sampled_per, at_samples) -> None:
         row("pyrotd: SD and SV", seconds, ratio(seconds, sampled), error(at_samples.sd, sd))
         print(f"{'':>12}SV {error(at_samples.sv, sv)}")
         seconds = best(
-            lambda: [pyrotd.calc_spec_accels(DT, motion, 1 / PERIODS, DAMPING, osc_type=kind) for kind in ("sd", "sv")]
+            lambda: [
+                pyrotd.calc_spec_accels(DT, motion, 1 / PERIODS, DAMPING, osc_type=kind)
+                for kind in ("sd", "sv")
+            ]
         )[0]
         row("pyrotd: SD and SV, not padded", seconds, ratio(seconds, sampled))
     if oscillators := module("esi_core.gmprocess.metrics.oscillators", "esi-core"):
         seconds, per = best(lambda: esi_per(oscillators, motion))
-        row("esi-core (C of gmprocess): PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
+        row(
+            "esi-core (C of gmprocess): PER",
+            seconds,
+            ratio(seconds, sampled),
+            error(sampled_per, per),
+        )
     if eqsig := module("eqsig.sdof", "eqsig"):
         seconds, per = best(lambda: eqsig_per(eqsig, motion))
         row("eqsig: PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
     seconds, per = best(lambda: lsim_per(motion))
     row("SciPy lsim: PER", seconds, ratio(seconds, sampled), error(sampled_per, per))
     seconds, psa = best(lambda: obspy_psa(motion))
-    row("ObsPy peak_ground_motion: PSA", seconds, ratio(seconds, sampled), error(at_samples.psa, psa))
+    row(
+        "ObsPy peak_ground_motion: PSA",
+        seconds,
+        ratio(seconds, sampled),
+        error(at_samples.psa, psa),
+    )
 
 
 def azimuths() -> None:
@@ -227,13 +262,21 @@ def azimuths() -> None:
                     DT, *padded, 1 / PERIODS, DAMPING, [50, 100], method=method
                 )
             )
-            table = np.sort(found, order=["osc_freq", "percentile"])["spec_accel"].reshape(-1, 2)[::-1]
+            table = np.sort(found, order=["osc_freq", "percentile"])["spec_accel"].reshape(-1, 2)[
+                ::-1
+            ]
             pseudo = (2 * np.pi / PERIODS) ** 2
             others = f"{seconds.processor / exact.processor:.3g} times our exact SD"
             row(f"pyrotd {method}: RotD50, RotD100 of SD", seconds, ratio(seconds, ours), others)
             for column, percentile in enumerate((50, 100)):
-                print(f"{'':>12}RotD{percentile} {error(rotd(sd, percentile) * pseudo, table[:, column])}")
-        seconds, _ = best(lambda: pyrotd.calc_rotated_spec_accels(DT, north, east, 1 / PERIODS, DAMPING, [50, 100]))
+                print(
+                    f"{'':>12}RotD{percentile} {error(rotd(sd, percentile) * pseudo, table[:, column])}"
+                )
+        seconds, _ = best(
+            lambda: pyrotd.calc_rotated_spec_accels(
+                DT, north, east, 1 / PERIODS, DAMPING, [50, 100]
+            )
+        )
         row("pyrotd optimized, not padded", seconds, ratio(seconds, ours))
 
 
@@ -260,10 +303,19 @@ def scaling() -> None:
     east = ground_motion(SAMPLES, 1)
     for count in (4, 36, 180, 720):
         angles = np.arange(count) * 180 / count
-        seconds, _ = best(lambda angles=angles: azimuthal_per_spectrum(motion, east, DT, PERIODS, azimuths=angles), 0.5)
+        seconds, _ = best(
+            lambda angles=angles: azimuthal_per_spectrum(
+                motion, east, DT, PERIODS, azimuths=angles
+            ),
+            0.5,
+        )
         row(f"{count} azimuths, 100 periods, 12000 samples", seconds)
     seconds, _ = best(lambda: bilinear_response(motion, DT, 1.0, DAMPING, 0.01, 0.05), 0.5)
-    row("bilinear_response, 12000 samples", seconds, f"{1e9 * seconds.processor / SAMPLES:.0f} ns a sample")
+    row(
+        "bilinear_response, 12000 samples",
+        seconds,
+        f"{1e9 * seconds.processor / SAMPLES:.0f} ns a sample",
+    )
 
 
 def threads() -> None:
@@ -280,8 +332,14 @@ def threads() -> None:
     os.sched_setaffinity(0, cores)
     row("1 core", one)
     same = "same bits" if np.array_equal(spectra, alone) else "DIFFERENT"
-    row(f"{len(cores)} cores", every, f"{one.clock / every.clock:.2f} times faster by the clock, {same}")
-    print(f"{'':>12}the machine grants {len(cores) * loop.clock / loops.clock:.2f} times one core to multiply-adds")
+    row(
+        f"{len(cores)} cores",
+        every,
+        f"{one.clock / every.clock:.2f} times faster by the clock, {same}",
+    )
+    print(
+        f"{'':>12}the machine grants {len(cores) * loop.clock / loops.clock:.2f} times one core to multiply-adds"
+    )
 
 
 def long_record() -> None:

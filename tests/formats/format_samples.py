@@ -33,7 +33,9 @@ class Sample(NamedTuple):
 def block(values: NDArray[np.float64] | list[float], layout: str, per_line: int) -> str:
     """Write numbers as FORTRAN does."""
     fields = [layout % value for value in values]
-    return "\n".join("".join(fields[first : first + per_line]) for first in range(0, len(fields), per_line))
+    return "\n".join(
+        "".join(fields[first : first + per_line]) for first in range(0, len(fields), per_line)
+    )
 
 
 def pairs(values: NDArray[np.float64], dt: float, indent: str = "") -> str:
@@ -42,7 +44,9 @@ def pairs(values: NDArray[np.float64], dt: float, indent: str = "") -> str:
     return "\n".join(indent + line for line in lines)
 
 
-def csmip_header(channel: int, direction: str, dt: float, unit: str, agency: str = "CGS") -> list[str]:
+def csmip_header(
+    channel: int, direction: str, dt: float, unit: str, agency: str = "CGS"
+) -> list[str]:
     return [
         f"Uncorrected Accelerogram Data             Processed: 02/13/12, {agency}  146be002",
         "Record of Mon Feb 13, 2012 13:06:45.0 PST             (Avol1 v9.2,12/11)",
@@ -72,7 +76,11 @@ def csmip_v1() -> Sample:
     for channel, direction in enumerate(("360 Deg", "Up", "90 Deg"), start=1):
         title = f" {len(MOTION)} Accelerogram points at 200 pts/sec in units of g .      Format: (8f9.6)"
         channels += csmip_header(channel, direction, 0.005, "g") + numbers(50, r6=4.0 / channel)
-        channels += [title, block(MOTION / channel, "%9.6f", 8), f"/&  -----  End of Data for Channel {channel}"]
+        channels += [
+            title,
+            block(MOTION / channel, "%9.6f", 8),
+            f"/&  -----  End of Data for Channel {channel}",
+        ]
     values = tuple(GRAVITY * np.round(MOTION / channel, 6) for channel in (1, 2, 3))
     ids = ("CE.89146..HNN", "CE.89146..HNZ", "CE.89146..HNE")
     return Sample("CSMIP_V1", "\n".join(channels) + "\n", ids, values, 0.005, (0, None, 90), (0, -90, 0), "raw",
@@ -81,7 +89,9 @@ def csmip_v1() -> Sample:
 
 def csmip_raw() -> Sample:
     """Digitised film: times and values in turn."""
-    channel = csmip_header(1, "S 16 E", 0.01, "G/10") + numbers(50) + [pairs(MOTION, 0.01), "/&  end"]
+    channel = (
+        csmip_header(1, "S 16 E", 0.01, "G/10") + numbers(50) + [pairs(MOTION, 0.01), "/&  end"]
+    )
     return Sample("CSMIP_V1", "\n".join(channel), ("CE.89146..HN1",), (GRAVITY / 10 * np.round(MOTION, 3),), 0.01,
                   (164,), (0,), "raw", start="2012-02-13T21:06:45", coordinates=(40.941, -123.633))  # fmt: skip
 
@@ -89,10 +99,14 @@ def csmip_raw() -> Sample:
 def csmip_v2() -> Sample:
     lines = ["Corrected accelerogram   89146-L2500-12044.02       Chan  1: 118 Deg     from"]
     lines += csmip_header(1, "118 Deg", 0.01, "g")
-    lines += ["Accelerogram bandpass filtered with 3 dB pts at   .30 and 40.00 cyc/sec"] + ["free text"] * 10
+    lines += ["Accelerogram bandpass filtered with 3 dB pts at   .30 and 40.00 cyc/sec"] + [
+        "free text"
+    ] * 10
     lines += numbers(100, r60=0.01, r61=0.3, r65=-4.0, r72=40.0)
     for kind, unit in (("accel", "cm/sec2"), ("veloc", "cm/sec"), ("displ", "cm")):
-        lines += [f" {len(MOTION)} points of {kind} data equally spaced at  .010 sec, in {unit}. (8f10.6)"]
+        lines += [
+            f" {len(MOTION)} points of {kind} data equally spaced at  .010 sec, in {unit}. (8f10.6)"
+        ]
         lines += [block(MOTION, "%10.6f", 8)]
     text = "\n".join([*lines, "/&  ----------  End of data for channel  1  ----------"])
     return Sample("CSMIP_V2", text, ("CE.89146..HN2",), (0.01 * MOTION,), 0.01, (118,), (0,), "processed",
@@ -108,7 +122,14 @@ def renadic() -> Sample:
     lines[7] = "UNIVERSIDAD DE CHILE - RENADIC"
     text = "\n".join([*lines, *numbers(50), pairs(MOTION, 0.01), "/&  END OF DATA"])
     return Sample(
-        "RENADIC", text, (".ANGOL..HNZ",), (GRAVITY / 10 * np.round(MOTION, 3),), 0.01, (None,), (-90,), "raw"
+        "RENADIC",
+        text,
+        (".ANGOL..HNZ",),
+        (GRAVITY / 10 * np.round(MOTION, 3),),
+        0.01,
+        (None,),
+        (-90,),
+        "raw",
     )
 
 
@@ -132,17 +153,32 @@ def usc(volume: int) -> Sample:
     if volume == 1:
         text = "\n".join(lines + numbers(50) + [pairs(MOTION, 0.01, " ")])
         values = GRAVITY / 10 * np.round(MOTION, 3)
-        return Sample("USC", text, (".0017..HN1",), (values,), 0.01, (185,), (0,), "raw", coordinates=place)
-    lines = ["CORRECTED ACCELEROGRAM  IIBB127  94.610.0 COMP S05W   FILE   0  CORRESPONDING T", *lines]
+        return Sample(
+            "USC", text, (".0017..HN1",), (values,), 0.01, (185,), (0,), "raw", coordinates=place
+        )
+    lines = [
+        "CORRECTED ACCELEROGRAM  IIBB127  94.610.0 COMP S05W   FILE   0  CORRESPONDING T",
+        *lines,
+    ]
     lines += ["ACCELEROGRAM IS BAND-PASS FILTERED BETWEEN  .225- .325 AND 25.00-27.00 HZ.", "", ""]
     lines += ["PEAK ACCELERATION =     4.00000  CMS/SEC/SEC AT    4.580   SEC."] + ["free text"] * 7
     lines += numbers(100)
     for kind, unit in (("ACC", "CM/SEC/SEC"), ("VEL", "CM/SEC"), ("DIS", "CM")):
-        lines += [f"  {len(MOTION)} POINTS OF {kind} DATA EQUALLY SPACED AT   .020 SEC.  IN UNITS {unit}"]
+        lines += [
+            f"  {len(MOTION)} POINTS OF {kind} DATA EQUALLY SPACED AT   .020 SEC.  IN UNITS {unit}"
+        ]
         lines += [block(MOTION, "%10.3f", 8)]
     values = 0.01 * MOTION
     return Sample(
-        "USC", "\n".join(lines), (".0017..BN1",), (values,), 0.02, (185,), (0,), "processed", coordinates=place
+        "USC",
+        "\n".join(lines),
+        (".0017..BN1",),
+        (values,),
+        0.02,
+        (185,),
+        (0,),
+        "processed",
+        coordinates=place,
     )
 
 
@@ -201,7 +237,9 @@ def itaca() -> Sample:
         "Accelaration time series in m/s/s",
         block(MOTION, "%14.7E", 5),
     ]
-    return Sample("ITACA", "\n".join(lines), ("IT.2987..HNE",), (MOTION,), 0.005, (90,), (0,), "processed")
+    return Sample(
+        "ITACA", "\n".join(lines), ("IT.2987..HNE",), (MOTION,), 0.005, (90,), (0,), "processed"
+    )
 
 
 def dyna_lines(first: str, time: str) -> list[str]:
@@ -245,7 +283,11 @@ def dyna() -> Sample:
 
 
 def afad() -> Sample:
-    lines = ["AAD_Filtered_TADAS_FILE", "AAD_LOW_CUT_FREQUENCY_HZ: 0.025", "AAD_HIGH_CUT_FREQUENCY_HZ: 40.0"]
+    lines = [
+        "AAD_Filtered_TADAS_FILE",
+        "AAD_LOW_CUT_FREQUENCY_HZ: 0.025",
+        "AAD_HIGH_CUT_FREQUENCY_HZ: 40.0",
+    ]
     text = "\n".join(lines + dyna_lines("202302060117", "2023/02/06 01:17:36.5357130"))
     return Sample("AFAD", text, ("HI.ARS1..HNE",), (0.01 * MOTION,), 0.005, (90,), (0,), "processed",
                   start="2023-02-06T01:17:36.535713", coordinates=(37.6349, 22.7293))  # fmt: skip
@@ -306,7 +348,12 @@ def unam() -> Sample:
     ]
     lines = ["*" * 80, "             INSTITUTO DE INGENIERIA", "ARCHIVO ESTANDAR DE ACELERACION:"]
     lines += [f"{name:39}: {value}" for name, value in fields]
-    lines += ["DATOS DE ACELERACION:", "---------+" * 8, "   CANAL-1   CANAL-2   CANAL-3", "---------+" * 8]
+    lines += [
+        "DATOS DE ACELERACION:",
+        "---------+" * 8,
+        "   CANAL-1   CANAL-2   CANAL-3",
+        "---------+" * 8,
+    ]
     lines += ["".join(f"{value:10.4f}" for value in row) for row in rows]
     ids = (".ACAC..CNZ", ".ACAC..CNN", ".ACAC..CNE")
     return Sample("UNAM", "\n".join(lines), ids, tuple(0.01 * rows.T), 0.004, (None, 0, 90), (-90, 0, 0), "raw",
@@ -348,10 +395,27 @@ def smc() -> Sample:
     integers[1:6], integers[12:14] = [1989, 291, 0, 4, 30], [90, 360]
     integers[15], integers[16], integers[29] = 1, len(MOTION), 1675
     reals = [0.17e39] * 50
-    reals[1], reals[10:12], reals[29], reals[31], reals[32] = 200.0, [37.728, -122.385], 4.0, -3.75, 0.1
-    motion = "".join(f"{value:11.4E}"[:8] + f"{value:11.4E}"[8] + f"{value:11.4E}"[-1] for value in MOTION)
-    lines = ["2 CORRECTED ACCELEROGRAM", "*", "SAF0A", "     1989  10  18    0004 Some Event", "Moment Mag=      7.1"]
-    lines += ["station = San Francisco, Some Street component=    360", "epicentral dist =     89.0"]
+    reals[1], reals[10:12], reals[29], reals[31], reals[32] = (
+        200.0,
+        [37.728, -122.385],
+        4.0,
+        -3.75,
+        0.1,
+    )
+    motion = "".join(
+        f"{value:11.4E}"[:8] + f"{value:11.4E}"[8] + f"{value:11.4E}"[-1] for value in MOTION
+    )
+    lines = [
+        "2 CORRECTED ACCELEROGRAM",
+        "*",
+        "SAF0A",
+        "     1989  10  18    0004 Some Event",
+        "Moment Mag=      7.1",
+    ]
+    lines += [
+        "station = San Francisco, Some Street component=    360",
+        "epicentral dist =     89.0",
+    ]
     lines += ["inst type=SMA-1      data source = USGS", "*", "*", "*"]
     lines += [block(integers, "%10d", 8), block(reals, "%15.7E", 5), "|comment"]
     lines += ["\n".join(motion[first : first + 80] for first in range(0, len(motion), 80))]
@@ -425,7 +489,9 @@ def cosmos(counts: bool) -> Sample:
             text += [f"   {size} raw accel.   pts, approx  0 secs, units=counts (50),Format=(10I8)"]
             text += [block(1000 * MOTION, "%8d", 10)]
         else:
-            text += [f"   {size} acceleration pts, approx   0 secs, units=cm/sec2(04),Format=(8F10.5)"]
+            text += [
+                f"   {size} acceleration pts, approx   0 secs, units=cm/sec2(04),Format=(8F10.5)"
+            ]
             text += [block(MOTION, "%10.5f", 8)]
         text += [f"End-of-data for C031.{code}.NC.01 acceleration"]
     values = (1000 * MOTION if counts else 0.01 * MOTION,) * 2

@@ -34,7 +34,9 @@ def read(content: str) -> obspy.Trace:
 def test_gravity_turns_g_into_metres_per_second_squared():
     trace = read(NAMED)
     # the standard value of gravity is exact
-    assert_allclose(trace.data, 9.80665 * np.array([-5e-4, 2.5e-4, 0, 1, -2, 3e-3, 4e-3]), rtol=1e-15)
+    assert_allclose(
+        trace.data, 9.80665 * np.array([-5e-4, 2.5e-4, 0, 1, -2, 3e-3, 4e-3]), rtol=1e-15
+    )
     assert trace.stats.units == "m/s2"
     assert trace.stats.delta == 0.01
 
@@ -73,8 +75,16 @@ def test_obspy_detects_path_and_open_file(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("NPTS=      7", "NPTS=      8", "line 6, samples: the header promises 8, the file holds 7"),
-        ("NPTS=      7", "NPTS=      6", "line 6, samples: the header promises 6, the file holds 7"),
+        (
+            "NPTS=      7",
+            "NPTS=      8",
+            "line 6, samples: the header promises 8, the file holds 7",
+        ),
+        (
+            "NPTS=      7",
+            "NPTS=      6",
+            "line 6, samples: the header promises 6, the file holds 7",
+        ),
         ("NPTS=      7", "NPTS=     -7", "line 4, NPTS: must be a positive whole number, got '-7'"),
         ("NPTS=      7", "NPTS=    ***", "line 4, NPTS: '\\*\\*\\*' is not a number"),
         (".0100 SEC", "0 SEC", "line 4, DT: must be positive and plausible, got '0'"),
@@ -104,7 +114,15 @@ def test_written_and_read_again(tmp_path: Path):
     again = obspy.read(str(path))[0]
     # eight significant digits are written
     assert_allclose(again.data, stream[0].data, rtol=5e-8)
-    for word in ("station", "starttime", "delta", "channel", "sensor_azimuth", "event", "station_name"):
+    for word in (
+        "station",
+        "starttime",
+        "delta",
+        "channel",
+        "sensor_azimuth",
+        "event",
+        "station_name",
+    ):
         assert again.stats[word] == stream[0].stats[word]
     assert_array_equal(stream[0].data, before[0].data)
 

@@ -15,17 +15,31 @@ from numpy.testing import assert_allclose, assert_array_equal
 from obspy import Stream, UTCDateTime
 
 from per_obspy.errors import RecordRejected
-from per_obspy.formats._text import Text, fixed_block
+from per_obspy.formats.text.lines import Text, fixed_block
 
 WORDS = {"units", "quantity", "processing_level"}
-BOUNDARIES = {"csmip_v1", "geonet_v1a", "geonet_v2a", "bhrc", "cosmos_v0c", "cosmos_v2c"}  # several channels a file
+BOUNDARIES = {
+    "csmip_v1",
+    "geonet_v1a",
+    "geonet_v2a",
+    "bhrc",
+    "cosmos_v0c",
+    "cosmos_v2c",
+}  # several channels a file
 
 
 def plugins() -> dict[str, dict[str, EntryPoint]]:
     """Return our formats: name -> isFormat, readFormat."""
-    ours = [point for point in entry_points(group="obspy.plugin.waveform") if point.value.startswith("per_obspy.")]
+    ours = [
+        point
+        for point in entry_points(group="obspy.plugin.waveform")
+        if point.value.startswith("per_obspy.")
+    ]
     return {
-        point.name: {part.name: part.load() for part in entry_points(group=f"obspy.plugin.waveform.{point.name}")}
+        point.name: {
+            part.name: part.load()
+            for part in entry_points(group=f"obspy.plugin.waveform.{point.name}")
+        }
         for point in ours
     }
 
@@ -51,7 +65,9 @@ def test_obspy_reads_path_and_open_file(sample: Sample, tmp_path: Path):
 def test_samples_interval_and_direction(sample: Sample):
     stream = read(sample, sample.text)
     assert [trace.id for trace in stream] == list(sample.ids)
-    for trace, values, azimuth, dip in zip(stream, sample.values, sample.azimuths, sample.dips, strict=True):
+    for trace, values, azimuth, dip in zip(
+        stream, sample.values, sample.azimuths, sample.dips, strict=True
+    ):
         # written exactly; a product of a few rounded factors
         assert_allclose(trace.data, values, rtol=1e-14)
         assert trace.data.dtype == np.float64
@@ -110,7 +126,8 @@ def test_every_cut_is_refused(sample: Sample, request: pytest.FixtureRequest):
         except RecordRejected:
             continue
         for trace, values in zip(stream, whole, strict=False):
-            # the last digits of the last sample may be missing: a cut file of free numbers cannot show that
+            # the last digits of the last sample may be missing: a cut file of free numbers cannot
+            # show that
             assert_array_equal(trace.data[:-1], values[:-1])
             assert len(trace) == len(values)
         assert len(stream) == len(whole) or request.node.callspec.id in BOUNDARIES
@@ -120,7 +137,10 @@ def test_every_cut_is_refused(sample: Sample, request: pytest.FixtureRequest):
 def test_lines_that_are_left_out_or_doubled_are_refused(sample: Sample):
     lines = sample.text.rstrip().split("\n")
     last = len(lines) - 2 if lines[-1].startswith(("/&", "End")) else len(lines) - 1
-    for changed in (lines[:last] + lines[last + 1 :], [*lines[:last], lines[last - 1], *lines[last:]]):
+    for changed in (
+        lines[:last] + lines[last + 1 :],
+        [*lines[:last], lines[last - 1], *lines[last:]],
+    ):
         with pytest.raises(RecordRejected, match=r"line \d+"):
             read(sample, "\n".join(changed))
 
@@ -174,27 +194,38 @@ def test_damaged_files(sample: Sample, data: st.DataObject):
         place = data.draw(st.integers(0, max(len(content) - 1, 0)))
         size = data.draw(st.integers(0, 12))
         piece = st.one_of(
-            st.binary(max_size=12), st.sampled_from([b"-999", b"9" * 12, b"0", b" ", b"\n", b"-", b"1E30"])
+            st.binary(max_size=12),
+            st.sampled_from([b"-999", b"9" * 12, b"0", b" ", b"\n", b"-", b"1E30"]),
         )
         content[place : place + size] = data.draw(piece)
     refuses_or_reads(sample.name, bytes(content))
 
 
 def obspy_test_files() -> list[Path]:
-    return sorted(path for path in Path(obspy.__file__).parent.glob("**/tests/data/**/*") if path.is_file())
+    return sorted(
+        path for path in Path(obspy.__file__).parent.glob("**/tests/data/**/*") if path.is_file()
+    )
 
 
 def test_no_test_file_of_obspy_is_claimed():
     files = obspy_test_files()
     if not files:
         pytest.skip("this ObsPy is installed without its test files")
-    claimed = [(path.name, name) for path in files for name, plugin in PLUGINS.items() if plugin["isFormat"](str(path))]
+    claimed = [
+        (path.name, name)
+        for path in files
+        for name, plugin in PLUGINS.items()
+        if plugin["isFormat"](str(path))
+    ]
     assert claimed == []
 
 
 def test_samples_are_read_at_20_megabytes_a_second():
     """One block of fixed width; a quarter of the demand leaves room for a busy machine."""
-    rows = ["".join(f"{value:15.7E}" for value in row) for row in np.random.default_rng(1).normal(size=(40_000, 5))]
+    rows = [
+        "".join(f"{value:15.7E}" for value in row)
+        for row in np.random.default_rng(1).normal(size=(40_000, 5))
+    ]
     began = perf_counter()
     values = fixed_block(Text("memory", rows), 0, 200_000, 15, 5)
     rate = 3.0 / (perf_counter() - began)
@@ -205,7 +236,12 @@ def test_samples_are_read_at_20_megabytes_a_second():
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [
-        ("cosmos_v2c", "with 13 text lines", "with 2 text lines", "line 1, text lines: 2, the format has 13"),
+        (
+            "cosmos_v2c",
+            "with 13 text lines",
+            "with 2 text lines",
+            "line 1, text lines: 2, the format has 13",
+        ),
         (
             "cosmos_v2c",
             "approx   0 secs",
@@ -213,19 +249,39 @@ def test_samples_are_read_at_20_megabytes_a_second():
             "line 48, interval: 0.005 s in the header, but 23 samples",
         ),
         ("cosmos_v2c", "units=cm/sec2(04)", "units=furlong(99)", "line 48, units: "),
-        ("cosmos_v0c", "       4.000000", "    -999.000000", "line 1, gain: unknown: 2.0 microvolts"),
-        ("csmip_v1", "No. of Points =  23", "No. of Points =  24", "line 28, number of points: 23, but 24 on line 11"),
+        (
+            "cosmos_v0c",
+            "       4.000000",
+            "    -999.000000",
+            "line 1, gain: unknown: 2.0 microvolts",
+        ),
+        (
+            "csmip_v1",
+            "No. of Points =  23",
+            "No. of Points =  24",
+            "line 28, number of points: 23, but 24 on line 11",
+        ),
         ("csmip_v1", "sec and g ", "sec and furlong ", "line 12, unit: .* is neither g nor g/10"),
         ("csmip_v1", "/&", "??", "end of channel: expected '/&' after the samples"),
         ("csmip_v2", "in cm/sec2", "in furlongs", "line 46, unit: "),
-        ("csmip_v2", "points of veloc", "points of other", "title of veloc: expected points at an interval"),
+        (
+            "csmip_v2",
+            "points of veloc",
+            "points of other",
+            "title of veloc: expected points at an interval",
+        ),
         (
             "csmip_raw",
             "  0.020  2.000",
             "  0.009  2.000",
             "line 28, time 3: 0.009 s breaks the mean interval of 0.01 s",
         ),
-        ("renadic", "23  Record", "0  Record", "line 11, number of points: must be a positive whole number"),
+        (
+            "renadic",
+            "23  Record",
+            "0  Record",
+            "line 11, number of points: must be a positive whole number",
+        ),
         ("usc_v1", "UNITS ARE SEC AND G/10", "UNITS ARE FURLONGS    ", "line 12, unit: "),
         (
             "geonet_v1a",
@@ -242,15 +298,40 @@ def test_samples_are_read_at_20_megabytes_a_second():
             "DATA_TYPE: SPECTRUM",
             "line 27, DATA_TYPE: 'SPECTRUM' is not a time series",
         ),
-        ("afad", "SAMPLING_INTERVAL_S: 0.005000", "SAMPLING_INTERVAL_S:", "line 21, SAMPLING_INTERVAL_S: empty"),
-        ("nsmn", "NUMBER OF DATA ", "NUMBER OF DATE ", "line 1, NUMBER OF DATA: the header has no such field"),
+        (
+            "afad",
+            "SAMPLING_INTERVAL_S: 0.005000",
+            "SAMPLING_INTERVAL_S:",
+            "line 21, SAMPLING_INTERVAL_S: empty",
+        ),
+        (
+            "nsmn",
+            "NUMBER OF DATA ",
+            "NUMBER OF DATE ",
+            "line 1, NUMBER OF DATA: the header has no such field",
+        ),
         ("unam", "Gal (cm/s/s)", "Furlongs", "UNIDADES DE LOS DATOS: 'Furlongs' is not gal"),
         ("unam", "/23/23/23", "/23/23/22", "NUM. TOTAL DE MUESTRAS: channels must share length"),
         ("unam", "/23/23/23", "/23/23", "2 values for 3 channels"),
-        ("cwb", "\n    0.0300", "\n    0.0390", "line 24, time: 0.039 s breaks the spacing of 0.01 s"),
+        (
+            "cwb",
+            "\n    0.0300",
+            "\n    0.0390",
+            "line 24, time: 0.039 s breaks the spacing of 0.01 s",
+        ),
         ("cwb", "gal. DCoffset", "furlong", "AmplitudeUnit: 'furlong.*is not gal"),
-        ("smc", "  2.0000000E+02", "  0.0000000E+00", "line 18, sampling rate: must be positive and plausible"),
-        ("bhrc", ".200000E+03", ".100000E+03", "line 22, sampling rate: 100 Hz, but 23 samples last"),
+        (
+            "smc",
+            "  2.0000000E+02",
+            "  0.0000000E+00",
+            "line 18, sampling rate: must be positive and plausible",
+        ),
+        (
+            "bhrc",
+            ".200000E+03",
+            ".100000E+03",
+            "line 22, sampling rate: 100 Hz, but 23 samples last",
+        ),
         ("bhrc", "SECONDS AND G/10", "FURLONGS", "line 12, unit: 'UNITS ARE FURLONGS' is not g/10"),
     ],
 )

@@ -18,8 +18,8 @@ pytestmark = pytest.mark.real_data
 
 FOLDER = Path(os.environ.get("PER_OBSPY_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
-#: files whose interval in peaks.csv is the recorder's (real number 34), not the series' (real number 62): the header's
-#: time of the peak and the length of the record fit only the latter
+#: files whose interval in peaks.csv is the recorder's (real number 34), not the series' (real
+#: number 62): the header's time of the peak and the length of the record fit only the latter
 INTERVALS = {
     "cosmos/Cosmos12TimeSeriesTest.v1": 0.01,
     "cosmos/us1000hyfh_akbmrp_AKBMR--n.1000hyfh.BNZ.--.acc.V2c": 0.005,
@@ -55,7 +55,11 @@ def other_files() -> list[str]:
     """Return records that peaks.csv leaves out; their headers tell their peaks."""
     folder = FOLDER / "records"
     found = [path for name in OTHERS for path in sorted((folder / name).glob("*"))]
-    return [str(path.relative_to(folder)) for path in found if str(path.relative_to(folder)) not in EXPECTED]
+    return [
+        str(path.relative_to(folder))
+        for path in found
+        if str(path.relative_to(folder)) not in EXPECTED
+    ]
 
 
 @pytest.mark.parametrize("name", EXPECTED)
@@ -74,11 +78,16 @@ def test_the_header_agrees_with_its_own_samples(real_data: Path, name: str):
     stream = obspy.read(str(real_data / "records" / name))
     compared = [trace for trace in stream if "header_peak" in trace.stats]
     if name in PEAKS:
-        assert all(abs(trace.stats.header_peak / np.abs(trace.data).max() - 1) > 0.005 for trace in compared)
+        assert all(
+            abs(trace.stats.header_peak / np.abs(trace.data).max() - 1) > 0.005
+            for trace in compared
+        )
         return
     for trace in compared:
         rounding = ROUNDING.get(trace.stats._format, 0.0)
-        assert np.abs(trace.data).max() == pytest.approx(trace.stats.header_peak, rel=1e-4, abs=rounding)
+        assert np.abs(trace.data).max() == pytest.approx(
+            trace.stats.header_peak, rel=1e-4, abs=rounding
+        )
 
 
 @pytest.mark.parametrize("name", [name for name in INTERVALS if name in EXPECTED])
@@ -119,7 +128,8 @@ def test_official_spectra_fit_the_corrected_record_beside_them(real_data: Path, 
         ours = response_spectra(trace.data, trace.stats.delta, official.periods, 0.05)
         for kind in ("sd", "sv", "sa"):
             error = np.abs(getattr(ours, kind) / getattr(official, kind)[five] - 1)
-            # three digits are printed (up to 0.5 %), the agency's maxima are at samples (some per cent at 0.04 s)
+            # three digits are printed (up to 0.5 %), the agency's maxima are at samples (some per
+            # cent at 0.04 s)
             assert np.median(error) < 0.015
             assert np.percentile(error, 95) < 0.06
 
@@ -136,7 +146,9 @@ def one_file_of_each_format() -> list[str]:
     smallest: dict[str, tuple[int, str]] = {}
     for name in EXPECTED:
         size = (FOLDER / "records" / name).stat().st_size
-        smallest[name.split("/")[0]] = min(smallest.get(name.split("/")[0], (size, name)), (size, name))
+        smallest[name.split("/")[0]] = min(
+            smallest.get(name.split("/")[0], (size, name)), (size, name)
+        )
     return [name for _, name in smallest.values() if "knet" not in name]
 
 
@@ -151,7 +163,9 @@ def test_damaged_real_files_are_refused_or_read(real_data: Path, name: str):
         damaged = bytearray(content)
         for reach in (2000, len(content)):
             place = int(random.integers(min(reach, len(content))))
-            damaged[place : place + int(random.integers(20))] = pieces[int(random.integers(len(pieces)))]
+            damaged[place : place + int(random.integers(20))] = pieces[
+                int(random.integers(len(pieces)))
+            ]
         try:
             stream = obspy.read(io.BytesIO(bytes(damaged)), format=reader_name)
         except RecordRejected:

@@ -21,16 +21,24 @@ from per_obspy.inventory.catalogue import (
 from per_obspy.inventory.simulated import simulated_pairs
 
 CHECKOUT = Path(__file__).parents[2]
-ORIGIN = Origin("old town", 'a survey called "street by street"', "CC0-1.0", datetime.date(2026, 11, 20))
+ORIGIN = Origin(
+    "old town", 'a survey called "street by street"', "CC0-1.0", datetime.date(2026, 11, 20)
+)
 
 
 @pytest.fixture
 def index(tmp_path):
     (tmp_path / "data").mkdir()
-    simulated_pairs([-67.95], [-20.35], 20, seed=1).to_csv(tmp_path / "data" / "old.csv", index=False)
+    simulated_pairs([-67.95], [-20.35], 20, seed=1).to_csv(
+        tmp_path / "data" / "old.csv", index=False
+    )
     simulated_pairs([10.0], [50.0], 30, seed=1).to_parquet(tmp_path / "data" / "new.parquet")
     add_inventory(tmp_path / "catalog.toml", tmp_path / "data" / "old.csv", ORIGIN)
-    add_inventory(tmp_path / "catalog.toml", tmp_path / "data" / "new.parquet", ORIGIN._replace(name="Neustadt ü"))
+    add_inventory(
+        tmp_path / "catalog.toml",
+        tmp_path / "data" / "new.parquet",
+        ORIGIN._replace(name="Neustadt ü"),
+    )
     return tmp_path / "catalog.toml"
 
 
@@ -103,7 +111,9 @@ def test_bounding_box_across_the_date_line():
 
 
 def test_a_bounding_box_of_one_place():
-    pairs = pd.DataFrame({"longitude_1": [5.0], "longitude_2": [5.0], "latitude_1": [1.0], "latitude_2": [1.0]})
+    pairs = pd.DataFrame(
+        {"longitude_1": [5.0], "longitude_2": [5.0], "latitude_1": [1.0], "latitude_2": [1.0]}
+    )
     assert bounding_box(pairs) == (5.0, 1.0, 5.0, 1.0)
 
 
@@ -137,7 +147,9 @@ def test_a_damaged_index(index, old, new, message):
 
 
 def test_a_region_that_is_no_box(index):
-    with pytest.raises(ValueError, match="region must be west, south, east, north in degrees, got -99, 19, 400, 20"):
+    with pytest.raises(
+        ValueError, match="region must be west, south, east, north in degrees, got -99, 19, 400, 20"
+    ):
         find_inventories(index, Box(-99, 19, 400, 20))
     with pytest.raises(ValueError, match="region must be"):
         find_inventories(index, Box(-99, 20, -98, 19))

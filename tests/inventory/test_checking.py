@@ -10,7 +10,14 @@ from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF
 
 
 def _row(**changes):
-    row = {"pair_id": "a", "gap": 0.1, "longitude_1": 10.0, "latitude_1": 50.0, "height_1": 12.0, "storeys_1": 4.0}
+    row = {
+        "pair_id": "a",
+        "gap": 0.1,
+        "longitude_1": 10.0,
+        "latitude_1": 50.0,
+        "height_1": 12.0,
+        "storeys_1": 4.0,
+    }
     row |= {"longitude_2": 10.0001, "latitude_2": 50.0, "height_2": 9.0, "storeys_2": 3.0}
     return row | changes
 
@@ -69,7 +76,9 @@ def test_one_fault(changes, reason):
 
 def test_swapped_coordinates_outside_their_range_are_suspected():
     reasons = _reasons(longitude_1=19.4, latitude_1=-99.1, longitude_2=19.4, latitude_2=-99.1)
-    hint = "is outside -90 to 90 degrees (longitude and latitude swapped, or metres of a projection?)"
+    hint = (
+        "is outside -90 to 90 degrees (longitude and latitude swapped, or metres of a projection?)"
+    )
     assert reasons == (f"latitude_1 = -99.1 degrees {hint}", f"latitude_2 = -99.1 degrees {hint}")
 
 
@@ -104,7 +113,13 @@ def test_neighbours_across_the_date_line():
 def test_every_reason_of_a_row_is_told():
     # would catch a check that stops at the first fault
     reasons = _reasons(gap=-1.0, period_1=0.0, system_1="wood", height_2=0.0, damping_1="five")
-    assert [reason.split(" = ")[0] for reason in reasons] == ["gap", "system_1", "period_1", "damping_1", "height_2"]
+    assert [reason.split(" = ")[0] for reason in reasons] == [
+        "gap",
+        "system_1",
+        "period_1",
+        "damping_1",
+        "height_2",
+    ]
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -136,7 +151,9 @@ def test_good_rows_survive_bad_ones():
 
 @pytest.mark.parametrize("empty", ["", " ", "NA", "nan", "null", "-", None])
 def test_an_empty_cell_of_an_optional_column_is_missing(empty):
-    pairs = checked_pairs(pd.DataFrame([_row(damping_1=empty), _row(pair_id="b", damping_1="0.1")]), "pairs.csv")
+    pairs = checked_pairs(
+        pd.DataFrame([_row(damping_1=empty), _row(pair_id="b", damping_1="0.1")]), "pairs.csv"
+    )
     assert pairs.attrs["rejected"] == ()
     assert np.isnan(pairs["damping_1"][0])
     assert pairs["damping_1"][1] == 0.1
@@ -155,7 +172,9 @@ def test_the_table_stays_as_it_was():
 
 
 def test_whole_table_faults():
-    with pytest.raises(CatalogError, match=r"pairs.csv: missing column gap \(columns found: pair_id, longitude_1"):
+    with pytest.raises(
+        CatalogError, match=r"pairs.csv: missing column gap \(columns found: pair_id, longitude_1"
+    ):
         checked_pairs(pd.DataFrame([_row()]).drop(columns="gap"), "pairs.csv")
     with pytest.raises(CatalogError, match=r"pairs.csv: the table has no rows"):
         checked_pairs(pd.DataFrame([_row()]).iloc[:0], "pairs.csv")

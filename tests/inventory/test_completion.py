@@ -11,7 +11,14 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.contact import contact_participation
 from per_obspy.inventory.schema import COLUMNS, COMPLETED
 
-PLACE = {"pair_id": "a", "gap": 0.1, "longitude_1": 10.0, "latitude_1": 50.0, "longitude_2": 10.001, "latitude_2": 50.0}
+PLACE = {
+    "pair_id": "a",
+    "gap": 0.1,
+    "longitude_1": 10.0,
+    "latitude_1": 50.0,
+    "longitude_2": 10.001,
+    "latitude_2": 50.0,
+}
 SIZES = {"height_1": 12.0, "height_2": 9.0}
 
 
@@ -29,10 +36,20 @@ def test_what_is_given_stays_and_is_not_marked():
             f"system_{i}": "steel_mrf",
             f"period_{i}": 0.7 * scale,
         }
-        given |= {f"damping_{i}": 0.02 * scale, f"mass_{i}": 4e5 * scale, f"participation_{i}": 1.1 * scale}
+        given |= {
+            f"damping_{i}": 0.02 * scale,
+            f"mass_{i}": 4e5 * scale,
+            f"participation_{i}": 1.1 * scale,
+        }
         given |= {f"yield_displacement_{i}": 0.03 * scale, f"hardening_{i}": 0.05 * scale}
         given |= {f"period_log_std_{i}": 0.1 * scale, f"damping_log_std_{i}": 0.2 * scale}
-    given |= {"contact_height": 11.0, "floor_offset": 0.2, "restitution": 0.4, "gap_std": 0.01, "azimuth": 30.0}
+    given |= {
+        "contact_height": 11.0,
+        "floor_offset": 0.2,
+        "restitution": 0.4,
+        "gap_std": 0.01,
+        "azimuth": 30.0,
+    }
     row = _completed(**given)
     assert row["derived"] == ""
     assert {name: row[name] for name in given} == given
@@ -46,7 +63,12 @@ def test_a_bare_row_is_marked_where_it_was_filled():
     assert row["storeys_1"], row["storeys_2"] == (4.0, 3.0)
     assert row["contact_height"] == 9.0
     assert_allclose(row["mass_1"] / row["mass_2"], 4 / 3, rtol=1e-14)  # equal areas are assumed
-    assert row[["damping_1", "restitution", "gap_std", "hardening_1"]].tolist() == [0.05, 0.65, 0.0, 0.0]
+    assert row[["damping_1", "restitution", "gap_std", "hardening_1"]].tolist() == [
+        0.05,
+        0.65,
+        0.0,
+        0.0,
+    ]
     assert row["yield_displacement_1"] == np.inf
     assert np.isnan(row["azimuth"])
 
@@ -117,7 +139,10 @@ def test_yield_displacement_from_coefficient():
     ("columns", "misaligned"),
     [
         ({"storeys_1": 4.0, "storeys_2": 3.0}, False),
-        ({"storeys_1": 3.0, "storeys_2": 3.0}, True),  # floors of the first at 4, 8, 12 m; roof of the second at 9 m
+        (
+            {"storeys_1": 3.0, "storeys_2": 3.0},
+            True,
+        ),  # floors of the first at 4, 8, 12 m; roof of the second at 9 m
         ({}, False),  # derived storeys do not say where floors are
         ({"floor_offset": -1.0}, True),
     ],
@@ -128,18 +153,40 @@ def test_misaligned_floors(columns, misaligned):
 
 def test_middle_of_the_pair():
     row = _completed(**SIZES)
-    assert_allclose([row["longitude"], row["latitude"]], [10.0005, 50.0], rtol=1e-13)  # turned by 180 degrees and back
+    assert_allclose(
+        [row["longitude"], row["latitude"]], [10.0005, 50.0], rtol=1e-13
+    )  # turned by 180 degrees and back
     across = _completed(**SIZES | {"longitude_1": 179.9998, "longitude_2": -179.9996})
-    assert_allclose(across["longitude"], -179.9999, rtol=1e-12)  # would catch a mean of 0.0001 degrees
+    assert_allclose(
+        across["longitude"], -179.9999, rtol=1e-12
+    )  # would catch a mean of 0.0001 degrees
 
 
 def test_swapping_the_buildings_swaps_the_columns():
     # would catch an index 1 where 2 is meant
-    first = {"height": 30.0, "storeys": 10.0, "system": "steel_mrf", "area": 300.0, "yield_coefficient": 0.1}
+    first = {
+        "height": 30.0,
+        "storeys": 10.0,
+        "system": "steel_mrf",
+        "area": 300.0,
+        "yield_coefficient": 0.1,
+    }
     second = {"height": 9.0, "period": 0.4, "damping": 0.02}
-    one = _completed(**{f"{k}_1": v for k, v in first.items()}, **{f"{k}_2": v for k, v in second.items()})
-    two = _completed(**{f"{k}_2": v for k, v in first.items()}, **{f"{k}_1": v for k, v in second.items()})
-    for name in ("period", "mass", "contact_mass", "participation", "damping", "yield_displacement", "storeys"):
+    one = _completed(
+        **{f"{k}_1": v for k, v in first.items()}, **{f"{k}_2": v for k, v in second.items()}
+    )
+    two = _completed(
+        **{f"{k}_2": v for k, v in first.items()}, **{f"{k}_1": v for k, v in second.items()}
+    )
+    for name in (
+        "period",
+        "mass",
+        "contact_mass",
+        "participation",
+        "damping",
+        "yield_displacement",
+        "storeys",
+    ):
         assert (one[f"{name}_1"], one[f"{name}_2"]) == (two[f"{name}_2"], two[f"{name}_1"])
 
 

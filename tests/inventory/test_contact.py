@@ -4,14 +4,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.inventory.contact import contact_mass, contact_participation, floor_offset, floors_misaligned
+from per_obspy.inventory.contact import (
+    contact_mass,
+    contact_participation,
+    floor_offset,
+    floors_misaligned,
+)
 
 STOREYS = np.array([1, 2, 3, 5, 10])
 
 
 def test_participation_at_the_roof():
     # 1, 6/5, 9/7, 15/11, 10/7; the literature prints two decimals
-    assert_allclose(contact_participation(STOREYS, 30.0, 30.0), [1.0, 1.2, 1.29, 1.36, 1.43], atol=0.005)
+    assert_allclose(
+        contact_participation(STOREYS, 30.0, 30.0), [1.0, 1.2, 1.29, 1.36, 1.43], atol=0.005
+    )
     assert_allclose(contact_participation(1e9, 30.0, 30.0), 1.5, rtol=1e-8)  # limit, off by 1/(2N)
 
 
@@ -23,7 +30,8 @@ def test_one_storey_is_an_oscillator():
 @pytest.mark.parametrize("storeys", [1, 2, 7, 30])
 @pytest.mark.parametrize("level", [0.2, 0.5, 1.0])
 def test_closed_forms_are_the_modal_sums(storeys, level):
-    # would catch a wrong power of z_c/H, or the effective modal mass in place of the generalised one
+    # would catch a wrong power of z_c/H, or the effective modal mass in place of the generalised
+    # one
     floor = np.arange(1, storeys + 1) / storeys
     mass = np.full(storeys, 1.7e5)
     participation = mass @ floor / (mass @ floor**2) * level
@@ -34,10 +42,12 @@ def test_closed_forms_are_the_modal_sums(storeys, level):
 
 @pytest.mark.parametrize("level", [0.1, 0.6, 1.0])
 def test_energy_does_not_depend_on_where_it_is_seen(level):
-    # kinetic energy of an oscillator of velocity 1: m*_c q**2 / 2 is the same at every level, that of the mode itself
+    # kinetic energy of an oscillator of velocity 1: m*_c q**2 / 2 is the same at every level, that
+    # of the mode itself
     storeys, height = 6, 18.0
     seen = (
-        contact_mass(9e5, storeys, height, level * height) * contact_participation(storeys, height, level * height) ** 2
+        contact_mass(9e5, storeys, height, level * height)
+        * contact_participation(storeys, height, level * height) ** 2
     )
     floor = np.arange(1, storeys + 1) / storeys
     mode = 9e5 / storeys * (floor.sum() ** 2) / (floor**2).sum()
@@ -45,7 +55,9 @@ def test_energy_does_not_depend_on_where_it_is_seen(level):
 
 
 def test_contact_above_the_building_is_refused():
-    with pytest.raises(ValueError, match=r"contact_height must not be above the building, got 1\.5"):
+    with pytest.raises(
+        ValueError, match=r"contact_height must not be above the building, got 1\.5"
+    ):
         contact_participation(2, 6.0, 9.0)
     with pytest.raises(ValueError, match=r"height must be positive, got 0\.0"):
         contact_mass(1e5, 2, 0.0, 3.0)

@@ -11,8 +11,8 @@ from per_obspy.inventory.schema import SYSTEMS
 FEET = 0.3048
 
 
-# Goel & Chopra (1997), best-fit lines for measured periods, height in feet: T = 0.035 H**0.80 for steel and
-# T = 0.018 H**0.90 for concrete moment frames. Published with two digits: 3 %.
+# Goel & Chopra (1997), best-fit lines for measured periods, height in feet: T = 0.035 H**0.80 for
+# steel and T = 0.018 H**0.90 for concrete moment frames. Published with two digits: 3 %.
 @pytest.mark.parametrize(
     ("system", "coefficient", "exponent"), [("steel_mrf", 0.035, 0.8), ("concrete_mrf", 0.018, 0.9)]
 )
@@ -21,7 +21,9 @@ def test_moment_frames_follow_the_best_fit_to_measured_periods(system, coefficie
     assert_allclose(asce7_period(feet * FEET, system), coefficient * feet**exponent, rtol=0.03)
 
 
-@pytest.mark.parametrize(("system", "lower"), [("steel_mrf", (0.0724, 0.8)), ("concrete_mrf", (0.0466, 0.9))])
+@pytest.mark.parametrize(
+    ("system", "lower"), [("steel_mrf", (0.0724, 0.8)), ("concrete_mrf", (0.0466, 0.9))]
+)
 def test_medians_lie_above_the_lower_bound_of_the_code(system, lower):
     # would catch the best-fit ratio forgotten or divided by
     height = np.array([5.0, 50.0])
@@ -29,7 +31,8 @@ def test_medians_lie_above_the_lower_bound_of_the_code(system, lower):
 
 
 @pytest.mark.parametrize(
-    ("system", "exponent"), [("steel_mrf", 0.8), ("concrete_mrf", 0.9), ("ebf_brbf", 0.75), ("other", 0.75)]
+    ("system", "exponent"),
+    [("steel_mrf", 0.8), ("concrete_mrf", 0.9), ("ebf_brbf", 0.75), ("other", 0.75)],
 )
 def test_asce7_scales_with_a_power_of_height(system, exponent):
     # would catch exponents attached to the wrong system

@@ -14,8 +14,11 @@ def test_uniform_building_in_closed_form(storeys):
     mass, stiffness = 2e5, 3e8
     angle = (2 * np.arange(1, storeys + 1) - 1) * np.pi / (2 * storeys + 1)
     found = shear_building(np.full(storeys, mass), np.full(storeys, stiffness))
-    # eigenvalues are right to round-off of the largest, 4 k/m: the smallest of 40 loses three digits
-    assert_allclose(found.periods, np.pi / (np.sqrt(stiffness / mass) * np.sin(angle / 2)), rtol=1e-12)
+    # eigenvalues are right to round-off of the largest, 4 k/m: the smallest of 40 loses three
+    # digits
+    assert_allclose(
+        found.periods, np.pi / (np.sqrt(stiffness / mass) * np.sin(angle / 2)), rtol=1e-12
+    )
     shapes = np.sin(np.arange(1, storeys + 1)[:, None] * angle)
     assert_allclose(found.shapes, shapes / shapes[-1], rtol=1e-9, atol=1e-11)
 
@@ -32,7 +35,9 @@ def test_irregular_building_against_a_general_eigensolver():
     matrix -= np.diag(stiffnesses[1:], -1)
     values, vectors = eigh(matrix, np.diag(masses))
     found = shear_building(masses, stiffnesses)
-    assert_allclose(found.periods, 2 * np.pi / np.sqrt(values), rtol=1e-10)  # two solvers' round-off
+    assert_allclose(
+        found.periods, 2 * np.pi / np.sqrt(values), rtol=1e-10
+    )  # two solvers' round-off
     assert_allclose(found.shapes, vectors / vectors[-1], rtol=1e-8, atol=1e-10)
 
 
@@ -50,15 +55,25 @@ def test_modes_are_orthogonal_and_participations_make_one():
 def test_scaling(factor):
     # T ~ sqrt(m/k); participation does not change; mass ~ m
     masses, stiffnesses = _random_building(4)
-    once, heavier = equivalent_sdof(masses, stiffnesses, 2), equivalent_sdof(factor * masses, stiffnesses, 2)
-    assert_allclose(heavier, [once.period * np.sqrt(factor), once.participation, once.mass * factor], rtol=1e-11)
+    once, heavier = (
+        equivalent_sdof(masses, stiffnesses, 2),
+        equivalent_sdof(factor * masses, stiffnesses, 2),
+    )
+    assert_allclose(
+        heavier, [once.period * np.sqrt(factor), once.participation, once.mass * factor], rtol=1e-11
+    )
     stiffer = equivalent_sdof(masses, factor * stiffnesses, 2)
-    assert_allclose(stiffer, [once.period / np.sqrt(factor), once.participation, once.mass], rtol=1e-11)
+    assert_allclose(
+        stiffer, [once.period / np.sqrt(factor), once.participation, once.mass], rtol=1e-11
+    )
 
 
 def test_energy_is_the_same_seen_from_any_floor():
     masses, stiffnesses = _random_building(5)
-    energies = [one.mass * one.participation**2 for one in (equivalent_sdof(masses, stiffnesses, i) for i in range(5))]
+    energies = [
+        one.mass * one.participation**2
+        for one in (equivalent_sdof(masses, stiffnesses, i) for i in range(5))
+    ]
     assert_allclose(energies, energies[0], rtol=1e-11)
 
 

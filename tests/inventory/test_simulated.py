@@ -64,7 +64,9 @@ def test_it_looks_like_a_town(pairs):
 
 def test_measured_periods_scatter_about_the_formula(pairs):
     measured = pairs[pairs["period_1"].notna()]
-    residual = np.log(measured["period_1"] / asce7_period(measured["height_1"], measured["system_1"]))
+    residual = np.log(
+        measured["period_1"] / asce7_period(measured["height_1"], measured["system_1"])
+    )
     assert abs(residual.mean()) < 4 * 0.3 / np.sqrt(len(measured))
     assert abs(residual.std() - 0.3) < 0.03
 

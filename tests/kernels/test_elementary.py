@@ -3,17 +3,26 @@
 import numpy as np
 from scipy.special import ndtr
 
-from per_obspy.kernels.elementary import exponentials, exponentials_less_one, logarithms, normal_tails
+from per_obspy.kernels.elementary import (
+    exponentials,
+    exponentials_less_one,
+    logarithms,
+    normal_tails,
+)
 
 ROOM = np.empty(200, np.int64)
 
 
 def test_exponentials():
     # mutation: a coefficient, the sign of the exponent, one of the parts of ln 2
-    x = np.concatenate([np.linspace(-700.0, 700.0, 100), np.linspace(-1.0, 1.0, 97), [0.0, -1e3, -np.inf]])
+    x = np.concatenate(
+        [np.linspace(-700.0, 700.0, 100), np.linspace(-1.0, 1.0, 97), [0.0, -1e3, -np.inf]]
+    )
     found = x.copy()
     exponentials(found, ROOM)
-    np.testing.assert_allclose(found[:-2], np.exp(x[:-2]), rtol=1e-15)  # a few units of the last place
+    np.testing.assert_allclose(
+        found[:-2], np.exp(x[:-2]), rtol=1e-15
+    )  # a few units of the last place
     assert found[-3] == 1.0
     assert np.all(found[-2:] < 1e-307)
 
@@ -21,7 +30,12 @@ def test_exponentials():
 def test_exponentials_less_one():
     # mutation: one taken from the exponential, which leaves nothing of a small number
     x = np.concatenate(
-        [np.linspace(-3.0, 3.0, 100), np.geomspace(1e-300, 1.0, 49), -np.geomspace(1e-300, 1.0, 49), [0.0, 700.0]]
+        [
+            np.linspace(-3.0, 3.0, 100),
+            np.geomspace(1e-300, 1.0, 49),
+            -np.geomspace(1e-300, 1.0, 49),
+            [0.0, 700.0],
+        ]
     )
     found = x.copy()
     exponentials_less_one(found, ROOM)
@@ -38,7 +52,8 @@ def test_logarithms():
 
 
 def test_normal_tails():
-    # mutation: the lower tail; an error near 0 or far out. Rounding of x² counts x² times: 3e-13 at 36
+    # mutation: the lower tail; an error near 0 or far out. Rounding of x² counts x² times: 3e-13 at
+    # 36
     x = np.concatenate([np.linspace(-6.0, 6.0, 150), np.linspace(6.0, 36.0, 47), [0.0, 1e3, -1e3]])
     found = x.copy()
     normal_tails(found, np.empty(200), ROOM)

@@ -39,7 +39,14 @@ def _places(count, seed=2, period=1.5, column=0, share=0.0, length=8000.0):
     features = np.random.default_rng(seed).normal(size=(count, 2))
     columns = (np.full(count, value) for value in (period, column, share, length))
     period, column, share, length = columns
-    return vectors, features, period.astype(float), column.astype(np.int64), share.astype(float), length
+    return (
+        vectors,
+        features,
+        period.astype(float),
+        column.astype(np.int64),
+        share.astype(float),
+        length,
+    )
 
 
 def _kriged(stations, places, neighbours=20):
@@ -59,12 +66,17 @@ def _expected(stations, places, column):
     unmatched = there - here @ weights
     covariance = TREND[1][column, :2, :2]
     median = TREND[0][column, :2] @ there + residuals[:, column] @ weights
-    left = 1.0 - np.sum(across * weights, axis=0) + np.sum(unmatched * (covariance @ unmatched), axis=0)
+    left = (
+        1.0
+        - np.sum(across * weights, axis=0)
+        + np.sum(unmatched * (covariance @ unmatched), axis=0)
+    )
     return np.stack([median, TREND[3][column] * np.sqrt(left)], axis=1)
 
 
 def test_an_inverse_gives_the_same():
-    # would catch a triangle of the factor that is read on the wrong side, a lost term, a feature that is not used
+    # would catch a triangle of the factor that is read on the wrong side, a lost term, a feature
+    # that is not used
     stations, places = _stations(12), _places(30)
     for column in (0, 1):
         some = (*places[:3], np.full(30, column), *places[4:])
@@ -99,7 +111,8 @@ def test_the_nearest_serve_and_only_those_that_know(neighbours):
 
 
 def test_company_changes_no_bit():
-    # mutation: places of a block that have fewer stations than others are told by a station that is not theirs
+    # mutation: places of a block that have fewer stations than others are told by a station that is
+    # not theirs
     stations, places = _stations(9), _places(70)
     stations[2][::3] = 2.0, 9.0
     places[2][::2] = 2.5
@@ -125,5 +138,7 @@ def test_an_unknown_feature_is_the_middle_one():
     stations, places = _stations(6), _places(4)
     unknown, middle = places[1].copy(), places[1].copy()
     unknown[:, 0], middle[:, 0] = np.nan, TREND[2][0, 0]
-    first, second = (_kriged(stations, (places[0], features, *places[2:])) for features in (unknown, middle))
+    first, second = (
+        _kriged(stations, (places[0], features, *places[2:])) for features in (unknown, middle)
+    )
     assert_allclose(first, second, rtol=1e-14)

@@ -20,7 +20,9 @@ def test_momentum_and_restitution(velocity_1, velocity_2, mass_1, mass_2, restit
     momentum = mass_1 * velocity_1 + mass_2 * velocity_2
     scale = 10 * (mass_1 + mass_2)
     assert mass_1 * after_1 + mass_2 * after_2 == pytest.approx(momentum, abs=ROUNDING * scale)
-    assert after_2 - after_1 == pytest.approx(restitution * (velocity_1 - velocity_2), abs=ROUNDING * 10)
+    assert after_2 - after_1 == pytest.approx(
+        restitution * (velocity_1 - velocity_2), abs=ROUNDING * 10
+    )
 
 
 @given(velocities, velocities, masses, masses, restitutions)
@@ -31,17 +33,29 @@ def test_energies_are_what_the_structures_lose(velocity_1, velocity_2, mass_1, m
     scale = 100 * (mass_1 + mass_2)
     assert left_1 == pytest.approx(mass_1 * (velocity_1**2 - after_1**2) / 2, abs=ROUNDING * scale)
     assert left_2 == pytest.approx(mass_2 * (velocity_2**2 - after_2**2) / 2, abs=ROUNDING * scale)
-    loss = (1 - restitution**2) * mass_1 * mass_2 / (mass_1 + mass_2) * (velocity_1 - velocity_2) ** 2 / 2
+    loss = (
+        (1 - restitution**2)
+        * mass_1
+        * mass_2
+        / (mass_1 + mass_2)
+        * (velocity_1 - velocity_2) ** 2
+        / 2
+    )
     assert left_1 + left_2 == pytest.approx(loss, abs=ROUNDING * scale)
 
 
 @given(velocities, velocities, masses, masses, restitutions)
 def test_corrected_closed_forms(velocity_1, velocity_2, mass_1, mass_2, restitution):
-    # the bracketed polynomials of (9) and (10) with their signs put right; mutation: 2 m1 for m1, (1 - e) for (1 + e)
+    # the bracketed polynomials of (9) and (10) with their signs put right; mutation: 2 m1 for m1,
+    # (1 - e) for (1 + e)
     total, difference = mass_1 + mass_2, velocity_1 - velocity_2
     common = (1 + restitution) * mass_1 * mass_2 / total**2 / 2 * difference
-    bracket_1 = (2 * mass_1 + (1 - restitution) * mass_2) * velocity_1 + (1 + restitution) * mass_2 * velocity_2
-    bracket_2 = (1 + restitution) * mass_1 * velocity_1 + (2 * mass_2 + (1 - restitution) * mass_1) * velocity_2
+    bracket_1 = (2 * mass_1 + (1 - restitution) * mass_2) * velocity_1 + (
+        1 + restitution
+    ) * mass_2 * velocity_2
+    bracket_2 = (1 + restitution) * mass_1 * velocity_1 + (
+        2 * mass_2 + (1 - restitution) * mass_1
+    ) * velocity_2
     left_1, left_2 = transfer_energies(velocity_1, velocity_2, mass_1, mass_2, restitution)
     scale = 100 * total
     assert left_1 == pytest.approx(common * bracket_1, abs=ROUNDING * scale)
@@ -50,9 +64,12 @@ def test_corrected_closed_forms(velocity_1, velocity_2, mass_1, mass_2, restitut
 
 @given(velocities, velocities, masses, masses, restitutions)
 def test_mirror(velocity_1, velocity_2, mass_1, mass_2, restitution):
-    # seen from the other side of the street, 1 and 2 and all signs change places; mutation: shares m1/M and m2/M mixed
+    # seen from the other side of the street, 1 and 2 and all signs change places; mutation: shares
+    # m1/M and m2/M mixed
     after_1, after_2 = post_impact_velocities(velocity_1, velocity_2, mass_1, mass_2, restitution)
-    mirror_2, mirror_1 = post_impact_velocities(-velocity_2, -velocity_1, mass_2, mass_1, restitution)
+    mirror_2, mirror_1 = post_impact_velocities(
+        -velocity_2, -velocity_1, mass_2, mass_1, restitution
+    )
     assert -mirror_1 == pytest.approx(after_1, abs=ROUNDING * 10)
     assert -mirror_2 == pytest.approx(after_2, abs=ROUNDING * 10)
 

@@ -29,19 +29,25 @@ CASES = [
 
 @pytest.mark.parametrize("case", CASES)
 def test_against_monte_carlo(case):
-    # mutation: variance of the difference with the wrong sign, conditional mean without its slope, e^d for e^2d.
-    # 400 000 samples: a standard error of 8e-4, four of them
-    assert pounding_probability(*case) == pytest.approx(simulated_probability(*case, count=400_000), abs=3.2e-3)
+    # mutation: variance of the difference with the wrong sign, conditional mean without its slope,
+    # e^d for e^2d. 400 000 samples: a standard error of 8e-4, four of them
+    assert pounding_probability(*case) == pytest.approx(
+        simulated_probability(*case, count=400_000), abs=3.2e-3
+    )
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[5]])
 def test_against_integration_over_both_radii(case):
-    # mutation: anything in the reduction to one dimension. SciPy integrates over the plane of ln r1 and ln r2
+    # mutation: anything in the reduction to one dimension. SciPy integrates over the plane of ln r1
+    # and ln r2
     r1, r2, rho, gap, b1, b2, shared, model, spread = case
     rest = np.hypot(model, spread)
 
     def integrand(y, x):
-        first, second = r1 * np.exp(b1 * x), r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y))
+        first, second = (
+            r1 * np.exp(b1 * x),
+            r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y)),
+        )
         demand = np.sqrt(first**2 + second**2 - 2 * rho * first * second)
         return norm.pdf(x) * norm.pdf(y) * norm.cdf(np.log(demand / gap) / rest)
 
@@ -49,7 +55,13 @@ def test_against_integration_over_both_radii(case):
     assert pounding_probability(*case) == pytest.approx(expected, abs=1e-7)
 
 
-@given(st.floats(0.01, 1.0), st.floats(0.01, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 1.0), st.floats(0.05, 0.6))
+@given(
+    st.floats(0.01, 1.0),
+    st.floats(0.01, 1.0),
+    st.floats(-1.0, 1.0),
+    st.floats(0.01, 1.0),
+    st.floats(0.05, 0.6),
+)
 @settings(max_examples=40)
 def test_radii_that_move_together_have_a_closed_form(r1, r2, correlation, gap, dispersion):
     # mutation: dispersion of the ratio not vanishing. Then ln g_cr is normal around its median
@@ -62,7 +74,8 @@ def test_radii_that_move_together_have_a_closed_form(r1, r2, correlation, gap, d
 @given(st.floats(0.05, 0.5), st.floats(0.05, 0.5), st.floats(-0.99, 0.99), st.floats(-0.9, 0.9))
 @settings(max_examples=25)
 def test_symmetry_scale_and_monotony(r1, r2, correlation, shared):
-    # mutation: structure 1 favoured; a length in metres where a ratio should stand; gap and demand exchanged
+    # mutation: structure 1 favoured; a length in metres where a ratio should stand; gap and demand
+    # exchanged
     gaps = np.array([0.05, 0.1, 0.2, 0.4])
     here = pounding_probability(r1, r2, correlation, gaps, 0.3, 0.5, shared, 0.1)
     there = pounding_probability(r2, r1, correlation, gaps, 0.5, 0.3, shared, 0.1)
@@ -73,12 +86,20 @@ def test_symmetry_scale_and_monotony(r1, r2, correlation, shared):
     assert here[0] > here[-1]
 
 
-@given(st.floats(0.05, 0.6), st.floats(-0.9, 1.0), st.floats(1.05, 20.0), st.sampled_from([0.0, 1e-9, 3e-5, 1e-4]))
+@given(
+    st.floats(0.05, 0.6),
+    st.floats(-0.9, 1.0),
+    st.floats(1.05, 20.0),
+    st.sampled_from([0.0, 1e-9, 3e-5, 1e-4]),
+)
 @settings(max_examples=40)
-def test_radii_that_grow_as_the_other_shrinks_have_a_closed_form(dispersion, correlation, cosine, model):
-    # mutation: a jump of the chance inside a panel, which no rule of points sees (7e-5 of the probability).
-    # Equal radii, correlation -1: g_cr² / r² = 2 cosh(2 b x) - 2 rho, x standard normal. A model error blurs the
-    # crossing x by its own size over the slope, which counts by its square
+def test_radii_that_grow_as_the_other_shrinks_have_a_closed_form(
+    dispersion, correlation, cosine, model
+):
+    # mutation: a jump of the chance inside a panel, which no rule of points sees (7e-5 of the
+    # probability). Equal radii, correlation -1: g_cr² / r² = 2 cosh(2 b x) - 2 rho, x standard
+    # normal. A model error blurs the crossing x by its own size over the slope, which counts by its
+    # square
     gap = 0.2 * np.sqrt(2.0 * (cosine - correlation))
     crossing = np.arccosh(cosine) / (2.0 * dispersion)
     blur = model * (cosine - correlation) / (np.sqrt(cosine**2 - 1.0) * dispersion)
@@ -95,11 +116,15 @@ def test_certainty_walls_and_touching_pairs():
     np.testing.assert_allclose(wall, 0.5, atol=1e-12)
     # no model error and only structure 2 uncertain: r2 must exceed a root of the quadratic, 3-4-5
     expected = norm.cdf(np.log(0.4 / 0.5) / 0.3)
-    assert pounding_probability(0.3, 0.4, 0.0, np.hypot(0.3, 0.5), 0.0, 0.3, 0.0) == pytest.approx(expected, abs=1e-9)
+    assert pounding_probability(0.3, 0.4, 0.0, np.hypot(0.3, 0.5), 0.0, 0.3, 0.0) == pytest.approx(
+        expected, abs=1e-9
+    )
 
 
 def test_demand_of_a_record():
-    np.testing.assert_allclose(demand_probability(0.2, [0.1, 0.2, 0.4], 0.3), norm.cdf(np.log([2.0, 1.0, 0.5]) / 0.3))
+    np.testing.assert_allclose(
+        demand_probability(0.2, [0.1, 0.2, 0.4], 0.3), norm.cdf(np.log([2.0, 1.0, 0.5]) / 0.3)
+    )
     assert demand_probability([0.2, 0.0, 0.0], [0.0, 0.1, 0.0], 0.3).tolist() == [1.0, 0.0, 0.0]
     assert demand_probability([0.2, 0.1], 0.15, 0.0).tolist() == [1.0, 0.0]
 
@@ -107,13 +132,17 @@ def test_demand_of_a_record():
 def test_first_order_warns_and_is_close_where_it_may_be():
     case = CASES[0]
     with pytest.warns(UserWarning, match="use pounding_probability"):
-        assert first_order_probability(*case) == pytest.approx(pounding_probability(*case), abs=0.05)
+        assert first_order_probability(*case) == pytest.approx(
+            pounding_probability(*case), abs=0.05
+        )
 
 
 def test_dispersions_combine():
     assert combined_dispersion([0.3, 0.4]) == pytest.approx(0.5)
     # shared ground motion 0.3 and 0.4 at 0.9, own periods 0.4 and 0.3: 0.9 * 0.12 / 0.25
-    assert combined_dispersion_correlation([0.3, 0.4], [0.4, 0.3], [0.9, 0.0]) == pytest.approx(0.432)
+    assert combined_dispersion_correlation([0.3, 0.4], [0.4, 0.3], [0.9, 0.0]) == pytest.approx(
+        0.432
+    )
     assert combined_dispersion_correlation([0.0], [0.3], [1.0]) == 0.0
     rng = np.random.default_rng(2)
     dispersion = float(lognormal_dispersion(0.1, 0.05))

@@ -26,7 +26,9 @@ def motion():
 def test_no_pair_needs_more_than_both_peaks_at_once(motion):
     # caught: radii or peaks of one structure given to the other
     gaps = compare_gaps(motion, DT, PERIODS_1, PERIODS_2)
-    assert (gaps.exact <= gaps.absolute_sd * (1.0 + 1e-12)).all()  # equal but for rounding where both peaks coincide
+    assert (
+        gaps.exact <= gaps.absolute_sd * (1.0 + 1e-12)
+    ).all()  # equal but for rounding where both peaks coincide
     assert_array_equal(gaps.larger_per, np.maximum(gaps.ddc_per, gaps.record_per))
 
 
@@ -40,7 +42,10 @@ def test_equal_structures_need_no_gap_unless_they_count_as_uncorrelated(motion):
 
 def test_gaps_do_not_ask_which_structure_stands_left(motion):
     # caught: the one-sided distance in place of the larger one
-    one, other = compare_gaps(motion, DT, PERIODS_1, PERIODS_2), compare_gaps(-motion, DT, PERIODS_2, PERIODS_1)
+    one, other = (
+        compare_gaps(motion, DT, PERIODS_1, PERIODS_2),
+        compare_gaps(-motion, DT, PERIODS_2, PERIODS_1),
+    )
     for here, there in zip(one, other, strict=True):
         # the absolute term: what rounding leaves of the equal pair's correlation
         assert_allclose(here, there, rtol=1e-9, atol=1e-9)
@@ -51,7 +56,9 @@ def test_a_gap_above_the_critical_one_changes_nothing(motion):
     assert (compared.status == "no_pounding").all()
     assert not compared.impacts.any()
     assert_array_equal(compared.predicted, compared.per)
-    assert_allclose(compared.actual, compared.per, rtol=1e-9)  # two algorithms for the same closed form
+    assert_allclose(
+        compared.actual, compared.per, rtol=1e-9
+    )  # two algorithms for the same closed form
 
 
 def test_a_gap_below_the_critical_one_is_hit(motion):
@@ -75,7 +82,9 @@ def test_the_mirror_image_is_the_same_pair(motion):
 def test_the_largest_amplification_leaves_out_what_has_no_single_hit():
     per = np.array([[1.0, 2.0], [4.0, 1.0]])
     predicted, actual = np.array([[2.0, np.nan], [4.0, np.nan]]), np.array([[1.0, 2.0], [6.0, 3.0]])
-    compared = SingleHitComparison(np.array(["ok", "no_grazing_state"]), per, predicted, actual, np.array([1, 2]))
+    compared = SingleHitComparison(
+        np.array(["ok", "no_grazing_state"]), per, predicted, actual, np.array([1, 2])
+    )
     largest = amplifications(compared)
     assert_array_equal(largest, [[2.0], [1.5]])
 

@@ -13,7 +13,9 @@ RATE = 100.0  # Hz
 def earthquake() -> Callable[..., NDArray[np.float64]]:
     """Return a function that makes acceleration, m/s2: silence until the onset, then shaking from 0.1 to 20 Hz."""
 
-    def make(seed: int = 1, onset: float = 20.0, shaking: float = 15.0, duration: float = 120.0) -> NDArray[np.float64]:
+    def make(
+        seed: int = 1, onset: float = 20.0, shaking: float = 15.0, duration: float = 120.0
+    ) -> NDArray[np.float64]:
         time = np.arange(round(duration * RATE)) / RATE - onset
         scaled = np.maximum(time, 0) / (0.2 * shaking)
         envelope = np.where(time > 0, scaled**0.5 * np.exp(-scaled / 2), 0.0)

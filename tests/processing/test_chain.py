@@ -9,7 +9,7 @@ from obspy.core import AttribDict
 from per_obspy.config import Checks, Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.chain import process, process_station
-from per_obspy.processing.physical import in_acceleration
+from per_obspy.processing.instrument_response import in_acceleration
 
 RATE, COUNT = 100.0, 6000
 SETTINGS = Processing()
@@ -23,7 +23,13 @@ def pulse(offset=0.0):
 
 
 def trace(channel="HNE", samples=None, station="STA", **stats):
-    header = {"network": "XX", "station": station, "channel": channel, "sampling_rate": RATE, "units": "m/s2"}
+    header = {
+        "network": "XX",
+        "station": station,
+        "channel": channel,
+        "sampling_rate": RATE,
+        "units": "m/s2",
+    }
     data = pulse() if samples is None else samples
     return Trace(data, header | {"starttime": UTCDateTime(2020, 1, 1)} | stats)
 
@@ -55,7 +61,10 @@ def test_every_number_and_step_is_recorded():
     kept = out.stats.per_obspy
     assert all(type(value) in (str, int, float) for value in kept.values())
     steps = " | ".join(out.stats.processing)
-    order = [steps.index(word) for word in ("mean", "trend", "tapered", "zeros before", "Butterworth", "usable")]
+    order = [
+        steps.index(word)
+        for word in ("mean", "trend", "tapered", "zeros before", "Butterworth", "usable")
+    ]
     assert order == sorted(order)
 
 
@@ -124,10 +133,14 @@ SHAPES = {
     "sine": lambda t, _: np.sin(t),
     "parabola": lambda t, _: t**2,
     "late noise": lambda t, rng: np.where(2 * t > t[-1], rng.normal(size=t.size), 0),
-    "burst": lambda t, rng: rng.normal(size=t.size) * np.exp(-(((t - t.mean()) / (t[-1] / 9 + 1e-3)) ** 2)),
+    "burst": lambda t, rng: (
+        rng.normal(size=t.size) * np.exp(-(((t - t.mean()) / (t[-1] / 9 + 1e-3)) ** 2))
+    ),
     "giants": lambda t, rng: np.where(rng.random(t.size) > 0.99, 1e200, 0),
 }
-LENIENT = Processing(checks=Checks(**{name: check.model_copy(update={"level": "note"}) for name, check in Checks()}))
+LENIENT = Processing(
+    checks=Checks(**{name: check.model_copy(update={"level": "note"}) for name, check in Checks()})
+)
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)
@@ -138,10 +151,13 @@ LENIENT = Processing(checks=Checks(**{name: check.model_copy(update={"level": "n
     how=st.sampled_from([Processing(), LENIENT, Processing(permanent_offset=True)]),
 )
 def test_any_record_is_kept_whole_or_named(shape, count, rate, how):
-    # with every check off as well: what is left must still be numbers, never a crash that loses the station
+    # with every check off as well: what is left must still be numbers, never a crash that loses the
+    # station
     samples = SHAPES[shape](np.arange(count) / rate, np.random.default_rng(count))
     sizes = {"HNE": 1, "HNN": 2, "HNZ": 3}
-    stream = Stream([trace(code, samples * size, sampling_rate=rate) for code, size in sizes.items()])
+    stream = Stream(
+        [trace(code, samples * size, sampling_rate=rate) for code, size in sizes.items()]
+    )
     kept, rejected = process_station(stream, how)
     assert {one.id for one in kept} | {row.name for row in rejected} == {one.id for one in stream}
     for one in kept:
@@ -175,8 +191,11 @@ def test_the_response_is_removed_as_obspy_removes_it(ridgecrest, station):
     ours = in_acceleration(Stream([trace]))[0].data
     theirs = trace.copy()
     theirs.data = theirs.data - theirs.data.mean()
-    theirs.remove_response(output="ACC", water_level=None, pre_filt=(-2, -1, 40, 45), zero_mean=False, taper=False)
-    # another length of transform moves what wraps around: 1e-5 of the peak; the phase of this filter is worth 10 %
+    theirs.remove_response(
+        output="ACC", water_level=None, pre_filt=(-2, -1, 40, 45), zero_mean=False, taper=False
+    )
+    # another length of transform moves what wraps around: 1e-5 of the peak; the phase of this
+    # filter is worth 10 %
     assert_allclose(ours, theirs.data, atol=1e-4 * np.abs(theirs.data).max())
 
 
@@ -187,7 +206,9 @@ def test_ridgecrest_gives_sane_motion_at_all_stations(ridgecrest):
     for one in out:
         velocity = np.cumsum(one.data) * one.stats.delta
         displacement = np.cumsum(velocity) * one.stats.delta
-        assert 0.2 < np.abs(one.data).max() < 6.0  # m/s2: the strongest station is known to have 0.57 g
+        assert (
+            0.2 < np.abs(one.data).max() < 6.0
+        )  # m/s2: the strongest station is known to have 0.57 g
         # a filtered record ends at rest: the pads hold 1.5 n periods of the corner
         assert abs(velocity[-1]) < 1e-3 * np.abs(velocity).max()
         assert abs(displacement[-1]) < 0.01 * np.abs(displacement).max()

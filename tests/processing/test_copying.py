@@ -13,7 +13,9 @@ def test_a_copy_is_equal_and_shares_nothing_but_the_response():
         "starttime": UTCDateTime(2020, 1, 1),
         "corners": AttribDict(highpass=0.1),
     }
-    stream = Stream([Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]}), Trace()])
+    stream = Stream(
+        [Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]}), Trace()]
+    )
     before, out = stream.copy(), copied(stream)
     assert out == stream
     assert out[0].stats.response is stream[0].stats.response

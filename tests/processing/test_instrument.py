@@ -6,10 +6,10 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_instruments, process_station
-from per_obspy.processing.filtering import acausal_bandpass
+from per_obspy.processing.filter.butterworth import acausal_bandpass
 from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.outcome import integrated
-from per_obspy.processing.windows import Source
+from per_obspy.processing.noise.windows import Source
+from per_obspy.processing.quality.final_checks import integrated
 
 START = UTCDateTime(2020, 1, 1)
 SETTINGS = Processing()
@@ -20,9 +20,17 @@ def record(earthquake):
     """Return a function that makes one component of a record with a little noise."""
 
     def make(channel="HNE", seed=1, factor=1.0, onset=20.0, **stats):
-        samples = earthquake(seed, onset=onset) + 1e-4 * np.random.default_rng(seed + 50).normal(size=12000)
+        samples = earthquake(seed, onset=onset) + 1e-4 * np.random.default_rng(seed + 50).normal(
+            size=12000
+        )
         dip = -90.0 if channel.endswith("Z") else 0.0
-        header = {"network": "XX", "station": "STA", "channel": channel, "sampling_rate": 100.0, "units": "m/s2"}
+        header = {
+            "network": "XX",
+            "station": "STA",
+            "channel": channel,
+            "sampling_rate": 100.0,
+            "units": "m/s2",
+        }
         header |= {"starttime": START, "sensor_dip": dip, "per_obspy": AttribDict()} | stats
         return Trace(factor * samples, header)
 
@@ -33,7 +41,9 @@ def test_horizontals_share_their_corners_and_the_vertical_has_its_own(record):
     three = Stream([record("HNE", 1), record("HNN", 2), record("HNZ", 3)])
     out, rejected = process_instrument(three, SETTINGS, None)
     assert rejected == ()
-    east, north, vertical = (out.select(channel=code)[0].stats.per_obspy for code in ("HNE", "HNN", "HNZ"))
+    east, north, vertical = (
+        out.select(channel=code)[0].stats.per_obspy for code in ("HNE", "HNN", "HNZ")
+    )
     assert east.highpass == north.highpass == max(east.own_highpass, north.own_highpass)
     assert "own_highpass" not in vertical
     assert {"shared"} < {east.highpass_source, north.highpass_source}
@@ -66,7 +76,9 @@ def test_without_noise_the_magnitude_decides_from_event_or_header(record, size, 
     source = Source(START, 0.0, 0.0, 1e4, size)
     late = record(onset=0.5)
     by_event, _ = process_instrument(Stream([late]), SETTINGS, source)
-    by_header, _ = process_instrument(Stream([record(onset=0.5, event=AttribDict(magnitude=size))]), SETTINGS, None)
+    by_header, _ = process_instrument(
+        Stream([record(onset=0.5, event=AttribDict(magnitude=size))]), SETTINGS, None
+    )
     for out in (by_event, by_header):
         assert out[0].stats.per_obspy.lowest_highpass == corner
         assert out[0].stats.per_obspy.highpass >= corner
@@ -92,7 +104,11 @@ def test_a_raw_record_goes_before_the_same_record_processed_by_others(record):
 
 
 def test_sensors_of_a_building_stay_apart(record):
-    floors = [record(code, seed, location=floor) for seed, floor in enumerate(("01", "02")) for code in ("HNE", "HNN")]
+    floors = [
+        record(code, seed, location=floor)
+        for seed, floor in enumerate(("01", "02"))
+        for code in ("HNE", "HNN")
+    ]
     apart, rejected = process_instruments(Stream(floors), SETTINGS)
     assert [{trace.stats.location for trace in one} for one in apart] == [{"01"}, {"02"}]
     assert rejected == ()
@@ -103,9 +119,13 @@ def test_hours_of_quiet_do_not_swallow_the_shaking(record):
     short = record()
     long = record()
     quiet = 1e-4 * np.random.default_rng(4).normal(size=60_000)
-    long.data = np.concatenate((quiet, long.data, 1e-4 * np.random.default_rng(5).normal(size=60_000)))
+    long.data = np.concatenate(
+        (quiet, long.data, 1e-4 * np.random.default_rng(5).normal(size=60_000))
+    )
     settings = Processing(longest_noise=19.0, longest_signal=100.0, highpass=0.1)
-    ours, theirs = (process_instrument(Stream([one]), settings, None)[0][0] for one in (long, short))
+    ours, theirs = (
+        process_instrument(Stream([one]), settings, None)[0][0] for one in (long, short)
+    )
     assert np.abs(ours.data).max() == pytest.approx(np.abs(theirs.data).max(), rel=1e-3)
     assert ours.stats.npts < 20_000  # 119 s and the pads of 75 s, not 22 minutes
 
@@ -113,9 +133,13 @@ def test_hours_of_quiet_do_not_swallow_the_shaking(record):
 def offset_record(record, displacement, after=5e-4):
     """Return a record whose ground moves for good within 4 s of the shaking, with a baseline that shifts as well."""
     trace = record()
-    trace.data = acausal_bandpass(trace.data, 100.0, 0.2, np.inf)  # comes to rest, but for what is added here
+    trace.data = acausal_bandpass(
+        trace.data, 100.0, 0.2, np.inf
+    )  # comes to rest, but for what is added here
     time = np.arange(12000) / 100.0
-    velocity = displacement * np.where(np.abs(time - 25) < 2, (1 + np.cos(np.pi * (time - 25) / 2)) / 4, 0.0)
+    velocity = displacement * np.where(
+        np.abs(time - 25) < 2, (1 + np.cos(np.pi * (time - 25) / 2)) / 4, 0.0
+    )
     trace.data = trace.data + np.gradient(velocity, 0.01) + np.where(time > 45, after, 0.0)
     return trace
 
@@ -124,10 +148,12 @@ def offset_record(record, displacement, after=5e-4):
 def test_a_permanent_offset_is_kept_on_request(record, displacement):
     settings = Processing(permanent_offset=True)
     plain, offset = (
-        process_instrument(Stream([offset_record(record, size)]), settings, None)[0] for size in (0.0, displacement)
+        process_instrument(Stream([offset_record(record, size)]), settings, None)[0]
+        for size in (0.0, displacement)
     )
     final = [integrated(integrated(out))[0].data[-1] for out in (plain, offset)]
-    # the shift alone would move the ground by 1.4 m; what bridges the shaking is a guess, worth a decimetre or two
+    # the shift alone would move the ground by 1.4 m; what bridges the shaking is a guess, worth a
+    # decimetre or two
     assert abs(final[0]) < 0.2
     assert final[1] - final[0] == pytest.approx(displacement, rel=0.15)
     filtered, _ = process_instrument(Stream([offset_record(record, displacement)]), SETTINGS, None)

@@ -5,7 +5,7 @@ import pytest
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process_station
-from per_obspy.processing.gathering import is_horizontal
+from per_obspy.processing.station.components import is_horizontal
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.azimuthal import azimuthal_sd_spectrum, rotd
 from per_obspy.spectra.horizontals import north_and_east
@@ -21,7 +21,9 @@ def motion(request, real_data):
     stream, _ = read_station(found.stations[request.param], found.inventory, request.param)
     kept, _ = process_station(stream, Processing())
     pair = [trace for trace in kept if is_horizontal(trace)]
-    pair_motion = north_and_east(*(one.data for one in pair), *(one.stats.sensor_azimuth for one in pair))
+    pair_motion = north_and_east(
+        *(one.data for one in pair), *(one.stats.sensor_azimuth for one in pair)
+    )
     return (*pair_motion, pair[0].stats.delta, pair[0].stats.per_obspy)
 
 
@@ -38,8 +40,9 @@ def rotd50_peak(north, east):
 def test_the_spectrum_is_smooth(motion):
     periods = STEP ** np.arange(0, 200) * 0.1
     sa = (2 * np.pi / periods) ** 2 * rotd50_sd(motion, periods)
-    # an oscillator cannot tell periods apart that are closer than its half-power width, 2 x damping = 10 %: over a
-    # fifth of that the spectrum changes by less than 2 % / 10 % = 20 %; spikes and dropouts at one period would
+    # an oscillator cannot tell periods apart that are closer than its half-power width, 2 x damping
+    # = 10 %: over a fifth of that the spectrum changes by less than 2 % / 10 % = 20 %; spikes and
+    # dropouts at one period would
     assert np.abs(np.diff(np.log(sa))).max() < 0.2
     # and it has no line: no value stands out from its neighbours at 4 % distance by a quarter
     middle = np.log(sa[2:-2]) - 0.5 * (np.log(sa[:-4]) + np.log(sa[4:]))
@@ -48,8 +51,9 @@ def test_the_spectrum_is_smooth(motion):
 
 def test_stiff_oscillators_feel_the_peak_acceleration(motion):
     sa = (2 * np.pi / 0.01) ** 2 * rotd50_sd(motion, [0.01])[0]
-    # nothing above the corner of 37.5 Hz is left: at 100 Hz the amplification is 1 / (1 - (37.5 / 100)^2) = 1.16 at
-    # most, for motion that is all at the corner; the strongest of it is below 10 Hz, where it is 1.01
+    # nothing above the corner of 37.5 Hz is left: at 100 Hz the amplification is 1 / (1 - (37.5 /
+    # 100)^2) = 1.16 at most, for motion that is all at the corner; the strongest of it is below 10
+    # Hz, where it is 1.01
     np.testing.assert_allclose(sa, rotd50_peak(*motion[:2]), rtol=0.05)
 
 
@@ -57,8 +61,9 @@ def test_beyond_the_corner_there_is_only_the_peak_displacement(motion):
     north, east, dt, chosen = motion
     displacement = [np.cumsum(np.cumsum(one)) * dt**2 for one in (north, east)]
     sd = rotd50_sd(motion, [10 / chosen.highpass])[0]
-    # ten periods of the corner: the oscillator stands still and the ground moves below it; what is left of the ground
-    # at the corner moves it by (1 / 10)^2 at most, in cycles that resonate no more than a few times
+    # ten periods of the corner: the oscillator stands still and the ground moves below it; what is
+    # left of the ground at the corner moves it by (1 / 10)^2 at most, in cycles that resonate no
+    # more than a few times
     np.testing.assert_allclose(sd, rotd50_peak(*displacement), rtol=0.1)
 
 
@@ -68,5 +73,6 @@ def test_the_usable_periods_end_before_the_corner_bends_the_spectrum(motion):
     assert 5.0 < chosen.longest_period < 100.0  # s: M 7.1 within 100 km, records of 325 s
     limits = [chosen.longest_period, 3 * chosen.longest_period]
     sa = (2 * np.pi / np.array(limits)) ** 2 * rotd50_sd(motion, limits)
-    # from the corner on the spectrum falls at least with the first power of period: constant displacement is the second
+    # from the corner on the spectrum falls at least with the first power of period: constant
+    # displacement is the second
     assert sa[1] < sa[0] / 3

@@ -45,8 +45,11 @@ def test_the_spectrum_is_recovered_inside_the_usable_periods(earthquake, drift):
         inside.append(wrong[good].max())
         median.append(np.median(wrong[good]))
         outside.append(wrong[2 * usable.longest_period < PERIODS].max())
-        assert usable.longest_period > 10  # s: errors are not avoided by calling everything unusable
-    # at 0.8 of the corner's period the filter has amplitude 0.95: errors of a few percent near the limit, stated as 6 %
+        assert (
+            usable.longest_period > 10
+        )  # s: errors are not avoided by calling everything unusable
+    # at 0.8 of the corner's period the filter has amplitude 0.95: errors of a few percent near the
+    # limit, stated as 6 %
     assert max(inside) < 0.06
     assert max(median) < 0.002
     # honest: what lies well beyond the limit is worse
@@ -57,7 +60,9 @@ def shifted(truth, shift, start, end):
     """Return the largest error of PER inside the usable periods and the warnings, for a shift between two times."""
     recorded = truth + 1e-5 * np.random.default_rng(100).normal(size=COUNT)
     recorded[round(start * RATE) : round(end * RATE)] += shift
-    processed = process(Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})]))[0]
+    processed = process(
+        Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})])
+    )[0]
     usable = processed.stats.per_obspy
     good = (usable.shortest_period <= PERIODS) & (usable.longest_period >= PERIODS)
     return error(processed.data, truth)[good].max(), usable.get("warnings", "")
@@ -65,11 +70,13 @@ def shifted(truth, shift, start, end):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_strong_shifts_during_the_shaking_are_flagged(earthquake, seed):
-    # 15 s of 0.05 m/s2 leave 0.75 m/s: PER inside the usable periods is wrong by 12 to 21 %, which the record must say
+    # 15 s of 0.05 m/s2 leave 0.75 m/s: PER inside the usable periods is wrong by 12 to 21 %, which
+    # the record must say
     wrong, warnings = shifted(earthquake(seed), 0.05, 22, 37)
     assert wrong > 0.06  # else there is nothing to warn of
     assert "the baseline shifted during the shaking" in warnings
-    # without a shift nothing is said, although this ground itself ends with up to 0.23 of its peak velocity
+    # without a shift nothing is said, although this ground itself ends with up to 0.23 of its peak
+    # velocity
     wrong, warnings = shifted(earthquake(seed), 0.0, 22, 37)
     assert wrong < 0.06
     assert "baseline" not in warnings
@@ -77,11 +84,18 @@ def test_strong_shifts_during_the_shaking_are_flagged(earthquake, seed):
 
 @pytest.mark.real_data
 def test_a_real_sensor_that_tilted_is_flagged_and_its_neighbours_are_not(real_data):
-    # SLA HNN: velocity runs away to 14 times its processed peak; another program rejects it for signal to noise
+    # SLA HNN: velocity runs away to 14 times its processed peak; another program rejects it for
+    # signal to noise
     folder = real_data / "records" / "ridgecrest2019_mseed"
     found = find_stations(folder)
-    kept, _ = process_station(read_station(found.stations["CI.SLA"], found.inventory, "CI.SLA")[0], Processing())
-    flagged = {one.stats.channel for one in kept if "baseline shifted" in one.stats.per_obspy.get("warnings", "")}
+    kept, _ = process_station(
+        read_station(found.stations["CI.SLA"], found.inventory, "CI.SLA")[0], Processing()
+    )
+    flagged = {
+        one.stats.channel
+        for one in kept
+        if "baseline shifted" in one.stats.per_obspy.get("warnings", "")
+    }
     assert flagged == {"HNN"}
 
 
@@ -89,14 +103,17 @@ def test_a_real_sensor_that_tilted_is_flagged_and_its_neighbours_are_not(real_da
 @pytest.mark.parametrize("record", ["20161113_110300_HSES_20", "20161113_110313_THZ_20"])
 def test_geonet_raw_records_give_the_spectra_of_geonets_own_processing(real_data, record):
     folder = real_data / "records" / "kaikoura2016_geonet"
-    raw, official = (read(str(folder / f"{record}.{suffix}"), format="GEONET") for suffix in ("V1A", "V2A"))
+    raw, official = (
+        read(str(folder / f"{record}.{suffix}"), format="GEONET") for suffix in ("V1A", "V2A")
+    )
     ours, rejected = process_station(raw, Processing())
     assert rejected == ()
     periods = np.geomspace(0.2, 4.0, 25)
     for trace in (one for one in ours if one.stats.sensor_dip == 0):
         theirs = next(one for one in official if one.stats.channel[-1] == trace.stats.channel[-1])
         spectra = [per_spectrum(one.data, one.stats.delta, periods) for one in (trace, theirs)]
-        # GeoNet filters from 0.1-0.25 Hz, resamples to 50 Hz and cuts after 164 s: 7 % is what the choices are worth
+        # GeoNet filters from 0.1-0.25 Hz, resamples to 50 Hz and cuts after 164 s: 7 % is what the
+        # choices are worth
         np.testing.assert_allclose(spectra[0], spectra[1], rtol=0.07)
 
 
@@ -110,7 +127,9 @@ def test_willow_creek_raw_gives_the_spectra_of_its_official_record(real_data):
     periods = np.geomspace(0.1, 0.8 / theirs, 25)
     for trace in (one for one in ours if one.stats.sensor_dip == 0):
         same = next(
-            one for one in official.select(channel=trace.stats.channel) if one.stats.get("quantity") == "acceleration"
+            one
+            for one in official.select(channel=trace.stats.channel)
+            if one.stats.get("quantity") == "acceleration"
         )
         spectra = [per_spectrum(one.data, one.stats.delta, periods) for one in (trace, same)]
         # their corner of 0.3 Hz bends the last octave; below it the two agree within 1 %

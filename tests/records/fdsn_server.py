@@ -15,7 +15,7 @@ import numpy as np
 from obspy import Inventory, Stream, UTCDateTime
 from obspy.core.event import Catalog
 
-from per_obspy.records.simulated import Simulation
+from per_obspy.records.simulation.earthquake import Simulation
 
 Fault = Callable[["_Handler", bytes], None]
 
@@ -39,7 +39,11 @@ class FdsnServer(ThreadingHTTPServer):
 
     def __init__(self, simulation: Simulation) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.stream, self.inventory, self.event = simulation.stream, _begun(simulation.inventory), simulation.event
+        self.stream, self.inventory, self.event = (
+            simulation.stream,
+            _begun(simulation.inventory),
+            simulation.event,
+        )
         self.requests: list[Request] = []
         self.times: list[float] = []
         self.faults: list[tuple[str, str, Fault]] = []
@@ -56,7 +60,9 @@ class FdsnServer(ThreadingHTTPServer):
 
     def asked(self, service: str, subject: str | None = None) -> int:
         """Return the number of requests to a service."""
-        return sum(one.service == service and subject in (None, one.subject) for one in self.requests)
+        return sum(
+            one.service == service and subject in (None, one.subject) for one in self.requests
+        )
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Say nothing of clients that hung up, as the tests make them do; everything else is still an error."""
@@ -101,14 +107,18 @@ class _Handler(BaseHTTPRequestHandler):
     def _body(self, request: Request) -> bytes:
         if request.service in self.server.extra:
             return self.server.extra[request.service]
-        return {"station": self._station, "dataselect": self._dataselect, "event": self._event}[request.service](
-            request.parameters
-        )
+        return {"station": self._station, "dataselect": self._dataselect, "event": self._event}[
+            request.service
+        ](request.parameters)
 
     def _station(self, wanted: dict[str, str]) -> bytes:
         found = Inventory()
         for network, station, location, channel in _combinations(wanted):
-            circle = {name: float(wanted[name]) for name in ("latitude", "longitude", "maxradius") if name in wanted}
+            circle = {
+                name: float(wanted[name])
+                for name in ("latitude", "longitude", "maxradius")
+                if name in wanted
+            }
             found += self.server.inventory.select(network, station, location, channel, **circle)
         if not found.get_contents()["channels"]:
             return b""
@@ -143,7 +153,13 @@ class _Handler(BaseHTTPRequestHandler):
         Catalog([event]).write(content, format="QUAKEML")
         return content.getvalue()
 
-    def reply(self, code: int, body: bytes, length: int | None = None, headers: dict[str, str] | None = None) -> None:
+    def reply(
+        self,
+        code: int,
+        body: bytes,
+        length: int | None = None,
+        headers: dict[str, str] | None = None,
+    ) -> None:
         self.send_response(code)
         self.send_header("Content-Length", str(len(body) if length is None else length))
         for name, value in (headers or {}).items():
@@ -165,8 +181,16 @@ def _begun(inventory: Inventory) -> Inventory:
 
 
 def _combinations(wanted: dict[str, str]) -> list[tuple[str, str, str, str]]:
-    lists = [wanted.get(name, "*").split(",") for name in ("network", "station", "location", "channel")]
-    return [(n, s, "" if x == "--" else x, c) for n in lists[0] for s in lists[1] for x in lists[2] for c in lists[3]]
+    lists = [
+        wanted.get(name, "*").split(",") for name in ("network", "station", "location", "channel")
+    ]
+    return [
+        (n, s, "" if x == "--" else x, c)
+        for n in lists[0]
+        for s in lists[1]
+        for x in lists[2]
+        for c in lists[3]
+    ]
 
 
 def mseed(stream: Stream) -> bytes:

@@ -29,7 +29,12 @@ def mseed(station: str) -> bytes:
     return file.getvalue()
 
 
-CONTENT = {"deep/one.mseed": mseed("ONE"), "two.mseed": mseed("TWO"), "three.AT2": AT2, "readme.txt": b"words"}
+CONTENT = {
+    "deep/one.mseed": mseed("ONE"),
+    "two.mseed": mseed("TWO"),
+    "three.AT2": AT2,
+    "readme.txt": b"words",
+}
 
 
 def pack(path: Path) -> Path:
@@ -47,7 +52,9 @@ def pack(path: Path) -> Path:
     return path
 
 
-every = pytest.mark.parametrize("name", ["a.zip", "a.tar", "a.tar.gz", "a.tgz", "a.tar.bz2", "a.tar.xz", "A.ZIP.zip"])
+every = pytest.mark.parametrize(
+    "name", ["a.zip", "a.tar", "a.tar.gz", "a.tgz", "a.tar.bz2", "a.tar.xz", "A.ZIP.zip"]
+)
 
 
 @every

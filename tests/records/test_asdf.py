@@ -12,9 +12,15 @@ from obspy.core.event import Catalog
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
 from per_obspy.processing.chain import process
-from per_obspy.records.asdf import find_asdf_stations, has_event, is_asdf, read_asdf_event, read_asdf_station
+from per_obspy.records.asdf import (
+    find_asdf_stations,
+    has_event,
+    is_asdf,
+    read_asdf_event,
+    read_asdf_station,
+)
 from per_obspy.records.metadata import metadata_text
-from per_obspy.records.simulated import Simulation, simulate
+from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 PROCESSED = json.dumps({"standard": {"process_level": "corrected physical units"}})
 CORNERS = json.dumps({"corner_frequencies": {"type": "snr", "highpass": 0.1, "lowpass": 30.0}})
@@ -34,9 +40,7 @@ def put_text(group, name: str, text: str | bytes) -> None:
 
 
 def put_waveform(group, trace, tag: str, samples: np.ndarray) -> None:
-    times = (
-        f"{trace.stats.starttime.strftime('%Y-%m-%dT%H:%M:%S')}__{trace.stats.endtime.strftime('%Y-%m-%dT%H:%M:%S')}"
-    )
+    times = f"{trace.stats.starttime.strftime('%Y-%m-%dT%H:%M:%S')}__{trace.stats.endtime.strftime('%Y-%m-%dT%H:%M:%S')}"
     name = f"{trace.id}__{times}__{tag}"
     group.createDimension(name, samples.size)
     variable = group.createVariable(name, samples.dtype, (name,))
@@ -59,13 +63,27 @@ def workspace(simulation: Simulation, tmp_path: Path) -> Path:
             station, stream_name = ".".join(trace.id.split(".")[:2]), f"{trace.id[:-1]}_e1_default"
             group = file.createGroup(f"Waveforms/{station}")
             if "StationXML" not in group.variables:
-                put_text(group, "StationXML", metadata_text(simulation.inventory.select(station=station[3:])))
-                put_text(file.createGroup(f"AuxiliaryData/StreamSupplementalStats/{station}"), stream_name, PROCESSED)
+                put_text(
+                    group,
+                    "StationXML",
+                    metadata_text(simulation.inventory.select(station=station[3:])),
+                )
+                put_text(
+                    file.createGroup(f"AuxiliaryData/StreamSupplementalStats/{station}"),
+                    stream_name,
+                    PROCESSED,
+                )
             put_waveform(group, trace, "e1_unprocessed", trace.data.astype(np.int32))
-            put_waveform(group, trace, "e1_default", trace.data / 2000.0)  # 200 000 counts a m/s2, cm/s2
+            put_waveform(
+                group, trace, "e1_default", trace.data / 2000.0
+            )  # 200 000 counts a m/s2, cm/s2
             parameters = file.createGroup(f"AuxiliaryData/TraceProcessingParameters/{station}")
             put_text(parameters, f"{trace.id}_e1_default", CORNERS)
-            put_text(file.createGroup("Provenance"), f"{trace.id}_e1_default", PROVENANCE.format("cm/s^2"))
+            put_text(
+                file.createGroup("Provenance"),
+                f"{trace.id}_e1_default",
+                PROVENANCE.format("cm/s^2"),
+            )
     return path
 
 
@@ -78,7 +96,10 @@ def test_raw_records_are_counts_with_their_response(workspace: Path, simulation:
     for trace in stream:
         (sent,) = simulation.stream.select(id=trace.id)
         assert np.array_equal(trace.data, sent.data)
-        assert (trace.stats.starttime.ns, trace.stats.delta) == (sent.stats.starttime.ns, sent.stats.delta)
+        assert (trace.stats.starttime.ns, trace.stats.delta) == (
+            sent.stats.starttime.ns,
+            sent.stats.delta,
+        )
         assert (trace.stats.units, trace.stats.processing_level) == ("counts", "raw")
         assert trace.stats.response.instrument_sensitivity.value == 2e5
         assert trace.stats.coordinates == sent.stats.coordinates
@@ -96,11 +117,15 @@ def test_processed_records_are_si_with_their_corners(workspace: Path, simulation
         assert dict(trace.stats.corners) == {"highpass": 0.1, "lowpass": 30.0}
 
 
-@pytest.mark.parametrize(("unit", "reason"), [("furlong", "gives furlong as output_units"), ("", "gives no unit")])
+@pytest.mark.parametrize(
+    ("unit", "reason"), [("furlong", "gives furlong as output_units"), ("", "gives no unit")]
+)
 def test_an_unknown_unit_is_a_reason(workspace: Path, unit: str, reason: str):
     with netCDF4.Dataset(workspace, "a") as file:
         said = file["Provenance"].variables["XX.S001..HNE_e1_default"]
-        said[:] = np.frombuffer(PROVENANCE.format(unit).encode().ljust(said.size), np.int8)[: said.size]
+        said[:] = np.frombuffer(PROVENANCE.format(unit).encode().ljust(said.size), np.int8)[
+            : said.size
+        ]
     found = find_asdf_stations(workspace, "*_default")
     stream, (rejection,) = read_asdf_station((workspace,), found.inventory, "XX.S001", "*_default")
     assert len(stream) == 2
@@ -109,7 +134,9 @@ def test_an_unknown_unit_is_a_reason(workspace: Path, unit: str, reason: str):
 
 
 def test_a_tag_that_is_not_there_names_those_that_are(workspace: Path):
-    with pytest.raises(CatalogError, match=r"no waveform of tag x, only of e1_default, e1_unprocessed"):
+    with pytest.raises(
+        CatalogError, match=r"no waveform of tag x, only of e1_default, e1_unprocessed"
+    ):
         find_asdf_stations(workspace, "x")
 
 
@@ -150,5 +177,6 @@ def test_our_processing_of_gmprocess_s_raw_records_comes_to_its_results(real_dat
     assert {trace.stats.processing_level for trace in theirs} == {"processed"}
     for trace in theirs:
         (same,) = ours.select(id=trace.id)
-        # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse by less than 1 %
+        # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse by
+        # less than 1 %
         assert np.abs(same.data).max() == pytest.approx(np.abs(trace.data).max(), rel=0.01)

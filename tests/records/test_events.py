@@ -12,7 +12,7 @@ from obspy.core.event import Catalog, Event, Origin
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.events import EventRow, find_events, read_event
-from per_obspy.records.simulated import Simulation, simulate
+from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,12 @@ def server(simulation: Simulation) -> Iterator[FdsnServer]:
 
 def feature(**changes: object) -> dict[str, object]:
     """Return an event as the USGS feeds write it."""
-    known = {"mag": 7.1, "place": "18km W of Searles Valley, CA", "time": 1562383193040, "magType": "mw"}
+    known = {
+        "mag": 7.1,
+        "place": "18km W of Searles Valley, CA",
+        "time": 1562383193040,
+        "magType": "mw",
+    }
     return {
         "type": "Feature",
         "id": "ci38457511",
@@ -42,7 +47,14 @@ def feed(*features: object) -> bytes:
 
 
 SEARLES = EventRow(
-    "ci38457511", "2019-07-06T03:19:53.040", 35.77, -117.599, 8000.0, 7.1, "mw", "18km W of Searles Valley, CA"
+    "ci38457511",
+    "2019-07-06T03:19:53.040",
+    35.77,
+    -117.599,
+    8000.0,
+    7.1,
+    "mw",
+    "18km W of Searles Valley, CA",
 )
 
 
@@ -65,7 +77,15 @@ def test_the_latest_comes_first_and_gaps_stay_gaps(tmp_path: Path):
 def test_a_service_is_asked_what_was_asked(server: FdsnServer, simulation: Simulation):
     (row,) = find_events(server.url, {"minmagnitude": "6"})
     origin = simulation.event.origins[0]
-    assert row[:1] + row[2:] == ("xx1", origin.latitude, origin.longitude, origin.depth, 6.5, "Mw", "Nowhere")
+    assert row[:1] + row[2:] == (
+        "xx1",
+        origin.latitude,
+        origin.longitude,
+        origin.depth,
+        6.5,
+        "Mw",
+        "Nowhere",
+    )
     assert UTCDateTime(row.time) == origin.time
     assert server.requests[0].parameters == {"minmagnitude": "6", "format": "text"}
 
@@ -95,14 +115,18 @@ def test_an_event_without_origin_is_refused(tmp_path: Path):
 
 
 def test_an_origin_without_time_is_refused(tmp_path: Path):
-    Catalog([Event(origins=[Origin(latitude=1.0, longitude=2.0)])]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    Catalog([Event(origins=[Origin(latitude=1.0, longitude=2.0)])]).write(
+        str(tmp_path / "event.xml"), format="QUAKEML"
+    )
     with pytest.raises(CatalogError, match="an origin without time"):
         find_events(str(tmp_path / "event.xml"), {})
     with pytest.raises(CatalogError, match="an origin without time"):
         read_event(tmp_path / "event.xml")
 
 
-@pytest.mark.parametrize("wrong", [b"<html>", b"EventID\nxx", b"\xff\xfe", b"#EventID|Time\nxx|yesterday"])
+@pytest.mark.parametrize(
+    "wrong", [b"<html>", b"EventID\nxx", b"\xff\xfe", b"#EventID|Time\nxx|yesterday"]
+)
 def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wrong: bytes):
     server.fail("event", "*", content(wrong))
     with pytest.raises(ServiceError, match="something else than a list of events"):

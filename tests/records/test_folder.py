@@ -28,7 +28,16 @@ def inventory(
 ) -> Inventory:
     place = {"latitude": latitude, "longitude": -117.0, "elevation": 700.0}
     described = [
-        Channel(code, "", **place, depth=0, azimuth=azimuth, dip=dip, response=answer or response(), **epoch)
+        Channel(
+            code,
+            "",
+            **place,
+            depth=0,
+            azimuth=azimuth,
+            dip=dip,
+            response=answer or response(),
+            **epoch,
+        )
         for code, (azimuth, dip) in channels.items()
     ]
     return Inventory([Network("CI", [Station("CLC", **place, channels=described)])], source="test")
@@ -39,7 +48,13 @@ THREE = {"HN1": (30.0, 0.0), "HN2": (120.0, 0.0), "HNZ": (0.0, -90.0)}
 
 def record(channel: str, samples: np.ndarray | None = None) -> Trace:
     samples = np.arange(300, dtype=np.int32) if samples is None else samples
-    header = {"network": "CI", "station": "CLC", "channel": channel, "starttime": START, "delta": 0.01}
+    header = {
+        "network": "CI",
+        "station": "CLC",
+        "channel": channel,
+        "starttime": START,
+        "delta": 0.01,
+    }
     return Trace(samples, header)
 
 
@@ -79,13 +94,19 @@ def test_records_in_subfolders_get_their_metadata(folder: Path):
 
 def test_comments_of_the_station_tell_its_ground(folder: Path):
     described = inventory(THREE)
-    described[0][0].comments = [Comment("a park"), Comment("site_class = lakebed"), Comment("vs30=180.5")]
+    described[0][0].comments = [
+        Comment("a park"),
+        Comment("site_class = lakebed"),
+        Comment("vs30=180.5"),
+    ]
     described.write(str(folder / "station.xml"), format="STATIONXML")
     stream, _ = read_all(folder)
     assert {(trace.stats.site_class, trace.stats.vs30) for trace in stream} == {("lakebed", 180.5)}
     described[0][0].comments = [Comment("site_class=")]
     described.write(str(folder / "station.xml"), format="STATIONXML")
-    assert not any("site_class" in trace.stats or "vs30" in trace.stats for trace in read_all(folder)[0])
+    assert not any(
+        "site_class" in trace.stats or "vs30" in trace.stats for trace in read_all(folder)[0]
+    )
 
 
 @pytest.mark.parametrize("velocity", ["soft", "-200", "0", "nan", "inf", "1e5"])
@@ -113,7 +134,9 @@ def test_without_stationxml_raw_records_say_why_they_cannot_be_used(folder: Path
 
 
 def test_a_channel_that_stationxml_lacks_is_one_rejection(folder: Path):
-    inventory({code: THREE[code] for code in ("HN1", "HNZ")}).write(str(folder / "station.xml"), format="STATIONXML")
+    inventory({code: THREE[code] for code in ("HN1", "HNZ")}).write(
+        str(folder / "station.xml"), format="STATIONXML"
+    )
     stream, reasons = read_all(folder)
     assert [trace.stats.channel for trace in stream] == ["HN1", "HNZ"]
     assert len(reasons) == 1
@@ -121,7 +144,9 @@ def test_a_channel_that_stationxml_lacks_is_one_rejection(folder: Path):
 
 
 def test_the_epoch_of_the_record_decides(folder: Path):
-    old = inventory(THREE, latitude=10.0, start_date=UTCDateTime(2000, 1, 1), end_date=UTCDateTime(2010, 1, 1))
+    old = inventory(
+        THREE, latitude=10.0, start_date=UTCDateTime(2000, 1, 1), end_date=UTCDateTime(2010, 1, 1)
+    )
     new = inventory(THREE, latitude=36.0, start_date=UTCDateTime(2010, 1, 1))
     (old + new).write(str(folder / "station.xml"), format="STATIONXML")
     assert {trace.stats.coordinates.latitude for trace in read_all(folder)[0]} == {36}
@@ -199,7 +224,9 @@ def test_folders_without_records_are_refused(tmp_path: Path):
         find_stations(tmp_path)
     (tmp_path / "a.txt").write_text("words")
     (tmp_path / "b.txt").write_text("more words")
-    with pytest.raises(CatalogError, match=r"none of its 2 files is a record; a\.txt: ObsPy cannot read it"):
+    with pytest.raises(
+        CatalogError, match=r"none of its 2 files is a record; a\.txt: ObsPy cannot read it"
+    ):
         find_stations(tmp_path)
     with pytest.raises(CatalogError, match=r"none of its 1 files is a record; a\.txt"):
         find_stations(tmp_path / "a.txt")
@@ -238,7 +265,10 @@ def test_ridgecrest(real_data: Path):
         assert [trace.stats.get("sensor_azimuth") for trace in stream] == [90, 0, None]
     gain = obspy.read_inventory(str(real_data / "records" / "ridgecrest2019_mseed" / "CI.CLC.xml"))
     stream, _ = read_station(contents.stations["CI.CLC"], gain)
-    peaks = [np.ptp(trace.data) / 2 / trace.stats.response.instrument_sensitivity.value for trace in stream[:2]]
+    peaks = [
+        np.ptp(trace.data) / 2 / trace.stats.response.instrument_sensitivity.value
+        for trace in stream[:2]
+    ]
     # README of the data: CLC 0.51 g; half the range instead of a baseline costs a few per cent
     assert max(peaks) / 9.80665 == pytest.approx(0.51, rel=0.1)
 
@@ -256,12 +286,16 @@ def test_knet_counts_keep_their_gain(real_data: Path):
             assert trace.stats.coordinates.latitude == pytest.approx(41, abs=1)
             # the header has the peak about the mean, to 0.001 gal
             peak = np.abs(trace.data - trace.data.mean()).max()
-            assert peak * trace.stats.calib == pytest.approx(trace.stats.header_peak * trace.stats.calib, abs=2e-5)
+            assert peak * trace.stats.calib == pytest.approx(
+                trace.stats.header_peak * trace.stats.calib, abs=2e-5
+            )
 
 
 @pytest.mark.real_data
 def test_a_cut_knet_file_is_a_reason(real_data: Path, tmp_path: Path):
-    lines = (real_data / "records" / "aomori2018_knet" / "AOM0011801241951.NS").read_text().splitlines()
+    lines = (
+        (real_data / "records" / "aomori2018_knet" / "AOM0011801241951.NS").read_text().splitlines()
+    )
     (tmp_path / "AOM0011801241951.NS").write_text("\n".join(lines[:500]))
     contents = find_stations(tmp_path)
     stream, rejected = read_station(contents.stations["BO.AOM001"], None)
@@ -276,7 +310,9 @@ STATION_TEXT = """#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTi
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("beside", [True, False])
-def test_station_text_gives_the_coordinates_that_renadic_leaves_out(real_data: Path, tmp_path: Path, beside: bool):
+def test_station_text_gives_the_coordinates_that_renadic_leaves_out(
+    real_data: Path, tmp_path: Path, beside: bool
+):
     folder = tmp_path / "records"
     folder.mkdir()
     source = real_data / "records" / "maule2010_renadic" / "angol1002271parte1.v1"

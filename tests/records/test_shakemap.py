@@ -51,8 +51,8 @@ def test_values_by_hand(tmp_path):
     assert grid["latitude"].values.tolist() == [45.5, 46.0]
     assert grid["longitude"].values.tolist() == [10.0, 10.5, 11.0]
     assert grid["period"].values.tolist() == [0.3, 1.0, 3.0]
-    # the first row of the file is the north-west corner; a per cent of gravity is 0.0980665 m/s2. Would catch a map
-    # upside down or transposed
+    # the first row of the file is the north-west corner; a per cent of gravity is 0.0980665 m/s2.
+    # Would catch a map upside down or transposed
     northwest = grid.sel(latitude=46.0, longitude=10.0)
     assert_allclose(northwest["psa"], 0.0980665 * np.array([10.0, 4.0, 1.0]), rtol=1e-12)
     southeast = grid.sel(latitude=45.5, longitude=11.0)
@@ -66,7 +66,9 @@ def test_values_by_hand(tmp_path):
 def test_packed_and_in_any_order_it_is_the_same(tmp_path):
     rows = make_rows()
     plain = read_shakemap(write(tmp_path / "grid.xml", grid_xml(FIELDS, rows, (2, 3))))
-    (tmp_path / "grid.xml.gz").write_bytes(gzip.compress(grid_xml(FIELDS, rows[::-1], (2, 3)).encode()))
+    (tmp_path / "grid.xml.gz").write_bytes(
+        gzip.compress(grid_xml(FIELDS, rows[::-1], (2, 3)).encode())
+    )
     packed = read_shakemap(tmp_path / "grid.xml.gz")
     assert packed.equals(plain)
 
@@ -76,9 +78,13 @@ def test_uncertainty_of_its_own_file_or_of_the_grid(tmp_path):
     rows = make_rows()
     apart = [(*row[:2], 0.5, 0.6, 0.01 * i) for i, row in enumerate(rows, start=70)]
     grid = write(tmp_path / "grid.xml", grid_xml(FIELDS, rows, (2, 3)))
-    uncertainty = write(tmp_path / "uncertainty.xml", grid_xml(("LON", "LAT", *names), apart, (2, 3)))
+    uncertainty = write(
+        tmp_path / "uncertainty.xml", grid_xml(("LON", "LAT", *names), apart, (2, 3))
+    )
     both = read_shakemap(grid, uncertainty)
-    assert_allclose(both["psa_log_std"].sel(latitude=45.5, longitude=10.0), [0.5, 0.6, 0.73], rtol=1e-12)
+    assert_allclose(
+        both["psa_log_std"].sel(latitude=45.5, longitude=10.0), [0.5, 0.6, 0.73], rtol=1e-12
+    )
     joined = [(*row, *other[2:]) for row, other in zip(rows, apart, strict=True)]
     one = read_shakemap(write(tmp_path / "one.xml", grid_xml((*FIELDS, *names), joined, (2, 3))))
     assert one.equals(both)
@@ -113,23 +119,53 @@ WRONG = {
     "cut": (grid_xml(FIELDS, make_rows(), (2, 3))[:-60], "cannot be read as XML"),
     "another document": ("<quakeml></quakeml>", "its root is quakeml, not shakemap_grid"),
     "a bomb": (grid_xml(FIELDS, make_rows(), (2, 3), BOMB), "DOCTYPE"),
-    "fewer rows": (grid_xml(FIELDS, make_rows()[:-1], (2, 3)), "grid_data has 5 rows of 9, the head tells 2 x 3 nodes"),
+    "fewer rows": (
+        grid_xml(FIELDS, make_rows()[:-1], (2, 3)),
+        "grid_data has 5 rows of 9, the head tells 2 x 3 nodes",
+    ),
     "another shape": (grid_xml(FIELDS, make_rows(), (3, 2)), "not those of a grid"),
-    "a shorter row": (grid_xml(FIELDS, [*make_rows()[:-1], (1, 2)], (2, 3)), "grid_data: .*columns changed"),
+    "a shorter row": (
+        grid_xml(FIELDS, [*make_rows()[:-1], (1, 2)], (2, 3)),
+        "grid_data: .*columns changed",
+    ),
     "no rows": (grid_xml(FIELDS, [], (2, 3)), "has no grid_data"),
     "no size": (grid_xml(FIELDS, make_rows(), ("two", 3)), "tells no nlat and nlon"),
     "one latitude": (grid_xml(FIELDS, make_rows()[:3], (1, 3)), "needs two latitudes"),
-    "no spectra": (grid_xml(FIELDS[:5], [row[:5] for row in make_rows()], (2, 3)), "has no field PSA03, PSA10, PSA30"),
+    "no spectra": (
+        grid_xml(FIELDS[:5], [row[:5] for row in make_rows()], (2, 3)),
+        "has no field PSA03, PSA10, PSA30",
+    ),
     "no place": (grid_xml(("X", *FIELDS[1:]), make_rows(), (2, 3)), "has no field LON"),
-    "NaN": (grid_xml(FIELDS, _changed(PSA10=np.nan), (2, 3)), "PSA10 = nan pctg at longitude 10.5, latitude 46"),
-    "below zero": (grid_xml(FIELDS, _changed(PSA03=-1), (2, 3)), "PSA03 = -1 pctg at longitude 10.5"),
+    "NaN": (
+        grid_xml(FIELDS, _changed(PSA10=np.nan), (2, 3)),
+        "PSA10 = nan pctg at longitude 10.5, latitude 46",
+    ),
+    "below zero": (
+        grid_xml(FIELDS, _changed(PSA03=-1), (2, 3)),
+        "PSA03 = -1 pctg at longitude 10.5",
+    ),
     "cm/s2": (grid_xml(FIELDS, _changed(PSA03=9810), (2, 3)), "PSA03 = 9810 pctg"),
-    "far north": (grid_xml(FIELDS, _changed(LAT=460), (2, 3)), "LAT = 460 is not between -90 and 90"),
-    "far east": (grid_xml(FIELDS, _changed(LON=361), (2, 3)), "LON = 361 is not between -360 and 360"),
+    "far north": (
+        grid_xml(FIELDS, _changed(LAT=460), (2, 3)),
+        "LAT = 460 is not between -90 and 90",
+    ),
+    "far east": (
+        grid_xml(FIELDS, _changed(LON=361), (2, 3)),
+        "LON = 361 is not between -360 and 360",
+    ),
     "a node twice": (grid_xml(FIELDS, _changed(LON=10.0), (2, 3)), "not those of a grid"),
-    "another unit": (grid_xml(FIELDS, make_rows(), (2, 3)).replace("pctg", "gal"), "PSA03 is in 'gal'"),
-    "not numbered": (grid_xml(FIELDS, make_rows(), (2, 3)).replace('index="3"', 'index="4"'), "not numbered"),
-    "no name": (grid_xml(FIELDS, make_rows(), (2, 3)).replace('name="PGV"', ""), "grid_field without index or name"),
+    "another unit": (
+        grid_xml(FIELDS, make_rows(), (2, 3)).replace("pctg", "gal"),
+        "PSA03 is in 'gal'",
+    ),
+    "not numbered": (
+        grid_xml(FIELDS, make_rows(), (2, 3)).replace('index="3"', 'index="4"'),
+        "not numbered",
+    ),
+    "no name": (
+        grid_xml(FIELDS, make_rows(), (2, 3)).replace('name="PGV"', ""),
+        "grid_field without index or name",
+    ),
 }
 
 

@@ -13,8 +13,8 @@ from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
 from per_obspy.records.events import read_event
 from per_obspy.records.folder import read_station
-from per_obspy.records.simulated import Simulation, simulate, write_simulation
-from per_obspy.records.simulated_metadata import scenario_event
+from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
+from per_obspy.records.simulation.metadata import scenario_event
 from per_obspy.records.sources import find_sources, input_files
 
 CHECKOUT = Path(__file__).parents[2]
@@ -40,14 +40,23 @@ def archive(simulation: Simulation, tmp_path: Path) -> Path:
         stats = whole.stats
         for piece in whole / 1:
             day = piece.stats.starttime
-            target = tmp_path / "sds" / str(day.year) / stats.network / stats.station / f"{stats.channel}.D"
+            target = (
+                tmp_path
+                / "sds"
+                / str(day.year)
+                / stats.network
+                / stats.station
+                / f"{stats.channel}.D"
+            )
             target.mkdir(parents=True, exist_ok=True)
             piece.write(str(target / f"{piece.id}.D.{day.year}.{day.julday:03d}"), format="MSEED")
     return tmp_path / "sds"
 
 
 def table(tmp_path: Path, network: str = "XX", station: str = "T1") -> Columns:
-    (tmp_path / "table.txt").write_text("".join(f"{i * 0.01:.2f} {np.sin(i / 9):.6f}\n" for i in range(500)))
+    (tmp_path / "table.txt").write_text(
+        "".join(f"{i * 0.01:.2f} {np.sin(i / 9):.6f}\n" for i in range(500))
+    )
     return Columns(
         file=tmp_path / "table.txt",
         network=network,
@@ -68,7 +77,9 @@ def test_folder_and_table_stand_side_by_side(folder: Path, tmp_path: Path):
         stream, rejected = source.reader(source.files, source.inventory, name)
         assert rejected == ()
         assert {f"{trace.stats.network}.{trace.stats.station}" for trace in stream} == {name}
-        assert {trace.stats.units for trace in stream} == ({"m/s2"} if name == "XX.T1" else {"counts"})
+        assert {trace.stats.units for trace in stream} == (
+            {"m/s2"} if name == "XX.T1" else {"counts"}
+        )
 
 
 def test_a_station_of_two_sources_is_taken_from_the_first(folder: Path, tmp_path: Path):
@@ -79,9 +90,13 @@ def test_a_station_of_two_sources_is_taken_from_the_first(folder: Path, tmp_path
     assert "table.txt, which comes first" in rejection.reasons[0]
 
 
-def test_an_archive_gives_the_window_around_the_event(folder: Path, archive: Path, simulation: Simulation):
+def test_an_archive_gives_the_window_around_the_event(
+    folder: Path, archive: Path, simulation: Simulation
+):
     records = Records(
-        sds=Sds(folder=archive, before=5, after=10), event=folder / "event.xml", stationxml=folder / "stations.xml"
+        sds=Sds(folder=archive, before=5, after=10),
+        event=folder / "event.xml",
+        stationxml=folder / "stations.xml",
     )
     found = find_sources(records, None)
     assert list(found.stations) == ["XX.S001", "XX.S002"]
@@ -109,7 +124,10 @@ def test_an_archive_needs_a_window():
 def test_what_a_result_depends_on(folder: Path, archive: Path, tmp_path: Path):
     (tmp_path / "grid.xml").touch()
     records = Records(
-        folder=folder, columns=(table(tmp_path),), event=folder / "event.xml", shakemap=tmp_path / "grid.xml"
+        folder=folder,
+        columns=(table(tmp_path),),
+        event=folder / "event.xml",
+        shakemap=tmp_path / "grid.xml",
     )
     assert {path.name for path in input_files(records, None)} == {
         "XX.S001.mseed",
@@ -150,14 +168,22 @@ def test_a_workspace_brings_its_event(real_data: Path):
 
 def test_the_sections_in_the_documentation_are_valid():
     text = (CHECKOUT / "docs" / "sources.md").read_text(encoding="utf-8")
-    examples = [tomllib.loads(block.split("```")[0])["records"] for block in text.split("```toml")[1:]]
-    assert [name for example in examples for name in Records(**example).model_fields_set - {"event", "stationxml"}] == [
+    examples = [
+        tomllib.loads(block.split("```")[0])["records"] for block in text.split("```toml")[1:]
+    ]
+    assert [
+        name
+        for example in examples
+        for name in Records(**example).model_fields_set - {"event", "stationxml"}
+    ] == [
         "fdsn",
         "sds",
         "asdf",
     ]
     table = text.split("| key |")[1].split("\n\n")[0]
-    keys = {key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1])}
+    keys = {
+        key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1])
+    }
     assert keys == set(Fdsn.model_fields) - {"providers", "cache"}
 
 

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from per_obspy.report.evaluation import _draw_shares, write_evaluation
-from per_obspy.screening.evaluation import evaluation
+from per_obspy.screening.region.evaluation import evaluation
 
 
 @pytest.fixture
@@ -18,7 +18,9 @@ def risk(tmp_path):
     def risk(observed, probability):
         count = len(probability)
         state = np.where(np.nan_to_num(probability) > 0.5, "yes", "no")
-        table = pd.DataFrame({"rank": range(1, count + 1), "state": state, "probability": probability})
+        table = pd.DataFrame(
+            {"rank": range(1, count + 1), "state": state, "probability": probability}
+        )
         table = table if observed is None else table.assign(observed=observed)
         table.to_parquet(tmp_path / "risk.parquet")
         return tmp_path / "risk.parquet"
@@ -29,9 +31,17 @@ def risk(tmp_path):
 def test_only_pairs_that_were_looked_at_count(risk, tmp_path):
     path = risk([1.0, np.nan, 0.0, 1.0], [0.9, 0.9, 0.1, 0.2])
     files = write_evaluation(path, tmp_path, simulated=True)
-    assert [file.relative_to(tmp_path).as_posix() for file in files] == ["evaluation.json", "figures/reliability.png"]
+    assert [file.relative_to(tmp_path).as_posix() for file in files] == [
+        "evaluation.json",
+        "figures/reliability.png",
+    ]
     told = json.loads(files[0].read_text())
-    assert (told["pairs"], told["pounded"], told["hit_rate"], told["false_alarm_rate"]) == (3, 2, 0.5, 0.0)
+    assert (told["pairs"], told["pounded"], told["hit_rate"], told["false_alarm_rate"]) == (
+        3,
+        2,
+        0.5,
+        0.0,
+    )
     assert told["brier_score"] == pytest.approx((0.1**2 + 0.1**2 + 0.8**2) / 3)
     assert sum(one["events"] for one in told["reliability"]) == 3
     assert files[1].read_bytes().startswith(b"\x89PNG")

@@ -11,8 +11,8 @@ import pytest
 import shapely
 
 from per_obspy.report.gis import class_style, write_pairs_layer, write_totals_layer
-from per_obspy.screening.outlines import box_outlines
-from per_obspy.screening.totals import grid_cells, totals
+from per_obspy.screening.region.outlines import box_outlines
+from per_obspy.screening.region.totals import grid_cells, totals
 
 CLASSES = ("severe", "high", "low")
 TABLE = pd.DataFrame(
@@ -56,7 +56,8 @@ def test_pairs_come_back_with_their_places_and_values(tmp_path, pieces):
 
 
 def test_qgis_finds_its_style(tmp_path):
-    # QGIS looks in layer_styles for the table and the geometry column of a layer and takes the default
+    # QGIS looks in layer_styles for the table and the geometry column of a layer and takes the
+    # default
     path = tmp_path / "risk.gpkg"
     write_pairs_layer([TABLE], CLASSES, path, FACTS)
     query = (
@@ -104,7 +105,9 @@ def test_totals_are_cells_or_points(tmp_path):
     # each place lies in the polygon of its cell
     polygons = dict(zip(values["area"], shapely.from_wkb(geometry), strict=True))
     places = shapely.points(TABLE["longitude"], TABLE["latitude"])
-    assert all(polygons[cell].contains(place) for cell, place in zip(cells.cell, places, strict=True))
+    assert all(
+        polygons[cell].contains(place) for cell, place in zip(cells.cell, places, strict=True)
+    )
     write_totals_layer(totals(TABLE, "everywhere"), None, tmp_path / "area.gpkg", FACTS)
     assert pyogrio.read_info(tmp_path / "area.gpkg")["geometry_type"] == "Point"
 
@@ -112,7 +115,11 @@ def test_totals_are_cells_or_points(tmp_path):
 def test_a_table_without_pairs_is_an_empty_layer(tmp_path):
     write_pairs_layer([TABLE.iloc[:0]], CLASSES, tmp_path / "risk.gpkg", FACTS)
     info = pyogrio.read_info(tmp_path / "risk.gpkg", layer="pairs")
-    assert (info["features"], info["geometry_type"], list(info["fields"])) == (0, "Point", list(TABLE))
+    assert (info["features"], info["geometry_type"], list(info["fields"])) == (
+        0,
+        "Point",
+        list(TABLE),
+    )
 
 
 def test_a_layer_that_cannot_be_finished_leaves_the_old_one(tmp_path):

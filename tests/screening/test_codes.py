@@ -19,7 +19,11 @@ INCH = 0.0254
 def _pairs(**columns):
     """Return completed pairs: 24 m concrete frames of 8 storeys with aligned floors unless said otherwise."""
     given = {"gap": 0.1, "height_1": 24.0, "height_2": 24.0, "storeys_1": 8.0, "storeys_2": 8.0}
-    given |= {"system_1": "concrete_mrf", "system_2": "concrete_mrf", "position": "inside"} | columns
+    given |= {
+        "system_1": "concrete_mrf",
+        "system_2": "concrete_mrf",
+        "position": "inside",
+    } | columns
     count = max(np.size(values) for values in given.values())
     place = dict.fromkeys(("longitude_1", "latitude_1", "longitude_2", "latitude_2"), 0.0)
     table = pd.DataFrame({"pair_id": [f"p{i}" for i in range(count)], **place})
@@ -28,11 +32,14 @@ def _pairs(**columns):
 
 def _rule(name, pairs, displacement_1=0.03, displacement_2=0.04, codes=REGION):
     count = len(pairs)
-    return code_columns(pairs, np.full(count, displacement_1), np.full(count, displacement_2), codes)[name].tolist()
+    return code_columns(
+        pairs, np.full(count, displacement_1), np.full(count, displacement_2), codes
+    )[name].tolist()
 
 
 def test_every_column_stands_in_the_table_of_rules_and_says_what_it_is():
-    # would catch a rule without a source, an unverified one without its label, and a stale row of the table
+    # would catch a rule without a source, an unverified one without its label, and a stale row of
+    # the table
     rules = code_rules().set_index("column")
     columns = code_columns(_pairs(), [0.03], [0.04], REGION).columns
     assert columns.tolist() == rules.index.tolist()
@@ -58,7 +65,8 @@ def test_asce_and_eurocode_combine_by_the_root_of_the_squares():
 
 @pytest.mark.parametrize(
     ("zone", "expected"),
-    # each side SD + share of 24 m: 0.054 + 0.064, 0.102 + 0.112, 0.174 + 0.184; halved, for the buildings are alike
+    # each side SD + share of 24 m: 0.054 + 0.064, 0.102 + 0.112, 0.174 + 0.184; halved, for the
+    # buildings are alike
     [("I", 0.059), ("II", 0.107), ("III", 0.179)],
 )
 def test_ntc_by_zone(zone, expected):
@@ -70,7 +78,11 @@ def test_ntc_by_zone(zone, expected):
 
 def test_ntc_halves_only_what_is_known_to_be_alike_and_asks_for_50_mm_on_each_side():
     name, whole = "required_gap_ntc2004_event_based", 2 * 0.179
-    for change in ({"system_2": "steel_mrf"}, {"floor_offset": 1.0}, {"system_1": "", "system_2": ""}):
+    for change in (
+        {"system_2": "steel_mrf"},
+        {"floor_offset": 1.0},
+        {"system_1": "", "system_2": ""},
+    ):
         assert_allclose(_rule(name, _pairs(**change)), whole)
     assert_allclose(_rule(name, _pairs(height_2=21.0, storeys_2=7.0)), 0.03 + 0.04 + 2 * 0.006 * 21)
     assert_allclose(_rule(name, _pairs(system_2="other"), 0.0, 0.0, Codes(ntc_zone="I")), 0.1)
@@ -90,7 +102,9 @@ def test_ntc_halves_only_what_is_known_to_be_alike_and_asks_for_50_mm_on_each_si
 )
 def test_gb_widens_by_started_steps_above_15_m_of_the_lower_building(intensity, height, expected):
     pairs = _pairs(height_1=height, storeys_1=round(height / 3), height_2=45.0, storeys_2=15.0)
-    assert_allclose(_rule("required_gap_gb50011_2010", pairs, codes=Codes(gb_intensity=intensity)), expected)
+    assert_allclose(
+        _rule("required_gap_gb50011_2010", pairs, codes=Codes(gb_intensity=intensity)), expected
+    )
 
 
 def test_gb_says_nothing_of_other_systems():
@@ -107,19 +121,26 @@ def test_the_turkish_rule_takes_the_larger_of_height_and_displacement():
 
 def test_rules_of_sum_and_height():
     assert_allclose(_rule("required_gap_is1893_event_based_unverified", _pairs()), 0.035)
-    assert_allclose(_rule("required_gap_is1893_event_based_unverified", _pairs(floor_offset=1.0)), 0.07)
+    assert_allclose(
+        _rule("required_gap_is1893_event_based_unverified", _pairs(floor_offset=1.0)), 0.07
+    )
     assert_allclose(_rule("required_gap_e030_unverified", _pairs()), 0.144)
-    assert_allclose(_rule("required_gap_e030_unverified", _pairs(height_1=3.0, storeys_1=1.0)), 0.03)
+    assert_allclose(
+        _rule("required_gap_e030_unverified", _pairs(height_1=3.0, storeys_1=1.0)), 0.03
+    )
     assert_allclose(_rule("required_gap_gem", _pairs(height_2=12.0, storeys_2=4.0)), 0.48)
 
 
 @pytest.mark.parametrize(
-    ("seismicity", "inches"), [("very_high", 2.0), ("high", 1.5), ("moderately_high", 1.0), ("lower", 0.5)]
+    ("seismicity", "inches"),
+    [("very_high", 2.0), ("high", 1.5), ("moderately_high", 1.0), ("lower", 0.5)],
 )
 def test_fema_asks_for_inches_a_storey_of_the_shorter_building(seismicity, inches):
     pairs = _pairs(storeys_2=12.0, height_2=36.0)
     codes = Codes(fema_seismicity=seismicity)
-    assert_allclose(_rule("required_gap_fema_p154_unverified", pairs, codes=codes), 8 * inches * INCH)
+    assert_allclose(
+        _rule("required_gap_fema_p154_unverified", pairs, codes=codes), 8 * inches * INCH
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,7 +151,10 @@ def test_fema_asks_for_inches_a_storey_of_the_shorter_building(seismicity, inche
         ({"gap": 0.5, "floor_offset": 0.62}, "floor_misalignment"),
         ({"gap": 0.1, "floor_offset": 0.60}, "separation"),
         ({"gap": 0.1, "floor_offset": -0.62}, "separation floor_misalignment pounding"),
-        ({"gap": 0.1, "storeys_2": 10.0, "height_2": 30.0}, "separation height_difference pounding"),
+        (
+            {"gap": 0.1, "storeys_2": 10.0, "height_2": 30.0},
+            "separation height_difference pounding",
+        ),
         ({"gap": 0.1, "storeys_2": 9.0, "height_2": 27.0}, "separation"),
         ({"gap": 0.1, "position": "end"}, "separation end_of_row pounding"),
         ({"gap": 0.5, "position": "end"}, "end_of_row"),
@@ -141,7 +165,8 @@ def test_fema_flags(change, flags):
 
 
 @pytest.mark.parametrize(
-    ("gap", "aligned", "misaligned"), [(0.0, 0.7, 0.4), (0.119, 0.7, 0.4), (0.2, 0.8, 0.7), (0.25, 1.0, 0.8)]
+    ("gap", "aligned", "misaligned"),
+    [(0.0, 0.7, 0.4), (0.119, 0.7, 0.4), (0.2, 0.8, 0.7), (0.25, 1.0, 0.8)],
 )
 def test_nzsee_factors(gap, aligned, misaligned):
     assert _rule("nzsee_iep_factor_unverified", _pairs(gap=gap)) == [aligned]
@@ -170,7 +195,11 @@ def test_event_based_rules_keep_the_order_and_scale_of_the_buildings():
     swapped = code_columns(pairs, [0.3, 0.1, 0.2], [0.1, 0.2, 0.3], REGION)
     pd.testing.assert_frame_equal(once, swapped)
     double = code_columns(pairs, [0.2, 0.4, 0.6], [0.6, 0.2, 0.4], REGION)
-    for name in ("asce7_event_based", "ec8_event_based_unverified", "is1893_event_based_unverified"):
+    for name in (
+        "asce7_event_based",
+        "ec8_event_based_unverified",
+        "is1893_event_based_unverified",
+    ):
         assert_allclose(double[f"required_gap_{name}"], 2 * once[f"required_gap_{name}"])
 
 

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import RegularGridInterpolator
+from screening_samples import make_station, table_of
 
 import per_obspy
+from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.values import at_contact, both, components, values
-from per_obspy.screening.yielding import linearized_columns
-
-from .conftest import make_station
-from .test_yielding import table_of
 
 TARGET = 1.25
 
@@ -29,7 +27,9 @@ def with_demand(station, rows, share=0.7):
 @pytest.fixture(scope="module")
 def table(station):
     periods = [(0.5, 0.8), (1.0, 0.6), (1.3, 1.5), (2.0, 0.9)]
-    return with_demand(station, [{"period_1": a, "period_2": b, "azimuth": 40.0} for a, b in periods])
+    return with_demand(
+        station, [{"period_1": a, "period_2": b, "azimuth": 40.0} for a, b in periods]
+    )
 
 
 def test_every_column_is_described(station, table):
@@ -38,7 +38,10 @@ def test_every_column_is_described(station, table):
 
 def test_nothing_is_asked_of_a_pair_whose_gap_is_enough(station, table):
     # catches: the estimate alone decides, although the exact demand is below the gap
-    for enough in (table.assign(gap=table["demand"]), table.assign(demand=0.9 * table["gap"], demand_rule="exact")):
+    for enough in (
+        table.assign(gap=table["demand"]),
+        table.assign(demand=0.9 * table["gap"], demand_rule="exact"),
+    ):
         found = mitigation_columns(station, enough, TARGET)
         assert_array_equal(found["missing_gap"], 0.0)
         assert_array_equal(found["supplemental_damping"], 0.0)
@@ -53,19 +56,27 @@ def test_touching_pairs_lack_their_whole_demand_and_no_damping_helps(station, ta
 
 def test_a_wider_gap_needs_less(station, table):
     shares = np.linspace(0.3, 1.0, 15)
-    found = [mitigation_columns(station, table.assign(gap=share * table["demand"]), TARGET) for share in shares]
-    damping = np.nan_to_num([one["supplemental_damping"] for one in found], nan=1.0)  # not enough: more than any
+    found = [
+        mitigation_columns(station, table.assign(gap=share * table["demand"]), TARGET)
+        for share in shares
+    ]
+    damping = np.nan_to_num(
+        [one["supplemental_damping"] for one in found], nan=1.0
+    )  # not enough: more than any
     assert np.all(np.diff(damping, axis=0) <= 0.0)
     assert np.all(damping[0] > 0.1)
     assert np.all(np.diff([one["missing_gap"] for one in found], axis=0) < 0.0)
 
 
 def test_the_added_damping_brings_the_critical_gap_to_the_gap(station, table):
-    # catches: damping added to one building only, the correlation of the dampings before, a radius not at contact
+    # catches: damping added to one building only, the correlation of the dampings before, a radius
+    # not at contact
     table = table.assign(gap=0.95 * table["demand"])
     added = mitigation_columns(station, table, TARGET)["supplemental_damping"]
     axes = np.log(station["damping"].to_numpy()), np.log(station["period"].to_numpy())
-    stored = RegularGridInterpolator(axes, np.log(station["per_azimuthal"].sel(azimuth=40.0).to_numpy().astype(float)))
+    stored = RegularGridInterpolator(
+        axes, np.log(station["per_azimuthal"].sel(azimuth=40.0).to_numpy().astype(float))
+    )
     assert np.all(0.05 + added < 0.1)  # within the stored dampings
     radii = []
     for i, radius in enumerate(at_contact(table, "per"), start=1):
@@ -80,7 +91,9 @@ def test_the_added_damping_brings_the_critical_gap_to_the_gap(station, table):
 
 def test_against_the_record_itself(station, table):
     # catches: the spectrum of another azimuth or building
-    added = mitigation_columns(station, table.assign(gap=0.85 * table["demand"]), TARGET)["supplemental_damping"]
+    added = mitigation_columns(station, table.assign(gap=0.85 * table["demand"]), TARGET)[
+        "supplemental_damping"
+    ]
     north, east, dt = components(station)
     along = north * np.cos(np.radians(40.0)) + east * np.sin(np.radians(40.0))
     for index, row in enumerate(table.to_dict("records")):
@@ -103,15 +116,21 @@ def test_scaling_ground_and_gap_changes_no_ratio():
     found = mitigation_columns(one, with_demand(one, rows), TARGET)
     scaled = mitigation_columns(other, with_demand(other, rows), TARGET)
     assert_allclose(scaled["missing_gap"], 2.0 * found["missing_gap"], rtol=1e-9)
-    assert_allclose(scaled["supplemental_damping"], found["supplemental_damping"], rtol=1e-4)  # stored as float32
+    assert_allclose(
+        scaled["supplemental_damping"], found["supplemental_damping"], rtol=1e-4
+    )  # stored as float32
     assert_allclose(scaled["bumper_restitution"], found["bumper_restitution"], rtol=1e-6)
 
 
 def test_an_exact_demand_is_followed_in_proportion(station, table):
     # catches: the estimate compared with the gap, whatever the demand that decides
     usual = mitigation_columns(station, table, TARGET)["supplemental_damping"]
-    smaller = table.assign(demand=0.5 * table["demand"], gap=0.5 * table["gap"], demand_rule="exact")
-    assert_allclose(mitigation_columns(station, smaller, TARGET)["supplemental_damping"], usual, rtol=1e-9)
+    smaller = table.assign(
+        demand=0.5 * table["demand"], gap=0.5 * table["gap"], demand_rule="exact"
+    )
+    assert_allclose(
+        mitigation_columns(station, smaller, TARGET)["supplemental_damping"], usual, rtol=1e-9
+    )
 
 
 def test_equal_derived_buildings_are_uncorrelated(station):
@@ -129,7 +148,9 @@ def test_a_yielding_pair_is_followed_as_its_equivalent_one(station, table):
     # catches: elastic periods and dampings of buildings that yield
     weak = table.assign(yield_displacement_1=table["sd_1"] / 1.5, hardening_1=0.05)
     weak = weak.assign(**linearized_columns(station, weak))
-    weak = weak.assign(demand=weak["critical_gap_linearized"], gap=0.8 * weak["critical_gap_linearized"])
+    weak = weak.assign(
+        demand=weak["critical_gap_linearized"], gap=0.8 * weak["critical_gap_linearized"]
+    )
     found = mitigation_columns(station, weak, TARGET)["supplemental_damping"]
     elastic = weak.drop(columns=["yield_displacement_1"]).assign(yield_displacement_1=np.inf)
     elastic = elastic.assign(**linearized_columns(station, elastic))
@@ -138,7 +159,8 @@ def test_a_yielding_pair_is_followed_as_its_equivalent_one(station, table):
 
 
 def test_the_bumper_keeps_the_single_hit_within_the_target(station, table):
-    # catches: a restitution for one of the buildings only, plain periods with radii of another demand
+    # catches: a restitution for one of the buildings only, plain periods with radii of another
+    # demand
     table = table.assign(gap=0.9 * table["demand"])
     found = mitigation_columns(station, table, 1.5)["bumper_restitution"]
     critical = np.maximum(table["critical_gap_per"], table["critical_gap_record"])

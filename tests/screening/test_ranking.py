@@ -21,7 +21,15 @@ TABLE = pd.DataFrame(
         ("z no demand", "possible", 0.5, 0.2, np.nan, 9.0, 9.0),
         ("no", "no", 0.5, np.nan, 0.1, 9.0, 9.0),
     ],
-    columns=["pair_id", "state", "probability", "impact_velocity", "demand_ratio", "importance_2", "occupants_1"],
+    columns=[
+        "pair_id",
+        "state",
+        "probability",
+        "impact_velocity",
+        "demand_ratio",
+        "importance_2",
+        "occupants_1",
+    ],
 )
 
 

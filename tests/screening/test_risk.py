@@ -4,16 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from screening_samples import make_pairs, make_station
 
 import per_obspy
 from per_obspy.config import Screening
 from per_obspy.screening.columns import ORDER, RESULTS
 
-from .conftest import make_pairs, make_station
-
 
 def _table(station, *rows, **settings):
-    return per_obspy.risk_table(station, make_pairs(rows), screening=Screening(**settings)).set_index("pair_id")
+    return per_obspy.risk_table(
+        station, make_pairs(rows), screening=Screening(**settings)
+    ).set_index("pair_id")
 
 
 def test_columns_come_in_their_order_and_others_are_carried_through(station):
@@ -25,13 +26,16 @@ def test_columns_come_in_their_order_and_others_are_carried_through(station):
 def test_a_given_pair_is_answered_by_the_exact_demand(station):
     table = _table(station, {"gap": 0.0001}, {"gap": 9.0})
     assert table["demand_rule"].tolist() == ["exact", "exact"]
-    assert table.loc["P0", "demand"] == table.loc["P1", "demand"]  # the gap does not change what is needed
+    assert (
+        table.loc["P0", "demand"] == table.loc["P1", "demand"]
+    )  # the gap does not change what is needed
     assert table.loc["P0", "state"] == "yes"
     assert table.loc["P1", "state"] == "no"
 
 
 def test_the_exact_demand_is_the_gap_at_which_impacts_begin(station):
-    # would catch: a participation, azimuth or side that differs between relative displacement and history
+    # would catch: a participation, azimuth or side that differs between relative displacement and
+    # history
     (demand,) = _table(station, {})["demand"]
     table = _table(station, {"gap": demand * (1 + 1e-6)}, {"gap": demand * (1 - 1e-6)})
     assert table.loc["P0", "impacts"] == 0
@@ -39,19 +43,24 @@ def test_the_exact_demand_is_the_gap_at_which_impacts_begin(station):
 
 
 def test_the_estimate_beside_the_exact_demand_is_the_largest(station):
-    # Mutations: the ratio upside down; the exact demand in the place of the estimate; SRSS for given periods.
+    # Mutations: the ratio upside down; the exact demand in the place of the estimate; SRSS for
+    # given periods.
     equal = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
     table = _table(station, equal, {"period_2": 0.7}, {"period_2": 1.5}).sort_index()
     largest = np.maximum(table["critical_gap_per"], table["critical_gap_record"])
     assert_allclose(table["demand_estimated"], largest)
     assert set(table["estimate_rule"]) <= {"per_white_noise", "per_record"}
     assert np.isnan(table["estimate_over_exact"].iloc[0])  # equal buildings need no gap
-    assert_allclose(table["estimate_over_exact"][1:] * table["demand_exact"][1:], table["demand_estimated"][1:])
+    assert_allclose(
+        table["estimate_over_exact"][1:] * table["demand_exact"][1:], table["demand_estimated"][1:]
+    )
 
 
 def test_radii_are_computed_at_the_pairs_own_period_damping_and_azimuth(station):
     # would catch: values read off the stored grid, buildings exchanged
-    table = _table(station, {"period_1": 0.777, "damping_1": 0.031, "period_2": 1.234, "damping_2": 0.07})
+    table = _table(
+        station, {"period_1": 0.777, "damping_1": 0.031, "period_2": 1.234, "damping_2": 0.07}
+    )
     north, east = station["acceleration"].to_numpy()
     along = north * np.cos(np.radians(30.0)) + east * np.sin(np.radians(30.0))
     for i, (period, damping) in enumerate(((0.777, 0.031), (1.234, 0.07)), start=1):
@@ -62,8 +71,18 @@ def test_radii_are_computed_at_the_pairs_own_period_damping_and_azimuth(station)
 
 def test_every_gap_grows_with_participation(station):
     # would catch: an estimate that forgets the contact level
-    names = ["critical_gap_per", "critical_gap_record", "critical_gap_sd", "srss_gap", "absolute_gap", "demand_exact"]
-    once, twice = (_table(station, {"participation_1": q, "participation_2": q})[names].to_numpy() for q in (1.0, 2.0))
+    names = [
+        "critical_gap_per",
+        "critical_gap_record",
+        "critical_gap_sd",
+        "srss_gap",
+        "absolute_gap",
+        "demand_exact",
+    ]
+    once, twice = (
+        _table(station, {"participation_1": q, "participation_2": q})[names].to_numpy()
+        for q in (1.0, 2.0)
+    )
     assert_allclose(twice, 2 * once, rtol=1e-8)  # homogeneous of degree one; peaks located to 1e-9
 
 
@@ -74,7 +93,13 @@ def test_twice_the_motion_is_twice_the_demand(station):
 
 def test_derived_periods_are_never_a_plain_no(station):
     # would catch: equal heights give equal periods, a correlation of 1 and a demand of 0
-    unknown = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0, "gap": 0.5}
+    unknown = {
+        "period_1": np.nan,
+        "period_2": np.nan,
+        "height_1": 18.0,
+        "storeys_1": 6.0,
+        "gap": 0.5,
+    }
     table = _table(station, unknown)
     assert table.loc["P0", "demand_rule"] == "srss"
     assert table.loc["P0", "demand"] == table.loc["P0", "srss_gap"] > 0
@@ -85,7 +110,10 @@ def test_derived_periods_are_never_a_plain_no(station):
 def test_outside_the_usable_periods_the_estimates_decide_and_a_flag_says_so():
     table = _table(make_station(longest=0.8), {})
     assert table.loc["P0", "demand_rule"] in {"per_white_noise", "per_record"}
-    assert table.loc["P0", "demand"] == table[["critical_gap_per", "critical_gap_record"]].loc["P0"].max()
+    assert (
+        table.loc["P0", "demand"]
+        == table[["critical_gap_per", "critical_gap_record"]].loc["P0"].max()
+    )
     assert "outside_usable_periods" in table.loc["P0", "flags"]
 
 
@@ -121,7 +149,11 @@ def test_turning_a_pair_round_exchanges_its_buildings(station):
     table = _table(station, {}, turned)
     assert_allclose(*table["demand"], rtol=1e-9)
     assert_allclose(*table["probability"], rtol=1e-9)
-    assert_allclose(table.loc["P0", "amplification_exact_1"], table.loc["P1", "amplification_exact_2"], rtol=1e-6)
+    assert_allclose(
+        table.loc["P0", "amplification_exact_1"],
+        table.loc["P1", "amplification_exact_2"],
+        rtol=1e-6,
+    )
 
 
 def test_one_horizontal_serves_with_a_flag_and_without_the_exact_rung():
@@ -155,12 +187,17 @@ def test_rejections_of_the_reader_are_kept(station):
 
 
 def test_results_of_an_earlier_table_are_not_taken_for_new_ones(station):
-    # would catch a computed column that gives way to one of the pair table, which is another event's
+    # would catch a computed column that gives way to one of the pair table, which is another
+    # event's
     rows = [{"period_2": other, "gap": 0.01} for other in (0.7, 1.5)]
     pairs, given = make_pairs(rows), make_pairs(rows).columns
     fresh = per_obspy.risk_table(station, pairs)
-    numbers = [name for name in fresh if name not in given and pd.api.types.is_numeric_dtype(fresh[name])]
-    stale = pairs.assign(**dict.fromkeys([name for name in numbers if name in RESULTS], 7.0), raised_touching=1.0)
+    numbers = [
+        name for name in fresh if name not in given and pd.api.types.is_numeric_dtype(fresh[name])
+    ]
+    stale = pairs.assign(
+        **dict.fromkeys([name for name in numbers if name in RESULTS], 7.0), raised_touching=1.0
+    )
     pd.testing.assert_frame_equal(per_obspy.risk_table(station, stale), fresh)
 
 
@@ -179,20 +216,26 @@ def test_ties_go_to_importance_then_occupants_then_name(station):
 
 def test_a_row_does_not_depend_on_the_others(station, monkeypatch):
     # would catch: lanes or blocks that leak into each other
-    rows = [{"period_1": 0.5 + 0.1 * i, "gap": 0.01 * i, "azimuth": np.nan if i % 3 else 40.0} for i in range(9)]
+    rows = [
+        {"period_1": 0.5 + 0.1 * i, "gap": 0.01 * i, "azimuth": np.nan if i % 3 else 40.0}
+        for i in range(9)
+    ]
     together = _table(station, *rows).sort_index()
     monkeypatch.setattr("per_obspy.screening.rows.BLOCK", 2)
     pd.testing.assert_frame_equal(_table(station, *rows).sort_index(), together, check_exact=True)
 
 
-@pytest.mark.parametrize(("ratio", "name"), [(0.4, "severe"), (0.9, "high"), (1.4, "moderate"), (5.0, "low")])
+@pytest.mark.parametrize(
+    ("ratio", "name"), [(0.4, "severe"), (0.9, "high"), (1.4, "moderate"), (5.0, "low")]
+)
 def test_risk_classes_follow_the_thresholds(station, ratio, name):
     (demand,) = _table(station, {})["demand"]
     assert _table(station, {"gap": ratio * demand}).loc["P0", "risk_class"] == name
 
 
 def test_a_radius_far_above_the_displacement_is_flagged():
-    # a velocity step: the long oscillator keeps its velocity, radius v T / 2 pi, and returns through damping
+    # a velocity step: the long oscillator keeps its velocity, radius v T / 2 pi, and returns
+    # through damping
     pulse = np.zeros(4000)
     pulse[100:110] = 10.0
     pulse[110:120] = -9.0

@@ -22,11 +22,15 @@ def reference() -> Reference:
     return largest_responses
 
 
-def largest_responses(acceleration: np.ndarray, dt: float, period: float, damping: float) -> np.ndarray:
+def largest_responses(
+    acceleration: np.ndarray, dt: float, period: float, damping: float
+) -> np.ndarray:
     """Dense evaluation, then Brent's method around the highest values; one period of free vibration included."""
     phase = 2.0 * np.pi * dt / period
     # u, u' dt, a dt², change of a dt² over a step; time in steps
-    system = np.array([[0, 1, 0, 0], [-(phase**2), -2 * damping * phase, -1, 0], [0, 0, 0, 1], [0, 0, 0, 0.0]])
+    system = np.array(
+        [[0, 1, 0, 0], [-(phase**2), -2 * damping * phase, -1, 0], [0, 0, 0, 1], [0, 0, 0, 0.0]]
+    )
     free = int(np.ceil(period / dt)) + 1
     ground = np.concatenate([acceleration, np.zeros(1 + free)]) * dt**2
     states = np.zeros((ground.size, 4))
@@ -54,6 +58,8 @@ def largest_responses(acceleration: np.ndarray, dt: float, period: float, dampin
                     return -float(quantities(expm(system * time) @ start)[row])
 
                 bounds = (begin[1] / parts, (begin[1] + 1) / parts)
-                peak = minimize_scalar(lower, bounds=bounds, method="bounded", options={"xatol": 1e-7})
+                peak = minimize_scalar(
+                    lower, bounds=bounds, method="bounded", options={"xatol": 1e-7}
+                )
                 values[row, place] = max(values[row, place], -peak.fun)
     return values.max(axis=1)

@@ -55,17 +55,26 @@ def test_sampled_peaks_are_those_of_each_rotated_motion(pair, damping):
 def test_default_azimuths_are_whole_degrees(pair):
     per = azimuthal_per_spectrum(*pair, DT, PERIODS)
     assert per.shape == (6, 180)
-    assert_allclose(per[:, [0, 45, 179]], azimuthal_per_spectrum(*pair, DT, PERIODS, azimuths=[0, 45, 179]), rtol=1e-13)
+    assert_allclose(
+        per[:, [0, 45, 179]],
+        azimuthal_per_spectrum(*pair, DT, PERIODS, azimuths=[0, 45, 179]),
+        rtol=1e-13,
+    )
 
 
 def test_a_quarter_turn_of_the_ground_exchanges_the_components(pair):
     # a' = -(the component that came from the east): catches a wrong sense of rotation
     turned = azimuthal_per_spectrum(-pair[1], pair[0], DT, PERIODS, azimuths=[30.0, 120.0])
-    assert_allclose(turned, azimuthal_per_spectrum(*pair, DT, PERIODS, azimuths=[-60.0, 30.0]), rtol=1e-12)
+    assert_allclose(
+        turned, azimuthal_per_spectrum(*pair, DT, PERIODS, azimuths=[-60.0, 30.0]), rtol=1e-12
+    )
 
 
 def test_half_a_turn_changes_nothing(pair):
-    once, turned = (azimuthal_sd_spectrum(*pair, DT, PERIODS, azimuths=azimuths) for azimuths in ([10.0], [190.0]))
+    once, turned = (
+        azimuthal_sd_spectrum(*pair, DT, PERIODS, azimuths=azimuths)
+        for azimuths in ([10.0], [190.0])
+    )
     assert_allclose(turned, once, rtol=1e-12)
 
 
@@ -87,10 +96,15 @@ def test_rotd_agrees_with_pyrotd():
     # its FFT interpolates between samples as band limited and wraps round: smooth motion, padded
     time = np.arange(8000) * 0.005
     shape = np.exp(-(((time - 6) / 2) ** 2))
-    north, east = shape * np.sin(2 * np.pi * 1.3 * time), 0.7 * shape * np.cos(2 * np.pi * 0.9 * time)
+    north, east = (
+        shape * np.sin(2 * np.pi * 1.3 * time),
+        0.7 * shape * np.cos(2 * np.pi * 0.9 * time),
+    )
     periods = np.array([0.5, 1.0, 2.0])
     spectra = azimuthal_sd_spectrum(north, east, 0.005, periods)
-    theirs = pyrotd.calc_rotated_spec_accels(0.005, north, east, 1 / periods, 0.05, [50, 100], method="rigorous")
+    theirs = pyrotd.calc_rotated_spec_accels(
+        0.005, north, east, 1 / periods, 0.05, [50, 100], method="rigorous"
+    )
     pseudo = np.sort(theirs, order=["osc_freq", "percentile"])["spec_accel"].reshape(3, 2)[::-1]
     # sinc² of the straight lines at 1.3 Hz and sampled peaks: 3e-5
     for column, percentile in enumerate([50, 100]):
@@ -122,7 +136,9 @@ def test_wrong_arguments_are_named(function, changed, message):
         function(**{"north": [0.0, 1.0], "east": [0.0, 1.0], "dt": DT, "periods": [1.0]} | changed)
 
 
-@pytest.mark.parametrize(("values", "percentile"), [([1.0], 101), ([1.0], -1), (1.0, 50), ([np.nan], 50)])
+@pytest.mark.parametrize(
+    ("values", "percentile"), [([1.0], 101), ([1.0], -1), (1.0, 50), ([np.nan], 50)]
+)
 def test_wrong_percentiles_are_refused(values, percentile):
     with pytest.raises(ValueError, match=r"spectrum must|percentile must"):
         rotd(values, percentile)

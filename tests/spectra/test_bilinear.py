@@ -48,15 +48,17 @@ def test_full_hardening_is_the_linear_oscillator(record):
 
 @pytest.mark.parametrize(("limit", "hardening"), CASES)
 def test_energy_is_conserved(record, limit, hardening):
-    # input - damping = kinetic + recoverable + hysteretic: catches a wrong event, offset or path.
-    # 8 samples between make the trapezoid of input and damping good to 1e-4 of the input; free vibration is left out
-    # by comparing at the last sample, with the path up to there
+    # input - damping = kinetic + recoverable + hysteretic: catches a wrong event, offset or path. 8
+    # samples between make the trapezoid of input and damping good to 1e-4 of the input; free
+    # vibration is left out by comparing at the last sample, with the path up to there
     fine = np.interp(np.arange((record.size - 1) * 8 + 1) / 8, np.arange(record.size), record)
     ours = bilinear_response(fine, DT / 8, PERIOD, DAMPING, limit, hardening)
     u, v, p = ours.displacement, ours.velocity, ours.plastic_displacement
     given = -np.trapezoid(fine * v, dx=DT / 8)
     damped = np.trapezoid(2 * DAMPING * OMEGA * v**2, dx=DT / 8)
-    kept = 0.5 * v[-1] ** 2 + 0.5 * OMEGA**2 * (hardening * u[-1] ** 2 + (1 - hardening) * (u[-1] - p[-1]) ** 2)
+    kept = 0.5 * v[-1] ** 2 + 0.5 * OMEGA**2 * (
+        hardening * u[-1] ** 2 + (1 - hardening) * (u[-1] - p[-1]) ** 2
+    )
     yielded = (1 - hardening) * OMEGA**2 * limit * np.abs(np.diff(p)).sum()
     assert_allclose(given - damped, kept + yielded, atol=1e-3 * given)
 
@@ -98,7 +100,8 @@ def test_more_samples_of_the_same_straight_lines_change_nothing(record, limit, h
 
 
 def test_elastoplastic_block_pushed_by_a_constant_acceleration():
-    # closed form without hardening and damping: the yield force leaves the constant rest a - omega² uy
+    # closed form without hardening and damping: the yield force leaves the constant rest a - omega²
+    # uy
     limit, pull = 0.01, 5.0
     push = np.full(40, -pull)
     ours = bilinear_response(push, DT, PERIOD, 0.0, limit, 0.0)
@@ -128,7 +131,9 @@ def _by_ode_solver(record, limit, hardening):
                 return branch * x[1] if branch else limit - abs(x[0] - plastic)
 
             over.terminal, over.direction = True, -1
-            piece = solve_ivp(rates, (time, end), state, "DOP853", events=over, rtol=1e-11, atol=1e-14)
+            piece = solve_ivp(
+                rates, (time, end), state, "DOP853", events=over, rtol=1e-11, atol=1e-14
+            )
             time, state = piece.t[-1], piece.y[:, -1].copy()
             if branch:
                 plastic = state[0] - branch * limit
@@ -146,7 +151,11 @@ def test_agrees_with_an_ode_solver(record, limit, hardening):
     part = record[:200]
     ours = bilinear_response(part, DT, PERIOD, DAMPING, limit, hardening)
     assert ours.ductility > 1.5
-    assert_allclose(ours.displacement, _by_ode_solver(part, limit, hardening), atol=1e-8 * ours.displacement_maximum)
+    assert_allclose(
+        ours.displacement,
+        _by_ode_solver(part, limit, hardening),
+        atol=1e-8 * ours.displacement_maximum,
+    )
 
 
 def test_constant_yield_spectra_are_single_responses(record):
@@ -167,7 +176,9 @@ def test_constant_ductility_is_reached_and_weaker_oscillators_need_more(record):
     assert_allclose(spectra.ductility, 3.0, rtol=1e-8)  # the root's tolerance
     # the largest root: every stronger oscillator stays below, on a grid finer than the scan
     for factor in np.geomspace(1.001, 5.0, 100):
-        stronger = constant_yield_spectra(record, DT, periods, DAMPING, factor * spectra.yield_coefficient, 0.05)
+        stronger = constant_yield_spectra(
+            record, DT, periods, DAMPING, factor * spectra.yield_coefficient, 0.05
+        )
         assert np.all(stronger.ductility < 3.0)
 
 
@@ -196,7 +207,14 @@ def test_no_motion_has_no_ductility():
     ],
 )
 def test_wrong_arguments_are_named(changed, message):
-    given = {"acceleration": [1.0], "dt": DT, "period": 1.0, "damping": 0.05, "yield_displacement": 1, "hardening": 0}
+    given = {
+        "acceleration": [1.0],
+        "dt": DT,
+        "period": 1.0,
+        "damping": 0.05,
+        "yield_displacement": 1,
+        "hardening": 0,
+    }
     with pytest.raises(ValueError, match=message):
         bilinear_response(**given | changed)
 

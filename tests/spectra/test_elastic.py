@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
-from per_obspy.spectra import blocks
+from per_obspy.spectra import oscillator_blocks
 from per_obspy.spectra.elastic import (
     per_spectrum,
     response_spectra,
@@ -51,7 +51,9 @@ def test_samples_agree_with_lsim(noise):
         radius = np.hypot(states[:, 0], states[:, 1] / omega).max()
         # lsim's own matrix exponential is good to 1e-12
         assert_allclose(sampled_per_spectrum(noise, DT, [period], 0.05), [radius], rtol=1e-10)
-        assert_allclose(sampled_response_spectra(noise, DT, [period], 0.05).per, [radius], rtol=1e-10)
+        assert_allclose(
+            sampled_response_spectra(noise, DT, [period], 0.05).per, [radius], rtol=1e-10
+        )
 
 
 def test_more_samples_of_the_same_straight_lines_change_nothing(noise):
@@ -80,7 +82,9 @@ def test_sampled_peaks_never_exceed_the_exact_ones(noise):
 def test_everything_is_proportional_to_the_motion(noise, factor):
     # catches absolute thresholds, and squares that overflow or vanish
     for once, scaled in zip(
-        response_spectra(noise, DT, PERIODS), response_spectra(factor * noise, DT, PERIODS), strict=True
+        response_spectra(noise, DT, PERIODS),
+        response_spectra(factor * noise, DT, PERIODS),
+        strict=True,
     ):
         assert_allclose(scaled, abs(factor) * once, rtol=1e-12)
 
@@ -92,7 +96,10 @@ def test_powers_of_two_scale_exactly(noise):
 
 def test_stretched_time_scales_lengths_by_its_square(noise):
     # catches a mixed-up omega: [m] = [m/s²] [s²]
-    once, stretched = response_spectra(noise, DT, PERIODS), response_spectra(noise, 4 * DT, 4 * PERIODS)
+    once, stretched = (
+        response_spectra(noise, DT, PERIODS),
+        response_spectra(noise, 4 * DT, 4 * PERIODS),
+    )
     for field, power in (("per", 2), ("sd", 2), ("sv", 1), ("sa", 0), ("psv", 1), ("psa", 0)):
         assert_allclose(getattr(stretched, field), 4.0**power * getattr(once, field), rtol=1e-12)
 
@@ -103,16 +110,21 @@ def test_a_late_start_changes_nothing(noise, count):
     quiet_start = np.concatenate([[0.0], noise])
     late = np.concatenate([np.zeros(count), quiet_start])
     # a tile seam moves, and with it which of two equal formulas is used
-    assert_allclose(per_spectrum(late, DT, PERIODS), per_spectrum(quiet_start, DT, PERIODS), rtol=1e-12)
+    assert_allclose(
+        per_spectrum(late, DT, PERIODS), per_spectrum(quiet_start, DT, PERIODS), rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("count", [1, 500])
 def test_zeros_after_the_record_change_nothing(noise, count):
-    # catches free vibration that is left out; undamped at long periods it holds the largest displacement
+    # catches free vibration that is left out; undamped at long periods it holds the largest
+    # displacement
     padded = np.concatenate([noise, np.zeros(count)])
     for damping in (0.0, 0.05):
         pairs = zip(
-            response_spectra(noise, DT, PERIODS, damping), response_spectra(padded, DT, PERIODS, damping), strict=True
+            response_spectra(noise, DT, PERIODS, damping),
+            response_spectra(padded, DT, PERIODS, damping),
+            strict=True,
         )
         for once, longer in pairs:
             assert_allclose(longer, once, rtol=1e-12)
@@ -127,8 +139,9 @@ def test_zeros_after_the_record_change_nothing(noise, count):
     damping=st.floats(0.0, 0.95),
 )
 def test_radius_lies_between_its_bounds(seed, samples, smoothing, ratio, damping):
-    # (13) and (14) of Valles-Mattox & Reinhorn as the inequalities that hold; catches a peak of SD or SV between the
-    # samples that PER misses (or the reverse), as at periods of few steps, where samples alone miss up to 14 %
+    # (13) and (14) of Valles-Mattox & Reinhorn as the inequalities that hold; catches a peak of SD
+    # or SV between the samples that PER misses (or the reverse), as at periods of few steps, where
+    # samples alone miss up to 14 %
     noise = np.random.default_rng(seed).normal(size=samples + smoothing - 1)
     record = np.convolve(noise, np.ones(smoothing), "valid")
     periods = ratio * DT * np.array([1.0, 1.3, 7.0])
@@ -181,7 +194,9 @@ def test_soft_oscillators_stay_where_they_are(noise):
 def test_undamped_period_that_divides_the_step(noise, reference, divisor):
     # the scaled input of the packed step vanishes here
     period = DT / divisor
-    assert_allclose(per_spectrum(noise, DT, [period], 0.0), reference(noise, DT, period, 0.0)[:1], rtol=1e-9)
+    assert_allclose(
+        per_spectrum(noise, DT, [period], 0.0), reference(noise, DT, period, 0.0)[:1], rtol=1e-9
+    )
 
 
 def test_no_motion_no_response():
@@ -195,7 +210,9 @@ def test_shapes_follow_the_dampings(noise):
     assert per_spectrum(noise, DT, PERIODS, [0.02, 0.05, 0.1]).shape == (3, 5)
     assert per_spectrum(noise, DT, 1.0).shape == (1,)
     # catches rows and columns exchanged
-    assert_array_equal(per_spectrum(noise, DT, PERIODS, [0.02, 0.1])[1], per_spectrum(noise, DT, PERIODS, 0.1))
+    assert_array_equal(
+        per_spectrum(noise, DT, PERIODS, [0.02, 0.1])[1], per_spectrum(noise, DT, PERIODS, 0.1)
+    )
 
 
 def test_many_oscillators_equal_few(noise):
@@ -209,14 +226,16 @@ def test_inputs_stay_unchanged_and_counts_are_numbers(noise):
     before = noise.copy()
     response_spectra(noise, DT, PERIODS)
     assert_array_equal(noise, before)
-    assert_array_equal(per_spectrum([1, 2, 3], DT, PERIODS), per_spectrum([1.0, 2.0, 3.0], DT, PERIODS))
+    assert_array_equal(
+        per_spectrum([1, 2, 3], DT, PERIODS), per_spectrum([1.0, 2.0, 3.0], DT, PERIODS)
+    )
 
 
 def test_threads_change_no_bit(noise, monkeypatch):
     periods = np.geomspace(0.05, 5.0, 300)
     alone = response_spectra(noise, DT, periods)
-    monkeypatch.setattr(blocks, "STEPS_WORTH_THREADS", 0)
-    monkeypatch.setattr(blocks.os, "sched_getaffinity", lambda _: range(4))
+    monkeypatch.setattr(oscillator_blocks, "STEPS_WORTH_THREADS", 0)
+    monkeypatch.setattr(oscillator_blocks.os, "sched_getaffinity", lambda _: range(4))
     for once, threaded in zip(alone, response_spectra(noise, DT, periods), strict=True):
         assert_array_equal(threaded, once)
 
@@ -244,6 +263,11 @@ def test_threads_change_no_bit(noise, monkeypatch):
 )
 def test_wrong_arguments_are_named(changed, message):
     arguments = {"acceleration": [0.0, 1.0], "dt": DT, "periods": [1.0], "damping": 0.05} | changed
-    for function in (per_spectrum, response_spectra, sampled_per_spectrum, sampled_response_spectra):
+    for function in (
+        per_spectrum,
+        response_spectra,
+        sampled_per_spectrum,
+        sampled_response_spectra,
+    ):
         with pytest.raises(ValueError, match=message):
             function(**arguments)

@@ -13,11 +13,15 @@ def _sensed(azimuth):
     return MOTION[0] * np.cos(np.radians(azimuth)) + MOTION[1] * np.sin(np.radians(azimuth))
 
 
-@pytest.mark.parametrize(("azimuth_1", "azimuth_2"), [(0, 90), (37, 127), (200, 110), (10, 75), (359, 91), (-30, 60)])
+@pytest.mark.parametrize(
+    ("azimuth_1", "azimuth_2"), [(0, 90), (37, 127), (200, 110), (10, 75), (359, 91), (-30, 60)]
+)
 def test_motion_comes_back(azimuth_1, azimuth_2):
     # would catch: a swapped sine, a wrong sign of the determinant, sensors taken as orthogonal
     north, east = north_and_east(_sensed(azimuth_1), _sensed(azimuth_2), azimuth_1, azimuth_2)
-    assert_allclose([north, east], MOTION, rtol=0, atol=1e-14)  # round-off of a 2 x 2 system, angles of 65 degrees up
+    assert_allclose(
+        [north, east], MOTION, rtol=0, atol=1e-14
+    )  # round-off of a 2 x 2 system, angles of 65 degrees up
 
 
 def test_north_and_east_sensors_pass_bit_by_bit():

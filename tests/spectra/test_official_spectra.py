@@ -20,9 +20,13 @@ def csmip(real_data):
     channels = []
     for volume_3 in sorted((real_data / "spectra_v3").glob("*/*.[vV]3")):
         volume_2 = volume_3.with_suffix(volume_3.suffix.replace("3", "2"))
-        records = [trace for trace in obspy.read(str(volume_2)) if trace.stats.quantity == "acceleration"]
+        records = [
+            trace for trace in obspy.read(str(volume_2)) if trace.stats.quantity == "acceleration"
+        ]
         for official, trace in zip(read_spectra(str(volume_3)), records, strict=True):
-            ours = response_spectra(trace.data, trace.stats.delta, official.periods, official.damping)
+            ours = response_spectra(
+                trace.data, trace.stats.delta, official.periods, official.damping
+            )
             usable = (official.periods >= 5 * trace.stats.delta) & (
                 official.periods <= 0.8 / trace.stats.corners.highpass
             )
@@ -33,8 +37,9 @@ def csmip(real_data):
 
 @pytest.mark.parametrize("quantity", ["sd", "sv", "sa"])
 def test_official_csmip_spectra(csmip, quantity):
-    # all channels, periods and dampings. The tables have three digits (0.17 % on average at their low end), and their
-    # program looks at samples that it interpolates in its own way: 5 dt is the limit of agreement at short periods
+    # all channels, periods and dampings. The tables have three digits (0.17 % on average at their
+    # low end), and their program looks at samples that it interpolates in its own way: 5 dt is the
+    # limit of agreement at short periods
     ratios = [getattr(ours, quantity) / getattr(official, quantity) for ours, official, _ in csmip]
     errors = np.abs(np.concatenate([ratio.ravel() for ratio in ratios]) - 1)
     assert errors.size > 7000
@@ -62,13 +67,16 @@ def northridge(real_data):
     tables = {}
     for damping in (2, 5, 10):
         lines = (folder / f"RSN1044_Damping{damping}.txt").read_text(errors="replace").splitlines()
-        tables[damping] = np.array([[float(word) for word in line.split()] for line in lines[6:] if line.strip()])
+        tables[damping] = np.array(
+            [[float(word) for word in line.split()] for line in lines[6:] if line.strip()]
+        )
     return trace, tables
 
 
 @pytest.mark.parametrize("damping", [2, 5, 10])
 def test_northridge_elastic_spectra(northridge, damping):
-    # periods 0.05 to 4 s, five digits; the tables come from a stepping program at dt = 0.02 s: 1 % at 0.05 s
+    # periods 0.05 to 4 s, five digits; the tables come from a stepping program at dt = 0.02 s: 1 %
+    # at 0.05 s
     trace, tables = northridge
     table = tables[damping]
     ours = response_spectra(trace.data, trace.stats.delta, table[:, 0], damping / 100)
@@ -80,10 +88,13 @@ def test_northridge_elastic_spectra(northridge, damping):
 
 @pytest.mark.parametrize(("ductility", "column"), [(2.0, 10), (4.0, 11), (6.0, 12)])
 def test_northridge_constant_ductility(northridge, ductility, column):
-    # elastoplastic; catches a smaller root, a wrong ductility and hardening (1 % of it would show as 1 to 3 %)
+    # elastoplastic; catches a smaller root, a wrong ductility and hardening (1 % of it would show
+    # as 1 to 3 %)
     trace, tables = northridge
     table = tables[5][3::8]
-    ours = constant_ductility_spectra(trace.data, trace.stats.delta, table[:, 0], 0.05, ductility, 0.0)
+    ours = constant_ductility_spectra(
+        trace.data, trace.stats.delta, table[:, 0], 0.05, ductility, 0.0
+    )
     errors = np.abs(100 * ours.sd / table[:, column] - 1)
     assert np.median(errors) <= 0.002
     assert errors.max() <= 0.012
@@ -97,7 +108,11 @@ def test_mexico_city_1985(real_data):
     assert_allclose([spectra.sd[2], spectra.sa[2] / 9.81], [0.984, 0.995], rtol=1e-3)
 
 
-ITACA = [f"{number}/{number}_{component}" for number in ("16833", "16839") for component in ("H1", "H2", "V")]
+ITACA = [
+    f"{number}/{number}_{component}"
+    for number in ("16833", "16839")
+    for component in ("H1", "H2", "V")
+]
 
 
 @pytest.mark.parametrize("name", ITACA)
@@ -105,7 +120,9 @@ def test_official_itaca_spectra(real_data, name):
     # its column called 2 % is not 2 %; from 20 dt on, as peaks are sampled there
     record = real_data / "records" / "itaca2009" / name
     trace = obspy.read(f"{record}.cor.acc")[0]
-    rows = [line.split() for line in Path(f"{record}.rs").read_text().splitlines()[1:] if line.strip()]
+    rows = [
+        line.split() for line in Path(f"{record}.rs").read_text().splitlines()[1:] if line.strip()
+    ]
     table = np.array([[float(word) for word in row] for row in rows])
     table = table[table[:, 0] >= 20 * trace.stats.delta]
     for column, damping in ((2, 0.05), (4, 0.10), (5, 0.20)):

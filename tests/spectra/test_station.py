@@ -18,7 +18,11 @@ MOTION = RANDOM.normal(size=(3, 1200)) * np.hanning(1200)
 
 def _stream(azimuths=(0.0, 90.0), vertical=True, **changes):
     traces = [
-        _trace(f"HN{i}", MOTION[0] * np.cos(np.radians(a)) + MOTION[1] * np.sin(np.radians(a)), sensor_azimuth=a)
+        _trace(
+            f"HN{i}",
+            MOTION[0] * np.cos(np.radians(a)) + MOTION[1] * np.sin(np.radians(a)),
+            sensor_azimuth=a,
+        )
         for i, a in enumerate(azimuths, start=1)
     ]
     traces += [_trace("HNZ", MOTION[2], sensor_dip=-90.0)] if vertical else []
@@ -36,7 +40,9 @@ def _trace(channel, data, **stats):
         "starttime": UTCDateTime(2020, 1, 1),
         "units": "m/s2",
         "coordinates": AttribDict(latitude=10.0, longitude=20.0, elevation=30.0),
-        "per_obspy": AttribDict(highpass=0.1, lowpass=30.0, shortest_period=0.3, longest_period=1.5),
+        "per_obspy": AttribDict(
+            highpass=0.1, lowpass=30.0, shortest_period=0.3, longest_period=1.5
+        ),
     }
     return Trace(data.copy(), header | stats)
 
@@ -50,7 +56,9 @@ def test_dimensions_and_units(station):
     assert station["per"].dims == ("component", "damping", "period")
     assert station["per_azimuthal"].dims == ("azimuth", "damping", "period")
     assert station["component_name"].values.tolist() == ["horizontal_1", "horizontal_2", "vertical"]
-    assert {name: station[name].attrs["units"] for name in ("per", "sd", "sa", "acceleration", "period")} == {
+    assert {
+        name: station[name].attrs["units"] for name in ("per", "sd", "sa", "acceleration", "period")
+    } == {
         "per": "m",
         "sd": "m",
         "sa": "m s-2",
@@ -68,7 +76,9 @@ def test_a_component_is_the_spectrum_of_its_trace(station):
 
 def test_along_north_and_east_the_azimuthal_spectrum_is_the_component(station):
     # would catch: azimuth counted from east, cos and sin exchanged
-    assert_allclose(station["per_azimuthal"].sel(azimuth=0), station["per"][0], rtol=1e-6)  # float32
+    assert_allclose(
+        station["per_azimuthal"].sel(azimuth=0), station["per"][0], rtol=1e-6
+    )  # float32
     assert_allclose(station["per_azimuthal"].sel(azimuth=90), station["per"][1], rtol=1e-6)
 
 
@@ -81,7 +91,9 @@ def test_percentiles_bound_each_other(station):
 @pytest.mark.parametrize("azimuths", [(90.0, 0.0), (37.0, 127.0), (10.0, 65.0), (200.0, 290.0)])
 def test_sensors_of_any_azimuth_give_the_same_motion(station, azimuths):
     turned = per_obspy.station_spectra(_stream(azimuths), PERIODS, (0.05, 0.2))
-    assert_allclose(turned["acceleration"], MOTION[:2], atol=1e-12)  # round-off of a 2 x 2 system, motion of order 1
+    assert_allclose(
+        turned["acceleration"], MOTION[:2], atol=1e-12
+    )  # round-off of a 2 x 2 system, motion of order 1
     assert_allclose(turned["per_azimuthal"], station["per_azimuthal"], rtol=2e-6)  # float32
     assert_allclose(turned["per_rotd100"], station["per_rotd100"], rtol=2e-6)
 
@@ -133,8 +145,14 @@ def test_the_stream_is_left_as_it_was():
         (_stream(units="counts"), "XX.ONE..HN1 is in 'counts', not m/s2"),
         (_stream((20.0, 30.0)), "too close to the same line"),
         (Stream([_trace("HN1", MOTION[0]), _trace("HN2", MOTION[1])]), "azimuths .* are unknown"),
-        (Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1][:-1])]), "npts is 1200, but 1199"),
-        (Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1], delta=0.02)]), "delta is 0.01, but 0.02"),
+        (
+            Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1][:-1])]),
+            "npts is 1200, but 1199",
+        ),
+        (
+            Stream([_trace("HNN", MOTION[0]), _trace("HNE", MOTION[1], delta=0.02)]),
+            "delta is 0.01, but 0.02",
+        ),
     ],
 )
 def test_a_stream_that_is_no_station_is_refused_with_the_reason(stream, reason):

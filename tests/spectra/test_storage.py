@@ -29,7 +29,9 @@ def _station(name, channels=("HNN", "HNE", "HNZ"), count=20):
         )
         for channel in channels
     ]
-    return per_obspy.station_spectra(Stream(traces), np.geomspace(0.1, 5.0, count), (0.02, 0.05), 30)
+    return per_obspy.station_spectra(
+        Stream(traces), np.geomspace(0.1, 5.0, count), (0.02, 0.05), 30
+    )
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,8 @@ def stations():
 
 @pytest.mark.parametrize("index", [0, 2])
 def test_a_shard_is_identical_after_a_round_trip(stations, tmp_path, index):
-    # would catch: a decoded time, a lost attribute, float64 squeezed into float32, fill values in coordinates
+    # would catch: a decoded time, a lost attribute, float64 squeezed into float32, fill values in
+    # coordinates
     write_spectra(stations[index], tmp_path / "shard.nc")
     xr.testing.assert_identical(read_spectra(tmp_path / "shard.nc"), stations[index])
 
@@ -53,7 +56,9 @@ def test_a_region_is_identical_after_a_round_trip(stations, tmp_path):
 def test_a_region_made_of_shards_is_that_of_the_stations(stations, tmp_path):
     for i, station in enumerate(stations):
         write_spectra(station, tmp_path / f"{i}.nc")
-    xr.testing.assert_identical(region([read_spectra(tmp_path / f"{i}.nc") for i in range(3)]), region(stations))
+    xr.testing.assert_identical(
+        region([read_spectra(tmp_path / f"{i}.nc") for i in range(3)]), region(stations)
+    )
 
 
 def test_a_region_is_sorted_and_tells_what_is_missing(stations):
@@ -70,7 +75,9 @@ def test_stations_on_different_grids_do_not_make_a_region(stations):
         region([stations[0], _station("D", count=21)])
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # raised inside the checker by its own dependencies
+@pytest.mark.filterwarnings(
+    "ignore::DeprecationWarning"
+)  # raised inside the checker by its own dependencies
 @pytest.mark.parametrize("which", ["shard", "region"])
 def test_conventions(stations, tmp_path, which):
     """All of CF; of ACDD what is highly recommended, but for standard names, which no table has for these spectra."""
@@ -83,14 +90,20 @@ def test_conventions(stations, tmp_path, which):
     cf, errors = scores["cf:1.11"]
     assert not errors, "the checker itself failed"
     assert [result.msgs for result in cf if _failed(result)] == []
-    high = [result for result in scores["acdd:1.3"][0] if result.weight == 3 and "standard_name" not in result.msgs]
+    high = [
+        result
+        for result in scores["acdd:1.3"][0]
+        if result.weight == 3 and "standard_name" not in result.msgs
+    ]
     assert any(result.name == "Global Attributes" and result.value == (3, 3) for result in high)
     assert [(result.name, result.msgs) for result in high if _failed(result)] == []
 
 
 def _failed(result):
     """Tell whether a check lost points; messages alone may be remarks."""
-    reached, possible = result.value if isinstance(result.value, tuple) else (bool(result.value), True)
+    reached, possible = (
+        result.value if isinstance(result.value, tuple) else (bool(result.value), True)
+    )
     return reached < possible
 
 

@@ -1,0 +1,236 @@
+"""``per-obspy run`` and its parts: ``simulate``, ``process``, ``spectra`` and ``report``."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from per_obspy.commands.endings import AsJson, end_if_nothing, tell
+from per_obspy.commands.printing import print_table, shown_progress
+
+if TYPE_CHECKING:
+    from per_obspy.jobs.output_folder import Result
+
+#: Columns of the worst pairs that are printed, with their titles.
+SHOWN = {
+    "pair_id": "pair",
+    "station": "station",
+    "period_1": "T1 (s)",
+    "period_2": "T2 (s)",
+    "gap": "gap (m)",
+    "demand": "demand (m)",
+    "state": "pounding",
+    "impact_velocity": "impact (m/s)",
+    "amplification_1": "ampl. 1",
+    "amplification_2": "ampl. 2",
+}
+
+
+def run(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the results.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Do a whole run: records to spectra to risk table to figures.
+
+    Example: per-obspy run workflows/demo.toml
+    """
+    from per_obspy.pipeline.run import run as whole_run
+
+    with shown_progress() as progress:
+        result = whole_run(configuration, output, progress=progress)
+    tell(result, as_json, print_result)
+
+
+def report(
+    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the results.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write totals, figures and map layers again from the risk table of an earlier run.
+
+    Example: per-obspy report workflows/demo.toml
+    """
+    from per_obspy.pipeline.run import report as report_again
+
+    with shown_progress() as progress:
+        result = report_again(configuration, output, progress=progress)
+    tell(result, as_json, print_result)
+
+
+def simulate(
+    scenario: Annotated[Path, typer.Argument(help="TOML file of the scenario.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for MiniSEED, StationXML and QuakeML.")
+    ],
+) -> None:
+    """
+    Simulate the records of a scenario earthquake.
+
+    Example: per-obspy simulate catalogs/demo/scenario.toml -o output/simulated
+    """
+    from per_obspy.config import Simulation, load
+    from per_obspy.records.simulation.earthquake import simulate as simulated
+    from per_obspy.records.simulation.earthquake import write_simulation
+
+    simulation = simulated(load(scenario, Simulation).scenario)
+    write_simulation(simulation, output)
+    print(f"{len(simulation.stream)} simulated records are in {output}")
+
+
+def spectra(
+    sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="netCDF file.")] = Path(
+        "spectra.nc"
+    ),
+    damping: Annotated[
+        list[float] | None, typer.Option(help="Fraction of critical; repeat for several.")
+    ] = None,
+    shortest: Annotated[float, typer.Option(help="Shortest period, s.")] = 0.05,
+    longest: Annotated[float, typer.Option(help="Longest period, s.")] = 10.0,
+    count: Annotated[int, typer.Option(help="Number of periods.")] = 100,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw spectra and state space of every station.")
+    ] = False,
+    plot_period: Annotated[
+        float,
+        typer.Option(min=0.01, max=100.0, help="Of the oscillator in the state-space figure, s."),
+    ] = 1.0,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write the spectra of records to one netCDF file.
+
+    Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
+    """
+    import os
+
+    from per_obspy.config import Processing, Spectra, checked
+    from per_obspy.pipeline.spectra import plot_station, spectra_of
+
+    given = {"shortest": shortest, "longest": longest, "count": count}
+    grid = checked(Spectra, given | ({"dampings": damping} if damping else {}))
+    with shown_progress() as progress:
+        done, rejected = spectra_of(
+            sources, output, Processing(), grid, os.cpu_count() or 1, progress
+        )
+    shards = [one.shard for one in done if one.shard]
+    figures = (
+        [plot_station(shard, 0.05, plot_period, output.parent) for shard in shards] if plot else []
+    )
+    files = [str(output)] * bool(shards) + [str(path) for pair in figures for path in pair]
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "stations": len(shards),
+                    "rejected": [one._asdict() for one in rejected],
+                    "files": files,
+                }
+            )
+        )
+    else:
+        print(
+            f"{len(shards)} stations, {len(rejected)} rejected",
+            output.with_suffix(".rejected.csv"),
+            *files,
+            sep="\n  ",
+        )
+    end_if_nothing(len(shards))
+
+
+def process(
+    sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")],
+    event: Annotated[Path | None, typer.Option(help="QuakeML file; no event is fine.")] = None,
+    settings: Annotated[
+        Path | None, typer.Option(help="TOML file with a run's processing section.")
+    ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """
+    Write processed records as MiniSEED, with a table of their corners and reasons.
+
+    Example: per-obspy process shared/records -o processed --report
+    """
+    import os
+
+    from per_obspy.config import Processing, load
+    from per_obspy.pipeline.process import process_records
+
+    chosen = load(settings, Processing) if settings else Processing()
+    with shown_progress() as progress:
+        result = process_records(
+            sources, output, chosen, event, report, (os.cpu_count() or 1, progress)
+        )
+    stations = [one for one in result.done if one.shard]
+    files = [str(path) for path in result.files]
+    if as_json:
+        rows = [one._asdict() for one in result.rejected]
+        resumed = sum(one.resumed for one in result.done)
+        print(
+            json.dumps(
+                {"stations": len(stations), "resumed": resumed, "rejected": rows, "files": files}
+            )
+        )
+    else:
+        print(f"{len(stations)} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
+    end_if_nothing(len(stations))
+
+
+def print_result(result: "Result") -> None:
+    """Print what a run has found and where it is."""
+    folder, record = result.folder, result.record
+    counts = record["counts"]
+    if result.did_nothing:
+        print("Nothing to do: the same inputs were run before.")
+    if record["simulated"]:
+        print("The ground motion is SIMULATED.")
+    rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
+    print(
+        f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
+        f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
+    )
+    if "evaluation.json" in record["outputs"]:
+        _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
+    if "risk.csv" in record["outputs"]:
+        _print_worst(folder / "risk.csv", 10)
+    for name in sorted({*record["outputs"], "run.json"}):
+        print(f"  {folder / name}")
+
+
+def _print_evaluation(found: dict[str, Any]) -> None:
+    """Print how the prediction did where somebody looked; nothing for a share of nothing."""
+    shares = {
+        "of the pounded ones were told yes": found["hit_rate"],
+        "yes or possible": found["hit_rate_with_possible"],
+        "of the others yes": found["false_alarm_rate"],
+    }
+    told = ", ".join(f"{value:.0%} {name}" for name, value in shares.items() if value is not None)
+    print(f"{found['pairs']} pairs were looked at, {found['pounded']} pounded: {told}")
+    if found["brier_score"] is not None:
+        print(
+            f"Brier score {found['brier_score']:.3f}; the share alone {found['brier_score_of_the_share']:.3f}"
+        )
+
+
+def _print_worst(path: Path, count: int) -> None:
+    """Print the worst pairs as a table."""
+    import pandas as pd
+
+    worst = pd.read_csv(path, nrows=count, dtype={"pair_id": str, "station": str})
+    print_table(
+        f"The {len(worst)} worst pairs",
+        list(SHOWN.values()),
+        worst[list(SHOWN)].itertuples(index=False),
+    )

@@ -1,0 +1,1 @@
+"""Parse the text files of strong-motion agencies: lines, number fields, blocks and header vocabulary."""

@@ -1,0 +1,1 @@
+"""Read and write pair tables: CSV and Parquet rows, checked and named."""

@@ -1,0 +1,36 @@
+"""Write a table of building pairs, CSV or Parquet."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from per_obspy.errors import CatalogError
+from per_obspy.files import written_whole
+
+
+def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
+    """
+    Write a pair table that :func:`~per_obspy.inventory.files.reading.read_pairs` reads back; whole or not at all.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        By the schema.
+    path : str or Path
+        ``.csv`` or ``.parquet``.
+
+    Raises
+    ------
+    CatalogError
+        If the suffix is another one.
+    """
+    file = Path(path)
+    plain = pairs.copy()
+    plain.attrs = {}  # what was rejected has a file of its own
+    if file.suffix.lower() not in (".csv", ".parquet"):
+        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected .csv or .parquet")
+    with written_whole(file) as part:
+        if file.suffix.lower() == ".csv":
+            plain.to_csv(part, index=False)
+        else:
+            plain.to_parquet(part, index=False)

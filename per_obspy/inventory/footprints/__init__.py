@@ -1,0 +1,1 @@
+"""Make pairs of adjacent buildings from building footprints."""

@@ -1,0 +1,139 @@
+"""
+Independent tasks on several processes, or on any executor; none of them can stop the others.
+
+A task whose worker dies takes the whole pool with it. What was under way then is done again, each
+task in a process of its own, so that only the guilty one is lost; the rest goes on in a new pool.
+Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
+"""
+
+import os
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from itertools import chain, islice
+from multiprocessing import get_context, parent_process
+from threading import Thread
+from typing import TypeVar
+
+from per_obspy.errors import PerError
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+#: Return the result of a task; other processes must be able to import the function.
+Do = Callable[[Task], Result]
+
+#: Return what stands for the result of a task that failed, given the reason.
+Lost = Callable[[Task, str], Result]
+
+#: Tasks submitted ahead, for each worker: one at work and one waiting.
+AHEAD = 2
+
+#: Tasks submitted ahead to an executor whose size nobody knows.
+AHEAD_ELSEWHERE = 64
+
+
+def results(
+    tasks: Iterable[Task],
+    do: Do[Task, Result],
+    lost: Lost[Task, Result],
+    workers: int,
+    executor: Executor | None,
+) -> Iterator[Result]:
+    """
+    Give the result of every task as it is finished.
+
+    Parameters
+    ----------
+    tasks : iterable
+        What to do; asked for while the work goes on.
+    do, lost : callable
+        What is done, and what stands for a failure.
+    workers : int
+        Number of processes; one, or a single task, needs none but this.
+    executor : Executor, optional
+        Where to work instead.
+    """
+    if executor is not None:
+        unfinished = yield from _on(executor, tasks, do, lost, AHEAD_ELSEWHERE)
+        yield from (lost(task, "its worker process died") for task in unfinished)
+        return
+    waiting = iter(tasks)
+    first = list(islice(waiting, 2))
+    if min(workers, len(first)) <= 1:
+        yield from (_caught(task, partial(do, task), lost) for task in chain(first, waiting))
+        return
+    waiting = chain(first, waiting)
+    for head in waiting:  # a pool, and another one after each worker that died
+        with _pool(workers) as pool:
+            unfinished = yield from _on(pool, chain([head], waiting), do, lost, AHEAD * workers)
+        for task in unfinished:
+            yield _alone(task, do, lost)
+
+
+def _on(
+    executor: Executor,
+    tasks: Iterable[Task],
+    do: Do[Task, Result],
+    lost: Lost[Task, Result],
+    ahead: int,
+) -> Generator[Result, None, list[Task]]:
+    """Give results until all tasks are done or the executor is broken; return what it was doing then."""
+    waiting, unfinished = iter(tasks), list[Task]()
+    pending: dict[Future[Result], Task] = {}
+    while True:
+        for task in islice(waiting, 0 if unfinished else ahead - len(pending)):
+            try:
+                pending[executor.submit(do, task)] = task
+            except BrokenProcessPool:
+                unfinished.append(task)
+                break
+        if not pending:
+            return unfinished
+        for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            task = pending.pop(future)
+            try:
+                yield _caught(task, future.result, lost)
+            except BrokenProcessPool:
+                unfinished.append(task)
+
+
+def _alone(task: Task, do: Do[Task, Result], lost: Lost[Task, Result]) -> Result:
+    """Return the result of a task that has a process of its own."""
+    try:
+        with _pool(1) as pool:
+            return _caught(task, pool.submit(do, task).result, lost)
+    except BrokenProcessPool:
+        return lost(task, "its worker process died")
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Return fresh processes: a fork of a process that has threads can hang."""
+    return ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_end_with_parent
+    )
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the one that started it has, even if that was killed: else it would wait for ever."""
+    parent = parent_process()
+    assert parent is not None  # a pool starts this process
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
+def _caught(task: Task, work: Callable[[], Result], lost: Lost[Task, Result]) -> Result:
+    """Return the result; whatever is raised becomes a reason, so that no task stops the others."""
+    try:
+        return work()
+    except BrokenProcessPool:
+        raise
+    except PerError as error:
+        return lost(task, str(error))
+    except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
+        return lost(task, f"{type(error).__name__}: {error}")

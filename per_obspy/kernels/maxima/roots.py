@@ -1,0 +1,79 @@
+r"""
+A stationary value within one step where its condition is monotone: the root of a cubic, set right on the series.
+
+The displacement is stationary where ``z = 0``, the squared radius also where ``2 xi z + a = 0``. A
+condition whose slope at one end exceeds what it can change over the step has one root at most,
+which lies close to that of the cubic with the same values and slopes at both ends. At a stationary
+point a small shift changes the value by its square.
+"""
+
+from per_obspy.kernels._jit import kernel
+from per_obspy.kernels.oscillator.within_step import derivative, fill_series
+
+#: Newton steps on the cubic, and on the series at most.
+CUBIC_STEPS, SERIES_STEPS = 2, 4
+#: Shift of a root, in phase, whose third power is rounding.
+SMALL_SHIFT = 1e-5
+
+
+@kernel
+def raise_to_root(number, ends, rates, damping, phase, terms, work, best):
+    """
+    Raise the largest values to the one at the root of ``2 xi z + a`` (number 0) or ``z`` (1) in a short step.
+
+    ``ends``: u, z and the acceleration before and after the step. Return whether it is certain that
+    there is no other.
+    """
+    rate = (ends[5] - ends[2]) / phase
+    start = _condition(number, ends[0], ends[1], ends[2], rate, damping)
+    end = _condition(number, ends[3], ends[4], ends[5], rate, damping)
+    level = 2.0 * damping if number == 0 else 1.0
+    if max(abs(start[1]), abs(end[1])) <= level * rates[1]:
+        return False
+    if start[0] * end[0] < 0.0:
+        motion, speed = work[0], work[1]
+        fill_series(ends[0], ends[1], ends[2], rate, 1.0, damping, terms, motion, speed)
+        root = phase * _cubic_root(start, end, phase)
+        _raise(number, root, phase, ends[2], rate, damping, terms, motion, speed, best)
+    return True
+
+
+@kernel
+def _condition(number, u, z, acceleration, rate, damping):
+    """Return a condition and its derivative with respect to the phase."""
+    change = -2.0 * damping * z - u - acceleration
+    if number == 1:
+        return z, change
+    return 2.0 * damping * z + acceleration, 2.0 * damping * change + rate
+
+
+@kernel
+def _cubic_root(start, end, phase):
+    """Return the part of a step at which the cubic with these values and slopes vanishes, nearly."""
+    value, slope, slope_end = start[0], phase * start[1], phase * end[1]
+    change = end[0] - value
+    square, cube = 3.0 * change - 2.0 * slope - slope_end, slope + slope_end - 2.0 * change
+    part = -value / change
+    for _ in range(CUBIC_STEPS):
+        here = value + part * (slope + part * (square + part * cube))
+        steepness = slope + part * (2.0 * square + 3.0 * part * cube)
+        part = min(max(part - here / steepness, 0.0), 1.0) if steepness != 0.0 else part
+    return part
+
+
+@kernel
+def _raise(number, root, phase, acceleration, rate, damping, terms, motion, speed, best):
+    """Raise the largest values to the one near a root of a condition."""
+    for _ in range(SERIES_STEPS):
+        u, z = derivative(motion, terms, 0, root), derivative(speed, terms, 0, root)
+        value, slope = _condition(number, u, z, acceleration + rate * root, rate, damping)
+        shift = -value / slope
+        if abs(shift) <= SMALL_SHIFT:
+            break
+        root = min(max(root + shift, 0.0), phase)
+    if number == 1:
+        u += 0.5 * shift * z
+        best[1] = max(best[1], abs(u))
+        best[0] = max(best[0], u * u)
+    else:
+        best[0] = max(best[0], u * u + z * z - shift * z * value)

@@ -1,0 +1,1 @@
+"""Advance one oscillator exactly over a step of piecewise-linear ground acceleration."""

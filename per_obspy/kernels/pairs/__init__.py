@@ -1,0 +1,1 @@
+"""Evaluate closed-form formulas for many building pairs at once."""

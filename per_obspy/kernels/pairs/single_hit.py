@@ -1,0 +1,319 @@
+"""
+Single-hit estimate of many pairs: grazing state, first earlier contact, impact, and the bound over all phases.
+
+Structure 1 stands left; ``u1 - u2`` reaches the critical gap at the grazing state. Pairs are worked
+on in blocks: the iteration outside, the pairs of a block inside, so that the compiler puts several
+pairs into one instruction.
+"""
+
+import math
+
+import numpy as np
+
+from per_obspy.kernels._jit import kernel
+
+PAIRS = 32  # of a block: its arrays stay in the first-level cache
+OK, NO_POUNDING, NO_GRAZING_STATE, INCONSISTENT_CRITICAL_GAP = 0, 1, 2, 3
+# time, then displacement, velocity, velocity after, radius after, amplification, energy of 1, then
+# of 2
+FIELDS = 13
+ULPS = 2e-15  # rounding that a tangent state may carry, relative to the radii
+STILL = 1e-15  # an advance in time that no longer matters, relative to the time
+TURN, TURN_REMAINDER = 6.283185307179586, 2.4492935982947064e-16  # 2 pi in two parts
+TURNS_PER_RADIAN = 1.0 / TURN
+SINE = tuple((-1.0) ** n / math.factorial(2 * n + 1) for n in range(1, 8))  # up to |y| = pi/4
+COSINE = tuple((-1.0) ** n / math.factorial(2 * n) for n in range(1, 9))
+# phases of the scan for the bound: even on the left; towards the right end, where a narrow peak can
+# stand, ever denser
+NODES = np.array(
+    [-1.0, -0.8, -0.6, -0.45, -0.3, -0.15, 0.0, 0.1, 0.2, 0.3, 0.4, 0.55]
+    + [1.0 - 2.0 ** (-n / 2) for n in range(3, 23)]
+    + [1.0]
+)
+GOLDEN = 0.6180339887498949
+SECTIONS = 26  # leave 1e-6 of the bracket, where a smooth peak is flat to 1e-11
+
+
+@kernel
+def estimate(arguments, begin, end, status, branches, bounds):
+    """
+    Fill ``status`` (n), ``branches`` (2, 13, n) and ``bounds`` (2, n) from pair ``begin`` to before pair ``end``.
+
+    ``arguments`` (9, n): radii 1 and 2, circular frequencies 1 and 2, (1 + e) m2/M and (1 + e) m1/M
+    (the part of the velocity difference that 1 and 2 receive), (1 + e) m1 m2/M, critical gap, gap;
+    M = m1 + m2.
+    """
+    states = np.empty((4, PAIRS))
+    constants = np.zeros((11, PAIRS))
+    constants[:2] = constants[10] = 1.0
+    times = np.empty(PAIRS)
+    for first in range(begin, end, PAIRS):
+        pairs = min(PAIRS, end - first)
+        for pair in range(pairs):
+            status[first + pair] = _grazing_state(arguments, first + pair, states, pair)
+        for branch in range(2):
+            _load(arguments, first, pairs, states, 1.0 - 2.0 * branch, constants)
+            _first_contact(constants, times)
+            _impact(arguments, first, pairs, constants, times, branches[branch])
+            for index in range(first, first + pairs):
+                if status[index] != OK:
+                    _no_impact(status[index], arguments, index, branches[branch])
+        for body in range(2):
+            _largest_radius(arguments, body, first, pairs, bounds)
+
+
+@kernel
+def _grazing_state(arguments, index, states, pair):
+    """Store x, v, and the critical gap less the gap, of the state that only just touches; return the status."""
+    radius_1, radius_2 = arguments[0, index], arguments[1, index]
+    stiffness_1, stiffness_2 = arguments[2, index] ** 2, arguments[3, index] ** 2
+    gap, reach = arguments[7, index], radius_1 + radius_2
+    states[0, pair] = states[1, pair] = states[3, pair] = 0.0
+    if arguments[8, index] >= gap:
+        return NO_POUNDING
+    if gap > reach * (1.0 + ULPS):
+        return INCONSISTENT_CRITICAL_GAP
+    gap = min(gap, reach)
+    a = stiffness_2 - stiffness_1
+    b = stiffness_2 * gap
+    c = stiffness_1 * radius_1**2 + stiffness_2 * (gap - radius_2) * (gap + radius_2)
+    discriminant = b * b - a * c
+    if discriminant < -ULPS * b * b:
+        return NO_GRAZING_STATE
+    x = c / (b + math.sqrt(max(discriminant, 0.0)))
+    low, high = max(-radius_1, gap - radius_2), min(radius_1, gap + radius_2)
+    if x < low - ULPS * reach or x > high + ULPS * reach:
+        return NO_GRAZING_STATE
+    x = min(max(x, low), high)
+    square_1 = stiffness_1 * (radius_1 - x) * (radius_1 + x)
+    square_2 = stiffness_2 * (radius_2 - (x - gap)) * (radius_2 + (x - gap))
+    states[0, pair], states[1, pair] = x, x - gap
+    states[2, pair] = math.sqrt(max(min(square_1, square_2), 0.0))
+    states[3, pair] = gap - arguments[8, index]
+    return OK
+
+
+@kernel
+def _load(arguments, first, pairs, states, sign, constants):
+    """Gather what the backward motion of a block needs; pairs without a state get a motion that is over at once."""
+    for pair in range(pairs):
+        omega_1, omega_2 = arguments[2, first + pair], arguments[3, first + pair]
+        velocity = sign * states[2, pair]
+        constants[0, pair], constants[1, pair] = omega_1, omega_2
+        constants[2, pair], constants[3, pair] = states[0, pair], states[1, pair]
+        constants[4, pair] = velocity
+        constants[5, pair], constants[6, pair] = velocity / omega_1, velocity / omega_2
+        constants[7, pair], constants[8, pair] = (
+            omega_1 * states[0, pair],
+            omega_2 * states[1, pair],
+        )
+        constants[9, pair] = states[3, pair]
+        curvature = (
+            omega_1**2 * arguments[0, first + pair] + omega_2**2 * arguments[1, first + pair]
+        )
+        constants[10, pair] = curvature if states[3, pair] > 0.0 else 1.0
+
+
+@kernel
+def _sine_products(phase):
+    """Return sin² and sin·cos of half the phase, by Taylor series to rounding, which the compiler can vectorise."""
+    turns = math.floor(phase * TURNS_PER_RADIAN + 0.5)
+    y = 0.25 * (phase - turns * TURN - turns * TURN_REMAINDER)
+    z = y * y
+    s0, s1, s2, s3, s4, s5, s6 = SINE
+    c0, c1, c2, c3, c4, c5, c6, c7 = COSINE
+    sine = y * (1.0 + z * (s0 + z * (s1 + z * (s2 + z * (s3 + z * (s4 + z * (s5 + z * s6)))))))
+    cosine = 1.0 + z * (
+        c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * (c6 + z * c7))))))
+    )
+    twice_sine, twice_cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return twice_sine * twice_sine, twice_sine * twice_cosine
+
+
+@kernel
+def _first_contact(constants, first_contact):
+    """
+    Find the smallest time before the grazing state at which the pair is the actual gap apart.
+
+    The distance to contact d has |d''| <= K2, so the step 2 d/(d' + sqrt(d'² + 2 K2 d)) never
+    passes the first root. A pair that has arrived stays, however long the others of its block go
+    on.
+    """
+    c, times, advances = np.empty((11, PAIRS)), np.zeros(PAIRS), np.ones(PAIRS)
+    c[:] = constants
+    moving = True
+    while moving:
+        for pair in range(PAIRS):
+            time = times[pair]
+            square_1, product_1 = _sine_products(c[0, pair] * time)
+            square_2, product_2 = _sine_products(c[1, pair] * time)
+            velocity, x_1, x_2 = c[4, pair], c[2, pair], c[3, pair]
+            swing = product_1 * c[5, pair] - product_2 * c[6, pair]
+            distance = max(c[9, pair] - 2.0 * (x_1 * square_1 - x_2 * square_2 + swing), 0.0)
+            turn = c[7, pair] * product_1 - c[8, pair] * product_2
+            closing = 2.0 * (turn - velocity * (square_1 - square_2))
+            root = math.sqrt(closing * closing + 2.0 * c[10, pair] * distance)
+            above = 2.0 * distance if closing > 0.0 else root - closing
+            below = closing + root if closing > 0.0 else c[10, pair]
+            advance = above / below if distance > 0.0 and advances[pair] > 0.0 else 0.0
+            times[pair] = time + advance
+            advances[pair] = advance - STILL * time
+        moving = False
+        for pair in range(PAIRS):
+            moving = moving or advances[pair] > 0.0
+    first_contact[:] = times
+
+
+@kernel
+def _impact(arguments, first, pairs, constants, times, branch):
+    """Store the states of a block at the actual contact and after it, with radii, amplifications and energies."""
+    c, given, fields = np.empty((11, PAIRS)), np.ones((7, PAIRS)), np.empty((13, PAIRS))
+    c[:], fields[0] = constants, times
+    for row in range(7):
+        for pair in range(pairs):
+            given[row, pair] = arguments[row, first + pair]
+    for pair in range(PAIRS):
+        square_1, product_1 = _sine_products(c[0, pair] * fields[0, pair])
+        square_2, product_2 = _sine_products(c[1, pair] * fields[0, pair])
+        velocity_1 = c[4, pair] * (1.0 - 2.0 * square_1) + 2.0 * c[7, pair] * product_1
+        velocity_2 = c[4, pair] * (1.0 - 2.0 * square_2) + 2.0 * c[8, pair] * product_2
+        fields[1, pair] = c[2, pair] * (1.0 - 2.0 * square_1) - 2.0 * c[5, pair] * product_1
+        fields[2, pair] = velocity_1
+        fields[3, pair] = velocity_1 - given[4, pair] * (velocity_1 - velocity_2)
+        fields[7, pair] = c[3, pair] * (1.0 - 2.0 * square_2) - 2.0 * c[6, pair] * product_2
+        fields[8, pair] = velocity_2
+        fields[9, pair] = velocity_2 + given[5, pair] * (velocity_1 - velocity_2)
+    _radii(given, fields)
+    for row in range(13):
+        for pair in range(pairs):
+            branch[row, first + pair] = fields[row, pair]
+
+
+@kernel
+def _radii(given, fields):
+    """Fill radius, amplification and transfer energy; a structure at rest that stays so has amplification 1."""
+    for body in range(2):
+        field = 6 * body
+        for pair in range(PAIRS):
+            before, after = fields[2 + field, pair], fields[3 + field, pair]
+            shifted = after / given[2 + body, pair]
+            radius = math.sqrt(fields[1 + field, pair] ** 2 + shifted * shifted)
+            resting = radius == 0.0 and given[body, pair] == 0.0
+            impulse = given[6, pair] * (fields[2, pair] - fields[8, pair]) * (1.0 - 2.0 * body)
+            fields[4 + field, pair] = radius
+            fields[5 + field, pair] = 1.0 if resting else radius / given[body, pair]
+            fields[6 + field, pair] = impulse * 0.5 * (before + after)
+
+
+@kernel
+def _no_impact(status, arguments, index, branch):
+    """Store what a pair without impact keeps, and NaN where there is no answer."""
+    known = status == NO_POUNDING
+    branch[:, index] = math.nan
+    for body in range(2):
+        branch[4 + 6 * body, index] = arguments[body, index] if known else math.nan
+        branch[5 + 6 * body, index] = 1.0 if known else math.nan
+        branch[6 + 6 * body, index] = 0.0 if known else math.nan
+
+
+@kernel
+def _largest_radius(arguments, body, first, pairs, bounds):
+    """
+    Store the largest radius that contact at the actual gap can leave to one structure, whatever the phases.
+
+    For every contact displacement x one of the two velocity signs of equal direction closes the
+    gap, and so does that of opposite direction: the largest |v'| is the sum of both contributions.
+    What remains is a maximum over x, with at most two peaks in all cases tried: the two highest of
+    a scan are refined.
+    """
+    constants, peaks = np.zeros((7, PAIRS)), np.zeros((4, PAIRS))
+    _load_bound(arguments, body, first, pairs, constants)
+    _scan(constants, peaks)
+    _refine(constants, peaks)
+    for pair in range(pairs):
+        square = max(peaks[2, pair], peaks[3, pair])
+        bounds[body, first + pair] = max(math.sqrt(square), arguments[body, first + pair])
+
+
+@kernel
+def _scan(constants, peaks):
+    """Find the places (two rows) and heights (two rows) of the two highest peaks among the nodes."""
+    c, p = np.empty((7, PAIRS)), np.zeros((6, PAIRS))  # two more rows: the heights before
+    c[:] = constants
+    for pair in range(PAIRS):
+        p[5, pair] = _radius_squared(c, pair, NODES[0])
+    for node in range(NODES.size):
+        y, following = NODES[node], NODES[min(node + 1, NODES.size - 1)]
+        for pair in range(PAIRS):
+            left, here, right = p[4, pair], p[5, pair], _radius_squared(c, pair, following)
+            height = here if here >= left and here >= right else 0.0
+            highest, second = height > p[2, pair], height > p[3, pair]
+            p[3, pair] = p[2, pair] if highest else (height if second else p[3, pair])
+            p[1, pair] = p[0, pair] if highest else (y if second else p[1, pair])
+            p[2, pair] = height if highest else p[2, pair]
+            p[0, pair] = y if highest else p[0, pair]
+            p[4, pair], p[5, pair] = here, right
+    peaks[:] = p[:4]
+
+
+@kernel
+def _refine(constants, peaks):
+    """Close in on each peak between the nodes beside it by golden sections."""
+    c, left, right = np.empty((7, PAIRS)), np.empty(PAIRS), np.empty(PAIRS)
+    inner, outer = np.empty((2, PAIRS)), np.empty((2, PAIRS))  # places and heights
+    c[:] = constants
+    for peak in range(2):
+        for pair in range(PAIRS):
+            node = np.searchsorted(NODES, peaks[peak, pair])
+            left[pair], right[pair] = NODES[max(node - 1, 0)], NODES[min(node + 1, NODES.size - 1)]
+            inner[0, pair] = right[pair] - GOLDEN * (right[pair] - left[pair])
+            outer[0, pair] = left[pair] + GOLDEN * (right[pair] - left[pair])
+            inner[1, pair] = _radius_squared(c, pair, inner[0, pair])
+            outer[1, pair] = _radius_squared(c, pair, outer[0, pair])
+        for _ in range(SECTIONS):
+            for pair in range(PAIRS):
+                keep_left = inner[1, pair] > outer[1, pair]
+                low = left[pair] if keep_left else inner[0, pair]
+                high = outer[0, pair] if keep_left else right[pair]
+                kept_place = inner[0, pair] if keep_left else outer[0, pair]
+                kept_height = inner[1, pair] if keep_left else outer[1, pair]
+                place = high - GOLDEN * (high - low) if keep_left else low + GOLDEN * (high - low)
+                height = _radius_squared(c, pair, place)
+                left[pair], right[pair] = low, high
+                inner[0, pair] = place if keep_left else kept_place
+                inner[1, pair] = height if keep_left else kept_height
+                outer[0, pair] = kept_place if keep_left else place
+                outer[1, pair] = kept_height if keep_left else height
+        for pair in range(PAIRS):
+            peaks[2 + peak, pair] = max(peaks[2 + peak, pair], inner[1, pair], outer[1, pair])
+
+
+@kernel
+def _load_bound(arguments, body, first, pairs, constants):
+    """Gather what the bound of one structure needs; a pair that cannot touch gets an interval and shares of zero."""
+    for pair in range(pairs):
+        radius, other = arguments[body, first + pair], arguments[1 - body, first + pair]
+        gap, received = arguments[8, first + pair], arguments[4 + body, first + pair]
+        low, high = max(-radius, gap - other), min(radius, gap + other)
+        touching = low <= high
+        constants[0, pair] = 0.5 * (low + high) if touching else 0.0
+        constants[1, pair] = 0.25 * (high - low) if touching else 0.0
+        constants[2, pair] = radius
+        constants[3, pair] = other
+        constants[4, pair] = gap
+        constants[5, pair] = abs(1.0 - received) if touching else 0.0
+        share = received * arguments[3 - body, first + pair] / arguments[2 + body, first + pair]
+        constants[6, pair] = share if touching else 0.0
+
+
+@kernel
+def _radius_squared(constants, pair, y):
+    """Return the squared radius after contact at the phase y in [-1, 1] (ends flattened, as a cosine would)."""
+    radius, other = constants[2, pair], constants[3, pair]
+    x = constants[0, pair] + constants[1, pair] * y * (3.0 - y * y)
+    behind = x - constants[4, pair]
+    own = max((radius - x) * (radius + x), 0.0)
+    given = max((other - behind) * (other + behind), 0.0)
+    own_share, given_share = constants[5, pair], constants[6, pair]
+    both = 2.0 * own_share * given_share * math.sqrt(own * given)
+    return x * x + own_share * own_share * own + given_share * given_share * given + both

@@ -1,0 +1,1 @@
+"""Advance rows of structures from impact to impact, one row at a time."""

@@ -1,0 +1,1 @@
+"""Advance many building pairs side by side, one pair per vector lane."""

@@ -1,0 +1,1 @@
+"""Find the largest relative displacement of two oscillators."""

@@ -1,0 +1,116 @@
+"""Peaks of the relative displacement between samples: a tile is walked again for one pair, on the exact solution."""
+
+import math
+
+from per_obspy.kernels._jit import kernel
+from per_obspy.kernels.oscillator.exact_step import state_after, step
+from per_obspy.kernels.relative.samples import TILE
+
+LONGEST_PHASE = 0.7  # of a step in which a peak is sought by one cubic
+BEYOND = 0.2  # of such a step: a peak of the cubic this far outside may be one just inside
+NEWTON = 4  # exact steps from the cubic's peak at most
+SETTLED = 1e-9  # of a step: what is left of such a shift is rounding, because the peak is flat
+
+
+@kernel
+def walk_tile(pair, dt, north, east, state, margin, largest):
+    """
+    Raise the largest values (2,) of a pair by the peaks between the samples of a tile.
+
+    ``state`` (4,): ``u`` and ``z = v / omega`` of both structures before the tile. A cubic errs by
+    ``margin`` at most.
+    """
+    first, second = step(pair[0], pair[1], dt), step(pair[3], pair[4], dt)
+    u1, z1, u2, z2 = state[0], state[1], state[2], state[3]
+    distance, slope = (
+        pair[2] * u1 - pair[5] * u2,
+        (pair[2] * pair[0] * z1 - pair[5] * pair[3] * z2) * dt,
+    )
+    end = pair[6] * north[0] + pair[7] * east[0]
+    for place in range(1, TILE + 1):
+        before, distance_0, slope_0, start = (u1, z1, u2, z2), distance, slope, end
+        end = pair[6] * north[place] + pair[7] * east[place]
+        u1, z1 = _stepped(first, u1, z1, start, end)
+        u2, z2 = _stepped(second, u2, z2, start, end)
+        distance, slope = (
+            pair[2] * u1 - pair[5] * u2,
+            (pair[2] * pair[0] * z1 - pair[5] * pair[3] * z2) * dt,
+        )
+        largest[0], largest[1] = max(largest[0], distance), max(largest[1], -distance)
+        leaving, arriving = distance_0 + slope_0 / 3.0, distance - slope / 3.0
+        high, low = max(leaving, arriving) + margin, min(leaving, arriving) - margin
+        if high > largest[0] or -low > largest[1]:
+            _peaks(
+                pair,
+                dt,
+                before,
+                start,
+                end,
+                (distance_0, slope_0, distance, slope),
+                margin,
+                largest,
+            )
+
+
+@kernel
+def _stepped(c, u, z, start, end):
+    """Return the state of a structure after a step."""
+    return c[0] * u + c[1] * z + (c[4] * start + c[5] * end), c[2] * u + c[3] * z + (
+        c[6] * start + c[7] * end
+    )
+
+
+@kernel
+def _peaks(pair, dt, state, start, end, ends, margin, largest):
+    """Raise the largest values to the peaks inside one step, cut so that one cubic sees each of them."""
+    parts = math.ceil(max(pair[0], pair[3]) * dt / LONGEST_PHASE)
+    width, rate = dt / parts, (end - start) / dt
+    distance_0, slope_0 = ends[0], ends[1] / parts
+    for part in range(parts):
+        distance_1, slope_1 = ends[2], ends[3] / parts
+        if part < parts - 1:
+            distance_1, slope_1, _ = _relative(pair, state, (part + 1) * width, start, rate)
+            slope_1 *= width
+        # derivative of the cubic over the part: slope_0 + 2 m x + k x²
+        change = distance_1 - distance_0
+        m, k = 3.0 * change - 2.0 * slope_0 - slope_1, 3.0 * (slope_0 + slope_1 - 2.0 * change)
+        root = math.sqrt(max(m * m - k * slope_0, 0.0))
+        q = -(m + math.copysign(root, m))
+        for x in (q / k if k != 0.0 else -1.0, slope_0 / q if q != 0.0 else -1.0):
+            if -BEYOND <= x <= 1.0 + BEYOND:
+                inside = min(max(x, 0.0), 1.0)
+                cubic = distance_0 + inside * (slope_0 + inside * (m + inside * k / 3.0))
+                if cubic + margin > largest[0] or margin - cubic > largest[1]:
+                    _climb(pair, state, (part + inside) * width, dt, start, rate, largest)
+        distance_0, slope_0 = distance_1, slope_1
+
+
+@kernel
+def _climb(pair, state, time, dt, acceleration, rate, largest):
+    """Raise the largest values to the stationary value near a time of the step."""
+    for _ in range(NEWTON):
+        _, slope, bend = _relative(pair, state, time, acceleration, rate)
+        earlier = time
+        time = min(max(time - slope / bend, 0.0), dt) if bend != 0.0 else time
+        if abs(time - earlier) <= SETTLED * dt:
+            break
+    distance, _, _ = _relative(pair, state, time, acceleration, rate)
+    largest[0], largest[1] = max(largest[0], distance), max(largest[1], -distance)
+
+
+@kernel
+def _relative(pair, state, time, acceleration, rate):
+    """Return relative displacement, velocity and acceleration at a time after the start of the step."""
+    distance = slope = bend = 0.0
+    for body in range(2):
+        omega, damping = pair[3 * body], pair[3 * body + 1]
+        weight = pair[3 * body + 2] * (1.0 - 2.0 * body)
+        u, v = state_after(
+            time, state[2 * body], state[2 * body + 1] * omega, omega, damping, acceleration, rate
+        )
+        distance += weight * u
+        slope += weight * v
+        bend -= weight * (
+            acceleration + rate * time + 2.0 * damping * omega * v + omega * omega * u
+        )
+    return distance, slope, bend

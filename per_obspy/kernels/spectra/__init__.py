@@ -1,0 +1,1 @@
+"""Compute PER and response spectra of one record for blocks of oscillators."""

@@ -1,0 +1,1 @@
+"""Correlate the displacements of two oscillators: white noise, ground spectra and records."""

@@ -1,0 +1,1 @@
+"""Integrate exact pounding histories of pairs and rows of structures."""

@@ -1,0 +1,218 @@
+"""Two structures joined by a link, or kept apart by a Kelvin-Voigt contact: exact coupled histories."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_events.links import ELASTIC, OPEN, Element, run_linked
+from per_obspy.kernels.pounding_events.motion import MOST_TERMS
+from per_obspy.pounding.history.tables import (
+    closed_record,
+    free_samples,
+    refinement,
+    row_at_rest,
+    structure_table,
+)
+from per_obspy.pounding.structure import Structure
+
+
+class LinkedHistory(NamedTuple):
+    """
+    Motion of two structures with an element between them.
+
+    Attributes
+    ----------
+    time : (n_time,) ndarray
+        Since the first sample, s.
+    displacement, velocity : (2, n_time) ndarray
+        At contact level, relative to the ground, positive from structure 1 to 2, m and m/s.
+    force : (n_time,) ndarray
+        Of the element, positive in compression, N.
+    displacement_maxima : (2,) ndarray
+        Largest displacement to either side, exact between samples, m.
+    closing, parting : float
+        Largest ``u1 - u2`` and ``u2 - u1``, exact between samples, m.
+    force_maximum : float
+        Largest force of the element in compression or tension, exact between samples, N.
+    """
+
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    force: FloatArray
+    displacement_maxima: FloatArray
+    closing: float
+    parting: float
+    force_maximum: float
+
+
+def linked_history(
+    acceleration: ArrayLike,
+    dt: float,
+    structure_1: Structure,
+    structure_2: Structure,
+    stiffness: float,
+    damping: float = 0.0,
+    yield_force: float = math.inf,
+    hardening: float = 0.0,
+    free_vibration: bool = True,
+) -> LinkedHistory:
+    """
+    History of two structures joined by an elastic, viscous or bilinear link.
+
+    The coupled equations are solved exactly for ground acceleration that is linear between samples;
+    a bilinear link changes its stiffness at the exact instant. Whether the structures would hit
+    each other is told by ``closing``.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, positive from structure 1 to 2, m/s². If it does not end at zero, it is
+        closed by one ramp.
+    dt : float
+        Sampling interval, s.
+    structure_1, structure_2 : Structure
+        Linear; 1 stands left.
+    stiffness : float
+        Of the link, N/m; 0 for a damper.
+    damping : float
+        Viscous coefficient of the link, N s/m.
+    yield_force : float
+        Of its spring, N; infinite for an elastic link.
+    hardening : float
+        Stiffness of its spring after yielding over that before, at least 0 and below 1.
+    free_vibration : bool
+        Follow 20 of the longest period after the record; else the history ends with the record's
+        last sample.
+
+    Returns
+    -------
+    LinkedHistory
+        Motion, link force and maxima.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range, or a structure is bilinear.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> apart = linked_history(pulse, 0.01, tower, annex, stiffness=0.0)
+    >>> joined = linked_history(pulse, 0.01, tower, annex, stiffness=1e9)
+    >>> bool(joined.closing < 0.01 * apart.closing)
+    True
+    """
+    element = Element(
+        checks.number("stiffness", stiffness, checks.not_negative),
+        checks.number("damping", damping, checks.not_negative),
+        checks.number("yield_force", yield_force, checks.positive_or_infinite),
+        checks.number("hardening", hardening, checks.fraction_of_critical),
+        0.0,
+    )
+    if element.yield_force < math.inf and element.stiffness == 0.0:
+        raise ValueError(
+            f"stiffness must be positive for a link that yields at {element.yield_force} N, got 0.0"
+        )
+    return _history(acceleration, dt, structure_1, structure_2, element, ELASTIC, free_vibration)
+
+
+def kelvin_voigt_history(
+    acceleration: ArrayLike,
+    dt: float,
+    structure_1: Structure,
+    structure_2: Structure,
+    gap: float,
+    stiffness: float,
+    damping: float = 0.0,
+    free_vibration: bool = True,
+) -> LinkedHistory:
+    """
+    History of two structures that hit each other through a spring and a dashpot without tension.
+
+    The penalty model of finite-element programs (OpenSees `ViscoelasticGap`, `ElasticPPGap`), for
+    comparison with `pounding_history`, to which it converges slowly, like the square root of the
+    compliance. Exact between samples.
+
+    Parameters
+    ----------
+    acceleration, dt, structure_1, structure_2, free_vibration
+        As in `linked_history`.
+    gap : float
+        Clear distance at rest, m.
+    stiffness : float
+        Of the contact, N/m.
+    damping : float
+        Of the contact, N s/m.
+
+    Returns
+    -------
+    LinkedHistory
+        The force is that of the contact.
+
+    Raises
+    ------
+    ValueError
+        As `linked_history`.
+
+    References
+    ----------
+    Anagnostopoulos (1988), Pounding of buildings in series during earthquakes, EESD 16, 443-456.
+    """
+    element = Element(
+        checks.number("stiffness", stiffness, checks.positive),
+        checks.number("damping", damping, checks.not_negative),
+        math.inf,
+        0.0,
+        checks.number("gap", gap, checks.not_negative),
+    )
+    return _history(acceleration, dt, structure_1, structure_2, element, OPEN, free_vibration)
+
+
+def _history(
+    acceleration: ArrayLike,
+    dt: float,
+    structure_1: Structure,
+    structure_2: Structure,
+    element: Element,
+    phase: int,
+    free_vibration: bool,
+) -> LinkedHistory:
+    """Check what all elements have in common, and run the kernel."""
+    record, step = (
+        checks.record("acceleration", acceleration),
+        checks.number("dt", dt, checks.positive),
+    )
+    structures = (structure_1, structure_2)
+    for structure in structures:
+        if structure.yield_displacement < math.inf:
+            raise ValueError(
+                f"yield_displacement must be infinite here, got {structure.yield_displacement}"
+            )
+    samples = record.size
+    if free_vibration:
+        record = closed_record(record)
+        samples = record.size + free_samples(max(structure_1.period, structure_2.period), step)
+    row = row_at_rest(structure_table(structures), np.zeros(1), np.zeros(1))
+    motion, force, maxima = np.zeros((samples, 2, 2)), np.zeros(samples), np.zeros(5)
+    parts = refinement(_largest_rate(structures, element), step)
+    if not run_linked(record, step, parts, row, element, phase, MOST_TERMS, motion, force, maxima):
+        raise RuntimeError("no end of phase changes of the link or contact within one step")
+    displacement, velocity = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
+    time = step * np.arange(samples, dtype=np.float64)
+    return LinkedHistory(
+        time, displacement, velocity, force, maxima[:2], maxima[2], maxima[3], maxima[4]
+    )
+
+
+def _largest_rate(structures: tuple[Structure, Structure], element: Element) -> float:
+    """Return a bound on the rates at which the coupled system can change, 1/s."""
+    mobility = sum(1.0 / structure.mass for structure in structures)
+    own = max(structure.frequency for structure in structures)
+    return math.sqrt(own**2 + element.stiffness * mobility) + element.damping * mobility

@@ -1,0 +1,60 @@
+"""A base-isolated building in its moat: pounding against walls that move with the ground."""
+
+import math
+
+from numpy.typing import ArrayLike
+
+from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
+from per_obspy.pounding.structure import Structure
+
+
+def moat_history(
+    acceleration: ArrayLike,
+    dt: float,
+    building: Structure,
+    gap_left: float,
+    gap_right: float,
+    restitution: float,
+    free_vibration: bool = True,
+) -> PoundingHistory:
+    """
+    Exact history of a building between two moat walls.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, positive from the left wall to the right one, m/s².
+    dt : float
+        Sampling interval, s.
+    building : Structure
+        The isolated building; bilinear for lead-rubber or friction isolators.
+    gap_left, gap_right : float
+        Clear distances to the walls at rest, m; at least one above zero.
+    restitution : float
+        Coefficient of restitution against the walls.
+    free_vibration : bool
+        As in `pounding_history`.
+
+    Returns
+    -------
+    PoundingHistory
+        Of left wall, building and right wall, in this order; the walls do not move.
+
+    Raises
+    ------
+    ValueError
+        As `pounding_history`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> pulse = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 301))
+    >>> history = moat_history(pulse, 0.01, Structure(3.0, 0.1, 1e6), 0.2, 0.25, 0.5)
+    >>> bool(abs(history.displacement[1]).max() <= 0.25)
+    True
+    """
+    wall = Structure(building.period, 0.0, math.inf, participation=0.0)
+    row = (wall, building, wall)
+    return pounding_history(
+        acceleration, dt, row, [gap_left, gap_right], restitution, free_vibration
+    )

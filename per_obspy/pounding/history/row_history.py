@@ -1,0 +1,256 @@
+"""Exact pounding history of two adjacent structures, or of a row of them."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
+from per_obspy.kernels.pounding_events.events import motion as columns
+from per_obspy.kernels.pounding_events.row_history import run_history
+from per_obspy.pounding.history.energies import Energies, closure_of, energies_of
+from per_obspy.pounding.history.tables import (
+    closed_record,
+    free_samples,
+    largest_ground_velocity,
+    refinement,
+    row_at_rest,
+    structure_table,
+)
+from per_obspy.pounding.structure import Structure
+
+#: Bouncing ends in contact once the separation speed is below this share of the largest ground
+#: velocity.
+SPEED_SHARE = 1e-11
+#: Impacts within one sampling interval after which structures that are pressed together stay in
+#: contact.
+MOST_BOUNCES = 100_000
+#: Impacts for which there is room at first.
+FIRST_ROOM = 1000
+#: Columns of the kernels' log of impacts.
+LOGGED = [
+    "time",
+    "left",
+    "velocity_before_1",
+    "velocity_after_1",
+    "velocity_before_2",
+    "velocity_after_2",
+    "impulse",
+    "displacement_1",
+    "displacement_2",
+]
+
+
+class PoundingHistory(NamedTuple):
+    """
+    Motion, impacts and energies of a row of structures.
+
+    Attributes
+    ----------
+    time : (n_time,) ndarray
+        Since the first sample of the record, s.
+    displacement, velocity, plastic_displacement : (n_structures, n_time) ndarray
+        At contact level, relative to the ground, positive towards the last structure, m and m/s; at
+        the instant of an impact the velocity after it.
+    impacts : DataFrame
+        One row an impact: ``time`` (s), ``left`` (index of the structure left of the gap),
+        ``velocity_before_i``, ``velocity_after_i`` (m/s), ``displacement_i`` (m),
+        ``transfer_energy_i`` (J) for the left (1) and right (2) structure, ``impulse`` (N s) and
+        ``energy_loss`` (J).
+    per : (n_structures,) ndarray
+        Largest radius ``sqrt(u² + (v / omega)²)`` with pounding, exact between samples, m.
+    displacement_maxima : (n_structures,) ndarray
+        Largest displacement to either side, exact between samples, m.
+    energy_radius : (n_structures,) ndarray
+        Largest radius of the recoverable energy, ``sqrt(2 E / (m omega²))``, m; equal to ``per`` if
+        linear.
+    opening_maxima : (n_structures - 1,) ndarray
+        Largest opening of each gap beyond its width at rest, ``max(u_right - u_left)``, exact
+        between samples, m.
+    energies : Energies
+        Of each structure over time, J.
+    closure : float
+        Largest imbalance of (3), (4) over the largest input (or transferred) energy of the
+        structure, dimensionless.
+    """
+
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    plastic_displacement: FloatArray
+    impacts: pd.DataFrame
+    per: FloatArray
+    displacement_maxima: FloatArray
+    energy_radius: FloatArray
+    opening_maxima: FloatArray
+    energies: Energies
+    closure: float
+
+
+def pounding_history(
+    acceleration: ArrayLike,
+    dt: float,
+    structures: Sequence[Structure],
+    gaps: ArrayLike,
+    restitution: ArrayLike,
+    free_vibration: bool = True,
+) -> PoundingHistory:
+    """
+    Exact history of structures that hit each other, with stereomechanical impacts (7), (8).
+
+    Between events every structure follows the exact solution for ground acceleration that is linear
+    between samples; contacts are the first roots of the clearance on that solution. Structures that
+    touch without bouncing (restitution 0, the end of a chatter, no gap) move together until the
+    contact force would turn into tension. In a row, impacts at one instant are taken pair by pair
+    from left to right until no touching pair approaches, so that the result of simultaneous hits
+    depends on the order of the row.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration, positive from the first structure towards the last, m/s². If it does
+        not end at zero, it is closed by one ramp of length dt.
+    dt : float
+        Sampling interval, s.
+    structures : sequence of Structure
+        From left to right, two or more.
+    gaps : float or (n_structures - 1,) array_like
+        Clear distances at rest, m; 0 starts in contact.
+    restitution : float or (n_structures - 1,) array_like
+        Coefficient of each gap, between 0 and 1.
+    free_vibration : bool
+        Go on after the record as long as a gap can close or a displacement grow, at most 20 of the
+        longest period; else the history ends with the record's last sample.
+
+    Returns
+    -------
+    PoundingHistory
+        Motion at the samples, impacts, maxima and energies.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range, or there are not N - 1 gaps for N structures.
+
+    Notes
+    -----
+    Impact sequences are chaotic: after some ten impacts two correct programs may differ.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq.
+    (1)-(8).
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> history = pounding_history(pulse, 0.01, [tower, annex], 0.02, 0.6)
+    >>> bool(history.closure < 1e-10), bool((history.impacts["energy_loss"] > 0).all())
+    (True, True)
+    """
+    record = checks.record("acceleration", acceleration)
+    step = checks.number("dt", dt, checks.positive)
+    gap = _for_each_gap("gaps", checks.not_negative("gaps", gaps), len(structures))
+    bounce = _for_each_gap(
+        "restitution", checks.between("restitution", restitution, 0.0, 1.0), len(structures)
+    )
+    table = structure_table(structures)
+    _refuse_pressed_walls(table[:, 5], gap)
+    samples = record.size
+    if free_vibration:
+        record = closed_record(record)
+        samples = record.size + free_samples(max(s.period for s in structures), step)
+    row, log, motion, work = _run(record, step, table, gap, bounce, samples)
+    energies = energies_of(table, motion, work)
+    displacement, velocity, plastic = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
+    return PoundingHistory(
+        time=step * np.arange(len(motion), dtype=np.float64),
+        displacement=displacement,
+        velocity=velocity,
+        plastic_displacement=plastic,
+        impacts=impact_table(log),
+        per=np.sqrt(row[:, columns.WIDEST]),
+        displacement_maxima=row[:, columns.HIGHEST].copy(),
+        energy_radius=np.sqrt(row[:, columns.RICHEST]),
+        opening_maxima=row[:-1, columns.OPENING].copy(),
+        energies=energies,
+        closure=closure_of(energies),
+    )
+
+
+def _run(
+    record: FloatArray,
+    step: float,
+    table: FloatArray,
+    gap: FloatArray,
+    bounce: FloatArray,
+    samples: int,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Run the kernel, a second time if the log of impacts was too short; return row, log, motion and work."""
+    parts = refinement(math.sqrt(table[:, 1].max()), step)
+    motion, work = np.zeros((samples, len(table), 3)), np.zeros((samples, len(table), 4))
+    room, impacts = -1, FIRST_ROOM
+    while room < impacts:
+        room = impacts
+        row, log = row_at_rest(table, gap, bounce), np.zeros((room, LOG_COLUMNS))
+        row[0, columns.STILL] = (
+            SPEED_SHARE * largest_ground_velocity(record, step) * table[:, 4].max()
+        )
+        row[0, columns.MOST_BOUNCES] = MOST_BOUNCES
+        used = run_history(record, step, parts, row, log, motion, work)
+        if used < 0:
+            raise RuntimeError(
+                f"no end of contacts at {-used * step:g} s: more than {2 * MOST_BOUNCES} events"
+            )
+        impacts = int(row[:, columns.IMPACTS].sum())
+    return row, log[:impacts], motion[:used], work[:used]
+
+
+def impact_table(log: FloatArray) -> pd.DataFrame:
+    """
+    Return the table of impacts.
+
+    Parameters
+    ----------
+    log : (n_impacts, 9) ndarray
+        Time (s), left structure, velocity before and after of the left and the right one (m/s),
+        impulse (N s), displacement of both (m).
+
+    Returns
+    -------
+    DataFrame
+        As in `PoundingHistory`.
+    """
+    table = pd.DataFrame(log, columns=LOGGED).astype({"left": np.int64})
+    for i, sign in ((1, 1.0), (2, -1.0)):  # (9), (10) in their short form
+        mean = 0.5 * (table[f"velocity_before_{i}"] + table[f"velocity_after_{i}"])
+        table[f"transfer_energy_{i}"] = sign * table["impulse"] * mean
+    return table.assign(energy_loss=table["transfer_energy_1"] + table["transfer_energy_2"])
+
+
+def _for_each_gap(name: str, values: FloatArray, structures: int) -> FloatArray:
+    """Return one value a gap."""
+    if structures < 2:
+        raise ValueError(f"structures must be two or more, got {structures}")
+    if values.shape not in {(), (1,), (structures - 1,)}:
+        raise ValueError(
+            f"{name} must be one number or {structures - 1}, one a gap, got the shape {values.shape}"
+        )
+    return np.array(np.broadcast_to(values, structures - 1))
+
+
+def _refuse_pressed_walls(mass: FloatArray, gap: FloatArray) -> None:
+    """Refuse two walls (infinite masses) that share an interface, or between which nothing can move."""
+    walls = np.flatnonzero(np.isinf(mass))
+    for left, right in pairwise(walls):
+        if right == left + 1 or not gap[left:right].any():
+            raise ValueError(
+                f"mass of structures {left} and {right} is infinite, with no room to move between them"
+            )

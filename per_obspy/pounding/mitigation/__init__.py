@@ -1,0 +1,1 @@
+"""Size the measures that prevent or soften pounding: damping, bumpers and links."""

@@ -1,0 +1,1 @@
+"""Replace yielding structures by equivalent linear ones."""

@@ -1,0 +1,1 @@
+"""Correct baselines and filter: polynomials, velocity segments and Butterworth corners."""

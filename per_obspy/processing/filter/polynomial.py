@@ -1,0 +1,85 @@
+"""Baselines that the earthquake did not make: means and polynomial trends."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from obspy import Stream
+
+from per_obspy.checks import FloatArray
+from per_obspy.processing.notes import noted
+
+
+def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
+    """
+    Return a copy without the mean of its quiet beginning, or of the whole record where there is none.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+    pre_event : float
+        Length of the noise at the beginning, s; 0 or less: the mean of the whole record.
+
+    Returns
+    -------
+    obspy Stream
+
+    References
+    ----------
+    Boore & Bommer 2005, Soil Dyn. Earthq. Eng. 25, 93-115, section 3.
+    """
+    out = stream.copy()
+    for trace in out:
+        quiet = trace.data[: max(round(pre_event / trace.stats.delta), 0)]
+        samples = quiet if quiet.size else trace.data
+        mean = float(samples.mean())
+        trace.data = trace.data - mean
+        source = f"the first {pre_event:g} s" if quiet.size else "the whole record"
+        noted(trace, f"mean {mean:.4g} of {source} removed", mean=mean, mean_of=source)
+    return out
+
+
+def trend_removed(stream: Stream, order: int = 1) -> Stream:
+    """
+    Return a copy without its least-squares polynomial trend, fitted to the whole record.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+    order : int
+        Of the polynomial; 1 is a straight line.
+
+    Returns
+    -------
+    obspy Stream
+    """
+    out = stream.copy()
+    for trace in out:
+        place = np.linspace(-1, 1, trace.stats.npts)
+        trace.data = trace.data - Polynomial.fit(place, trace.data, order, domain=[-1, 1])(place)
+        noted(trace, f"polynomial trend of order {order} removed", trend_order=order)
+    return out
+
+
+def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:
+    """
+    Return a copy without the baseline that a function of `velocity_baseline` takes out.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+    removed : callable
+        From samples, m/s2, and options to samples.
+    **options : float
+        What the function needs, SI.
+
+    Returns
+    -------
+    obspy Stream
+    """
+    out = stream.copy()
+    told = ", ".join(f"{name} {value:g}" for name, value in options.items())
+    for trace in out:
+        trace.data = removed(trace.data, trace.stats.delta, **options)
+        noted(trace, f"baseline by {removed.__name__} removed ({told})")
+    return out

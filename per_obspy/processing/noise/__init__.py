@@ -1,0 +1,1 @@
+"""Separate noise from signal: onset, windows, smoothing and signal-to-noise ratio."""

@@ -1,0 +1,1 @@
+"""Check raw and processed traces and collect the reasons for rejection."""

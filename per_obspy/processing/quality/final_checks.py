@@ -1,0 +1,76 @@
+"""Velocity and displacement of a record, and whether they come to rest."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from obspy import Stream, Trace
+from scipy.integrate import cumulative_trapezoid
+
+from per_obspy.config import Checks
+from per_obspy.processing.notes import noted
+from per_obspy.processing.quality.findings import Finding, above
+
+WORDS = {"acceleration": ("velocity", "m/s"), "velocity": ("displacement", "m")}
+
+
+def integrated(stream: Stream) -> Stream:
+    """
+    Return a copy integrated once by the trapezoidal rule, from rest at the first sample.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+        Acceleration, m/s2, or velocity, m/s; with the pads of its filter, where it has any.
+
+    Returns
+    -------
+    obspy Stream
+        Velocity, m/s, or displacement, m.
+    """
+    out = stream.copy()
+    for trace in out:
+        quantity, units = WORDS[trace.stats.get("quantity", "acceleration")]
+        trace.data = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)
+        trace.stats.quantity, trace.stats.units = quantity, units
+        noted(trace, f"integrated to {quantity}")
+    return out
+
+
+def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
+    """
+    Give a finding where velocity or displacement does not come to rest, pads included, or did not before the filter.
+
+    Parameters
+    ----------
+    trace : obspy Trace
+        Processed acceleration, m/s2.
+    checks : Checks
+        Thresholds and levels.
+
+    Yields
+    ------
+    Finding
+    """
+    velocity = integrated(Stream([trace]))
+    displacement = integrated(velocity)
+    for name, motion in (
+        ("final_velocity", velocity[0].data),
+        ("final_displacement", displacement[0].data),
+    ):
+        peak = np.abs(motion).max()
+        ratio = float(abs(motion[-1]) / peak) if peak else 0.0
+        yield from above(
+            name, getattr(checks, name), ratio, f"{name.replace('_', ' ')} over its peak:"
+        )
+    yield from _shift_findings(trace, float(np.abs(velocity[0].data).max()), checks)
+
+
+def _shift_findings(trace: Trace, peak: float, checks: Checks) -> Iterator[Finding]:
+    """Give a finding where the velocity that stayed before the filter, m/s, is large beside the peak now."""
+    stayed = float(trace.stats.get("per_obspy", {}).get("residual_velocity", 0.0))
+    meaning = (
+        "the baseline shifted during the shaking: velocity that stayed, over the peak velocity"
+    )
+    yield from above(
+        "baseline_shift", checks.baseline_shift, stayed / peak if peak else 0.0, meaning
+    )

@@ -1,0 +1,1 @@
+"""Assemble the traces of one station: merge, splice and pair components."""

@@ -1,0 +1,1 @@
+"""Fetch records, station metadata and events from FDSN web services."""

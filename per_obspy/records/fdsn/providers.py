@@ -1,0 +1,99 @@
+"""Who offers FDSN web services: names, base URLs, and routers that know who has what."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+import urllib3
+from obspy.clients.fdsn.header import URL_MAPPINGS
+
+from per_obspy.errors import CatalogError, Rejection, ServiceError
+from per_obspy.records.fdsn.web import answer
+
+#: routers -> query URL and what selects an answer of which the base URLs can be read
+ROUTERS = {
+    "eida-routing": (
+        "https://www.orfeus-eu.org/eidaws/routing/1/query",
+        {"service": "station", "format": "post"},
+        ("network", "station", "location", "channel", "starttime", "endtime"),
+    ),
+    "earthscope-federator": (
+        "https://service.earthscope.org/irisws/fedcatalog/1/query",
+        {"format": "request", "level": "channel"},
+        (
+            "network",
+            "station",
+            "location",
+            "channel",
+            "starttime",
+            "endtime",
+            "latitude",
+            "longitude",
+            "maxradius",
+        ),
+    ),
+}
+
+_STATION_SERVICE = re.compile(r"(https?://\S+?)/fdsnws/station/\d")
+
+
+def base_url(provider: str) -> str:
+    """
+    Return the base URL of a provider.
+
+    >>> base_url("http://localhost:8080/"), base_url("GEONET")
+    ('http://localhost:8080', 'https://service.geonet.org.nz')
+
+    Raises
+    ------
+    CatalogError
+        If it is neither a URL nor a name that ObsPy knows.
+    """
+    if provider.startswith(("http://", "https://")):
+        return provider.rstrip("/")
+    if provider.upper() not in URL_MAPPINGS:
+        names = ", ".join(sorted(URL_MAPPINGS))
+        raise CatalogError(
+            provider, f"is no base URL, no router ({', '.join(ROUTERS)}) and none of {names}"
+        )
+    return str(URL_MAPPINGS[provider.upper()])
+
+
+def base_urls(
+    pool: urllib3.PoolManager, providers: Iterable[str], wanted: Mapping[str, str]
+) -> tuple[list[str], list[Rejection]]:
+    """
+    Return the base URLs of providers in their order, each once; a router gives those that it names.
+
+    Parameters
+    ----------
+    pool : urllib3.PoolManager
+        From :func:`per_obspy.records.fdsn.web.web_pool`.
+    providers : iterable of str
+        ObsPy's names, base URLs, or the names of ``ROUTERS``.
+    wanted : mapping
+        Parameters of the FDSN station service.
+
+    Returns
+    -------
+    urls : list of str
+    rejected : list of Rejection
+        Routers that do not answer.
+    """
+    urls, rejected = dict[str, None](), []
+    for provider in providers:
+        if provider not in ROUTERS:
+            urls[base_url(provider)] = None
+            continue
+        try:
+            urls |= dict.fromkeys(_routed(pool, provider, wanted))
+        except ServiceError as error:
+            rejected.append(
+                Rejection("service", provider, ROUTERS[provider][0], None, (str(error),))
+            )
+    return list(urls), rejected
+
+
+def _routed(pool: urllib3.PoolManager, router: str, wanted: Mapping[str, str]) -> list[str]:
+    url, fixed, understood = ROUTERS[router]
+    said = answer(pool, url, fixed | {name: wanted[name] for name in understood if name in wanted})
+    return _STATION_SERVICE.findall(said.decode("utf-8", "replace"))

@@ -1,0 +1,1 @@
+"""Simulate the records of an earthquake by a stochastic point source."""

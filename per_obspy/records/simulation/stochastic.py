@@ -1,0 +1,132 @@
+"""
+Ground acceleration by the stochastic method: shaped noise with the spectrum of an omega-squared point source.
+
+Every function works on one site; numbers are SI. Reference for all: Boore (2003), Pure Appl.
+Geophys. 160, 635-676.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from per_obspy.checks import FloatArray
+
+#: Mean radiation pattern of S waves, free surface, partition onto two horizontals (Boore 2003,
+#: after eq. 6).
+RADIATION, FREE_SURFACE, PARTITION = 0.55, 2.0, 1.0 / np.sqrt(2.0)
+
+#: Distance at which spreading turns from 1/R (body waves) to 1/sqrt(R) (guided waves), m (Raoof and
+#: others 1999).
+CROSSOVER = 40_000.0
+
+#: Path duration per distance, s/m (Boore 2003, western North America: 0.05 s/km).
+PATH_DURATION = 5e-5
+
+#: Frequency in Hz and amplification of generic rock (Boore & Joyner 1997, table 3).
+ROCK_FREQUENCY = (0.01, 0.09, 0.16, 0.51, 0.84, 1.25, 2.26, 3.17, 6.05, 16.6, 61.2)
+ROCK_AMPLIFICATION = (1.00, 1.10, 1.18, 1.42, 1.58, 1.74, 2.06, 2.25, 2.58, 3.13, 4.00)
+
+#: Saragoni-Hart window: the peak at this fraction of its length, this much left at the end (Boore
+#: 2003, eq. 24-26).
+WINDOW_PEAK, WINDOW_END, WINDOW_STRETCH = 0.2, 0.05, 2.0
+
+
+def seismic_moment(magnitude: float) -> float:
+    """Return the seismic moment in N m (Hanks & Kanamori 1979)."""
+    return float(10.0 ** (1.5 * magnitude + 9.05))
+
+
+def corner_frequency(magnitude: float, stress_drop: float, shear_velocity: float) -> float:
+    """Return Brune's corner frequency in Hz, ``0.49 beta (stress drop / M0)**(1/3)`` in SI (Boore 2003, eq. 4)."""
+    return float(0.49 * shear_velocity * (stress_drop / seismic_moment(magnitude)) ** (1.0 / 3.0))
+
+
+def effective_distance(hypocentral: float, magnitude: float) -> float:
+    """Return the distance in m with near-source saturation of an extended fault (Yenier & Atkinson 2015)."""
+    return float(np.hypot(hypocentral, 1000.0 * 10.0 ** (-0.405 + 0.235 * magnitude)))
+
+
+def spreading(distance: float) -> float:
+    """Return the geometrical spreading, 1/m."""
+    return 1.0 / distance if distance < CROSSOVER else 1.0 / np.sqrt(distance * CROSSOVER)
+
+
+def source_spectrum(
+    frequency: FloatArray,
+    magnitude: float,
+    stress_drop: float,
+    shear_velocity: float,
+    density: float,
+) -> FloatArray:
+    """Return the acceleration spectrum of the source times distance, m2/s (Boore 2003, eq. 3, 5, 6)."""
+    constant = RADIATION * FREE_SURFACE * PARTITION / (4.0 * np.pi * density * shear_velocity**3)
+    corner = corner_frequency(magnitude, stress_drop, shear_velocity)
+    displacement = constant * seismic_moment(magnitude) / (1.0 + (frequency / corner) ** 2)
+    spectrum: FloatArray = (2.0 * np.pi * frequency) ** 2 * displacement
+    return spectrum
+
+
+def path_spectrum(
+    frequency: FloatArray,
+    distance: float,
+    shear_velocity: float,
+    quality: float,
+    quality_exponent: float,
+) -> FloatArray:
+    """Return spreading and anelastic attenuation ``exp(-pi f R / (Q beta))``, 1/m (Boore 2003, eq. 8)."""
+    factor = np.maximum(frequency, 1e-6) ** (1.0 - quality_exponent)
+    path: FloatArray = spreading(distance) * np.exp(
+        -np.pi * factor * distance / (quality * shear_velocity)
+    )
+    return path
+
+
+def rock_response(frequency: FloatArray, kappa: float) -> FloatArray:
+    """Return the amplification of generic rock and its diminution ``exp(-pi kappa f)``."""
+    amplification = np.interp(
+        np.log(np.maximum(frequency, 1e-6)), np.log(ROCK_FREQUENCY), ROCK_AMPLIFICATION
+    )
+    response: FloatArray = amplification * np.exp(-np.pi * kappa * frequency)
+    return response
+
+
+def kanai_tajimi(frequency: FloatArray, natural: float, damping: float) -> NDArray[np.complex128]:
+    """Return the complex, causal transfer function of a soft layer: absolute acceleration of a damped oscillator."""
+    ratio = frequency / natural
+    return np.asarray((1.0 + 2j * damping * ratio) / (1.0 - ratio**2 + 2j * damping * ratio))
+
+
+def duration(magnitude: float, distance: float, stress_drop: float, shear_velocity: float) -> float:
+    """Return the duration of shaking in s: of the source, one over the corner frequency, and of the path."""
+    return 1.0 / corner_frequency(magnitude, stress_drop, shear_velocity) + PATH_DURATION * distance
+
+
+def window(n_samples: int, dt: float, shaking: float) -> FloatArray:
+    """Return the Saragoni-Hart window of a duration in s; its maximum is 1."""
+    power = -WINDOW_PEAK * np.log(WINDOW_END) / (1.0 + WINDOW_PEAK * (np.log(WINDOW_PEAK) - 1.0))
+    time = np.arange(n_samples) * dt / (WINDOW_STRETCH * shaking)
+    shape: FloatArray = (np.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time)
+    return shape
+
+
+def shaped_noise(
+    noise: FloatArray, shape: FloatArray, spectrum: NDArray[np.complex128], dt: float
+) -> FloatArray:
+    """
+    Return acceleration in m/s2 with the window's shape and, on average, the spectrum; one row a component.
+
+    Parameters
+    ----------
+    noise : (n_components, n_samples) ndarray
+        Gaussian noise; its phase is that of the result.
+    shape : (n_samples,) ndarray
+        Window in time.
+    spectrum : (n_components, n_samples // 2 + 1) ndarray
+        Fourier spectrum of the result at the frequencies of ``rfft``, m/s.
+    dt : float
+        Sampling interval, s.
+    """
+    transform = fft.rfft(noise * shape)
+    transform /= np.sqrt(np.mean(np.abs(transform) ** 2, axis=-1, keepdims=True))
+    acceleration: FloatArray = fft.irfft(transform * spectrum, n=noise.shape[-1]) / dt
+    return acceleration

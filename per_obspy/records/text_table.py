@@ -1,0 +1,186 @@
+"""Plain tables of samples, one row a sample, whose layout the user has to say."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from obspy import Stream, UTCDateTime
+
+from per_obspy import checks
+from per_obspy.checks import FloatArray
+from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.formats.text.vocabulary import GAL, STANDARD_GRAVITY, coordinates, horizontal, trace
+
+#: unit of a table -> m/s2
+UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
+
+#: last letter of a SEED channel code -> orientation
+_LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
+
+#: how far a time may lie from even spacing, as a fraction of the interval (tables round their
+#: times)
+_UNEVENNESS = 0.05
+
+
+def read_columns(  # noqa: PLR0913 - a table without a header leaves all of these to be said
+    path: str | Path,
+    *,
+    station: str,
+    latitude: float,
+    longitude: float,
+    units: str,
+    channels: Mapping[str, int],
+    network: str = "",
+    azimuths: Mapping[str, float] | None = None,
+    separator: str | None = None,
+    skip: int = 0,
+    time_column: int | None = None,
+    dt: float | None = None,
+    start: str | None = None,
+    raw: bool = False,
+) -> Stream:
+    """
+    Read a plain table as one Stream in m/s2.
+
+    Parameters
+    ----------
+    path : str or Path
+        Text file, one row a sample; empty lines at the end and everything after ``#`` are ignored.
+    station, network : str
+        Codes.
+    latitude, longitude : float
+        Of the station, degrees.
+    units : str
+        Of the samples: one of ``m/s2``, ``cm/s2``, ``gal``, ``g``.
+    channels : mapping of str to int
+        Channel code -> column, counted from 0.
+    azimuths : mapping of str to float, optional
+        Channel code -> degrees clockwise from north. Codes that end in N, E, Z need none.
+    separator : str, optional
+        Between columns; white space if not given.
+    skip : int
+        Lines before the first sample, dimensionless.
+    time_column : int, optional
+        Column of time, s; it must be evenly spaced.
+    dt : float, optional
+        Sampling interval, s; either this or ``time_column``.
+    start : str, optional
+        Time of the first sample, ISO 8601, UTC.
+    raw : bool
+        Whether the record still has to be corrected.
+
+    Returns
+    -------
+    stream : Stream
+        One trace a channel, in the words of ``formats/vocabulary.py``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is wrong.
+    CatalogError
+        If the file cannot be read.
+    RecordRejected
+        If a row lacks a column, holds no number or breaks the spacing.
+    """
+    if units not in UNITS:
+        raise ValueError(f"units must be one of {', '.join(UNITS)}, got {units!r}")
+    if (time_column is None) == (dt is None):
+        raise ValueError(
+            f"exactly one of time_column and dt must be given, got {time_column} and {dt}"
+        )
+    site = coordinates(
+        checks.number(
+            "latitude", latitude, lambda name, value: checks.between(name, value, -90, 90)
+        ),
+        checks.number(
+            "longitude", longitude, lambda name, value: checks.between(name, value, -180, 180)
+        ),
+    )
+    directions = _directions(channels, azimuths or {})
+    rows = _rows(path, separator, skip)
+    if time_column is not None:
+        dt = _even_spacing(path, rows, _column(path, rows, time_column, "time"))
+    common = {
+        "network": network,
+        "station": station,
+        "starttime": None if start is None else UTCDateTime(start),
+        "units": "m/s2",
+        "quantity": "acceleration",
+        "processing_level": "raw" if raw else "processed",
+        "coordinates": site,
+    }
+    step = checks.number("dt", 0.0 if dt is None else dt, checks.positive)
+    return Stream(
+        trace(
+            UNITS[units] * _column(path, rows, column, code),
+            step,
+            common | directions[code] | {"channel": code},
+        )
+        for code, column in channels.items()
+    )
+
+
+def _directions(
+    channels: Mapping[str, int], azimuths: Mapping[str, float]
+) -> dict[str, dict[str, float]]:
+    if not channels:
+        raise ValueError("channels must name at least one column")
+    if unknown := set(azimuths) - set(channels):
+        raise ValueError(f"azimuths must belong to channels, got {sorted(unknown)}")
+    if unclear := [code for code in channels if code not in azimuths and code[-1:] not in _LETTERS]:
+        raise ValueError(
+            f"azimuths must tell the direction of {unclear}, whose codes do not end in N, E or Z"
+        )
+    given = {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
+    return {code: given.get(code) or _LETTERS[code[-1]] for code in channels}
+
+
+def _rows(path: str | Path, separator: str | None, skip: int) -> list[tuple[int, list[str]]]:
+    try:
+        content = Path(path).read_text(encoding="latin-1")
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
+    lines = [line.split("#")[0] for line in content.rstrip().splitlines()]
+    rows = [
+        (number, line.split(separator))
+        for number, line in enumerate(lines[skip:], skip + 1)
+        if line.strip()
+    ]
+    if len(rows) < 2:
+        raise RecordRejected(
+            str(path), f"{len(rows)} rows of samples after {skip} lines, a record needs two"
+        )
+    return rows
+
+
+def _column(
+    path: str | Path, rows: Sequence[tuple[int, list[str]]], column: int, name: str
+) -> FloatArray:
+    values = np.empty(len(rows))
+    for index, (line, fields) in enumerate(rows):
+        if not 0 <= column < len(fields):
+            raise RecordRejected(
+                str(path), f"line {line}, {name}: no column {column}, there are {len(fields)}"
+            )
+        try:
+            values[index] = float(fields[column])
+        except ValueError:
+            values[index] = np.nan
+        if not np.isfinite(values[index]):
+            raise RecordRejected(
+                str(path), f"line {line}, {name}: {fields[column].strip()!r} is not a finite number"
+            )
+    return values
+
+
+def _even_spacing(
+    path: str | Path, rows: Sequence[tuple[int, list[str]]], times: FloatArray
+) -> float:
+    dt = float(times[-1] - times[0]) / (len(times) - 1)
+    uneven = np.abs(np.diff(times) - dt) > _UNEVENNESS * abs(dt)
+    if dt <= 0 or uneven.any():
+        first = int(np.argmax(uneven))
+        problem = f"{times[first]:g} s is followed by {times[first + 1]:g} s, the mean interval is {dt:g} s"
+        raise RecordRejected(str(path), f"line {rows[first + 1][0]}, time: {problem}")
+    return float(f"{dt:.9g}")  # times are rounded, so more digits would be noise

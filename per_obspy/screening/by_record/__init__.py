@@ -1,0 +1,1 @@
+"""Compute demands of pairs from the record of their station."""

@@ -1,0 +1,1 @@
+"""Compute demands of pairs from a design spectrum or a ShakeMap."""

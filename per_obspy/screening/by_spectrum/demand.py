@@ -1,0 +1,110 @@
+"""
+Pairs judged by the spectral displacement of both buildings, where there is no record: rungs 2 and 3 of the ladder.
+
+There is no PER in a spectrum: the radius is the spectral displacement, because the gap from it and
+eq. (16) is the one that is known to be closest to the exact one (see ``design_probability.py``).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Screening
+from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
+from per_obspy.pounding.single_hit import single_hit
+from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
+from per_obspy.screening.codes import code_columns
+from per_obspy.screening.flags import period_is_derived
+from per_obspy.screening.ranking import risk_class
+from per_obspy.screening.values import both, values
+
+#: Building 1 and building 2.
+Both = tuple[FloatArray, FloatArray]
+
+
+class SpectralDemand(NamedTuple):
+    """
+    What spectral displacements ask of pairs at contact height, (n_pairs,).
+
+    Attributes
+    ----------
+    radii : pair of ndarray
+        Displacements at contact height, m.
+    correlation : ndarray
+        By eq. (16), dimensionless.
+    by_correlation, by_squares, demand : ndarray
+        Critical gap with that correlation, root of the sum of squares, and the one that decides, m.
+    squares_decide : ndarray of bool
+        Whether the root of the sum of squares does, as derived periods ask for.
+    """
+
+    radii: Both
+    correlation: FloatArray
+    by_correlation: FloatArray
+    by_squares: FloatArray
+    demand: FloatArray
+    squares_decide: NDArray[np.bool_]
+
+
+def spectral_demand(pairs: pd.DataFrame, displacement: Both) -> SpectralDemand:
+    """
+    Return what the displacements of both oscillators ask of completed pairs.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        Completed pairs.
+    displacement : pair of (n_pairs,) ndarray
+        SD of the oscillators, m.
+    """
+    share_1, share_2 = both(pairs, "participation")
+    radii = share_1 * displacement[0], share_2 * displacement[1]
+    (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
+    correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
+    by_correlation, by_squares = critical_gap(*radii, correlation), srss_gap(*radii)
+    squares_decide = period_is_derived(pairs) & (by_squares > by_correlation)
+    demand = np.where(squares_decide, by_squares, by_correlation)
+    return SpectralDemand(radii, correlation, by_correlation, by_squares, demand, squares_decide)
+
+
+def spectral_verdict(
+    pairs: pd.DataFrame,
+    displacement: Both,
+    asked: SpectralDemand,
+    probability: FloatArray,
+    screening: Screening,
+) -> pd.DataFrame:
+    """Return the pairs with the estimates, the single hit, state, class and code rules; not ranked yet."""
+    gap, demand = values(pairs, "gap"), asked.demand
+    ratio = demand_ratio(gap, demand)
+    possible = period_is_derived(pairs) | (probability >= screening.possible_from)
+    hit = single_hit(
+        *asked.radii,
+        *both(pairs, "period"),
+        *both(pairs, "contact_mass"),
+        values(pairs, "restitution"),
+        demand,
+        gap,
+    )
+    columns: dict[str, NDArray[np.generic]] = {
+        "sd_1": displacement[0],
+        "sd_2": displacement[1],
+        "correlation": asked.correlation,
+        "critical_gap_sd": asked.by_correlation,
+        "srss_gap_sd": asked.by_squares,
+        "absolute_gap_sd": absolute_gap(*asked.radii),
+        "demand": demand,
+        "demand_ratio": ratio,
+        "probability": probability,
+        "state": pounding_state(gap, demand, possible),
+        "risk_class": risk_class(ratio, screening.classes),
+        "single_hit_status": hit.status,
+        "impact_velocity": hit.impact_velocity,
+        "amplification_1": hit.amplification_1,
+        "amplification_2": hit.amplification_2,
+    }
+    return pairs.assign(**columns).join(code_columns(pairs, *asked.radii, screening.codes))

@@ -1,0 +1,116 @@
+"""
+Screening by a design or user spectrum: demands and code rules without a record.
+
+There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral
+displacement. On broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact
+one, a log-standard deviation of 0.14, and is too small in two of three cases. A gap below it is a
+yes; the probability, which knows of that error, makes others possible, and derived periods ask for
+SRSS at least.
+"""
+
+import numpy as np
+import pandas as pd
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Building, Screening
+from per_obspy.errors import Rejection
+from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.schema import Column
+from per_obspy.screening.by_spectrum.demand import spectral_demand, spectral_verdict
+from per_obspy.screening.by_spectrum.design_probability import design_probability
+from per_obspy.screening.by_spectrum.design_spectrum import DesignSpectrum, displacement_at, within
+from per_obspy.screening.ranking import worst_first
+from per_obspy.screening.values import both
+
+#: What this table adds to the columns that a risk table has as well.
+DESIGN: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("spectrum", "str", "", "file of the spectrum that was used instead of a record"),
+        Column(
+            "srss_gap_sd", "float64", "m", "root of the sum of the squared SD, at contact height"
+        ),
+        Column("absolute_gap_sd", "float64", "m", "sum of the SD, at contact height"),
+        Column(
+            "demand_rule",
+            "str",
+            "",
+            "what the demand is: sd_white_noise, or sd_srss for derived periods",
+        ),
+        Column(
+            "probability",
+            "float64",
+            "1",
+            "of pounding under the spectrum, with what is uncertain of the pair",
+        ),
+    )
+}
+
+LEADING = (
+    "rank", "pair_id", "risk_class", "state", "probability", "gap", "demand", "demand_rule", "demand_ratio",
+    "impact_velocity", "single_hit_status", "amplification_1", "amplification_2", "spectrum", "sd_1", "sd_2",
+    "correlation", "critical_gap_sd", "srss_gap_sd", "absolute_gap_sd",
+)  # fmt: skip
+
+
+def design_table(
+    spectrum: DesignSpectrum, pairs: pd.DataFrame, building: Building, screening: Screening
+) -> pd.DataFrame:
+    """
+    Return one row a pair, worst first, for a design or user spectrum.
+
+    Parameters
+    ----------
+    spectrum : DesignSpectrum
+        From :func:`~per_obspy.screening.by_spectrum.design_spectrum.read_design_spectrum`.
+    pairs : DataFrame
+        From :func:`per_obspy.read_pairs`.
+    building : Building
+        What is assumed where the inventory is silent.
+    screening : Screening
+        Risk classes and the region's values for code rules.
+
+    Returns
+    -------
+    DataFrame
+        ``LEADING``, the rules of :func:`~per_obspy.screening.codes.code_columns`, then the
+        completed pair table; ``attrs["rejected"]`` holds the pairs outside the periods or dampings
+        of the spectrum, with both.
+    """
+    complete = completed_pairs(pairs, building)
+    inside = np.all([within(spectrum, *one) for one in _oscillators(complete)], axis=0)
+    rejected = _outside(spectrum, complete[~inside])
+    table = _judged(spectrum, complete[inside].reset_index(drop=True), screening)
+    ranked = worst_first(table, table["impact_velocity"])
+    others = [name for name in ranked if name not in LEADING]
+    ranked = ranked[[*LEADING, *others]]
+    ranked.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
+    return ranked
+
+
+def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
+    """Return period and damping of buildings 1 and of buildings 2."""
+    return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
+
+
+def _outside(spectrum: DesignSpectrum, pairs: pd.DataFrame) -> tuple[Rejection, ...]:
+    """Return why pairs cannot be judged by the spectrum."""
+    ranges = {"period": (spectrum.periods, " s"), "damping": (spectrum.dampings, "")}
+    reasons: list[list[str]] = [[] for _ in range(len(pairs))]
+    for name in ("period_1", "period_2", "damping_1", "damping_2"):
+        known, unit = ranges[name[:-2]]
+        for row, value in enumerate(pairs[name].to_numpy(np.float64)):
+            if not known[0] <= value <= known[-1]:
+                span = f"{known[0]:g} to {known[-1]:g}{unit}"
+                reasons[row].append(f"{name} = {value:g}{unit} is outside the spectrum's {span}")
+    named = zip(pairs["pair_id"], reasons, strict=True)
+    return tuple(Rejection("pair", name, spectrum.name, None, tuple(why)) for name, why in named)
+
+
+def _judged(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    first, second = (displacement_at(spectrum, *one) for one in _oscillators(pairs))
+    asked = spectral_demand(pairs, (first, second))
+    probability = design_probability(spectrum, pairs)
+    rule = np.where(asked.squares_decide, "sd_srss", "sd_white_noise").astype(object)
+    table = pairs.assign(spectrum=spectrum.name, demand_rule=rule)
+    return spectral_verdict(table, (first, second), asked, probability, screening)

@@ -1,0 +1,1 @@
+"""Assign stations to pairs and interpolate ground motion between stations."""

@@ -1,0 +1,1 @@
+"""Sum risk over areas, compare it with observations and combine scenarios."""

@@ -1,0 +1,1 @@
+"""Compute the probability of pounding of pairs."""

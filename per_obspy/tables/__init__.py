@@ -1,0 +1,1 @@
+"""Read and write result tables: risk, totals, ensemble and their parts."""

@@ -1,0 +1,93 @@
+"""The table of processed records: corners, windows and why they are what they are, one row a record."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from per_obspy.files import written_whole
+
+#: column -> (unit, meaning), in the order of the table; every number of ``stats.per_obspy`` that
+#: one can ask for
+COLUMNS: dict[str, tuple[str, str]] = {
+    "id": ("", "network.station.location.channel"),
+    "file": ("", "MiniSEED file with the processed samples, m/s2, pads included"),
+    "source": ("", "file that was processed"),
+    "start": ("", "time of the first sample, UTC, pads included"),
+    "delta": ("s", "sampling interval"),
+    "npts": ("1", "number of samples, pads included"),
+    "latitude": ("degrees", "north"),
+    "longitude": ("degrees", "east"),
+    "elevation": ("m", "of the station"),
+    "sensor_azimuth": ("degrees", "clockwise from north; empty for verticals"),
+    "sensor_dip": ("degrees", "down from horizontal; up is -90"),
+    "azimuth_source": ("", "metadata, channel code or unknown"),
+    "sensor_location": ("", "where the header puts the sensor"),
+    "conversion": ("", "how counts became m/s2; empty for physical records"),
+    "onset": ("", "first wave, UTC"),
+    "onset_source": ("", "pick, travel time or configuration"),
+    "noise": ("s", "length of the noise window, from the first sample after the pad"),
+    "signal_to_noise": ("1", "of the best octave, smoothed"),
+    "clear_from": ("Hz", "lowest frequency at which the signal clears the noise"),
+    "clear_to": ("Hz", "highest frequency at which the signal clears the noise"),
+    "baseline": ("", "kind of baseline that was removed beside the mean"),
+    "residual_velocity": (
+        "m/s",
+        "left at the end of the shaking before any filter: a baseline that shifted",
+    ),
+    "highpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
+    "highpass_source": ("", "why it is there; shared: the other horizontal needs it"),
+    "own_highpass": ("Hz", "what this component alone would have had"),
+    "lowest_highpass": ("Hz", "what noise and duration would have allowed"),
+    "lowest_highpass_source": ("", "which of them"),
+    "lowpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
+    "lowpass_source": ("", "why it is there"),
+    "own_lowpass": ("Hz", "what this component alone would have had"),
+    "order": ("1", "n of the Butterworth filter; empty for records that were processed already"),
+    "taper": ("1", "fraction of the record at each end"),
+    "pad_before": ("s", "zeros before the record, filtered with it"),
+    "pad_after": ("s", "zeros after the record, filtered with it"),
+    "clock_shift": ("s", "by which the samples were moved to those of the other horizontal"),
+    "shortest_period": ("s", "shortest usable natural period"),
+    "longest_period": ("s", "longest usable natural period"),
+    "failed_checks": (
+        "",
+        "names in the configuration of the checks that warn, separated by spaces",
+    ),
+    "warnings": ("", "failed checks that do not reject, with figure and threshold"),
+    "notes": ("", "the same, without consequence"),
+}
+
+
+def processed_table(descriptions: Mapping[str, Iterable[Mapping[str, Any]]]) -> pd.DataFrame:
+    """
+    Return one row a record.
+
+    Parameters
+    ----------
+    descriptions : mapping
+        Name of the file -> what it is told to hold, from ``records.processed.read_descriptions``.
+
+    Returns
+    -------
+    DataFrame
+        With the columns of ``COLUMNS``; empty where a record has nothing.
+    """
+    rows = [
+        {**one, **one.get("coordinates", {}), **one.get("per_obspy", {}), "file": name}
+        for name, traces in descriptions.items()
+        for one in traces
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def write_processed_table(
+    descriptions: Mapping[str, Iterable[Mapping[str, Any]]], folder: Path
+) -> None:
+    """Write ``processed.csv`` and ``processed.columns.csv``; see :func:`processed_table`."""
+    with written_whole(folder / "processed.csv") as part:
+        processed_table(descriptions).to_csv(part, index=False)
+    rows = [(name, *meaning) for name, meaning in COLUMNS.items()]
+    with written_whole(folder / "processed.columns.csv") as part:
+        pd.DataFrame(rows, columns=["name", "unit", "meaning"]).to_csv(part, index=False)

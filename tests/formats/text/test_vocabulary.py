@@ -1,0 +1,115 @@
+"""Words, directions and codes that all formats share."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from obspy import UTCDateTime
+
+from per_obspy.errors import RecordRejected
+from per_obspy.formats.text.lines import Text
+from per_obspy.formats.text.vocabulary import (
+    channel_code,
+    coordinates,
+    full_year,
+    horizontal,
+    orientation,
+    trace,
+    utc,
+)
+
+TEXT = Text("some.file", ["first", "second"])
+AZIMUTHS = st.floats(0, 360, allow_nan=False)
+
+
+@given(AZIMUTHS)
+def test_components_at_right_angles_have_different_codes(azimuth: float):
+    # catches a class boundary that is closed on both sides: 45 and 135 degrees
+    one, other = (channel_code(100, horizontal(azimuth + turn)) for turn in (0, 90))
+    assert one != other
+    assert one[:2] == other[:2] == "HN"
+
+
+@given(AZIMUTHS)
+def test_a_reversed_sensor_is_never_called_north_or_east(azimuth: float):
+    # catches folding azimuths to half a circle: N with reversed polarity would be read as north
+    codes = [channel_code(100, horizontal(azimuth + turn))[-1] for turn in (0, 180)]
+    assert not set(codes) <= {"N", "E"}
+
+
+@pytest.mark.parametrize(
+    ("rate", "band"),
+    [(50, "B"), (79.9, "B"), (80, "H"), (249.9, "H"), (250, "C"), (1000, "F"), (5, "M")],
+)
+def test_band_codes_of_seed(rate: float, band: str):
+    assert channel_code(rate, {"sensor_dip": -90.0}) == f"{band}NZ"
+
+
+@pytest.mark.parametrize(
+    ("words", "azimuth"),
+    [("N21E", 21), ("S 16 E", 164), ("S05W", 185), ("N80W", 280), ("S90E", 90), ("N00E", 0), ("N90E", 90), ("360", 0),
+     ("360 Deg", 0), ("118 DEG", 118), ("NS", 0), ("WE", 90), ("West", 270), ("072.5", 72.5)],
+)  # fmt: skip
+def test_horizontal_directions(words: str, azimuth: float):
+    assert orientation(words) == {"sensor_azimuth": azimuth, "sensor_dip": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("words", "dip"),
+    [("Up", -90), ("UP", -90), ("V", -90), ("U-D", -90), ("DOWN", 90), ("DWN", 90)],
+)
+def test_vertical_directions(words: str, dip: float):
+    assert orientation(words) == {"sensor_dip": dip}
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["", "H1", "L", "Long", "Tran", "Radial", "361", "N100E", "N E", "Other", "9999", "-20"],
+)
+def test_unknown_directions_are_absent(words: str):
+    assert orientation(words) == {}
+
+
+@pytest.mark.parametrize(
+    "place", [(0.0, 0.0), (None, 5.0), (5.0, None), (91.0, 0.0), (0.0, 181.0), (np.inf, 1.0)]
+)
+def test_unknown_and_impossible_coordinates_are_absent(place: tuple[float | None, float | None]):
+    assert coordinates(*place) == {}
+
+
+def test_words_that_are_unknown_are_left_out():
+    words = {
+        "station": "A/ 1",
+        "event": {"name": None},
+        "coordinates": {},
+        "instrument": {"model": "X", "serial": None},
+    }
+    stats = trace(np.zeros(2), 0.01, words | {"header_peak": None}).stats
+    assert stats.station == "A1"  # a station's code names files
+    assert stats.instrument == {"model": "X"}
+    assert not {"event", "coordinates", "header_peak"} & set(stats)
+
+
+def test_clocks_of_other_zones():
+    assert utc(TEXT, 0, "time", (2021, 4, 18), (7, 11, 30.5), 8) == UTCDateTime(
+        "2021-04-17T23:11:30.5"
+    )
+    assert utc(TEXT, 0, "time", (2019, 12, 31), (20, 0, 0), -8) == UTCDateTime(
+        "2020-01-01T04:00:00"
+    )
+
+
+@pytest.mark.parametrize(
+    ("year", "full"), [("33", 1933), ("99", 1999), ("00", 2000), ("32", 2032), ("1906", 1906)]
+)
+def test_two_digits_of_a_year(year: str, full: int):
+    assert full_year(year) == full
+
+
+@pytest.mark.parametrize(
+    "date",
+    [(2020, 2, 30), (1899, 1, 1), (2100, 1, 1), (2020, 13, 1), (2020, 0, 1), (2020, 1, 10**12)],
+)
+def test_impossible_dates_are_refused(date: tuple[int, ...]):
+    with pytest.raises(RecordRejected, match=r"some\.file: line 2, time: "):
+        utc(TEXT, 1, "time", date)

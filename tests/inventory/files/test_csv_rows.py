@@ -1,0 +1,162 @@
+"""Files of pairs in chunks: the same rows, lines and reasons as in one piece."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from pandas.testing import assert_frame_equal
+
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.files.reading import PairInventory, checked_chunk, read_pairs
+
+HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note,zone"
+
+
+def _row(name, gap="0.05", note="shop", zone=3):
+    return f"{name},{gap},-67.95,-20.35,12,-67.9501,-20.35,9.5,{note},{zone}"
+
+
+ROWS = [
+    _row("a"),
+    _row("b", gap="five"),
+    "",
+    _row("c"),
+    "broken,1",
+    _row("a"),
+    _row("d", gap="-1"),
+    _row(" c "),
+    _row("e", note='"x, y"'),
+    "broken too",
+]
+
+
+@pytest.fixture
+def csv(tmp_path):
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, *ROWS]) + "\n")
+    return path
+
+
+def _in_chunks(paths, size):
+    tables = [checked_chunk(chunk) for chunk in PairInventory(paths).chunks(size)]
+    rejected = [one for table in tables for one in table.attrs["rejected"]]
+    for table in tables:
+        table.attrs = {}
+    return pd.concat([table for table in tables if len(table)], ignore_index=True), rejected
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 100])
+def test_chunks_hold_what_the_whole_file_holds(csv, size):
+    # would catch lines counted within a chunk, names that are only unique within one, types that
+    # depend on one
+    whole = read_pairs(csv)
+    rejected = list(whole.attrs["rejected"])
+    whole.attrs = {}
+    table, left_out = _in_chunks([csv], size)
+    assert_frame_equal(table, whole)
+    assert left_out == rejected
+    assert [(one.name, one.row) for one in left_out] == [
+        ("b", 3), ("broken", 6), ("a", 7), ("d", 8), ("c", 9), ("broken too", 11),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [1, 2, 100])
+def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, size):
+    # the reader takes everything up to the next mark, or to the end, for one cell
+    path = tmp_path / "pairs.csv"
+    rows = [
+        _row("a"),
+        "short,1",
+        _row("b", note='"it says'),
+        _row("c"),
+        _row("d", note='so"'),
+        "short too",
+        _row("e"),
+    ]
+    path.write_text("\n".join([HEADER, *rows, _row("f", zone='"3'), _row("g"), ""]))
+    table, rejected = _in_chunks([path], size)
+    assert table["pair_id"].tolist() == ["a", "e"]
+    reason = "{} has a line break: is a quotation mark not closed? {} further lines are lost"
+    assert [(one.name, one.row, *one.reasons) for one in rejected] == [
+        ("short", 3, "2 columns, the header has 10"),
+        ("b", 4, reason.format("note", 2)),
+        ("short too", 7, "1 columns, the header has 10"),
+        ("f", 9, reason.format("zone", 1)),
+    ]
+
+
+def test_a_quotation_mark_that_swallows_a_block_of_the_reader_is_found(tmp_path):
+    # blocks have 1 MB: here the reader itself gives up, without a line; the last block is read to
+    # its end
+    rows = [_row(f"p{i}", note="x" * 100) for i in range(20_000)]
+    path = tmp_path / "pairs.csv"
+    path.write_text(
+        "\n".join([HEADER, *rows[:19_000], _row("open", note='"x'), *rows[19_000:], ""])
+    )
+    table, rejected = _in_chunks([path], 7000)
+    assert (len(table), [(one.name, one.row) for one in rejected]) == (19_000, [("open", 19_002)])
+    path.write_text("\n".join([HEADER, *rows[:5000], _row("open", note='"x'), *rows[5000:], ""]))
+    with pytest.raises(
+        CatalogError, match=r"pairs\.csv: line 5002 has a quotation mark that is not closed on it"
+    ):
+        read_pairs(path)
+
+
+def test_a_quotation_mark_inside_a_cell_is_text(tmp_path):
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, _row("a", note='a 5" wall'), _row("b")]))
+    table, rejected = _in_chunks([path], 100)
+    assert table["note"].tolist() == ['a 5" wall', "shop"]
+    assert rejected == []
+
+
+@pytest.mark.parametrize("size", [1, 3, 100])
+def test_parquet_in_chunks(csv, tmp_path, size):
+    whole = read_pairs(csv)
+    whole.attrs = {}
+    whole.to_parquet(tmp_path / "pairs.parquet")
+    table, rejected = _in_chunks([tmp_path / "pairs.parquet"], size)
+    assert_frame_equal(table, whole)
+    assert rejected == []
+
+
+def test_a_name_in_two_files_is_repeated_in_the_second(csv, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join([HEADER, _row("a"), _row("z")]))
+    _, rejected = _in_chunks([csv, other], 2)
+    assert rejected[-1].source == str(other)
+    assert rejected[-1].reasons == ("pair_id = 'a' stands in an earlier row already",)
+
+
+def test_numbers_of_carried_columns_are_numbers_in_every_chunk(tmp_path):
+    # would catch a type that is guessed from the first rows: one zone is no whole number, one note
+    # no number
+    path = tmp_path / "pairs.csv"
+    rows = [_row(f"p{i}", note=i, zone=i if i != 4 else 4.5) for i in range(9)]
+    path.write_text("\n".join([HEADER, *rows, _row("q", note="x", zone="NA")]))
+    for size in (2, 100):
+        table, _ = _in_chunks([path], size)
+        assert table["zone"].dtype == np.float64
+        assert table["note"].tolist() == [*map(str, range(9)), "x"]
+        assert np.isnan(table["zone"].iloc[-1])
+
+
+def test_an_inventory_of_many_rows_in_a_csv_file(tmp_path):
+    # more than one block of the reader, 1 MB
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, *(_row(f"p{i}", note="x" * 100) for i in range(9000))]))
+    inventory = PairInventory([path])
+    lines = np.concatenate([chunk.rows.lines for chunk in inventory.chunks(1000)])
+    assert inventory.count == 9000
+    assert lines.tolist() == list(range(2, 9002))
+
+
+def test_whole_file_faults_come_before_the_first_chunk(tmp_path):
+    empty = tmp_path / "empty.csv"
+    empty.write_text(HEADER + "\n")
+    with pytest.raises(CatalogError, match="the table has no rows"):
+        PairInventory([empty])
+    empty.write_text("pair_id,gap\na,1\n")
+    with pytest.raises(CatalogError, match="missing column"):
+        PairInventory([empty])
+    with pytest.raises(CatalogError, match="no such file"):
+        PairInventory([tmp_path / "nothing.csv"])

@@ -1,0 +1,123 @@
+"""Tasks on processes: nothing is lost, none stops the others, and few are ahead of the results."""
+
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future
+from math import isqrt
+from pathlib import Path
+
+import pytest
+
+from per_obspy.errors import CatalogError
+from per_obspy.jobs.parallel import AHEAD, results
+
+#: Ends a process as the system does with one that takes too much memory.
+DIES = "__import__('os')._exit(9)"
+
+
+def lost(number, reason):
+    return f"{number}: {reason}"
+
+
+class Here(Executor):
+    """Do the work at once, in this process."""
+
+    def submit(self, function, /, *arguments):
+        future = Future()
+        try:
+            future.set_result(function(*arguments))
+        except ValueError as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_task_has_a_result_or_a_reason(workers):
+    found = list(results(iter([1, -2, 9, 16]), isqrt, lost, workers, None))
+    assert sorted(map(str, found)) == sorted(
+        ["1", "-2: ValueError: isqrt() argument must be nonnegative", "3", "4"]
+    )
+
+
+def _refused(number):
+    raise CatalogError("pairs.csv", f"row {number} is no row")
+
+
+def test_what_the_user_got_wrong_is_no_error_of_the_program():
+    assert list(results([7], _refused, lost, 1, None)) == ["7: pairs.csv: row 7 is no row"]
+
+
+def test_a_worker_that_dies_takes_only_its_task_with_it():
+    # would catch tasks that waited behind the guilty one and were forgotten, or a pool that is not
+    # replaced
+    tasks = [DIES if number == 3 else str(number) for number in range(12)]
+    found = list(results(tasks, eval, lost, 2, None))
+    assert f"{DIES}: its worker process died" in found
+    assert sorted(one for one in found if isinstance(one, int)) == [
+        number for number in range(12) if number != 3
+    ]
+
+
+SLEEPS = """
+import os, sys, time
+from per_obspy.jobs.parallel import results
+task = f"open({sys.argv[1]!r} + str(__import__('os').getpid()), 'w').close() or __import__('time').sleep(100)"
+if __name__ == "__main__":
+    list(results([task, task], eval, lambda *_: None, 2, None))
+"""
+
+
+def _waited(condition):
+    for _ in range(300):
+        if condition():
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _is_running(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_workers_end_when_the_run_is_killed(tmp_path):
+    # would catch workers that wait for their next task for ever, with all their memory
+    script = tmp_path / "sleeps.py"
+    script.write_text(SLEEPS)
+    (tmp_path / "at_work").mkdir()
+    run = subprocess.Popen([sys.executable, str(script), str(tmp_path / "at_work") + os.sep])
+    assert _waited(lambda: len(list((tmp_path / "at_work").iterdir())) == 2)
+    workers = [int(file.name) for file in (tmp_path / "at_work").iterdir()]
+    assert all(map(_is_running, workers))
+    run.kill()
+    run.wait()
+    assert _waited(lambda: not any(map(_is_running, workers)))
+
+
+def test_an_executor_that_was_given_does_the_work():
+    assert sorted(results([1, 4, 9], isqrt, lost, 1, Here())) == [1, 2, 3]
+
+
+def test_few_tasks_are_ahead_of_their_results():
+    asked = []
+
+    def tasks():
+        for number in range(40):
+            asked.append(number)
+            yield number
+
+    found = results(tasks(), isqrt, lost, 2, None)
+    for done in range(1, 20):
+        next(found)
+        assert len(asked) <= done + 2 * AHEAD  # would catch a pool that takes all tasks at once
+    list(found)
+    assert len(asked) == 40
+
+
+def test_nothing_to_do_is_done():
+    assert list(results([], isqrt, lost, 2, None)) == []

@@ -1,0 +1,121 @@
+"""Roots and largest values within a step."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from per_obspy.kernels.oscillator.exact_step import step, within_step
+
+
+def _series(*coefficients):
+    series = np.zeros(within_step.TERMS + 1)
+    series[: len(coefficients)] = coefficients
+    return series
+
+
+@pytest.mark.parametrize(
+    "roots",
+    [(0.1,), (0.2, 0.3), (0.2, 0.2001), (0.05, 0.25, 0.45), (0.1, 0.1 + 1e-7, 0.4), (-0.1, 0.7)],
+)
+def test_no_root_is_missed(roots):
+    # catches a search that trusts the signs at both ends: two close roots change none of them
+    coefficients = np.polynomial.polynomial.polyfromroots(roots)
+    points = np.empty(within_step.POINTS)
+    count = within_step.stationary_phases(_series(*coefficients), 6, 0.5, points)
+    assert np.all(np.diff(points[:count]) >= 0)
+    assert points[0] == 0.0
+    assert points[count - 1] == 0.5
+    for root in roots:
+        if 0 < root < 0.5:
+            # the root's tolerance, 1e-8 of a piece; of a nearly double root the value matters, not
+            # the place
+            value = abs(np.polynomial.polynomial.polyval(points[:count], coefficients)).min()
+            assert np.abs(points[:count] - root).min() < 2e-7 or value < 1e-14
+
+
+def _largest(u, z, start, end, damping, phase):
+    largest = np.zeros(4)
+    wanted = np.ones(4, dtype=bool)
+    within_step.largest_in_step(
+        u, z, start, end, damping, phase, wanted, within_step.workspace(), largest
+    )
+    return largest
+
+
+def _dense(case, parts):
+    u, z, start, end, damping, phase = case
+    values = []
+    for part in np.linspace(1 / parts, 1, parts):
+        a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase * part)
+        stop = start + (end - start) * part
+        x, w = (
+            a11 * u + a12 * z + b11 * start + b12 * stop,
+            a21 * u + a22 * z + b21 * start + b22 * stop,
+        )
+        values.append((x * x + w * w, abs(x), abs(w), abs(x + 2 * damping * w)))
+    return np.max(values, axis=0)
+
+
+CASES = [
+    (1.0, 0.05, -0.5, 0.3, 0.05, 0.3),
+    (0.2, -0.9, 0.9, -1.5, 0.0, 0.45),
+    (0.0, 0.0, 1.0, -1.0, 0.3, 1.9),
+    (-0.7, 0.3, 2.0, 1.0, 0.9, 4.0),
+    (0.4, 1.0, -3.0, 3.0, 0.02, 12.0),
+]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_largest_values_of_a_step(case):
+    # 4000 values a step miss a peak by (phase / 4000)² / 8 of it
+    u, z, *_ = case
+    found = np.maximum(_largest(*case), [u * u + z * z, abs(u), abs(z), abs(u + 2 * case[4] * z)])
+    dense = np.maximum(
+        _dense(case, 4000), [u * u + z * z, abs(u), abs(z), abs(u + 2 * case[4] * z)]
+    )
+    assert_allclose(found, dense, rtol=1e-5)
+    assert np.all(found >= dense * (1 - 1e-12))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_not_wanted_cannot_matter(seed):
+    # catches bounds that are too small: values between the samples never exceed the largest unless
+    # marked
+    random = np.random.default_rng(seed)
+    u, z, start, end = random.normal(size=4)
+    damping, phase = random.uniform(0, 0.9), random.uniform(0.05, 3.0)
+    a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase)
+    u_end, z_end = (
+        a11 * u + a12 * z + b11 * start + b12 * end,
+        a21 * u + a22 * z + b21 * start + b22 * end,
+    )
+    dense = _dense((u, z, start, end, damping, phase), 200)
+    square = max(u * u + z * z, u_end * u_end + z_end * z_end)
+    radius = within_step.radius_bound(square, max(abs(start), abs(end)), damping, phase)
+    assert radius**2 >= dense[0]
+    rates = within_step.rate_bounds(
+        radius, max(abs(start), abs(end)), abs(end - start), damping, phase
+    )
+    ends = np.array(
+        [
+            (x * x + w * w, abs(x), abs(w), abs(x + 2 * damping * w))
+            for x, w in ((u, z), (u_end, z_end))
+        ]
+    )
+    assert np.all(ends.max(axis=0) + within_step.slacks(rates, damping, phase) >= dense)
+    slack = within_step.velocity_slack(ends[:, 2].max(), rates, abs(end - start), damping, phase)
+    assert ends[:, 2].max() + slack >= dense[2]
+    assert (
+        within_step.step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase)
+        >= dense[2]
+    )
+    known = np.full(4, np.inf)
+    for row in range(4):
+        known[row] = dense[row] * (1 - 1e-6)
+        wanted = np.zeros(4, dtype=bool)
+        within_step.find_wanted(
+            u, z, start, u_end, z_end, end, damping, phase, radius, 4, known, wanted
+        )
+        if ends[:, row].max() < known[row]:
+            assert wanted.any()
+        known[row] = np.inf

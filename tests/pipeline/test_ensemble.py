@@ -1,0 +1,171 @@
+"""``per-obspy screen`` of an ensemble as a user meets it: two small simulated earthquakes and one inventory."""
+
+import json
+import shutil
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+
+from per_obspy import cli
+
+from .test_run import SPECTRA
+
+PAIRS = """\
+pair_id,longitude_1,latitude_1,height_1,period_1,longitude_2,latitude_2,height_2,period_2,gap
+a,0.3,0.0,12,0.5,0.3001,0.0,12,1.0,0.05
+b,0.3,0.0,12,0.3,0.3001,0.0,12,0.9,0.10
+c,0.3,0.0,12,0.3,0.3001,0.0,12,0.9,0.0
+"""
+
+ENSEMBLE = """\
+name = "two"
+output = "both"
+[[scenario]]
+name = "large"
+run = "large.toml"
+rate = 0.01
+[[scenario]]
+name = "small"
+run = "small.toml"
+rate = 0.03
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Both runs, done; the ensemble is not."""
+    folder = tmp_path_factory.mktemp("ensemble")
+    (folder / "pairs.csv").write_text(PAIRS)
+    for name, magnitude in (("large", 7.0), ("small", 5.5)):
+        (folder / f"{name}_event.toml").write_text(
+            f"[scenario]\nstations = 1\nmagnitude = {magnitude}\ndt = 0.02\n"
+        )
+        (folder / f"{name}.toml").write_text(
+            f'name = "{name}"\noutput = "{name}"\nworkers = 1\nsimulation = "{name}_event.toml"\n'
+            f'[pairs]\nfile = "pairs.csv"\n{SPECTRA}'
+        )
+    (folder / "ensemble.toml").write_text(ENSEMBLE)
+    _call(folder)
+    shutil.rmtree(folder / "both")
+    return folder
+
+
+def _call(folder, *arguments):
+    """Return exit code of ``per-obspy screen`` on the ensemble."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            sys, "argv", ["per-obspy", "screen", str(folder / "ensemble.toml"), *arguments]
+        )
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+    return stop.value.code or 0
+
+
+@pytest.fixture
+def copied(done, tmp_path):
+    shutil.copytree(done, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+def test_every_scenario_is_run_and_the_probabilities_are_joined(copied, capsys):
+    shutil.rmtree(copied / "small")
+    assert _call(copied) == 0
+    out, err = capsys.readouterr()
+    assert "SIMULATED" in out
+    assert "2 scenarios, 3 pairs; 0 rejected" in out
+    assert "small: stations: 1 of 1" in err
+    assert "large: stations" not in err  # it was done
+    table = pd.read_csv(copied / "both" / "ensemble.csv").set_index("pair_id")
+    large, small = (
+        pd.read_parquet(copied / name / "risk.parquet")
+        .set_index("pair_id")["probability"]
+        .reindex(table.index)
+        for name in ("large", "small")
+    )
+    assert_allclose(table["annual_probability"], 1 - np.exp(-0.01 * large - 0.03 * small))
+    assert_allclose(table["probability"], 0.25 * large + 0.75 * small)
+    assert table.loc["c", "probability"] == 1.0  # touching buildings meet in any earthquake
+
+
+def test_the_same_again_does_nothing_and_a_new_rate_runs_nothing(copied, capsys):
+    _call(copied)
+    capsys.readouterr()
+    assert _call(copied, "--json") == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["did_nothing"]
+    assert err == ""
+    (copied / "ensemble.toml").write_text(ENSEMBLE.replace("0.03", "0.06"))
+    assert _call(copied, "--json") == 0
+    out, err = capsys.readouterr()
+    assert not json.loads(out)["did_nothing"]
+    assert "stations" not in err
+    assert [one["rate"] for one in json.loads(out)["scenarios"]] == [0.01, 0.06]
+
+
+def test_what_an_ensemble_stands_on_is_told(copied, capsys):
+    _call(copied, "-o", str(copied / "elsewhere"))
+    record = json.loads((copied / "elsewhere" / "ensemble.json").read_text())
+    keys = [
+        json.loads((copied / name / "run.json").read_text())["key"] for name in ("large", "small")
+    ]
+    assert [one["key"] for one in record["scenarios"]] == keys
+    assert str(copied) not in json.dumps(record)
+    capsys.readouterr()
+
+
+def test_runs_with_different_inventories_reject_what_they_do_not_share(copied, capsys):
+    (copied / "fewer.csv").write_text(PAIRS.replace("a,0.3,", "d,0.3,").replace("0.10", "0.20"))
+    text = (copied / "small.toml").read_text()
+    (copied / "small.toml").write_text(text.replace("pairs.csv", "fewer.csv"))
+    assert _call(copied) == 0
+    assert "1 pairs; 3 rejected" in capsys.readouterr().out
+    rejected = pd.read_csv(copied / "both" / "rejected.csv").set_index("name")["reasons"]
+    assert rejected["a"].startswith("no probability in small")
+    assert rejected["d"].startswith("no probability in large")
+    assert rejected["b"] == "gap = 0.1 m in one scenario and 0.2 m in another"
+
+
+def test_nothing_usable_in_a_scenario_exits_with_3(copied, capsys):
+    text = (copied / "small.toml").read_text()
+    (copied / "small.toml").write_text(text + "[screening]\nlargest_distance = 1.0\n")
+    assert _call(copied) == 3
+    assert "nothing usable was left: see" in capsys.readouterr().err
+
+
+WRONG = {
+    "mixed": (("rate = 0.03", "weight = 0.03"), "'small' has a weight, others have the other one"),
+    "both": (("rate = 0.03", "rate = 0.03\nweight = 1"), "'small' needs either a weight or a rate"),
+    "neither": (("rate = 0.03\n", ""), "'small' needs either a weight or a rate"),
+    "negative": (
+        ("rate = 0.03", "rate = -0.03"),
+        "scenario.1.rate: Input should be greater than or equal to 0",
+    ),
+    "infinite": (("rate = 0.03", "rate = inf"), "scenario.1.rate: Input should be a finite number"),
+    "all 0": (("rate = 0.03", "rate = 0.0"), "weights or rates must have a positive sum"),
+    "same name": (('name = "small"', 'name = "Large"'), "name: 'Large' stands twice"),
+    "same run": (
+        ("small.toml", "large.toml"),
+        "scenario 'small' has the output folder of scenario 'large'",
+    ),
+    "a run's folder": (
+        ('"both"', '"small"'),
+        "scenario 'small' has the output folder of the ensemble",
+    ),
+    "no such run": (("small.toml", "absent.toml"), "absent.toml: cannot be read"),
+    "no run": (("small.toml", "ensemble.toml"), "ensemble.toml: scenario: unknown key"),
+    "misspelt": (("rate = 0.03", "rates = 0.03"), "scenario.1.rates: unknown key"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_wrong_ensemble_stops_with_one_line(copied, capsys, fault):
+    change, message = WRONG[fault]
+    text = ENSEMBLE.replace("0.01", "0.0") if fault == "all 0" else ENSEMBLE
+    (copied / "ensemble.toml").write_text(text.replace(*change))
+    assert _call(copied) == 2
+    _, err = capsys.readouterr()
+    assert err.count("\n") == 1
+    assert message in err

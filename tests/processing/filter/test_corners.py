@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+from obspy import Stream, Trace
+from obspy.core import AttribDict
+
+from per_obspy.config import Processing
+from per_obspy.processing.filter.corners import (
+    clean_corner,
+    corners_shared,
+    fallback_highpass,
+    highest_corner,
+    lowest_highpass,
+)
+
+TABLE = Processing().fallback_highpass
+
+
+def trace(highpass=0.1, lowpass=30.0):
+    numbers = AttribDict(
+        highpass=highpass, lowpass=lowpass, highpass_source="noise", lowpass_source="noise"
+    )
+    return Trace(np.zeros(1000), {"delta": 0.01, "per_obspy": numbers})
+
+
+@pytest.mark.parametrize(
+    ("magnitude", "corner"), [(2.0, 0.5), (3.5, 0.3), (5.4, 0.3), (7.1, 0.1), (None, 0.08)]
+)
+def test_the_table_is_used_from_each_magnitude_on(magnitude, corner):
+    found = fallback_highpass(magnitude, TABLE, 0.08)
+    assert found.frequency == corner
+    assert ("constant" if magnitude is None else "table") in found.reason
+
+
+def test_a_magnitude_below_the_table_gets_the_constant():
+    assert fallback_highpass(1.0, {3.0: 0.3}, 0.08).frequency == 0.08
+
+
+def test_both_horizontals_get_the_narrower_band():
+    out = corners_shared(Stream([trace(0.1, 20.0), trace(0.3, 30.0)]))
+    assert [(one.stats.per_obspy.highpass, one.stats.per_obspy.lowpass) for one in out] == [
+        (0.3, 20.0)
+    ] * 2
+    assert out[0].stats.per_obspy.own_highpass == 0.1
+    assert [one.stats.per_obspy.highpass_source for one in out] == ["shared", "noise"]
+
+
+def test_limits_from_length_and_sampling():
+    assert lowest_highpass(trace()).frequency == pytest.approx(0.1)
+    assert highest_corner(trace(), 40.0).frequency == pytest.approx(37.5)
+    assert highest_corner(trace(), 20.0).frequency == 20.0
+
+
+def test_the_reason_says_what_decided():
+    clean = clean_corner(trace(), lowest_highpass(trace()), 0.5, 0.02, 5)
+    assert clean.reason == "one cycle in the record"

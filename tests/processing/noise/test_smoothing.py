@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from obspy.signal.konnoohmachismoothing import konno_ohmachi_smoothing
+
+from per_obspy.processing.noise.smoothing import konno_ohmachi
+
+STEP = 0.05
+CENTRES = tuple(np.geomspace(0.5, 20.0, 25))
+
+
+def test_against_the_full_window_of_obspy():
+    frequencies = STEP * np.arange(1, 601)
+    spectrum = 1 + np.random.default_rng(1).random(600) + frequencies
+    places = np.searchsorted(frequencies, CENTRES)
+    expected = konno_ohmachi_smoothing(spectrum, frequencies, 20, normalize=True)[places]
+    ours = konno_ohmachi(np.concatenate(([0.0], spectrum)), STEP, tuple(frequencies[places]), 20.0)
+    # the side lobes left out weigh 0.2 % each of the centre, all together 1 % of the window
+    assert_allclose(ours, expected, rtol=0.01)
+
+
+def test_a_flat_spectrum_stays_flat_even_where_it_is_coarse():
+    # mutation: weights that are not normalised; centres below the first line
+    centres = (0.001, 0.06, 1.0, 29.0)
+    assert_allclose(konno_ohmachi(np.ones(601), STEP, centres), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 3.0])
+def test_smoothing_is_linear(factor):
+    spectra = np.random.default_rng(2).random((2, 601))
+    assert_allclose(
+        konno_ohmachi(factor * spectra, STEP, CENTRES),
+        factor * konno_ohmachi(spectra, STEP, CENTRES),
+        rtol=1e-12,
+    )

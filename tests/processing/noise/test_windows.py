@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core import AttribDict
+from obspy.core.event import Event, Magnitude, Origin
+
+from per_obspy.processing.noise.windows import (
+    Source,
+    noise_window_noted,
+    p_arrival,
+    source_of,
+    trimmed,
+)
+
+START = UTCDateTime(2020, 1, 1)
+DEGREE = 111.19  # km on the sphere of 6371 km
+
+
+def component(samples, channel="HNZ", dip=-90.0, **stats):
+    header = {"sampling_rate": 100.0, "channel": channel, "sensor_dip": dip, "starttime": START}
+    noise = 0.003 * np.random.default_rng(9).normal(size=samples.size)
+    return Trace(samples + noise, header | {"per_obspy": AttribDict()} | stats)
+
+
+def at(latitude):
+    return AttribDict(latitude=latitude, longitude=0.0, elevation=0.0)
+
+
+def test_near_the_source_p_comes_at_the_speed_of_the_upper_crust():
+    source = Source(START, 0.0, 0.0, 0.0, None)
+    arrival = p_arrival(component(np.zeros(10), coordinates=at(0.5)), source)
+    # 5.8 km/s in iasp91's upper crust; the chord is shorter than the arc by a millionth
+    assert arrival - START == pytest.approx(0.5 * DEGREE / 5.8, rel=1e-3)
+
+
+def test_a_trace_without_coordinates_has_no_computed_arrival():
+    assert p_arrival(component(np.zeros(10)), Source(START, 0.0, 0.0, 0.0, None)) is None
+
+
+def test_the_preferred_origin_and_magnitude_are_used():
+    origins = [
+        Origin(time=START, latitude=1, longitude=2, depth=3e3),
+        Origin(time=START, latitude=4, longitude=5),
+    ]
+    event = Event(origins=origins, magnitudes=[Magnitude(mag=6.0), Magnitude(mag=7.0)])
+    assert source_of(event) == Source(START, 1.0, 2.0, 3e3, 6.0)
+    event.preferred_origin_id = origins[1].resource_id
+    event.preferred_magnitude_id = event.magnitudes[1].resource_id
+    assert source_of(event) == Source(START, 4.0, 5.0, 1e4, 7.0)
+
+
+def test_noise_ends_before_the_pick_of_the_vertical(earthquake):
+    stream = Stream([component(earthquake(1)), component(earthquake(2, onset=25.0), "HNE", 0.0)])
+    out = noise_window_noted(stream, margin=0.5)
+    assert [trace.stats.per_obspy.noise for trace in out] == pytest.approx([19.5, 19.5], abs=0.3)
+    assert "vertical" in out[0].stats.per_obspy.onset_source
+    assert UTCDateTime(out[0].stats.per_obspy.onset) - START == pytest.approx(20.0, abs=0.3)
+    assert "noise" not in stream[0].stats.per_obspy
+
+
+def test_without_a_vertical_the_horizontals_decide(earthquake):
+    out = noise_window_noted(
+        Stream([component(earthquake(1), "HNE", 0.0), component(earthquake(2), "HNN", 0.0)])
+    )
+    assert out[0].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
+    assert "median of 2 picked horizontal" in out[0].stats.per_obspy.onset_source
+
+
+def test_each_component_counts_from_its_own_start(earthquake):
+    late = component(earthquake(onset=18.0), "HNE", 0.0, starttime=START + 2)
+    out = noise_window_noted(Stream([component(earthquake()), late]))
+    assert out[1].stats.per_obspy.noise == pytest.approx(out[0].stats.per_obspy.noise - 2)
+
+
+def test_a_pick_far_from_the_computed_arrival_is_replaced_by_it(earthquake):
+    trace = component(earthquake(), coordinates=at(0.5))
+    travel = 0.5 * DEGREE / 5.8
+    near, far = (Source(START + 20 + delay - travel, 0.0, 0.0, 0.0, None) for delay in (1.0, 40.0))
+    assert noise_window_noted(Stream([trace]), source=near)[
+        0
+    ].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
+    out = noise_window_noted(Stream([trace]), source=far)[0].stats.per_obspy
+    assert out.noise == pytest.approx(59.5, abs=0.1)
+    assert "travel time" in out.onset_source
+
+
+def test_no_onset_is_no_noise():
+    out = noise_window_noted(Stream([component(np.zeros(6000))]))[0].stats.per_obspy
+    assert (out.noise, out.onset_source) == (0.0, "no clear onset")
+
+
+def test_noise_shorter_than_the_limit_counts_as_none(earthquake):
+    out = noise_window_noted(Stream([component(earthquake(onset=2.0))]), shortest=2.0)[
+        0
+    ].stats.per_obspy
+    assert out.noise == 0.0
+
+
+def test_a_given_length_of_noise_is_used(earthquake):
+    out = noise_window_noted(Stream([component(earthquake())]), pre_event=7.0)[0].stats.per_obspy
+    assert (out.noise, out.onset_source) == (7.0, "configuration")
+
+
+def test_hours_around_the_shaking_are_cut(earthquake):
+    given = noise_window_noted(Stream([component(earthquake())]))
+    out = trimmed(given, before=15.0, after=60.0)[0]
+    onset = UTCDateTime(given[0].stats.per_obspy.onset)
+    assert out.stats.starttime - (onset - 15.0) == pytest.approx(0.0, abs=0.006)  # half a sample
+    assert out.stats.endtime - (onset + 60.0) == pytest.approx(0.0, abs=0.006)
+    assert out.stats.per_obspy.noise == pytest.approx(14.5, abs=0.01)
+    assert given[0].stats.npts == 12000
+
+
+def test_short_records_and_records_without_an_onset_stay_whole(earthquake):
+    for samples in (earthquake(), np.zeros(12000)):
+        given = noise_window_noted(Stream([component(samples)]))
+        assert trimmed(given, before=200.0) == given

@@ -1,0 +1,40 @@
+import numpy as np
+from numpy.testing import assert_allclose
+from obspy import Stream, Trace
+
+from per_obspy.config import Checks
+from per_obspy.processing.quality.final_checks import final_findings, integrated
+
+DT = 0.01
+
+
+def trace(samples):
+    return Trace(
+        np.asarray(samples, dtype=float), {"delta": DT, "quantity": "acceleration", "units": "m/s2"}
+    )
+
+
+def test_a_constant_acceleration_gives_a_line_and_a_parabola():
+    given = Stream([trace(np.full(101, 3.0))])
+    velocity = integrated(given)
+    displacement = integrated(velocity)
+    time = np.arange(101) * DT
+    assert_allclose(velocity[0].data, 3 * time, rtol=1e-12)
+    assert_allclose(displacement[0].data, 1.5 * time**2, rtol=1e-12)
+    assert (displacement[0].stats.quantity, displacement[0].stats.units) == ("displacement", "m")
+    assert (given[0].stats.quantity, given[0].stats.units) == ("acceleration", "m/s2")
+
+
+def test_a_motion_that_comes_to_rest_is_fine():
+    time = np.arange(1001) * DT
+    rest = np.gradient(np.gradient(np.exp(-((time - 5) ** 2)), DT), DT)
+    assert not list(final_findings(trace(rest), Checks()))
+
+
+def test_a_motion_that_goes_on_is_found_with_its_figures():
+    found = list(final_findings(trace(np.ones(1000)), Checks()))
+    assert [(one.check, one.level) for one in found] == [
+        ("final_velocity", "reject"),
+        ("final_displacement", "reject"),
+    ]
+    assert "over its peak: 1, allowed 0.1" in found[0].reason

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+from obspy import Stream, Trace
+
+from per_obspy.config import Check
+from per_obspy.errors import RecordRejected
+from per_obspy.processing.quality.findings import Finding, above, below, judged, surviving
+
+
+def test_thresholds_belong_to_the_good_side():
+    setting = Check(threshold=2.0, level="warn")
+    assert (below("x", setting, 2.0, ""), above("x", setting, 2.0, "")) == ([], [])
+    assert below("x", setting, 1.5, "figure")[0].reason == "figure 1.5, needs 2"
+    assert above("x", setting, 2.5, "figure")[0].reason == "figure 2.5, allowed 2"
+
+
+def test_levels_decide_what_a_finding_means():
+    trace = Trace(np.zeros(3), {"channel": "HNE"})
+    kept = judged(
+        trace,
+        [Finding("a", "warn", "one"), Finding("b", "note", "two"), Finding("c", "warn", "three")],
+    )[0]
+    assert (kept.stats.per_obspy.warnings, kept.stats.per_obspy.notes) == ("one; three", "two")
+    assert kept.stats.per_obspy.failed_checks == "a c"  # not b, which only notes
+    with pytest.raises(RecordRejected) as caught:
+        judged(
+            kept,
+            [
+                Finding("d", "reject", "four"),
+                Finding("e", "reject", "five"),
+                Finding("f", "warn", "six"),
+            ],
+        )
+    assert caught.value.reasons == ("four", "five", "one; three", "six")
+    assert "per_obspy" not in trace.stats
+
+
+def test_one_bad_trace_does_not_lose_the_others():
+    def picky(stream):
+        if stream[0].stats.channel == "HNE":
+            raise RecordRejected(stream[0].id, "first", "second")
+        return stream
+
+    traces = [Trace(np.zeros(3), {"channel": channel}) for channel in ("HNE", "HNN")]
+    kept, lost = surviving(picky, Stream(traces))
+    assert [one.stats.channel for one in kept] == ["HNN"]
+    assert lost[0].reasons == ("first", "second")

@@ -1,0 +1,187 @@
+import numpy as np
+import pytest
+from obspy import Stream, Trace
+
+from per_obspy.config import Checks
+from per_obspy.processing.quality.raw_checks import (
+    header_findings,
+    later_event,
+    longest_extreme_run,
+    outlier_findings,
+    raw_findings,
+)
+
+RATE, GAIN = 100.0, 2e5
+
+
+def recorded(samples, rate=RATE, **stats):
+    """Return counts: whole numbers with the noise of a good recorder."""
+    noise = 20 * np.random.default_rng(7).normal(size=samples.size)
+    return Trace(
+        np.round(GAIN * samples + noise + 1234), {"sampling_rate": rate, "channel": "HNE"} | stats
+    )
+
+
+def checks_that_fail(trace):
+    return {finding.check for finding in raw_findings(trace, Checks())}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_good_record_passes_every_check(earthquake, seed):
+    assert checks_that_fail(recorded(earthquake(seed))) == set()
+
+
+def clipped(x):
+    return np.clip(x, -0.4 * x.max(), 0.4 * x.max())
+
+
+def dropped_out(x):
+    x = x.copy()
+    x[2250:2320] = x[2250]
+    return x
+
+
+def spiked(x):
+    x = x.copy()
+    x[x.size // 4] += 8 * np.abs(x).max()
+    return x
+
+
+def late(x):
+    return x[2200:]
+
+
+def cut(x):
+    return x[:2400]
+
+
+def twice(x):
+    return x + 0.5 * np.roll(x, 7000)
+
+
+def wandering(x):
+    return x * 0 + np.cumsum(np.random.default_rng(1).normal(size=x.size)).cumsum() * 1e-3
+
+
+def brief(x):
+    return x[2000:2400]
+
+
+def noiseless(damage, x):
+    """Return damaged counts whose damage no noise of the recorder covers."""
+    return Trace(np.round(damage(recorded(x).data)), {"sampling_rate": RATE, "channel": "HNE"})
+
+
+@pytest.mark.parametrize(
+    ("damage", "check"),
+    [
+        (clipped, "clipped_run"),
+        (lambda x: np.clip(x, None, 0.3 * x.max()), "clipped_run"),
+        (dropped_out, "dropout"),
+        (spiked, "spike"),
+        (late, "late_trigger"),
+        (cut, "cut_off"),
+        (twice, "second_event"),
+        (wandering, "zero_crossings"),
+        (brief, "duration"),
+        (lambda x: 0 * x + 5, "levels"),
+    ],
+)
+def test_each_damage_is_found(earthquake, damage, check):
+    assert check in checks_that_fail(noiseless(damage, earthquake()))
+
+
+def test_a_slow_recorder_is_found(earthquake):
+    assert checks_that_fail(recorded(earthquake()[::10], rate=10.0)) >= {"sampling_rate"}
+
+
+def test_a_full_counter_is_a_warning_for_counts_only(earthquake):
+    samples = earthquake() / np.abs(earthquake()).max() * 0.9 * 2**23 / GAIN
+    assert checks_that_fail(recorded(samples)) == {"counter_use"}
+    assert checks_that_fail(recorded(samples, units="m/s2")) == set()
+
+
+def test_checks_do_not_stop_each_other(earthquake):
+    found = checks_that_fail(noiseless(lambda x: dropped_out(spiked(x))[:3500], earthquake()))
+    assert {"spike", "dropout"} <= found
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_sharp_beginning_is_no_spike(order):
+    # mutation: with the vicinity on one side only, the first sample of a burst stands out of the
+    # silence before it
+    burst = np.random.default_rng(12).normal(size=6000)
+    burst[:3000] = 1e-4 * burst[:3000]
+    burst[3000] = 3.0
+    assert "spike" not in checks_that_fail(
+        Trace(burst[::order], {"sampling_rate": RATE, "units": "m/s2"})
+    )
+
+
+def test_quiet_recorders_may_stand_still_before_the_shaking(earthquake):
+    # mutation: looking for stillness in the whole record rejects every coarse recorder
+    samples = np.round(earthquake() * 200)
+    assert "dropout" not in checks_that_fail(Trace(samples, {"sampling_rate": RATE}))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_coarse_recorders_are_not_clipped(earthquake, seed):
+    # a slow sensor with few levels stands still at each turn of the motion, also at the largest
+    slow = np.cumsum(earthquake(seed))
+    samples = np.round(10 * slow / np.ptp(slow))
+    assert longest_extreme_run(samples) == 1
+    # mutation: counting the run alone gives more than 1
+    assert (samples == samples.max()).sum() > 1
+
+
+@pytest.mark.parametrize(("order", "ratio"), [(1, 0.5), (-1, 0.5)])
+def test_another_event_is_found_before_and_after(earthquake, order, ratio):
+    both = (earthquake(3) + ratio * np.roll(earthquake(3), 6000))[::order]
+    assert later_event(both, 1 / RATE) == pytest.approx(ratio, rel=0.05)
+
+
+def test_the_run_at_an_extreme_does_not_count_equal_samples_elsewhere():
+    assert longest_extreme_run(np.array([0, 0, 0, 0, 1, -1, -1, 0.5])) == 2
+
+
+def instrument(*factors):
+    rng = np.random.default_rng(11)
+    return Stream(
+        [
+            Trace(factor * rng.normal(size=1000), {"channel": f"HN{letter}"})
+            for letter, factor in zip("ENZ", factors, strict=False)
+        ]
+    )
+
+
+def test_a_component_several_times_both_its_sisters_is_found():
+    found = outlier_findings(instrument(1, 10, 1), Checks())
+    assert list(found) == ["..HNN"] or list(found) == ["...HNN"]
+    assert [finding.check for finding in next(iter(found.values()))] == ["outlier"]
+    assert not any(outlier_findings(instrument(1, 3, 1), Checks()).values())
+
+
+def test_between_two_components_nobody_can_tell():
+    assert outlier_findings(instrument(1, 10), Checks()) == {}
+
+
+@pytest.mark.parametrize(
+    ("told", "found"), [(1.0, False), (1.005, False), (1.03, True), (0.9, True)]
+)
+def test_a_header_that_tells_another_peak_is_found(earthquake, told, found):
+    samples = earthquake() - earthquake().mean()
+    trace = Trace(samples + 3.0, {"units": "m/s2", "header_peak": told * np.abs(samples).max()})
+    assert bool(header_findings(trace, Checks())) is found
+
+
+def test_a_header_without_a_peak_tells_nothing(earthquake):
+    assert header_findings(Trace(earthquake()), Checks()) == []
+
+
+@pytest.mark.parametrize("samples", [np.arange(49.0), np.repeat([1.0, 2.0], 500)])
+def test_what_is_no_record_is_rejected_at_any_level(samples):
+    lenient = Checks(
+        **{name: check.model_copy(update={"level": "note"}) for name, check in Checks()}
+    )
+    found = list(raw_findings(Trace(samples, {"sampling_rate": RATE}), lenient))
+    assert [finding.level for finding in found].count("reject") == 1

@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from obspy import Stream, Trace, UTCDateTime
+
+from per_obspy.processing.station.components import instruments, is_horizontal, oriented, paired
+
+
+def trace(channel="HNE", count=1000, start=0.0, location="", **stats):
+    header = {
+        "network": "XX",
+        "station": "STA",
+        "location": location,
+        "channel": channel,
+        "sampling_rate": 100.0,
+    }
+    header |= {"starttime": UTCDateTime(2020, 1, 1) + start} | stats
+    return Trace(np.sin(np.arange(count) + 100 * start), header)
+
+
+def test_inputs_stay_unchanged():
+    stream = Stream([trace(), trace(start=10.0), trace("HNN")])
+    before = stream.copy()
+    paired(oriented(stream[1:]))
+    assert stream == before
+
+
+@pytest.mark.parametrize(
+    ("channel", "azimuth", "horizontal"),
+    [
+        ("HNN", 0.0, True),
+        ("HNE", 90.0, True),
+        ("HNZ", None, False),
+        ("HN1", None, True),
+        ("HNX", None, True),
+        ("NS", 0.0, True),
+        ("EW2", 90.0, True),
+        ("UD1", None, False),
+        ("090", 90.0, True),
+        ("360", 0.0, True),
+        ("H1", None, True),
+    ],
+)
+def test_the_code_tells_the_direction_where_metadata_are_silent(channel, azimuth, horizontal):
+    out = oriented(Stream([trace(channel)]))[0]
+    assert out.stats.get("sensor_azimuth") == azimuth
+    assert is_horizontal(out) is horizontal
+    assert out.stats.per_obspy.azimuth_source == ("unknown" if azimuth is None else "channel code")
+
+
+def test_metadata_go_before_the_code():
+    out = oriented(Stream([trace("HNE", sensor_azimuth=27.0, sensor_dip=0.0)]))[0]
+    assert out.stats.sensor_azimuth == 27.0
+    assert out.stats.per_obspy.azimuth_source == "metadata"
+
+
+def test_instruments_stay_apart_and_accelerometers_go_first():
+    codes = ["BHE", "HHE", "BNE", "HNE", "HNN"]
+    found = instruments(Stream([trace(code) for code in codes] + [trace("HNE", location="10")]))
+    assert [[(one.stats.location, one.stats.channel) for one in group] for group in found] == [
+        [("", "HNE"), ("", "HNN")],
+        [("10", "HNE")],
+        [("", "BNE")],
+        [("", "HHE")],
+        [("", "BHE")],
+    ]
+
+
+def test_surface_and_borehole_stay_apart_and_the_surface_goes_first():
+    found = instruments(Stream([trace(code) for code in ("EW1", "NS1", "EW2", "NS2")]))
+    assert [[one.stats.channel for one in group] for group in found] == [
+        ["EW2", "NS2"],
+        ["EW1", "NS1"],
+    ]
+
+
+def test_codes_that_are_azimuths_belong_to_one_instrument():
+    assert len(instruments(Stream([trace("090"), trace("360"), trace("UP")]))) == 1
+
+
+def test_horizontals_come_out_with_the_same_times():
+    # mutation: trimming by time alone leaves the fraction of a sample
+    early, late = trace("HNE", 1000), trace("HNN", 1000, start=0.504)
+    kept, rejected = paired(oriented(Stream([early, late, trace("HNZ")])))
+    east, north, vertical = (
+        kept.select(channel="HNE")[0],
+        kept.select(channel="HNN")[0],
+        kept.select(channel="HNZ")[0],
+    )
+    assert rejected == ()
+    assert east.stats.starttime == north.stats.starttime == late.stats.starttime
+    assert_array_equal(east.data, early.data[50:])
+    assert_array_equal(north.data, late.data[:950])
+    assert east.stats.per_obspy.clock_shift == pytest.approx(0.004)
+    assert vertical.stats.npts == 1000
+
+
+@pytest.mark.parametrize(
+    ("second", "reason"),
+    [
+        ({"sensor_azimuth": 275.0}, "5 degrees from its partner"),
+        ({"sampling_rate": 101.0}, "sampled every 0.00990099"),
+        ({"start": 5.0}, "shares 5.0 s of the 10.0 s"),
+        ({"count": 300}, "shares 3.0 s of the 10.0 s"),
+        ({"start": 50.0}, "shares 0.0 s"),
+    ],
+)
+def test_a_horizontal_that_does_not_fit_is_a_reason(second, reason):
+    options = {"sensor_azimuth": 0.0} | second
+    kept, rejected = paired(
+        oriented(Stream([trace("HNE", 1001, sensor_azimuth=90.0), trace("HNN", **options)]))
+    )
+    assert [one.stats.channel for one in kept] == ["HNE"]
+    assert any(reason in text for text in rejected[0].reasons)
+
+
+def test_sensors_at_odd_angles_pair():
+    kept, rejected = paired(
+        oriented(Stream([trace("HN1", sensor_azimuth=207.0), trace("HN2", sensor_azimuth=297.0)]))
+    )
+    assert (len(kept), rejected) == (2, ())
+
+
+def test_extra_components_are_reasons():
+    extra = [trace("HNE"), trace("HNN"), trace("HN3"), trace("HNZ"), trace("HNV", sensor_dip=-90.0)]
+    kept, rejected = paired(oriented(Stream(extra)))
+    assert len(kept) == 3
+    reasons = " ".join(row.reasons[0] for row in rejected)
+    assert reasons.count("a third horizontal") == reasons.count("a second vertical") == 1

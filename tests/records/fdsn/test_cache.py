@@ -1,0 +1,405 @@
+"""Fetching from a real HTTP server on loopback that fails on demand: nothing lost, nothing fetched twice."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fdsn_server import (
+    FdsnServer,
+    content,
+    cut,
+    dripping,
+    late,
+    mseed,
+    serving,
+    shortened,
+    stalled,
+    status,
+)
+from obspy import UTCDateTime
+
+from per_obspy.config import Fdsn, Scenario
+from per_obspy.errors import CatalogError, ServiceError
+from per_obspy.records.events import read_event
+from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations, providers
+from per_obspy.records.folder import read_station
+from per_obspy.records.simulation.earthquake import Simulation, simulate
+
+STATIONS = ["XX.S001", "XX.S002", "XX.S003", "XX.S004"]
+Ask = Callable[..., Fetched]
+
+
+@pytest.fixture(scope="module")
+def simulation() -> Simulation:
+    return simulate(Scenario(stations=4, dt=0.02, magnitude=5.0))
+
+
+@pytest.fixture
+def server(simulation: Simulation) -> Iterator[FdsnServer]:
+    with serving(simulation) as running:
+        yield running
+
+
+def request_to(server: FdsnServer, cache: Path, **changes: object) -> Fdsn:
+    given = {
+        "providers": (server.url,),
+        "event_id": "xx1",
+        "event_provider": server.url,
+        "wait": 0.01,
+        "timeout": 10.0,
+    }
+    return Fdsn(cache=cache, **given | changes)
+
+
+@pytest.fixture
+def ask(server: FdsnServer, tmp_path: Path) -> Ask:
+    """Fetch from the server into a cache of the test."""
+    return lambda again=False, **changes: fetch(
+        request_to(server, tmp_path, **changes), again=again
+    )
+
+
+def names(fetched: Fetched) -> list[str]:
+    return list(fetched_stations(fetched).stations)
+
+
+def test_what_arrives_is_what_the_service_has(simulation: Simulation, ask: Ask):
+    contents = fetched_stations(ask())
+    assert (list(contents.stations), contents.rejected) == (STATIONS, ())
+    for name, paths in contents.stations.items():
+        stream, rejected = read_station(paths, contents.inventory, name)
+        assert rejected == ()
+        assert len(stream) == 3
+        for trace in stream:
+            (sent,) = simulation.stream.select(id=trace.id)
+            # MiniSEED keeps whole counts exactly and the start to 100 us, here to the microsecond
+            # in blockette 1001
+            assert np.array_equal(trace.data, sent.data)
+            assert abs(trace.stats.starttime - sent.stats.starttime) < 1e-6
+            assert trace.stats.coordinates == sent.stats.coordinates
+
+
+def test_the_window_and_the_circle_are_those_of_the_event(server: FdsnServer, ask: Ask):
+    fetched = ask(before=10, after=20, radius=50_000.0)
+    origin = read_event(fetched.event).origins[0]
+    assert fetched.wanted.start == origin.time - 10
+    assert fetched.wanted.end == origin.time + 20
+    (listed,) = [
+        one.parameters for one in server.requests if one.subject == "*" and one.service == "station"
+    ]
+    # 50 km on a sphere of 6371 km, six digits
+    assert float(listed["maxradius"]) == pytest.approx(np.rad2deg(50 / 6371), rel=1e-5)
+    assert (float(listed["latitude"]), float(listed["longitude"])) == (
+        origin.latitude,
+        origin.longitude,
+    )
+    for paths in fetched_stations(fetched).stations.values():
+        for trace in read_station(paths, None)[0]:
+            assert trace.stats.starttime >= fetched.wanted.start
+            assert trace.stats.endtime <= fetched.wanted.end
+
+
+def test_place_and_time_need_no_event(server: FdsnServer, ask: Ask, simulation: Simulation):
+    start = simulation.event.origins[0].time
+    place = simulation.inventory[0][1]
+    fetched = ask(
+        event_id=None,
+        latitude=place.latitude,
+        longitude=place.longitude,
+        radius=10.0,  # m: only the station that stands there
+        start=str(start),
+        end=str(start + 30),
+    )
+    assert fetched.event is None
+    assert names(fetched) == ["XX.S002"]
+    assert server.asked("event") == 0
+
+
+def test_nothing_is_fetched_twice(server: FdsnServer, ask: Ask):
+    first = ask()
+    asked = len(server.requests)
+    assert server.asked("dataselect") == len(STATIONS)
+    assert ask() == first
+    assert len(server.requests) == asked
+
+
+def test_a_larger_circle_fetches_only_what_is_new(
+    server: FdsnServer, ask: Ask, simulation: Simulation
+):
+    place = {
+        "latitude": simulation.inventory[0][1].latitude,
+        "longitude": simulation.inventory[0][1].longitude,
+    }
+    assert names(ask(**place, radius=10.0)) == ["XX.S002"]
+    assert names(ask(**place, radius=100_000.0)) == STATIONS
+    assert server.asked("dataselect") == len(STATIONS)
+    assert names(ask(**place, radius=10.0)) == [
+        "XX.S002"
+    ]  # what others have brought is not taken for wanted
+
+
+def test_codes_select(ask: Ask):
+    fetched = ask(
+        networks=("YY", "X?"), stations=("S001", "*3"), channels=("HNE", "HNN"), locations=("--",)
+    )
+    contents = fetched_stations(fetched)
+    assert list(contents.stations) == ["XX.S001", "XX.S003"]
+    stream, _ = read_station(contents.stations["XX.S001"], contents.inventory, "XX.S001")
+    assert sorted(trace.stats.channel for trace in stream) == ["HNE", "HNN"]
+
+
+#: faults that a time-out ends; the others must not depend on how busy the machine is
+TIMED = ("stalled body", "no answer in time")
+
+PASSING = {
+    "429": (status(429),),
+    "500": (status(500),),
+    "502": (status(502),),
+    "503": (status(503),),
+    "504": (status(504),),
+    "cut body": (cut,),
+    "stalled body": (stalled(1.5),),
+    "no answer in time": (late(1.5),),
+    "one after the other": (status(503), cut, status(429)),
+}
+
+
+@pytest.mark.parametrize(
+    ("fault", "service", "subject"),
+    [(fault, "dataselect", "S002") for fault in PASSING]
+    + [
+        ("one after the other", *asked)
+        for asked in (("station", "S002"), ("station", "*"), ("event", "*"))
+    ],
+)
+def test_a_fault_that_passes_costs_a_retry_and_loses_nothing(server, ask, fault, service, subject):
+    server.fail(service, subject, *PASSING[fault])
+    fetched = ask(timeout=1.0 if fault in TIMED else 10.0)
+    assert (names(fetched), fetched.rejected) == (STATIONS, ())
+    assert server.asked(service, subject) == 1 + len(PASSING[fault])
+    assert server.faults == []
+
+
+def test_a_slow_answer_is_waited_for(server: FdsnServer, ask: Ask):
+    server.fail(
+        "dataselect", "S002", dripping(0.3, parts=5)
+    )  # 1.2 s in all, but never 1 s without a byte
+    assert names(ask(timeout=1.0)) == STATIONS
+    assert server.asked("dataselect", "S002") == 1
+
+
+def test_retry_after_is_honoured(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", status(429, Retry_After="1"))
+    assert names(ask()) == STATIONS
+    moments = [
+        moment
+        for one, moment in zip(server.requests, server.times, strict=True)
+        if (one.service, one.subject) == ("dataselect", "S002")
+    ]
+    # without the header the first retry comes at once
+    assert moments[1] - moments[0] >= 1.0
+
+
+def test_waits_double(server: FdsnServer, ask: Ask):
+    server.fail("station", "*", *[status(503)] * 3)
+    ask(wait=0.1)
+    moments = [
+        t for one, t in zip(server.requests, server.times, strict=True) if one.subject == "*"
+    ][-4:]
+    # nothing, then 0.2 and 0.4 s
+    assert np.diff(moments)[1] >= 0.2
+    assert np.diff(moments)[2] >= 0.4
+
+
+LASTING = {
+    "500": (status(500), "HTTP 500: the service is unwell"),
+    "403": (status(403), "HTTP 403"),
+    "404": (status(404), "not found"),
+    "413": (status(413), "refuses to answer so much at once (HTTP 413)"),
+    "cut body": (cut, "IncompleteRead"),
+    "stalled body": (stalled(1.5), "Read timed out"),
+    "web page": (content(b"<html>log in first</html>"), "ObsPy cannot read it"),
+    "cut by the service": (shortened, "cut"),
+}
+
+
+@pytest.mark.parametrize("fault", LASTING)
+def test_a_fault_that_stays_costs_one_station_and_says_why(server, ask, fault):
+    answer, reason = LASTING[fault]
+    server.fail("dataselect", "S002", *[answer] * 6)
+    fetched = ask(retries=1, timeout=1.0 if fault in TIMED else 10.0)
+    assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
+    (rejection,) = fetched.rejected
+    assert (rejection.kind, rejection.name) == ("station", "XX.S002")
+    assert reason in rejection.reasons[0]
+    server.faults.clear()
+    assert names(ask()) == STATIONS
+    assert {server.asked("dataselect", name) for name in ("S001", "S003", "S004")} == {1}
+
+
+@pytest.mark.parametrize("wrong", [b"<html>log in first</html>", b"", b"<FDSNStationXML>"])
+def test_records_without_metadata_are_kept_until_it_comes(
+    server: FdsnServer, ask: Ask, wrong: bytes
+):
+    server.fail("station", "S002", content(wrong))
+    fetched = ask()
+    assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
+    assert [one.name for one in fetched.rejected] == ["XX.S002"]
+    ask(again=True)
+    assert server.asked("dataselect", "S002") == 1
+    assert server.asked("station", "S002") == 2
+
+
+def test_another_stations_records_are_refused(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", content(mseed(server.stream.select(station="S001").copy())))
+    (rejection,) = ask().rejected
+    assert "answers with XX.S001 instead of XX.S002" in rejection.reasons[0]
+    assert (
+        server.asked("dataselect", "S002") == 1
+    )  # wrong content is no reason to ask again at once
+
+
+def test_no_data_is_a_reason_and_is_not_asked_for_again_until_told(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", status(204))
+    fetched = ask()
+    assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
+    assert fetched.rejected[0].reasons == (
+        f"127.0.0.1:{server.server_port} has no data of the window",
+    )
+    asked = len(server.requests)
+    assert ask() == fetched
+    assert len(server.requests) == asked
+    assert names(ask(again=True)) == STATIONS
+    assert server.asked("dataselect") == len(STATIONS) + 1
+
+
+def test_a_request_that_is_too_large_is_asked_for_channel_by_channel(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", status(413))
+    contents = fetched_stations(ask())
+    stream, _ = read_station(contents.stations["XX.S002"], contents.inventory, "XX.S002")
+    assert sorted(trace.stats.channel for trace in stream) == ["HNE", "HNN", "HNZ"]
+    assert server.asked("dataselect", "S002") == 4
+
+
+def test_the_next_provider_serves_what_the_first_cannot(
+    server: FdsnServer, simulation: Simulation, ask: Ask
+):
+    with serving(simulation) as second:
+        server.fail("dataselect", "S002", status(204))
+        server.fail("dataselect", "S003", *[status(500)] * 2)
+        fetched = ask(providers=(server.url, second.url), retries=1)
+    assert (names(fetched), fetched.rejected) == (STATIONS, ())
+    assert [one.subject for one in second.requests if one.service == "dataselect"] == [
+        "S002",
+        "S003",
+    ]
+
+
+def test_a_provider_that_is_down_is_one_row_and_the_other_serves(server: FdsnServer, ask: Ask):
+    fetched = ask(providers=("http://127.0.0.1:1", server.url), retries=0)
+    assert names(fetched) == STATIONS
+    (rejection,) = fetched.rejected
+    assert (rejection.kind, rejection.name) == ("service", "127.0.0.1:1")
+    assert "no answer" in rejection.reasons[0]
+
+
+@pytest.mark.parametrize("router", ["eida-routing", "earthscope-federator"])
+def test_routers_name_the_services(server: FdsnServer, ask: Ask, monkeypatch, router: str):
+    _, *rest = providers.ROUTERS[router]
+    monkeypatch.setitem(providers.ROUTERS, router, (f"{server.url}/route", *rest))
+    server.extra["/route"] = (
+        f"DATACENTER=A,http://a\nSTATIONSERVICE={server.url}/fdsnws/station/1/\nXX S001 -- HNE 1990 2000\n"
+        if router == "earthscope-federator"
+        else f"{server.url}/fdsnws/station/1/query\nXX * * * 1990-01-01T00:00:00 2000-01-01T00:00:00\n"
+    ).encode()
+    assert names(ask(providers=(router,))) == STATIONS
+    (asked,) = [one.parameters for one in server.requests if one.service == "/route"]
+    assert asked["channel"] == "HN?,BN?,CN?,EN?"
+
+
+def test_unknown_providers_and_events_are_wrong_input(ask: Ask):
+    with pytest.raises(CatalogError, match="NOWHERE: is no base URL, no router"):
+        ask(providers=("NOWHERE",))
+    with pytest.raises(CatalogError, match="has no event yy9"):
+        ask(event_id="yy9")
+
+
+def test_an_event_that_is_none_is_not_kept(server: FdsnServer, ask: Ask):
+    server.fail("event", "*", content(b"<html>"))
+    with pytest.raises(ServiceError, match="something else than the event"):
+        ask()
+    assert names(ask()) == STATIONS
+
+
+def test_services_that_fail_altogether_are_said_to_be_unavailable(server: FdsnServer, ask: Ask):
+    server.fail("station", "*", *[status(503)] * 2)
+    with pytest.raises(ServiceError, match=r"nothing could be fetched; .*HTTP 503"):
+        ask(retries=1)
+
+
+def test_what_is_in_the_cache_serves_when_services_fail(server: FdsnServer, ask: Ask):
+    server.fail("dataselect", "S002", status(204))
+    ask()
+    server.fail("station", "*", *[status(503)] * 2)
+    fetched = ask(again=True, retries=1)
+    assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
+    assert fetched.rejected[0].kind == "service"
+
+
+def test_nobody_there_is_a_reason(server: FdsnServer, ask: Ask):
+    fetched = ask(stations=("NOBODY",))
+    assert names(fetched) == []
+    assert "no station within" in fetched.rejected[0].reasons[0]
+    assert server.asked("dataselect") == 0
+
+
+def test_a_window_that_is_not_over_is_fetched_later(server: FdsnServer, ask: Ask):
+    end = UTCDateTime() + 60
+    with pytest.raises(ServiceError, match="is still to come"):
+        ask(start=str(end - 300), end=str(end))
+    assert server.asked("station") == 0
+
+
+def test_a_killed_fetch_goes_on_where_it_stopped(server: FdsnServer, ask: Ask, tmp_path: Path):
+    request = request_to(server, tmp_path, connections=1, timeout=30.0)
+    server.fail("dataselect", "S003", late(20.0))
+    code = "import sys; from per_obspy.config import Fdsn; from per_obspy.records.fdsn.cache import fetch\n"
+    code += "fetch(Fdsn.model_validate_json(sys.argv[1]))"
+    process = subprocess.Popen([sys.executable, "-c", code, request.model_dump_json()])
+    while not server.asked("dataselect", "S003"):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    (folder,) = [path for path in tmp_path.iterdir() if path.is_dir()]
+    assert {path.stem for path in folder.glob("*.mseed")} == {"XX.S001", "XX.S002"}
+    half = (folder / "XX.S001.mseed").read_bytes()[:1000]
+    (folder / f".XX.S003.{os.getpid() + 1}.part.mseed").write_bytes(
+        half
+    )  # as a kill while writing would leave it
+    fetched = ask(connections=1)
+    assert (names(fetched), fetched.rejected) == (STATIONS, ())
+    assert {
+        name: server.asked("dataselect", name) for name in ("S001", "S002", "S003", "S004")
+    } == {
+        "S001": 1,
+        "S002": 1,
+        "S003": 2,
+        "S004": 1,
+    }
+    assert all(len(paths) == 1 for paths in fetched_stations(fetched).stations.values())
+
+
+def test_the_mark_says_why_stations_are_missing(server: FdsnServer, ask: Ask, tmp_path: Path):
+    server.fail("dataselect", "S002", status(204))
+    fetched = ask()
+    (mark,) = tmp_path.glob("complete-*.json")
+    assert json.loads(mark.read_text())[0][:2] == ["station", "XX.S002"]
+    assert ask().rejected == fetched.rejected

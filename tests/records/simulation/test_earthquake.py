@@ -1,0 +1,206 @@
+"""A simulated earthquake: reproducible, labelled, readable by others, and of plausible size."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import obspy
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy import signal
+
+from per_obspy.config import Scenario
+from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.records.simulation.metadata import GAIN
+
+GRAVITY = 9.80665
+#: epicentre 33 km west of a city of 12 km radius, half of it on the lakebed
+SCENARIO = Scenario(stations=8)
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return simulate(SCENARIO)
+
+
+def _peak(simulation, station, channel="HNE"):
+    return np.abs(simulation.stream.select(station=station, channel=channel)[0].data).max() / GAIN
+
+
+def _sa(
+    acceleration: np.ndarray, dt: float, periods: np.ndarray, damping: float = 0.05
+) -> np.ndarray:
+    """Absolute acceleration of oscillators, discretised by SciPy: no code in common with the package."""
+    peaks = []
+    for omega in 2 * np.pi / periods:
+        continuous = [2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2]
+        numerator, denominator, _ = signal.cont2discrete(continuous, dt, method="foh")
+        peaks.append(np.abs(signal.lfilter(numerator.ravel(), denominator, acceleration)).max())
+    return np.array(peaks)
+
+
+def _soils(simulation):
+    return {station.code: station.geology for station in simulation.inventory[0]}
+
+
+def test_the_same_scenario_gives_the_same_bits(simulation):
+    for one, other in zip(simulation.stream, simulate(SCENARIO).stream, strict=True):
+        assert_array_equal(one.data, other.data)
+        assert one.stats.starttime == other.stats.starttime
+
+
+def test_no_station_depends_on_another(simulation):
+    # would catch one generator passed from station to station
+    fewer = simulate(SCENARIO.model_copy(update={"stations": 3}))
+    for trace in fewer.stream:
+        assert_array_equal(trace.data, simulation.stream.select(id=trace.id)[0].data)
+
+
+def test_another_seed_gives_another_earthquake(simulation):
+    other = simulate(SCENARIO.model_copy(update={"seed": 21, "stations": 1}))
+    assert not np.array_equal(other.stream[0].data, simulation.stream[0].data)
+
+
+def test_everything_says_that_it_is_simulated(simulation):
+    assert {trace.stats.network for trace in simulation.stream} == {"XX"}
+    assert "SIMULATED" in simulation.inventory.source
+    assert all("SIMULATED" in station.comments[0].value for station in simulation.inventory[0])
+    assert "SIMULATED" in simulation.event.comments[0].text
+    assert "simulated" in simulation.event.event_descriptions[0].text
+
+
+def test_written_files_are_what_others_read(simulation, tmp_path):
+    write_simulation(simulation, tmp_path)
+    contents = find_stations(tmp_path)
+    assert contents.rejected == ()
+    assert sorted(contents.stations) == [f"XX.S{number:03d}" for number in range(1, 9)]
+    stream, rejected = read_station(contents.stations["XX.S002"], contents.inventory)
+    assert rejected == ()
+    for trace in stream:
+        source = simulation.stream.select(id=trace.id)[0]
+        assert_array_equal(trace.data, source.data)
+        assert trace.stats.coordinates == source.stats.coordinates
+        assert trace.stats.units == source.stats.units == "counts"
+    (event,) = obspy.read_events(tmp_path / "event.xml")
+    assert event.preferred_magnitude().mag == 7.0
+
+
+def test_files_are_the_same_in_every_run(simulation, tmp_path):
+    # would catch ObsPy's random identifiers and its clock
+    def hashes(folder: Path) -> dict[str, str]:
+        write_simulation(simulation, folder)
+        return {
+            file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in folder.iterdir()
+        }
+
+    assert hashes(tmp_path / "one") == hashes(tmp_path / "two")
+
+
+def test_response_and_gain_agree(simulation):
+    trace = simulation.stream.select(station="S001", channel="HNN")[0]
+    by_gain = trace.data / GAIN
+    by_response = trace.copy().remove_response(
+        inventory=simulation.inventory, output="ACC", water_level=None, zero_mean=False, taper=False
+    )
+    # the flat response divides by the same number at every frequency; single precision inside
+    # evalresp
+    assert_allclose(by_response.data, by_gain, atol=1e-5 * np.abs(by_gain).max())
+
+
+def test_rounding_to_counts_lies_below_the_noise(simulation):
+    assert SCENARIO.noise > 0.5 / GAIN
+    quiet = simulation.stream[0].data[: int(0.9 * SCENARIO.pre_event / SCENARIO.dt)] / GAIN
+    # root mean square of 1800 samples: 2 % of scatter; some of the P wave leaks ahead of it through
+    # the filters
+    assert (
+        0.8 * SCENARIO.noise
+        < np.sqrt(np.mean(quiet**2))
+        < 0.01 * np.abs(simulation.stream[0].data).max() / GAIN
+    )
+
+
+def test_motion_ends_where_it_began(simulation):
+    for trace in simulation.stream:
+        velocity = np.cumsum(trace.data / GAIN) * SCENARIO.dt
+        assert (
+            abs(velocity[-1]) < 0.02 * np.abs(velocity).max()
+        )  # the omega-squared spectrum has no mean
+
+
+def test_larger_earthquakes_shake_more():
+    peaks = [
+        _peak(simulate(Scenario(stations=1, magnitude=m, lakebed_radius=0.0)), "S001")
+        for m in (5.0, 6.0, 7.0)
+    ]
+    ratios = np.divide(peaks[1:], peaks[:-1])
+    # published medians of PGA at 40 km grow by 2.7 from magnitude 5 to 6 and 2.0 from 6 to 7 (Boore
+    # & Atkinson 2008, eq. 1-5); a single record scatters by 1.3
+    assert ((ratios > 1.4) & (ratios < 7.0)).all()
+
+
+def test_shaking_decays_with_distance():
+    near, far = (
+        simulate(Scenario(stations=1, city_longitude=x, lakebed_radius=0.0)) for x in (0.3, 1.2)
+    )
+    ratio = _peak(near, "S001") / _peak(far, "S001")
+    # between 1/sqrt(R) without attenuation (2) and 1/R**2 (16) for four times the distance
+    assert 2.0 < ratio < 16.0
+
+
+def test_rock_of_magnitude_seven_has_the_published_size():
+    # Boore & Atkinson (2008), M 7, Rjb 35 km, Vs30 620 m/s: PGA 0.12 g, log-std 0.56: the mean of
+    # eight sites lies within a factor of two
+    rock = simulate(Scenario(stations=8, lakebed_radius=0.0))
+    stations = [f"S{number:03d}" for number in range(1, 9)]
+    peaks = [_peak(rock, station) / GRAVITY for station in stations]
+    assert 0.055 < np.exp(np.mean(np.log(peaks))) < 0.22
+    traces = [rock.stream.select(station=station, channel="HNE")[0] for station in stations]
+    one_second = [
+        _sa(trace.data / GAIN, SCENARIO.dt, np.array([1.0])) / GRAVITY for trace in traces
+    ]
+    # rock spectra of design codes have SA(1 s) / PGA near 1 (ASCE 7 with S1/Ss = 0.4); a factor of
+    # two
+    assert 0.5 < np.exp(np.mean(np.log(one_second))) / np.exp(np.mean(np.log(peaks))) < 2.0
+
+
+def test_lakebed_resonates_near_two_seconds(simulation):
+    periods = np.geomspace(0.3, 6.0, 25)
+    soils = _soils(simulation)
+    assert set(soils.values()) == {"rock", "lakebed"}
+    for station, soil in soils.items():
+        trace = simulation.stream.select(station=station, channel="HNN")[0]
+        spectrum = _sa(trace.data / GAIN, SCENARIO.dt, periods)
+        peak = periods[spectrum.argmax()]
+        if soil == "lakebed":
+            assert 1.4 < peak < 2.9  # 0.5 Hz with a log-standard deviation of 0.1, and a broad peak
+        else:
+            assert peak < 1.4
+
+
+def test_horizontals_are_correlated_as_configured():
+    def correlation(coefficient: float) -> float:
+        stream = simulate(Scenario(stations=12, correlation=coefficient, lakebed_radius=0.0)).stream
+        pairs = zip(stream.select(channel="HNN"), stream.select(channel="HNE"), strict=True)
+        return float(np.mean([np.corrcoef(north.data, east.data)[0, 1] for north, east in pairs]))
+
+    # about 100 independent samples a record (10 s of 5 Hz noise) and 12 records: 0.03 of scatter;
+    # four times that
+    assert abs(correlation(0.3) - 0.3) < 0.12
+    assert abs(correlation(-0.5) + 0.5) < 0.12
+
+
+def test_a_city_across_the_date_line():
+    # would catch longitudes beyond 180, which StationXML does not know
+    far = simulate(
+        Scenario(stations=8, longitude=-179.8, city_longitude=179.99, lakebed_longitude=179.99)
+    )
+    longitudes = np.array([station.longitude for station in far.inventory[0]])
+    assert (np.abs(longitudes) <= 180).all()
+    assert (longitudes > 0).any()
+    assert (longitudes < 0).any()
+
+
+def test_a_scenario_at_no_time():
+    with pytest.raises(ValueError, match="origin_time"):
+        Scenario(origin_time="yesterday")

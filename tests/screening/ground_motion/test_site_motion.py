@@ -1,0 +1,201 @@
+"""Motion at a site against that of the record: nothing to say at the station, less and less known away from it."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from screening_samples import make_station
+
+from per_obspy.config import Interpolation
+from per_obspy.screening.ground_motion.site_motion import Source, motion_at_pairs, prepared_field
+from per_obspy.screening.ground_motion.spatial_correlation import great_circle, spatial_correlation
+
+SETTINGS = Interpolation()
+
+
+@pytest.fixture(scope="module")
+def stations():
+    """Three stations, 20 km from each other along a meridian, the middle one shakes three times as much."""
+    return [
+        make_station("ONE", latitude=10.0, seed=4),
+        make_station("TWO", scale=3.0, latitude=10.18, seed=4),
+        make_station("SIX", latitude=10.36, seed=6),
+    ]
+
+
+def _pairs(longitude, latitude, period_1=1.0, period_2=0.6, **columns):
+    longitude, latitude, period_1, period_2 = np.broadcast_arrays(
+        longitude, latitude, period_1, period_2
+    )
+    places = {"longitude": longitude.ravel(), "latitude": latitude.ravel()}
+    return pd.DataFrame(
+        {**places, "period_1": period_1.ravel(), "period_2": period_2.ravel(), **columns}
+    )
+
+
+def test_at_a_station_its_record_is_the_motion(stations):
+    prepared = prepared_field(stations, SETTINGS)
+    periods = np.geomspace(0.06, 8.9, 40)
+    for index, latitude in enumerate((10.0, 10.18, 10.36)):
+        columns = motion_at_pairs(prepared, _pairs(20.0, latitude, periods, periods[::-1]), index)
+        for i in (1, 2):
+            # a system of three equations, then the root of a difference of ones
+            assert_allclose(columns[f"ln_per_ratio_{i}"], 0.0, atol=1e-12)
+            assert_allclose(columns[f"ln_per_std_{i}"], 0.0, atol=1e-7)
+        assert not columns["motion_from_other_site_class"].any()
+
+
+def test_the_ratio_is_to_the_record_that_is_given(stations):
+    # the same ground motion times 3 at the second station: seen from the first the ratio there is
+    # ln 3, and back -ln 3
+    prepared = prepared_field(stations[:2], SETTINGS)
+    there = motion_at_pairs(prepared, _pairs(20.0, 10.18), 0)
+    back = motion_at_pairs(prepared, _pairs(20.0, 10.0), 1)
+    # PER is stored in float32
+    assert_allclose([there["ln_per_ratio_1"], there["ln_per_ratio_2"]], np.log(3.0), rtol=1e-6)
+    assert_allclose(back["ln_per_ratio_1"], -there["ln_per_ratio_1"], rtol=1e-6)
+    assert_allclose(there["ln_per_std_1"], 0.0, atol=1e-7)
+
+
+def test_the_deviation_grows_with_the_distance_and_every_period_has_its_own(stations):
+    latitude = 10.0 - np.array([0.0, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0])
+    columns = motion_at_pairs(
+        prepared_field(stations, SETTINGS), _pairs(20.0, latitude, 0.3, 3.0), 0
+    )
+    for i in (1, 2):
+        assert (np.diff(columns[f"ln_per_std_{i}"]) > 0).all()
+    # long periods agree over longer distances (Jayaram & Baker 2009)
+    assert (columns["ln_per_std_2"][1:4] < columns["ln_per_std_1"][1:4]).all()
+
+
+def test_one_station_has_no_slope_and_the_assumed_deviation(stations):
+    # two places whose motion is uncorrelated differ by twice the variance: 0.6 sqrt(2) far away
+    places = _pairs(20.0, [10.0, 10.1, 80.0])
+    columns = motion_at_pairs(prepared_field(stations[:1], SETTINGS), places, 0)
+    assert_allclose(columns["ln_per_ratio_1"], 0.0, atol=1e-12)
+    near = float(spatial_correlation(great_circle(20.0, 10.0, 20.0, 10.1), 1.0))
+    expected = 0.6 * np.sqrt([0.0, 2.0 * (1.0 - near), 2.0])
+    assert_allclose(columns["ln_per_std_1"], expected, rtol=1e-9, atol=1e-7)
+
+
+def _on(station, site_class):
+    return station.assign_coords(site_class=site_class)
+
+
+def test_motion_never_crosses_site_classes_but_as_a_fallback_that_says_so(stations):
+    # beside the lakebed station a pair on rock moves as the rock does, whoever's record it is given
+    named = [
+        _on(one, name) for one, name in zip(stations, ("rock", "lakebed", "rock"), strict=True)
+    ]
+    prepared = prepared_field(named, SETTINGS)
+    places = _pairs([20.0] * 4, [10.18] * 4, site_class=["rock", "lakebed", "hill", ""])
+    columns = motion_at_pairs(prepared, places, 1)
+    assert columns["motion_from_other_site_class"].tolist() == [False, False, True, True]
+    only_rock = motion_at_pairs(prepared_field([named[1], *named[::2]], SETTINGS), places, 0)
+    alone = prepared_field(named[::2], SETTINGS)
+    from_rock = motion_at_pairs(alone, places.iloc[:1], 0)
+    assert_allclose(only_rock["ln_per_ratio_1"], columns["ln_per_ratio_1"], rtol=1e-12)
+    assert_allclose(columns["ln_per_std_1"][0], from_rock["ln_per_std_1"][0], rtol=1e-12)
+    # the rock estimate, seen from the lakebed's record, which is three times that of the first rock
+    # station
+    assert_allclose(
+        columns["ln_per_ratio_1"][0], from_rock["ln_per_ratio_1"][0] - np.log(3.0), rtol=1e-6
+    )
+    assert_allclose([columns["ln_per_ratio_1"][1], columns["ln_per_std_1"][1]], 0.0, atol=1e-7)
+    assert columns["ln_per_std_1"][0] > 0.2
+
+
+def test_louder_earthquakes_change_no_ratio(stations):
+    # all records times 5: would catch a ratio to something else than a record
+    louder = [one.assign(per_rotd50=one["per_rotd50"] * 5.0) for one in stations]
+    places = _pairs(20.05, [9.9, 10.1, 10.2, 10.5])
+    once, five = (
+        motion_at_pairs(prepared_field(some, SETTINGS), places, 2) for some in (stations, louder)
+    )
+    for name in ("ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1"):
+        # PER is stored in float32
+        assert_allclose(five[name], once[name], atol=1e-6)
+
+
+def test_periods_that_no_record_supports_have_no_motion(stations):
+    # usable from 0.05 to 9 s; would catch a record that is trusted beyond
+    columns = motion_at_pairs(prepared_field(stations, SETTINGS), _pairs(20.1, 10.1, 8.99, 9.01), 0)
+    assert np.isfinite([columns["ln_per_ratio_1"], columns["ln_per_std_1"]]).all()
+    assert np.isnan([columns["ln_per_ratio_2"], columns["ln_per_std_2"]]).all()
+
+
+def test_a_record_that_does_not_support_the_period_is_corrected_by_its_neighbours(stations):
+    # the first record ends at 3 s; at 4 s its stored value is compared with what the others tell of
+    # the place
+    short = [make_station("ONE", latitude=10.0, longest=3.0, seed=4), *stations[1:]]
+    columns = motion_at_pairs(prepared_field(short, SETTINGS), _pairs(20.0, 10.0, 4.0, 2.0), 0)
+    alone = motion_at_pairs(prepared_field(stations[1:], SETTINGS), _pairs(20.0, 10.0, 4.0, 2.0), 0)
+    assert_allclose(columns["ln_per_std_1"], alone["ln_per_std_1"], rtol=1e-12)
+    assert_allclose(columns["ln_per_std_2"], 0.0, atol=1e-7)
+
+
+def test_one_horizontal_and_a_station_without_motion(stations):
+    still = stations[1].assign(per_rotd50=stations[1]["per_rotd50"] * 0.0)
+    single = make_station("UNO", channels=("HNN",), latitude=10.0)
+    prepared = prepared_field([single, still, stations[2]], SETTINGS)
+    columns = motion_at_pairs(prepared, _pairs(20.0, [10.0, 10.18]), [0, 1])
+    assert_allclose(columns["ln_per_ratio_1"][0], 0.0, atol=1e-12)
+    assert np.isnan(columns["ln_per_ratio_1"][1])  # nothing is any number of times nothing
+    assert np.isfinite(columns["ln_per_std_1"]).all()
+
+
+def test_the_source_tells_an_attenuation():
+    # eight stations on a line, PER ~ 1/R from a hypocentre 20 km deep: continued beyond them, and
+    # exact between them
+    source = Source(20.0, 9.0, 20_000.0)
+    plain = make_station("ONE")
+    latitudes = np.linspace(10.0, 11.0, 8)
+    distance = np.hypot(great_circle(20.0, 9.0, 20.0, latitudes), 20_000.0)
+    stations = [
+        plain.assign(per_rotd50=plain["per_rotd50"].astype(np.float64) * 1e5 / far).assign_coords(
+            latitude=latitude
+        )
+        for latitude, far in zip(latitudes, distance, strict=True)
+    ]
+    beyond = np.array([9.5, 10.5, 12.0])
+    there = np.hypot(great_circle(20.0, 9.0, 20.0, beyond), 20_000.0)
+    columns = motion_at_pairs(prepared_field(stations, SETTINGS, source), _pairs(20.0, beyond), 3)
+    assert_allclose(columns["ln_per_ratio_1"], np.log(distance[3] / there), atol=1e-9)
+    without = motion_at_pairs(prepared_field(stations, SETTINGS), _pairs(20.0, beyond), 3)
+    assert abs(without["ln_per_ratio_1"][2] - np.log(distance[3] / there[2])) > 0.1
+
+
+def test_numbers_depend_neither_on_the_block_nor_on_the_process(stations):
+    # to the bit, in any order and stride; a field that was sent to another process is the same
+    # field
+    named = [_on(one, name) for one, name in zip(stations, ("rock", "rock", "hill"), strict=True)]
+    prepared = prepared_field(named, SETTINGS, Source(19.0, 10.0, 1e4))
+    sent = pickle.loads(pickle.dumps(prepared))
+    random = np.random.default_rng(3)
+    places = _pairs(
+        *(
+            random.uniform(*span, 101)
+            for span in ((19.9, 20.1), (9.9, 10.5), (0.06, 8.0), (0.06, 8.0))
+        )
+    )
+    places = places.assign(
+        site_class=random.choice(["rock", "hill", ""], 101), vs30=random.uniform(200, 800, 101)
+    )
+    index = random.integers(0, 3, 101)
+    whole = motion_at_pairs(prepared, places, index)
+    for rows in (slice(0, 1), slice(1, 64), slice(100, None, -1)):
+        part = motion_at_pairs(sent, places.iloc[rows], index[rows])
+        for name, column in part.items():
+            assert np.array_equal(column, whole[name][rows])
+
+
+def test_wrong_arguments_are_named(stations):
+    with pytest.raises(ValueError, match="stations must be one at least"):
+        prepared_field([], SETTINGS)
+    nowhere = stations[0].assign_coords(latitude=np.nan)
+    with pytest.raises(ValueError, match="latitude must be finite, got nan"):
+        prepared_field([nowhere], SETTINGS)
+    with pytest.raises(ValueError, match="station must be between 0 and 2, got 3"):
+        motion_at_pairs(prepared_field(stations, SETTINGS), _pairs(20.0, 10.0), 3)

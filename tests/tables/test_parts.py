@@ -1,0 +1,86 @@
+"""Parts joined in the order of the whole: the same as pandas makes of the table in memory."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from per_obspy.screening.ranking import in_order
+from per_obspy.tables import parts
+from per_obspy.tables.parts import joined_rows, joined_schema, write_part
+
+
+def table(count, seed, first=0):
+    """Return rows of which many are equally bad, so that only their names tell them apart."""
+    draw = np.random.default_rng(seed)
+    return pd.DataFrame(
+        {
+            "pair_id": [
+                f"pair {number}" for number in draw.permutation(np.arange(first, first + count))
+            ],
+            "state": draw.choice(["yes", "possible", "no"], count),
+            "probability": draw.choice([0.0, 0.5, 1.0], count),
+            "demand_ratio": draw.choice([0.0, 0.5, np.nan], count),
+            "velocity": draw.choice([0.0, 0.1, np.nan], count),
+        }
+    )
+
+
+def written(folder, pieces):
+    """Return the files of some pieces, each in its order."""
+    paths = [folder / f"{number:06}.parquet" for number in range(len(pieces))]
+    for number, (piece, path) in enumerate(zip(pieces, paths, strict=True)):
+        write_part(in_order(piece, piece["velocity"]), number, path)
+    return paths
+
+
+def read(paths, size):
+    return pa.concat_tables(joined_rows(paths, joined_schema(paths), size)).to_pandas()
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("cuts", [[], [1], [13, 14, 250]])
+def test_the_whole_is_in_order(tmp_path, monkeypatch, size, cuts):
+    # Mutations: an order of the parts instead of the rows; rows of a part taken twice at the edge
+    # of a group; ties between parts left in the order of the parts.
+    monkeypatch.setattr(parts, "TOGETHER", 11)
+    whole = table(300, seed=1)
+    edges = [0, *cuts, len(whole)]
+    pieces = [whole.iloc[first:last] for first, last in pairwise(edges)]
+    expected = in_order(whole, whole["velocity"])[list(whole)]
+    pd.testing.assert_frame_equal(
+        read(written(tmp_path, pieces), size), expected, check_dtype=False
+    )
+
+
+def test_parts_with_other_columns_and_types(tmp_path):
+    # Mutation: the first part tells the columns of all.
+    first, second = (
+        table(20, seed=2).assign(note=1, only_here="a"),
+        table(20, seed=3, first=20).assign(note="x"),
+    )
+    third = table(20, seed=4, first=40).assign(note=1.5)
+    rows = read(written(tmp_path, [first, second, third]), 50).set_index("pair_id")
+    assert set(rows.loc[first["pair_id"], "only_here"]) == {"a"}
+    assert rows.loc[[*second["pair_id"], *third["pair_id"]], "only_here"].isna().all()
+    assert [rows["note"][one["pair_id"].iloc[0]] for one in (first, second, third)] == [
+        "1",
+        "x",
+        "1.5",
+    ]
+
+
+def test_whole_numbers_and_fractions_are_numbers(tmp_path):
+    paths = written(
+        tmp_path, [table(5, seed=2).assign(note=1), table(5, seed=3, first=5).assign(note=1.5)]
+    )
+    assert joined_schema(paths).field("note").type == pa.float64()
+
+
+def test_columns_of_the_order_are_left_out(tmp_path):
+    paths = written(tmp_path, [table(5, seed=2)])
+    assert joined_schema(paths).names == list(table(5, seed=2))
+    assert "order_part" in pq.read_schema(paths[0]).names

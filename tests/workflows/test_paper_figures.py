@@ -1,0 +1,83 @@
+"""The scripts that redraw the paper and repeat its reliability run, without and with real records."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from per_obspy import single_hit
+
+WORKFLOWS = Path(__file__).parents[1] / "workflows"
+
+
+def _start(script: str, data: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    strict = ["-W", "error", "-W", "ignore:SelectableGroups:DeprecationWarning"]
+    command = [sys.executable, *strict, str(WORKFLOWS / script), *arguments]
+    environment = os.environ | {"PER_OBSPY_DATA": str(data)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def _run(script: str, data: Path, *arguments: str) -> str:
+    done = _start(script, data, *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_figures_of_the_simulated_lakebed(tmp_path):
+    said = _run("paper_figures.py", tmp_path / "absent", "-o", str(tmp_path), "-n", "5")
+    drawn = {path.name for path in tmp_path.glob("*.png")}
+    assert drawn == {f"fig{number}_simulated_lakebed.png" for number in range(1, 9)} | {
+        "correlation_ductility.png"
+    }
+    assert "a simulated one is drawn" in said
+    # five periods make ten pairs, at three gaps
+    assert (
+        len(re.findall(r"of 10 pairs: bias \d\.\d\d, scatter \d\.\d\d, \d+% under-predicted", said))
+        == 3
+    )
+
+
+def test_the_docstring_of_single_hit_says_what_the_page_on_reliability_says():
+    page = (WORKFLOWS.parent / "docs" / "reliability.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (0\.\d+) \| (.*) \|$", page, re.MULTILINE)
+    assert [ratio for ratio, _ in rows] == ["0.95", "0.8", "0.5", "0.05"]
+    for ratio, cells in rows:
+        equal, mexico, heavier, _, lighter, _ = cells.split(" | ")
+        said = re.search(rf"^\s+{float(ratio):.2f}\s+(.*)$", str(single_hit.__doc__), re.MULTILINE)
+        assert said is not None
+        assert re.split(r"\s{2,}", said[1].strip()) == [equal, mexico, heavier, lighter]
+
+
+@pytest.mark.real_data
+def test_the_tables_replace_the_measured_part_of_their_page(real_data, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("By hand.\n\n## Measured\n\nlong ago\n", encoding="utf-8")
+    said = _run("reliability_tables.py", real_data, "-o", str(page), "-n", "3")
+    assert page.read_text(encoding="utf-8") == f"By hand.\n\n## Measured\n\n{said}"
+    # three pairs, both ways, sixteen components
+    assert "of 96 cases" in said
+
+
+def test_the_tables_need_real_records(tmp_path):
+    done = _start("reliability_tables.py", tmp_path / "absent")
+    assert done.returncode == 2
+    assert "PER_OBSPY_DATA" in done.stderr
+
+
+def test_estimates_for_yielding_pairs(tmp_path):
+    said = _run("yielding_estimates.py", tmp_path / "absent", "-s", "2", "-n", "15")
+    rows = re.findall(
+        r"simulated (\w+), 15 pairs \| ([\w .()]+) \| (\d+\.\d+), \d+\.\d+, (\d+)%", said
+    )
+    assert [row[0] for row in rows] == ["rock"] * 3 + ["lakebed"] * 3
+    for ground in ("rock", "lakebed"):
+        (_, _, elastic, low), (_, _, linear, _), (_, name, governing, few) = [
+            row for row in rows if row[0] == ground
+        ]
+        assert name == "the one that governs"
+        # the largest of several is no smaller than each of them, and so is its median
+        assert float(governing) >= max(float(elastic), float(linear))
+        assert int(few) <= int(low)
