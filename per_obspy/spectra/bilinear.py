@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.oscillator.exact_step import bilinear as kernels
+from per_obspy.kernels.oscillator import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
 
 #: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.

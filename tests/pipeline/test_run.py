@@ -16,7 +16,7 @@ from pyarrow import parquet
 
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError
-from per_obspy.jobs.station import station as jobs
+from per_obspy.jobs import station as jobs
 from per_obspy.pipeline.run import run
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"

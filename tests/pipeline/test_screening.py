@@ -11,7 +11,7 @@ import pytest
 
 from per_obspy.errors import CatalogError, MissingExtra
 from per_obspy.inventory.catalogue import Origin, add_inventory
-from per_obspy.jobs.station import chunk
+from per_obspy.jobs import chunk
 from per_obspy.pipeline.run import report, run, screen
 
 from .test_run import SPECTRA, Here, _configuration

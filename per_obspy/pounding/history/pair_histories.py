@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_events.events import motion as columns
+from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.lanes import ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks

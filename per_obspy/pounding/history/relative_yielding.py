@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_events.events import motion as columns
+from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.run_without_contact import FAR, ROWS_APART, run_apart
 from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks
 from per_obspy.pounding.history.tables import closed_record, free_samples, row_at_rest

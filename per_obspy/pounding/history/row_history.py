@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_events.events import motion as columns
 from per_obspy.kernels.pounding_events.row_history import run_history
 from per_obspy.pounding.history.energies import Energies, closure_of, energies_of
 from per_obspy.pounding.history.tables import (

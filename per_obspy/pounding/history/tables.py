@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_events.events import motion as motion
+from per_obspy.kernels.pounding_events import motion
 from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
 from per_obspy.pounding.structure import Structure
 

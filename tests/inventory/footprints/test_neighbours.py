@@ -6,8 +6,8 @@ import shapely
 from numpy.testing import assert_allclose, assert_array_equal
 from shapely import affinity
 
+from per_obspy.inventory.footprints import neighbours as module
 from per_obspy.inventory.footprints.neighbours import neighbours
-from per_obspy.inventory.footprints.pairs import neighbours as module
 
 
 def _found(*polygons, distance=3.0):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.pounding_events.events import motion as columns
-from per_obspy.kernels.pounding_lanes.lanes import free_impacts as bounces
-from per_obspy.kernels.pounding_lanes.lanes import lanes as lanes
+from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_lanes import free_impacts as bounces
+from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.maxima_in_step import state, step
 from per_obspy.kernels.pounding_lanes.pairs import load_pair, write_constants, write_phase
 from per_obspy.kernels.pounding_lanes.step_by_step import repeat_step, segment_of

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from per_obspy.kernels.oscillator.exact_step import unit_responses
 from per_obspy.kernels.polynomial_roots import first_fall, value_and_slope
 from per_obspy.kernels.pounding_events.motion import fill_taylor, taylor_terms
+from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.deferred_maxima import write_lane
-from per_obspy.kernels.pounding_lanes.lanes import lanes as lanes
 from per_obspy.kernels.pounding_lanes.lanes import sweep
 from per_obspy.kernels.pounding_lanes.maxima_in_step import state, step
 from per_obspy.kernels.pounding_lanes.pairs import write_constants, write_phase

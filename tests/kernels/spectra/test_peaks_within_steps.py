@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.oscillator.exact_step import step, within_step
+from per_obspy.kernels.oscillator import within_step
+from per_obspy.kernels.oscillator.exact_step import step
 from per_obspy.kernels.spectra import azimuth_steps, azimuths, blocks, peaks_within_steps
 
 

@@ -28,7 +28,8 @@ from obspy import UTCDateTime
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.events import read_event
-from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations, providers
+from per_obspy.records.fdsn import providers
+from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
