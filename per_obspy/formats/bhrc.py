@@ -5,6 +5,7 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -19,14 +20,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import (
-    STANDARD_GRAVITY,
-    coordinates,
-    hemisphere,
-    horizontal,
-    trace,
-    utc,
-)
+from per_obspy.formats.text.vocabulary import coordinates, hemisphere, horizontal, trace, utc
 
 _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _RATE_LINE = 27, 21

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -18,15 +19,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import (
-    GAL,
-    STANDARD_GRAVITY,
-    channel_code,
-    coordinates,
-    orientation,
-    trace,
-    utc,
-)
+from per_obspy.formats.text.vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _TITLE = re.compile(
     r"(Raw|Uncorrected|Corrected) (acceleration|velocity|displacement)\b.*\(Format v0?1\.\d+ with (\d+) text lines\)"

@@ -8,6 +8,7 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.formats.text.blocks import is_title, titled_block
 from per_obspy.formats.text.csmip_header import Header, channel_name, known, read_header
 from per_obspy.formats.text.film import pair_lines, read_pairs
@@ -23,7 +24,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import GAL, STANDARD_GRAVITY, trace
+from per_obspy.formats.text.vocabulary import trace
 
 _INCH = 0.0254  # m
 _UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s+(G/10|G)\b")

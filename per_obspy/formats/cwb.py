@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
+from per_obspy.constants import GAL
 from per_obspy.formats.text.fields import (
     Fields,
     field,
@@ -24,7 +25,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import GAL, coordinates, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import coordinates, orientation, trace, utc
 
 _TITLE = b"#Earthquake Information"
 _COLUMNS = re.compile(r"Time\s+(\w)\(\+\);?\s*(\w)\(\+\);?\s*(\w)\(\+\)")

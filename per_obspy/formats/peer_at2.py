@@ -8,6 +8,7 @@ import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.trace import Stats
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -19,7 +20,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import STANDARD_GRAVITY, full_year, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import full_year, orientation, trace, utc
 
 _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"

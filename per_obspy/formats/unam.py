@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from obspy import Stream, UTCDateTime
 
+from per_obspy.constants import GAL
 from per_obspy.formats.text.fields import (
     Field,
     Fields,
@@ -27,7 +28,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import GAL, coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import coordinates, hemisphere, orientation, trace, utc
 
 _MARK = b"ARCHIVO ESTANDAR DE ACELERACION"
 _WIDTH = 10

@@ -5,6 +5,7 @@ from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
+from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.formats.text.blocks import titled_block
 from per_obspy.formats.text.film import pair_lines, read_pairs
 from per_obspy.formats.text.lines import (
@@ -17,15 +18,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import (
-    GAL,
-    STANDARD_GRAVITY,
-    channel_code,
-    coordinates,
-    orientation,
-    trace,
-    utc,
-)
+from per_obspy.formats.text.vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
 _VOLUME_1_LINES, _VOLUME_2_LINES = 27, 45

@@ -17,9 +17,9 @@ import pandas as pd
 from pydantic import Field
 
 from per_obspy import config
+from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
-from per_obspy.inventory.checking import METRES_PER_DEGREE
 from per_obspy.inventory.files.reading import read_pairs
 
 CRS = "OGC:CRS84"

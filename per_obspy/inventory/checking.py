@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
 from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
@@ -24,7 +25,6 @@ STOREY_HEIGHTS = (2.0, 12.0)
 #: Largest distance between the two positions of a pair, m; neighbours' centres lie closer.
 LARGEST_SEPARATION = 1000.0
 
-METRES_PER_DEGREE = 111_195.0
 
 #: Position of a row in the table, and what is wrong with it.
 Fault = tuple[int, str]

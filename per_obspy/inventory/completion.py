@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from per_obspy import config
 from per_obspy.checks import FloatArray
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.contact import (
     contact_mass,
@@ -24,7 +25,6 @@ from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
 
 #: Standard acceleration of gravity, m/s2.
-GRAVITY = 9.80665
 
 _FORMULAS: dict[str, Callable[[FloatArray, NDArray[np.str_]], FloatArray]] = {
     "asce7": asce7_period,
@@ -148,7 +148,7 @@ def _add_strength(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: in
         derived,
         name,
         numbers_in(pairs, name),
-        coefficient * GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2,
+        coefficient * STANDARD_GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2,
     )
     columns[name] = _first(columns[name], np.inf)
     columns[f"hardening_{i}"] = _first(numbers_in(pairs, f"hardening_{i}"), 0.0)

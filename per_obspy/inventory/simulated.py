@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.inventory.checking import METRES_PER_DEGREE
+from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.inventory.periods import asce7_period
 from per_obspy.inventory.schema import COLUMNS, POSITIONS, SYSTEMS
 

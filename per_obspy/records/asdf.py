@@ -22,13 +22,14 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.event import Event
 
+from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.folder import FolderContents
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import foreign_bytes
 
 #: unit that the provenance says the samples have -> m/s2
-_UNITS = {"cm/s^2": 0.01, "m/s^2": 1.0, "g": 9.80665}
+_UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
 
 _OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]*>([^<]+)<")
 

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, reason_of
-from per_obspy.formats.text.vocabulary import STANDARD_GRAVITY
 
 #: Pseudo-spectral acceleration is asked for at these periods; a map may have others beside them
 #: (PSA06: 0.6 s).

@@ -8,8 +8,9 @@ from obspy import Stream, UTCDateTime
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.formats.text.vocabulary import GAL, STANDARD_GRAVITY, coordinates, horizontal, trace
+from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
 UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}

@@ -8,11 +8,11 @@ from scipy.optimize import brentq
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.kernels.oscillator import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
 
 #: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.
-GRAVITY = 9.80665
 #: Ratio of neighbouring yield displacements in the search for the largest one that gives a
 #: ductility.
 SCAN_RATIO = 0.97
@@ -175,7 +175,7 @@ def constant_yield_spectra(
     coefficients = np.broadcast_to(
         checks.positive("yield_coefficients", yield_coefficients), omegas.shape
     )
-    limits = coefficients * GRAVITY / omegas**2
+    limits = coefficients * STANDARD_GRAVITY / omegas**2
     rows = [
         _response(record, dt, omega, ratio, limit, alpha)
         for omega, limit in zip(omegas, limits, strict=True)
@@ -230,7 +230,7 @@ def constant_ductility_spectra(
         unreached if np.isnan(limit) else _response(record, dt, omega, ratio, limit, alpha)
         for omega, limit in zip(omegas, limits, strict=True)
     ]
-    return _spectra(rows, limits * omegas**2 / GRAVITY)
+    return _spectra(rows, limits * omegas**2 / STANDARD_GRAVITY)
 
 
 def _hardening(hardening: float) -> float:

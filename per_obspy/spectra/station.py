@@ -18,6 +18,7 @@ from obspy import Stream, Trace
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import RecordRejected
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum, rotd
 from per_obspy.spectra.elastic import response_spectra
@@ -108,7 +109,9 @@ def _components(stream: Stream) -> dict[str, Trace]:
 
 
 def _is_vertical(trace: Trace) -> bool:
-    return bool(abs(trace.stats.get("sensor_dip", 0.0)) > 45.0 or trace.stats.channel.endswith("Z"))
+    return bool(
+        abs(trace.stats.get("sensor_dip", 0.0)) > VERTICAL_DIP or trace.stats.channel.endswith("Z")
+    )
 
 
 def _azimuth(trace: Trace) -> float:

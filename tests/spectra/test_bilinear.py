@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.spectra.bilinear import (
-    GRAVITY,
     bilinear_response,
     constant_ductility_spectra,
     constant_yield_spectra,
@@ -162,7 +162,7 @@ def test_constant_yield_spectra_are_single_responses(record):
     periods = np.array([0.2, 0.5, 1.5])
     spectra = constant_yield_spectra(record, DT, periods, DAMPING, 0.1, 0.05)
     for i, period in enumerate(periods):
-        limit = 0.1 * GRAVITY * (period / (2 * np.pi)) ** 2
+        limit = 0.1 * STANDARD_GRAVITY * (period / (2 * np.pi)) ** 2
         alone = bilinear_response(record, DT, period, DAMPING, limit, 0.05)
         # the yield displacement differs in the last bit
         assert_allclose(spectra.displacement_radius[i], alone.displacement_radius, rtol=1e-12)
@@ -186,7 +186,7 @@ def test_ductility_one_is_elastic(record):
     spectra = constant_ductility_spectra(record, DT, [PERIOD], DAMPING, 1.0, 0.05)
     linear = response_spectra(record, DT, [PERIOD], DAMPING)
     assert_allclose(spectra.sd, linear.sd, rtol=1e-12)
-    assert_allclose(spectra.yield_coefficient, linear.psa / GRAVITY, rtol=1e-12)
+    assert_allclose(spectra.yield_coefficient, linear.psa / STANDARD_GRAVITY, rtol=1e-12)
 
 
 def test_no_motion_has_no_ductility():

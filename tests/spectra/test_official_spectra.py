@@ -7,8 +7,9 @@ import obspy
 import pytest
 from numpy.testing import assert_allclose
 
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.csmip import read_spectra
-from per_obspy.spectra.bilinear import GRAVITY, constant_ductility_spectra
+from per_obspy.spectra.bilinear import constant_ductility_spectra
 from per_obspy.spectra.elastic import response_spectra
 
 pytestmark = pytest.mark.real_data
@@ -80,7 +81,11 @@ def test_northridge_elastic_spectra(northridge, damping):
     trace, tables = northridge
     table = tables[damping]
     ours = response_spectra(trace.data, trace.stats.delta, table[:, 0], damping / 100)
-    for values, column, unit in ((ours.sa, 1, GRAVITY), (ours.sv, 5, 0.01), (ours.sd, 9, 0.01)):
+    for values, column, unit in (
+        (ours.sa, 1, STANDARD_GRAVITY),
+        (ours.sv, 5, 0.01),
+        (ours.sd, 9, 0.01),
+    ):
         errors = np.abs(values / unit / table[:, column] - 1)
         assert np.median(errors) <= 0.002
         assert errors.max() <= 0.011

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 from obspy import UTCDateTime
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.formats.text.lines import DECIMAL, Text, block_lines, fixed_block, line_at, refuse
 from per_obspy.formats.text.vocabulary import (
-    STANDARD_GRAVITY,
     channel_code,
     coordinates,
     full_year,

@@ -41,9 +41,6 @@ from obspy.core import AttribDict
 from per_obspy.checks import FloatArray
 from per_obspy.formats.text.lines import Text, refuse
 
-STANDARD_GRAVITY = 9.80665  # m/s2
-GAL = 0.01  # m/s2
-
 #: words for a vertical sensor -> its dip, degrees down from horizontal
 VERTICAL_DIPS = {
     **dict.fromkeys(

@@ -6,12 +6,13 @@ from collections import defaultdict
 import numpy as np
 from obspy import Stream, Trace
 
+from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import Rejection
 from per_obspy.processing.copying import copied
 from per_obspy.processing.notes import is_processed, rejection, remembered
 
 PREFERENCE = ("HN", "BN", "HH", "BH")  # accelerometers before velocity sensors, fast before slow
-STEEPEST_HORIZONTAL = 45.0  # degrees of dip
+
 SMALLEST_ANGLE = 30.0  # degrees between two horizontals that can stand for the plane
 SEED_CODE = re.compile(r"[A-Z][GHLMN][A-Z0-9]")
 AZIMUTH_CODE = re.compile(r"[0-3]?\d\d")
@@ -49,7 +50,7 @@ def _direction(channel: str) -> str:
 
 def is_horizontal(trace: Trace) -> bool:
     """Tell whether an oriented trace is a horizontal component."""
-    return bool(abs(trace.stats.sensor_dip) < STEEPEST_HORIZONTAL)
+    return bool(abs(trace.stats.sensor_dip) < VERTICAL_DIP)
 
 
 def instruments(stream: Stream) -> list[Stream]:

@@ -20,6 +20,7 @@ from scipy import fft
 
 from per_obspy import config
 from per_obspy.checks import FloatArray
+from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.files import written_whole
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation import stochastic
@@ -131,7 +132,7 @@ def _place(scenario: config.Scenario, number: int) -> Place:
 
 
 def _degrees(metres: float) -> float:
-    return metres / 111_195.0
+    return metres / METRES_PER_DEGREE
 
 
 def _hypocentral(scenario: config.Scenario, place: Place) -> float:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from per_obspy.checks import FloatArray
+from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
 from per_obspy.screening.values import number, values
 
 #: Mean radius of the earth (IUGG), m. On the sphere distances are within 0.6 % of the ellipsoid's.
-EARTH_RADIUS = 6_371_008.8
 
 
 class Stations(NamedTuple):

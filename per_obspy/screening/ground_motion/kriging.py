@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
+from per_obspy.constants import EARTH_RADIUS
 from per_obspy.kernels.kriging import kriged
-from per_obspy.screening.ground_motion.assignment import EARTH_RADIUS, on_sphere
+from per_obspy.screening.ground_motion.assignment import on_sphere
 from per_obspy.screening.ground_motion.sites import Sites
 from per_obspy.screening.ground_motion.spatial_correlation import decay_length
 from per_obspy.screening.ground_motion.trend import Group, features_of, fitted_group

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.screening.ground_motion.assignment import EARTH_RADIUS
+from per_obspy.constants import EARTH_RADIUS
 
 #: The longest period for which the correlation was published, s; longer ones take its value.
 LONGEST = 10.0

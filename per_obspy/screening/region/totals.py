@@ -10,8 +10,8 @@ from pandas.api.types import union_categoricals
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.ground_motion.assignment import EARTH_RADIUS
 
 STATES = ("yes", "possible", "no")
 

@@ -6,12 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 from obspy.geodetics import gps2dist_azimuth
 
-from per_obspy.screening.ground_motion.assignment import (
-    EARTH_RADIUS,
-    Stations,
-    assigned,
-    nearest_station,
-)
+from per_obspy.constants import EARTH_RADIUS
+from per_obspy.screening.ground_motion.assignment import Stations, assigned, nearest_station
 
 
 def test_distances_agree_with_the_ellipsoid():

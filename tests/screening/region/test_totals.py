@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from per_obspy.screening.ground_motion.assignment import EARTH_RADIUS
+from per_obspy.constants import EARTH_RADIUS
 from per_obspy.screening.region.totals import STATES, TOTALS, expected_count, grid_cells, totals
 
 TABLE = pd.DataFrame(

@@ -1,0 +1,16 @@
+"""Physical constants and shared thresholds, each with its unit and source."""
+
+#: Standard acceleration of gravity, m/s2, by definition (CGPM 1901).
+STANDARD_GRAVITY = 9.80665
+
+#: Gal, m/s2, by definition.
+GAL = 0.01
+
+#: Mean radius of the Earth, m (IUGG, radius R1 of GRS 80).
+EARTH_RADIUS = 6_371_008.8
+
+#: Arc of one degree on the mean Earth, m, to six digits.
+METRES_PER_DEGREE = 111_195.0
+
+#: Dip of the sensor axis, degrees from horizontal, from which a component is vertical.
+VERTICAL_DIP = 45.0
