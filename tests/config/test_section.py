@@ -8,7 +8,7 @@ from per_obspy.config import Ensemble, Run, Simulation, load, screening_kind
 from per_obspy.errors import CatalogError
 
 GOOD = 'name = "x"\noutput = "out"\n[records]\nfolder = "in"\n[pairs]\nfile = "pairs.csv"\n'
-CHECKOUT = Path(__file__).parents[1]
+CHECKOUT = Path(__file__).parents[2]
 
 
 def _load(tmp_path, text):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-WORKFLOWS = Path(__file__).parents[1] / "workflows"
+WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 
 @pytest.fixture(scope="module")

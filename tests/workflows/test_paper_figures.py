@@ -10,7 +10,7 @@ import pytest
 
 from per_obspy import single_hit
 
-WORKFLOWS = Path(__file__).parents[1] / "workflows"
+WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 
 def _start(script: str, data: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -12,7 +12,7 @@ from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.run import run
 from per_obspy.spectra.storage import read_spectra
 
-CHECKOUT = Path(__file__).parents[1]
+CHECKOUT = Path(__file__).parents[2]
 WORKFLOWS = CHECKOUT / "workflows"
 
 
