@@ -1,5 +1,5 @@
 """
-Which neighbouring buildings hit each other in an earthquake, how hard, and what would have prevented it.
+Find which neighbouring buildings hit each other in an earthquake, and what would prevent it.
 
 Everything is SI: m, s, m/s², kg; damping as a fraction of critical; angles in degrees clockwise
 from north. The public names stand in ``__init__.pyi``; each is imported when it is first used.

@@ -1,5 +1,5 @@
 """
-Checks of arguments: each returns a float64 array or raises ``ValueError`` naming argument and value.
+Check arguments: each function returns a float64 array or raises ``ValueError``.
 
 NaN and infinity are refused everywhere, because a running maximum hides a NaN behind an ordinary
 number.
@@ -44,7 +44,7 @@ def positive(name: str, values: ArrayLike) -> FloatArray:
 
 
 def positive_or_infinite(name: str, values: ArrayLike) -> FloatArray:
-    """Return values above zero; infinity is allowed (a wall's mass, the yield displacement of a linear structure)."""
+    """Return values above zero; infinity is allowed (mass of a wall, yield displacement)."""
     array = numbers(name, values)
     return _require(name, array, array > 0, "positive")
 

@@ -18,7 +18,10 @@ from per_obspy.errors import PerError, ServiceError
 
 app = typer.Typer(
     name="per-obspy",
-    help="Which neighbouring buildings hit each other in an earthquake, how hard, and what would have prevented it.",
+    help=(
+        "Which neighbouring buildings hit each other in an earthquake, how hard, and what "
+        "would have prevented it."
+    ),
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

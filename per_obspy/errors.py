@@ -83,7 +83,7 @@ class MissingExtra(PerError, ImportError):
 
 
 def require_extra(extra: str, *modules: str) -> None:
-    """Raise :class:`MissingExtra` if one of the modules that an optional part needs is not installed."""
+    """Raise :class:`MissingExtra` if a module of an optional feature is not installed."""
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
         raise MissingExtra(extra, missing)
@@ -91,7 +91,7 @@ def require_extra(extra: str, *modules: str) -> None:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """
-    Return the question after a mistyped word, empty if nothing known is like it; capitals do not count.
+    Return a question that suggests the known word closest to a mistyped one, or an empty text.
 
     Examples
     --------

@@ -1,5 +1,5 @@
 """
-Check that no function is packed: nodes of its syntax tree, comments per step, comprehensions per line.
+Check that no function is packed: nodes of its body, comments per step, comprehensions per line.
 
 Run it as ``python tests/check_density.py [PATH ...]``; it lists every violation and exits with 1 if
 there is one. Expression contexts and operators are not counted as nodes.

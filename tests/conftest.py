@@ -28,7 +28,7 @@ def real_data() -> Path:
 
 @pytest.fixture
 def call(monkeypatch, capsys):
-    """Return exit code, output and errors of ``per-obspy`` with these arguments; a traceback is no answer."""
+    """Return exit code, output and errors of ``per-obspy`` with these arguments; no traceback."""
 
     def called(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["per-obspy", *map(str, arguments)])

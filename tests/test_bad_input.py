@@ -23,7 +23,15 @@ ROW = {
     "pair_id": "a", "longitude_1": 0.3, "latitude_1": 0.1, "height_1": 10.0,
     "longitude_2": 0.3001, "latitude_2": 0.1, "height_2": 12.0, "gap": 0.05,
 }  # fmt: skip
-RUN = 'name = "x"\noutput = "out"\nworkers = 1\n[records]\nfolder = "records"\n[pairs]\nfile = "pairs.csv"\n'
+RUN = """
+name = "x"
+output = "out"
+workers = 1
+[records]
+folder = "records"
+[pairs]
+file = "pairs.csv"
+"""
 MAPPED = RUN.replace('"records"\n', '"records"\nshakemap = "grid.xml"\n')
 STORED = RUN.replace('file = "pairs.csv"', 'catalog = "catalog.toml"')
 DESIGN = 'spectrum = "code.csv"\npairs = "pairs.csv"\noutput = "out"\n'
@@ -432,7 +440,8 @@ def test_every_fault_of_a_row_is_told(write, call):
     )
     _, out, _ = call("pairs", "check", "pairs.csv")
     told = next(line for line in out.splitlines() if line.startswith("  line 3, b: "))
-    assert [reason.split(" = ")[0] for reason in told.removeprefix("  line 3, b: ").split("; ")] == [
+    reasons = told.removeprefix("  line 3, b: ").split("; ")
+    assert [reason.split(" = ")[0] for reason in reasons] == [
         "gap", "restitution", "height_1", "mass_2",
     ]  # fmt: skip
 

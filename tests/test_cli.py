@@ -1,4 +1,9 @@
-"""The command line as a user meets it: help, exit codes, one line for what is wrong, no traceback."""
+"""
+The command line as a user meets it: help, exit codes, one line per error, no traceback.
+
+Covers ``per_obspy.commands.endings``, ``per_obspy.commands.printing`` and
+``per_obspy.commands.run``.
+"""
 
 import json
 import subprocess

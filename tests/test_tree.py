@@ -1,4 +1,4 @@
-"""The shape of the package: folders of at most twelve files, tests that mirror it, stems that occur once."""
+"""The shape of the package: folders of at most twelve files, mirrored tests, unique stems."""
 
 import ast
 from collections import defaultdict
@@ -18,9 +18,10 @@ LARGER_FOLDERS = {"formats"}
 
 #: Stems that occur in several rooms, because these rooms mirror each other layer by layer.
 MIRRORED = {
-    "run", "pairs", "records", "screening", "station", "ensemble", "totals", "evaluation", "spectra",  # fmt: skip
-    "risk", "demand", "single_hit", "probability", "links", "row_history", "kriging", "bilinear",
-}  # fmt: skip
+    *("run", "pairs", "records", "screening", "station", "ensemble", "totals", "evaluation"),
+    *("spectra", "risk", "demand", "single_hit", "probability", "links", "row_history"),
+    *("kriging", "bilinear"),
+}
 
 
 def _named_in_tests() -> str:

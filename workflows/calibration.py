@@ -1,5 +1,5 @@
 """
-How well the probability of pounding is calibrated: 100 000 pairs in simulated motion, predicted and as it turned out.
+Measure the calibration of the probability of pounding: 100 000 pairs in simulated motion.
 
 Run: ``python workflows/calibration.py``; prints the tables of docs/calibration.md, writes them into
 it and draws its figures.
@@ -18,7 +18,7 @@ MEASURED = "## Measured"  # the heading below which the page is the script's
 
 
 def main() -> None:
-    """Simulate, print the tables, write them into the page below what is said there by hand, draw the figures."""
+    """Simulate, print the tables, write them into the measured part of the page, draw figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=CHECKOUT / "docs" / "calibration.md")
     parser.add_argument("-e", "--events", type=int, default=20, help="simulated earthquakes")

@@ -1,4 +1,4 @@
-"""Pairs whose risk is told from stations, and what a motion and buildings that nobody told of then do to them."""
+"""Simulated pairs predicted from stations, and their outcome in the true motion."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -42,13 +42,15 @@ PLACES = ("at a station", "between stations", "between, motion varied")
 #: Kinds of pairs; periods count as given where both are. All but the last leave a gap.
 APART, YIELDING, TOUCHING = "all that leave a gap", "buildings that yield", "touching"
 KINDS = (
-    APART, "periods and gap given", "periods given, gap estimated", "periods derived", "of these, equal buildings",
+    APART, "periods and gap given", "periods given, gap estimated", "periods derived",
+    "of these, equal buildings",
     YIELDING, TOUCHING,
 )  # fmt: skip
 
 #: What is kept of the risk table.
 KEPT = (
-    "site", "probability", "demand_rule", "demand_exact", "demand_two_sided", "critical_gap_per", "critical_gap_record",
+    "site", "probability", "demand_rule", "demand_exact", "demand_two_sided", "critical_gap_per",
+    "critical_gap_record",
     "critical_gap_sd", "critical_gap_linearized",
 )  # fmt: skip
 
@@ -58,7 +60,7 @@ AMPLITUDE, CORRELATED_AS = 0.5, 1.0
 
 
 class Site(NamedTuple):
-    """A place with its true motion: degrees, kind of ground, north and east (m/s²), sampling interval (s)."""
+    """A place with its true motion: degrees, kind of ground, north and east (m/s²), step (s)."""
 
     longitude: float
     latitude: float
@@ -68,7 +70,7 @@ class Site(NamedTuple):
 
 
 class Network(NamedTuple):
-    """An earthquake at places with a station and at places without: what is known of the former, the truth of all."""
+    """An earthquake at places with and without a station, and the true motion of all of them."""
 
     scenario: Scenario
     stations: list[xr.Dataset]
@@ -173,7 +175,7 @@ def _amplitudes(places: Sequence, seed: int) -> FloatArray:
 
 
 def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> pd.DataFrame:
-    """Return the risk table of pairs at sites, as a planner with the stations would have it, and their ``site``."""
+    """Return the risk table of pairs at sites, made from the stations alone, and their ``site``."""
     east, north = (
         np.array([getattr(site, name) for site in sites]) for name in ("longitude", "latitude")
     )
@@ -191,7 +193,7 @@ def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> p
 
 
 def _more(raw: pd.DataFrame, seed: int) -> dict[str, FloatArray]:
-    """Return what the simulated inventory does not have: gaps that were estimated, buildings that yield."""
+    """Return columns missing from the simulated inventory: estimated gaps, yielding buildings."""
     generator = np.random.default_rng([seed, 3])
     estimated, yields = (
         generator.random(len(raw)) < ESTIMATED,
@@ -204,7 +206,7 @@ def _more(raw: pd.DataFrame, seed: int) -> dict[str, FloatArray]:
 
 
 def outcomes(rows: pd.DataFrame, sites: Sequence[Site], seed: int) -> NDArray[np.bool_]:
-    """Return whether each pair pounds: its true gap and buildings in the true motion of its site."""
+    """Return whether each pair pounds, with its true gap and buildings in its site's motion."""
     true = _true_pairs(rows, np.random.default_rng([seed, 4]))
     pounded = np.empty(len(rows), dtype=bool)
     for number, some in true.groupby("site"):
@@ -215,7 +217,7 @@ def outcomes(rows: pd.DataFrame, sites: Sequence[Site], seed: int) -> NDArray[np
 
 
 def _true_pairs(rows: pd.DataFrame, generator: np.random.Generator) -> pd.DataFrame:
-    """Draw periods, dampings and gaps from what the table says of their uncertainty; the rest is as it says."""
+    """Draw true periods, dampings and gaps from the table's uncertainties."""
     true = rows.copy()
     for i in (1, 2):
         for name in ("period", "damping"):

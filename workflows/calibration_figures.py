@@ -1,4 +1,4 @@
-"""The figures of docs/calibration.md: a reliability diagram a place, and simple against exact demands."""
+"""Figures of docs/calibration.md: a reliability diagram per place, simple and exact demands."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -56,7 +56,7 @@ def draw_reliability(places: Sequence[tuple[str, pd.DataFrame]], path: Path) -> 
 
 
 def _add_kind(axes: Axes, pairs: pd.DataFrame, kind: str, colour: str) -> None:
-    """Add the shares of one kind in bins; those of all pairs with two deviations, pairs of an earthquake dependent."""
+    """Add the shares of one kind per bin; all pairs with two deviations, dependent per event."""
     bins = np.minimum((pairs["probability"] * BINS).astype(int), BINS - 1)
     groups = [some for _, some in pairs.groupby(bins) if len(some) >= FEWEST]
     told, share = ([some[name].mean() for some in groups] for name in ("probability", "pounded"))
@@ -101,7 +101,8 @@ def draw_demands(demands: Mapping[str, tuple[FloatArray, FloatArray]], path: Pat
         axes.hexbin(exact, simple, bins="log", cmap="viridis_r", linewidths=0.1, **places)
         axes.plot(ends, ends, color="black", linewidth=0.8)
         found = summary(simple / exact, (1.0,))
-        text = f"estimate / exact: median {found.median:.2f}, σ of ln {found.log_std:.2f}, {found.below[0]:.0%} below 1"
+        text = f"estimate / exact: median {found.median:.2f}, σ of ln {found.log_std:.2f}, "
+        text += f"{found.below[0]:.0%} below 1"
         axes.set_title(f"{title}\n{text}", fontsize=9)
         axes.set(
             xlim=ends,

@@ -1,4 +1,4 @@
-"""The tables of docs/calibration.md: scores a kind of pair, reliability a bin, simple over exact demand."""
+"""Tables of docs/calibration.md: scores per kind, reliability per bin, simple/exact demand."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ LEAST = 1e-6
 
 
 def difference(pairs: pd.DataFrame) -> tuple[float, float]:
-    """Return mean probability minus share that pounded, and its standard deviation with pairs of an event dependent."""
+    """Return mean probability minus share that pounded, and its deviation, dependent per event."""
     excess = pairs["probability"] - pairs["pounded"]
     by_event = (excess - excess.mean()).groupby(pairs["event"]).sum()
     return float(excess.mean()), float(np.sqrt((by_event**2).sum()) / len(excess))
@@ -30,7 +30,10 @@ def difference(pairs: pd.DataFrame) -> tuple[float, float]:
 
 def kind_table(pairs: pd.DataFrame) -> Iterator[str]:
     """Yield one row a kind of pair."""
-    yield "| pairs | number | predicted | pounded | difference | Brier score | if true | of the share | sharp |"
+    yield (
+        "| pairs | number | predicted | pounded | difference "
+        "| Brier score | if true | of the share | sharp |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|"
     for kind in KINDS:
         some = pairs[pairs[kind]]
@@ -39,11 +42,12 @@ def kind_table(pairs: pd.DataFrame) -> Iterator[str]:
         mean, doubt = difference(some)
         scores = brier_score(pounded, told), (told * (1.0 - told)).mean(), share * (1.0 - share)
         cells = [f"{len(some)}", f"{told.mean():.3f}", f"{share:.3f}", f"{mean:+.3f} ± {doubt:.3f}"]
-        yield f"| {kind} | {' | '.join([*cells, *(f'{score:.4f}' for score in scores), f'{sharp:.0%}'])} |"
+        cells = [*cells, *(f"{score:.4f}" for score in scores), f"{sharp:.0%}"]
+        yield f"| {kind} | {' | '.join(cells)} |"
 
 
 def bin_table(pairs: pd.DataFrame) -> Iterator[str]:
-    """Yield one row a bin of the probability: mean probability, share that pounded, pairs; for every place."""
+    """Yield one row per bin of probability and place: mean probability, share, number of pairs."""
     yield "| probability | " + " | ".join(PLACES) + " |"
     yield "|---|" + "---|" * len(PLACES)
     found = [
@@ -68,7 +72,7 @@ def by_place(pairs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 
 def demands(pairs: pd.DataFrame, exact: str) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return every simple estimate with an exact demand, both of the station's record and the table's buildings."""
+    """Return simple estimates and exact demand for the station's record and tabled buildings."""
     moves = pairs[(pairs[exact] > LEAST) & pairs[APART]]
     linear, weak = moves[~moves[YIELDING]], moves[moves[YIELDING]]
     by_per = ["critical_gap_per", "critical_gap_record"]

@@ -1,4 +1,4 @@
-"""What the paper's figures show: pairs, histories, single hits and correlations. See ``paper_figures.py``."""
+"""Cases of the paper's figures: pairs, histories, single hits, correlations (paper_figures.py)."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -57,7 +57,7 @@ def hit_of(pair: Pair, gap: float | np.ndarray, restitution: float = RESTITUTION
 def critical_cases(
     record: Record, all_periods: list[tuple[float, float]]
 ) -> Iterator[tuple[Pair, float, PoundingHistory, SingleHit]]:
-    """Yield what Fig. 4 shows of each pair: circles, correlation, history far apart, onset of pounding."""
+    """Yield the content of Fig. 4 per pair: circles, correlation, history, onset of pounding."""
     for periods in all_periods:
         pair = pair_of(record, periods, 1.0)
         onset = hit_of(pair, pair.gap * (1.0 - 1e-12))
@@ -66,7 +66,7 @@ def critical_cases(
 
 
 def comparisons(record: Record, count: int) -> dict[float, SingleHitComparison]:
-    """Return Fig. 6: single hits beside exact histories, for all pairs of so many periods from 0.3 s to 4 s."""
+    """Return Fig. 6: single hits and exact histories of all pairs of ``count`` periods, 0.3-4 s."""
     pairs = np.array(list(combinations(np.geomspace(0.3, 4.0, count), 2))).T
     compared = {
         ratio: compare_single_hit(record.acceleration, record.dt, *pairs, ratio)
@@ -74,15 +74,17 @@ def comparisons(record: Record, count: int) -> dict[float, SingleHitComparison]:
     }
     for ratio, cases in compared.items():
         found = summary(np.divide(*amplifications(cases)), (0.99,))
-        text = f"bias {found.median:.2f}, scatter {found.log_std:.2f}, {found.below[0]:.0%} under-predicted by > 1 %"
+        text = f"bias {found.median:.2f}, scatter {found.log_std:.2f}, "
+        text += f"{found.below[0]:.0%} under-predicted by > 1 %"
         print(
-            f"{record.name}, gap {ratio:g} of the critical one, {found.cases} of {cases.status.size} pairs: {text}"
+            f"{record.name}, gap {ratio:g} of the critical one, {found.cases} of "
+            f"{cases.status.size} pairs: {text}"
         )
     return compared
 
 
 def damping_needs(record: Record, pair: Pair) -> tuple:
-    """Return Fig. 8: added damping, critical gaps with it, the least that is enough, and what pounding still does."""
+    """Return Fig. 8: added damping, its critical gaps, the least sufficient, pounding with less."""
     added, shares = (
         np.linspace(0.0, 0.3, 61),
         {"both": (1.0, 1.0), "only 1": (1.0, 0.0), "only 2": (0.0, 1.0)},
@@ -114,7 +116,7 @@ def damping_needs(record: Record, pair: Pair) -> tuple:
 
 
 def correlation_panels(ratios: np.ndarray) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
-    """Yield a panel for each ground and period: correlation over the ratio of periods, for prescribed ductilities."""
+    """Yield a panel per ground and period: correlation over period ratio, per ductility."""
     for name, ground in GROUNDS.items():
         for period in (1.0, 2.0):
             curves = {"(16), elastic": ddc_correlation(period, DAMPING, period * ratios, DAMPING)}

@@ -24,7 +24,7 @@ from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, save
 
 
 class Sheet(NamedTuple):
-    """What stands on every figure of a record: its title, its PNG file, whether the motion is simulated."""
+    """Common content of the figures of a record: title, PNG file, whether it is simulated."""
 
     title: str
     path: Path
@@ -77,7 +77,7 @@ def draw_radius_and_energies(
     history: PoundingHistory, period: float, mass: float, sheet: Sheet
 ) -> None:
     """
-    Draw Fig. 2 for the first structure: (a) its state space with the PER circle, (b) its energies over time.
+    Draw Fig. 2 for the first structure: (a) state space with PER circle, (b) energies over time.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def draw_critical_gaps(
     cases: Sequence[tuple[Pair, float, PoundingHistory, SingleHit]], sheet: Sheet
 ) -> None:
     """
-    Draw Fig. 4: the energy circles of pairs of structures at their critical gaps, with the onset of pounding.
+    Draw Fig. 4: energy circles of pairs at their critical gaps, with the onset of pounding.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def draw_critical_gaps(
 
 def draw_single_hit(hit: SingleHit, pair: Pair, sheet: Sheet) -> None:
     """
-    Draw Fig. 5: grazing state, way back to the actual contact, impact, and the radius after it, for both branches.
+    Draw Fig. 5: grazing state, actual contact, impact and radius after it, for both branches.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def _draw_hit(axes: Axes, hit: SingleHit, pair: Pair, i: int, branch: int) -> fl
 
 def draw_comparison(compared: Mapping[float, SingleHitComparison], sheet: Sheet) -> None:
     """
-    Draw Fig. 6: predicted against actual largest PER with pounding, and the amplifications behind it.
+    Draw Fig. 6: predicted against actual largest PER with pounding, and the amplifications.
 
     Parameters
     ----------
@@ -248,7 +248,8 @@ def draw_comparison(compared: Mapping[float, SingleHitComparison], sheet: Sheet)
         )
         predicted, actual = amplifications(cases)
         found = summary(predicted / actual, (0.99,))
-        text = f"{gap_ratio:g}: {found.median:.2f}, {found.log_std:.2f}, {found.below[0]:.0%} of {found.cases}"
+        text = f"{gap_ratio:g}: {found.median:.2f}, {found.log_std:.2f}, "
+        text += f"{found.below[0]:.0%} of {found.cases}"
         ratios.loglog(actual, predicted, ".", base=2, color=colour, markersize=4, label=text)
     radii.set(xlabel="actual PER with pounding (m)", ylabel="predicted PER with pounding (m)")
     radii.set_title("the structure that is amplified most", fontsize=10)
@@ -312,7 +313,7 @@ def draw_supplemental_damping(
     sheet: Sheet,
 ) -> None:
     """
-    Draw Fig. 8: the damping to add so that a pair needs no more than its gap, and what less of it still improves.
+    Draw Fig. 8: the added damping with which a pair fits its gap, and the effect of less of it.
 
     Parameters
     ----------
@@ -359,7 +360,7 @@ def draw_ductility_correlation(
     ratios: FloatArray, curves: Mapping[str, Mapping[str, FloatArray]], sheet: Sheet
 ) -> None:
     """
-    Draw the correlation of yielding pairs against the ratio of their periods, one panel a ground motion.
+    Draw the correlation of yielding pairs against their period ratio, one panel per ground motion.
 
     Parameters
     ----------

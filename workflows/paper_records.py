@@ -1,4 +1,4 @@
-"""Records that the paper's figures and the reliability tables use, and where they are; none belongs to the project."""
+"""Locate the records of the paper's figures and tables; none belongs to the project."""
 
 import os
 from pathlib import Path
@@ -36,7 +36,7 @@ BROAD_BAND = (
 
 
 class Record(NamedTuple):
-    """One horizontal component: name, acceleration (m/s²), sampling interval (s), whether it is simulated."""
+    """One horizontal component: name, acceleration (m/s²), sampling interval (s), simulated."""
 
     name: str
     acceleration: FloatArray
@@ -45,12 +45,12 @@ class Record(NamedTuple):
 
 
 def data_folder() -> Path:
-    """Return where real records are, if they are anywhere: PER_OBSPY_DATA, or ``shared/data`` beside the checkout."""
+    """Return the folder of real records, if any: PER_OBSPY_DATA or ``shared/data``."""
     return Path(os.environ.get("PER_OBSPY_DATA", CHECKOUT.parent / "shared" / "data"))
 
 
 def mexico_city_1985() -> list[Record]:
-    """Return the north and east components at SCT, 19 September 1985: the paper's record is the second."""
+    """Return the north and east components at SCT, 19 September 1985; the paper used the second."""
     path = data_folder() / "records" / "mexico1985_sct" / "sct190985.txt"
     place = {"network": "MX", "station": "SCT", "latitude": 19.393, "longitude": -99.147}
     stream = read_columns(path, **place, units="g", time_column=0, channels={"HNN": 1, "HNE": 2})
@@ -72,7 +72,7 @@ def broad_band(files: tuple[str, ...] = BROAD_BAND) -> list[Record]:
 
 
 def simulated_lakebed() -> Record:
-    """Return a processed horizontal of the demonstration's earthquake on its lakebed, where SCT 1985 is absent."""
+    """Return a processed horizontal of the demonstration's lakebed, a substitute for SCT 1985."""
     scenario = load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Simulation).scenario
     stream = simulate(
         scenario.model_copy(update={"stations": 2})

@@ -1,5 +1,5 @@
 """
-What is left of a known ground motion after noise, drifts and baseline shifts were added and processed away.
+Compare processed motion with the known truth after noise, drifts and baseline shifts were added.
 
 Run: ``python workflows/processing_truth.py docs/figures/processing_truth.png``; prints the table of
 docs/processing.md and draws the figure.
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def box(shift: float, start: float, end: float) -> Callable[[np.random.Generator], Array]:
-    """Return a baseline that is off by a shift, m/s2, between two times, s; the shaking lasts from 20 to 40 s."""
+    """Return a baseline with a shift (m/s2) between two times (s); the shaking lasts 20-40 s."""
     return lambda _: np.where((start < TIME) & (end > TIME), shift, 0.0)
 
 
@@ -49,7 +49,7 @@ ADDED: dict[str, Callable[[np.random.Generator], Array]] = {
 
 
 class Outcome(NamedTuple):
-    """PER over the true one by period, usable periods (s), and whether a shift of the baseline was flagged."""
+    """PER over the true PER by period, usable periods (s), and whether a shift was flagged."""
 
     ratio: Array
     shortest: float
@@ -131,7 +131,8 @@ def main(path: Path) -> None:
     """Print the table and draw the figure."""
     table = {kind: [outcome(kind, seed) for seed in range(SEEDS)] for kind in ADDED}
     print(
-        "| added, m/s² | median error | largest to 1.6 s | largest usable | largest beyond | usable to, s | flagged |"
+        "| added, m/s² | median error | largest to 1.6 s | largest usable | largest beyond | "
+        "usable to, s | flagged |"
     )
     print("|---|---|---|---|---|---|---|")
     for kind, outcomes in table.items():

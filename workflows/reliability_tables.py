@@ -1,4 +1,4 @@
-"""How reliable the estimates of the critical gap and of the single hit are, measured on real records (two minutes)."""
+"""Measure the reliability of critical gap and single hit on real records (two minutes)."""
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
@@ -32,7 +32,7 @@ ESTIMATES = {
 
 
 def gap_table(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterator[str]:
-    """Yield the rows on the critical gap: estimate over exact max |u1 - u2|, both structures with 5 % damping."""
+    """Yield the rows on the critical gap: estimate / exact max |u1 - u2|, 5 % damping."""
     yield "| estimate / exact | " + " | ".join(groups) + " |"
     yield "|---|" + "---|" * len(groups)
     compared = {

@@ -1,5 +1,5 @@
 """
-How far the estimates for pairs that yield are from the exact demand, in simulated motion and at SCT 1985.
+Compare estimates for yielding pairs with the exact demand, in simulated motion and SCT 1985.
 
 Run: ``python workflows/yielding_estimates.py``; prints the table of docs/screening.md: median of
 estimate / exact, sigma of its logarithm, share that is too small, and share where the linearization
@@ -53,7 +53,7 @@ def mexico_city_1985() -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def yielding_pairs(station: xr.Dataset, count: int, draw: np.random.Generator) -> Columns:
-    """Return random pairs at a station, in every one of which a building yields, with estimates and exact demand."""
+    """Return random pairs at a station, each with a yielding building, with all demands."""
     every = np.ones(count)
     pairs: Columns = {
         "azimuth": draw.uniform(0.0, 180.0, count),
@@ -104,7 +104,8 @@ def main() -> None:
     for name, station in mexico_city_1985():
         groups.setdefault(name, []).append(yielding_pairs(station, 10 * arguments.pairs, draw))
     print(
-        "| motion | estimate | median, σ_ln, too small | smallest | not converged |\n|---|---|---|---|---|"
+        "| motion | estimate | median, σ_ln, too small | smallest | not converged "
+        "|\n|---|---|---|---|---|"
     )
     for name, tables in groups.items():
         print("\n".join(row(name, estimate, tables) for estimate in ESTIMATES))

@@ -1,1 +1,1 @@
-"""Groups of commands of the command line, one module a group; each parses, calls one function, prints."""
+"""Commands of the command line, one module per group; each parses, calls a function, prints."""

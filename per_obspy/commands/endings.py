@@ -1,4 +1,4 @@
-"""How a command ends, and the option that makes it print for machines: the same for all."""
+"""Exit codes and endings that all commands share, and the option ``--json``."""
 
 import csv
 import json
@@ -19,31 +19,28 @@ WRONG_INPUT, NOTHING_USABLE, SERVICE_UNAVAILABLE = 2, 3, 75
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 
 
-def end_if_nothing(usable: int, said: str = "") -> None:
-    """Stop with the exit code for nothing usable if the count of what is left is 0, saying why if that is given."""
+def stop_if_nothing(usable: int, reason: str = "") -> None:
+    """Stop with the exit code for nothing usable if ``usable`` is 0; print the reason if given."""
     if usable:
         return
-    if said:
-        print(said, file=sys.stderr)
+    if reason:
+        print(reason, file=sys.stderr)
     raise typer.Exit(NOTHING_USABLE)
 
 
-def tell(result: "Result", as_json: bool, show: "Callable[[Result], None]") -> None:
+def print_and_end(result: "Result", as_json: bool, show: "Callable[[Result], None]") -> None:
     """Print the result of a run or of several, and stop where nothing usable was left."""
     if as_json:
-        print(
-            json.dumps(
-                {"folder": str(result.folder), "did_nothing": result.did_nothing, **result.record}
-            )
-        )
+        known = {"folder": str(result.folder), "did_nothing": result.did_nothing}
+        print(json.dumps({**known, **result.record}))
     else:
         show(result)
     if result.record["state"] == "nothing_usable":
-        end_if_nothing(0, why_nothing(result.folder / "rejected.csv"))
+        stop_if_nothing(0, why_nothing(result.folder / "rejected.csv"))
 
 
 def why_nothing(rejected: Path) -> str:
-    """Return that nothing usable was left, where the reasons are, and the first of them."""
+    """Return a message with the place of the reasons for rejection and the first of them."""
     with rejected.open(encoding="utf-8", newline="") as file:
         first = next(csv.DictReader(file), None)
     example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""

@@ -1,4 +1,4 @@
-"""``per-obspy pairs`` and ``per-obspy catalog``: inventories of building pairs, made, checked and stored."""
+"""``per-obspy pairs`` and ``per-obspy catalog``: make, check and store pair inventories."""
 
 import datetime
 import json
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from per_obspy.commands.endings import WRONG_INPUT, AsJson, end_if_nothing
+from per_obspy.commands.endings import WRONG_INPUT, AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table
 from per_obspy.errors import CatalogError, require_extra
 
@@ -28,7 +28,7 @@ SHOWN, COMMON = 10, 3
 
 
 class _FindByDefault(TyperGroup):
-    """A group whose first word may be left out: ``pairs FOOTPRINTS`` is ``pairs find FOOTPRINTS``."""
+    """A command group with a default: ``pairs FOOTPRINTS`` is ``pairs find FOOTPRINTS``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         known = (*self.commands, "--help", "-h")
@@ -38,7 +38,8 @@ class _FindByDefault(TyperGroup):
 pairs = typer.Typer(
     cls=_FindByDefault,
     no_args_is_help=True,
-    help="Pairs of neighbouring buildings: found in footprints, or checked. `pairs FILE` is `pairs find FILE`.",
+    help="Pairs of neighbouring buildings: found in footprints, or checked. "
+    "`pairs FILE` is `pairs find FILE`.",
 )
 catalog = typer.Typer(
     no_args_is_help=True, help="Stored inventories of pairs, with their sources and hashes."
@@ -75,26 +76,24 @@ def find_pairs(
     from per_obspy.inventory.footprints.pairs import pairs_from_footprints
     from per_obspy.tables.writing import write_rejected
 
+    # Find the pairs and write them with their rejections
     table = pairs_from_footprints(footprints, distance, layer, gap_std)
     rejected = table.attrs["rejected"]
     write_pairs(table, output)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))
-    facts = {
-        "pairs": len(table),
-        "touching": int((table["gap"] == 0.0).sum()),
-        "rejected": len(rejected),
-    }
+
+    # Print the counts, for machines or with the most common reasons for rejection
+    touching = int((table["gap"] == 0.0).sum())
     if as_json:
-        print(json.dumps({"output": str(output), **facts}))
+        counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
+        print(json.dumps({"output": str(output), **counts}))
     else:
-        print(
-            f"{facts['pairs']} pairs, {facts['touching']} of them touching, {len(rejected)} rejected: {output}"
-        )
-        for reason, count in Counter(
-            reason for one in rejected for reason in one.reasons
-        ).most_common(COMMON):
+        counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
+        print(f"{counted}: {output}")
+        reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
+        for reason, count in reasons.most_common(COMMON):
             print(f"  {count} times: {reason}")
-    end_if_nothing(len(table))
+    stop_if_nothing(len(table))
 
 
 @pairs.command("check")
@@ -115,62 +114,63 @@ def check_pairs(
         unused_columns,
     )
 
+    # Read the table and describe it
     table = read_pairs(file)
     rejected = table.attrs["rejected"]
     profile = inventory_profile(table)
     touching = int((table["gap"] == 0.0).sum())
     derived, unused, odd = derived_counts(table), unused_columns(table), suspicions(table)
+
+    # Print the description, for machines or people
     if as_json:
         columns = json.loads(profile.to_json(orient="records"))
-        faults = [one._asdict() for one in rejected]
+        faults = [rejection._asdict() for rejection in rejected]
         known = {"pairs": len(table), "touching": touching, "rejected": faults, "columns": columns}
         print(json.dumps({**known, "derived": derived, "unused": unused, "suspicions": odd}))
     else:
-        print(
-            f"{file}: {len(table)} usable pairs, {touching} of them touching, {len(rejected)} rejected rows"
-        )
+        counted = f"{len(table)} usable pairs, {touching} of them touching"
+        print(f"{file}: {counted}, {len(rejected)} rejected rows")
         _print_rejected(rejected)
         if not table.empty:
             _print_profile(profile, derived, unused, odd)
-    end_if_nothing(len(table), f"no usable row in {file}")
+    stop_if_nothing(len(table), f"no usable row in {file}")
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
-    """Print the first rejected rows, and where there are more, how many were rejected for what."""
+    """Print the first rejected rows; count the others by column and fault."""
     from per_obspy.inventory.profile import faults_by_column
 
-    for one in rejected[:SHOWN]:
-        print(f"  line {one.row}, {one.name}: {'; '.join(one.reasons)}")
+    for row in rejected[:SHOWN]:
+        print(f"  line {row.row}, {row.name}: {'; '.join(row.reasons)}")
+    # Where there are many, their faults by column
     if len(rejected) > SHOWN:
-        counts = ", ".join(
-            f"{fault} ({count})" for fault, count in faults_by_column(rejected).items()
-        )
+        faults = faults_by_column(rejected)
+        counts = ", ".join(f"{fault} ({count})" for fault, count in faults.items())
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
 
 
 def _print_profile(
     profile: "pd.DataFrame", derived: dict[str, int], unused: list[str], suspicions: list[str]
 ) -> None:
-    # the commonest of many numbers says nothing, and a place needs more than three digits
-    described = profile.assign(
-        most_frequent=profile["most_frequent"].where(profile["median"].isna(), "")
-    )
+    """Print the columns of a pair table, and the warnings about the table as a whole."""
+    # The most frequent of many numbers is meaningless
+    frequent = profile["most_frequent"].where(profile["median"].isna(), "")
+    described = profile.assign(most_frequent=frequent)
+    # Coordinates need more than three digits
+    degrees = described["column"].str.match("longitude|latitude")
     for name in ("smallest", "median", "largest"):
-        degrees = described["column"].str.match("longitude|latitude")
-        described[name] = (
-            described[name].astype(object).mask(degrees, described[name].map("{:.5f}".format))
-        )
+        digits = described[name].map("{:.5f}".format)
+        described[name] = described[name].astype(object).mask(degrees, digits)
     titles = [str(name).replace("_", " ") for name in profile.columns]
     print_table("What it gives", titles, described.itertuples(index=False))
+    # Derived values, unknown columns, suspicions
     if derived:
-        print(
-            "Derived or assumed instead (rows):",
-            ", ".join(f"{name} ({rows})" for name, rows in derived.items()),
-        )
+        counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
+        print("Derived or assumed instead (rows):", counts)
     if unused:
         print("Unknown columns, carried along unchanged:", "; ".join(unused))
-    for one in suspicions:
-        print("Suspicious:", one)
+    for suspicion in suspicions:
+        print("Suspicious:", suspicion)
 
 
 @catalog.command("add")
@@ -216,11 +216,13 @@ def check(index: Index = CATALOG, as_json: AsJson = False) -> None:
 
     count, faults = len(stored_inventories(index)), check_inventories(index)
     if as_json:
-        print(json.dumps({"inventories": count, "faults": [one._asdict() for one in faults]}))
+        rows = [fault._asdict() for fault in faults]
+        print(json.dumps({"inventories": count, "faults": rows}))
     else:
         print(f"{count - len(faults)} of {count} stored inventories are unchanged")
-    for one in faults:
-        print(f"per-obspy: {one.source}: {'; '.join(one.reasons)}", file=sys.stderr)
+    # One line per fault, whatever the form of the result
+    for fault in faults:
+        print(f"per-obspy: {fault.source}: {'; '.join(fault.reasons)}", file=sys.stderr)
     if faults:
         raise typer.Exit(WRONG_INPUT)
 
@@ -250,19 +252,16 @@ def find(
 
 
 def _print_inventories(entries: "Sequence[StoredInventory]", as_json: bool) -> None:
+    """Print stored inventories, one row per inventory."""
     if as_json:
         print(json.dumps([entry.model_dump(mode="json") for entry in entries]))
         return
-    rows = [
-        (
-            one.name,
-            one.pairs,
-            " ".join(f"{x:g}" for x in one.bounding_box),
-            one.licence,
-            one.source,
-            one.date,
-        )
-        for one in entries
-    ]
     titles = ("name", "pairs", "west south east north", "licence", "source", "date")
+    rows = [_inventory_cells(entry) for entry in entries]
     print_table(f"{len(rows)} stored inventories", titles, rows)
+
+
+def _inventory_cells(entry: "StoredInventory") -> tuple[object, ...]:
+    """Return the cells of one stored inventory."""
+    box = " ".join(f"{degrees:g}" for degrees in entry.bounding_box)
+    return entry.name, entry.pairs, box, entry.licence, entry.source, entry.date

@@ -1,4 +1,4 @@
-"""How commands print tables and progress."""
+"""Print tables and progress."""
 
 import sys
 from contextlib import contextmanager
@@ -24,7 +24,7 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
 
 
 def cell(value: object) -> str:
-    """Return a value as text: numbers with three digits, nothing for what is missing."""
+    """Return a value as text: numbers with three digits, missing ones as an empty text."""
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
     return str(value)
@@ -32,15 +32,18 @@ def cell(value: object) -> str:
 
 @contextmanager
 def shown_progress() -> "Iterator[Progress]":
-    """Give what is told of progress: bars on a terminal, plain lines elsewhere; both on standard error."""
+    """Yield a progress callback: bars on a terminal, plain lines elsewhere; on standard error."""
     from rich.console import Console
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
+    # A log gets one line per step
     console = Console(stderr=True)
     if not console.is_terminal:
         yield _print_line
         return
+
+    # A terminal gets one bar per stage, made when the stage begins
     tasks: dict[str, TaskID] = {}
     with Bars(console=console) as bars:
 

@@ -1,4 +1,4 @@
-"""``per-obspy events``, ``fetch`` and ``info``: earthquakes and records, listed, fetched and looked at."""
+"""``per-obspy events``, ``fetch`` and ``info``: list earthquakes, fetch and inspect records."""
 
 import json
 import sys
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.endings import AsJson, end_if_nothing
+from per_obspy.commands.endings import AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 #: What the table of records shows of each; JSON has everything.
 SHOWN = ("record", "format", "level", "start", "dt", "duration", "azimuth", "peak", "unit", "file")
+
+
+#: What the table of earthquakes shows of each.
+EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
 
 
 def events(
@@ -41,19 +45,17 @@ def events(
     """
     from per_obspy.records.events import find_events
 
+    # Ask by the parameters of FDSN event services
     query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
     query |= {"latitude": latitude, "longitude": longitude, "maxradius": radius}
-    rows = find_events(
-        source, {name: str(value) for name, value in query.items() if value is not None}
-    )
+    given = {name: str(value) for name, value in query.items() if value is not None}
+    rows = find_events(source, given)
     if as_json:
         print(json.dumps([row._asdict() for row in rows]))
     else:
-        titles = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
-        print_table(
-            f"{len(rows)} events, the latest first", titles, [_shown_event(row) for row in rows]
-        )
-    end_if_nothing(len(rows))
+        cells = [_event_cells(row) for row in rows]
+        print_table(f"{len(rows)} events, the latest first", EVENT_TITLES, cells)
+    stop_if_nothing(len(rows))
 
 
 def fetch(
@@ -74,13 +76,14 @@ def fetch(
 
     with shown_progress() as progress:
         folder, stations, rejected = fetch_configured(configuration, again, progress)
+    # Print what the cache holds, for machines or people
     if as_json:
-        rows = [one._asdict() for one in rejected]
+        rows = [rejection._asdict() for rejection in rejected]
         print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
     else:
         print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
         _print_rejected(rejected)
-    end_if_nothing(len(stations))
+    stop_if_nothing(len(stations))
 
 
 def info(
@@ -98,32 +101,34 @@ def info(
     from per_obspy.records.summary import describe_records
 
     records, rejected = describe_records(path, stationxml)
+    # Print every record and every reason, for machines or people
     if as_json:
-        useless = [one._asdict() for one in rejected]
-        print(
-            json.dumps({"records": [record._asdict() for record in records], "rejected": useless})
-        )
+        usable = [record._asdict() for record in records]
+        unusable = [rejection._asdict() for rejection in rejected]
+        print(json.dumps({"records": usable, "rejected": unusable}))
     else:
-        print_table(f"{len(records)} records", SHOWN, [_shown(record) for record in records])
+        print_table(f"{len(records)} records", SHOWN, [_record_cells(record) for record in records])
         _print_rejected(rejected)
-    end_if_nothing(len(records))
+    stop_if_nothing(len(records))
 
 
-def _shown_event(row: "EventRow") -> list[object]:
-    """Return the cells of an earthquake; nothing for what is unknown."""
+def _event_cells(row: "EventRow") -> list[object]:
+    """Return the cells of an earthquake, empty where a value is unknown."""
     depth = "" if row.depth is None else f"{row.depth:.0f}"
     magnitude = "" if row.magnitude is None else f"{row.magnitude:g} {row.magnitude_type}"
-    place = (f"{row.latitude:.3f}", f"{row.longitude:.3f}", depth)
-    return [row.event_id, row.time[:19], *place, magnitude, row.place]
+    # Time to the second, position to 100 m
+    position = (f"{row.latitude:.3f}", f"{row.longitude:.3f}")
+    return [row.event_id, row.time[:19], *position, depth, magnitude, row.place]
 
 
-def _shown(record: "RecordInfo") -> list[object]:
-    """Return the cells of a record; times to the second, nothing for what is unknown."""
+def _record_cells(record: "RecordInfo") -> list[object]:
+    """Return the cells of a record, times to the second, empty where a value is unknown."""
     known = record._asdict() | {"start": record.start[:19]}
     return ["" if known[name] is None else known[name] for name in SHOWN]
 
 
 def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:
-    """Print everything that cannot be used with all its reasons, on standard error."""
-    for one in rejected:
-        print(f"rejected {one.kind} {one.name}: {'; '.join(one.reasons)}", file=sys.stderr)
+    """Print every rejection with all its reasons on standard error."""
+    for rejection in rejected:
+        reasons = "; ".join(rejection.reasons)
+        print(f"rejected {rejection.kind} {rejection.name}: {reasons}", file=sys.stderr)

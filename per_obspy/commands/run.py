@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, end_if_nothing, tell
+from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from per_obspy.errors import Rejection
     from per_obspy.jobs.output_folder import Result
 
 #: Columns of the worst pairs that are printed, with their titles.
@@ -25,6 +28,9 @@ SHOWN = {
     "amplification_1": "ampl. 1",
     "amplification_2": "ampl. 2",
 }
+
+#: Damping of the spectra that are drawn, fraction of critical.
+PLOT_DAMPING = 0.05
 
 
 def run(
@@ -43,7 +49,7 @@ def run(
 
     with shown_progress() as progress:
         result = whole_run(configuration, output, progress=progress)
-    tell(result, as_json, print_result)
+    print_and_end(result, as_json, print_result)
 
 
 def report(
@@ -62,7 +68,7 @@ def report(
 
     with shown_progress() as progress:
         result = report_again(configuration, output, progress=progress)
-    tell(result, as_json, print_result)
+    print_and_end(result, as_json, print_result)
 
 
 def simulate(
@@ -115,35 +121,39 @@ def spectra(
     from per_obspy.config import Processing, Spectra, checked
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
-    given = {"shortest": shortest, "longest": longest, "count": count}
-    grid = checked(Spectra, given | ({"dampings": damping} if damping else {}))
+    # The grid, checked as in a configuration
+    given: dict[str, object] = {"shortest": shortest, "longest": longest, "count": count}
+    if damping:
+        given["dampings"] = damping
+    grid = checked(Spectra, given)
+
+    # Spectra of all stations, and figures of each on request
     with shown_progress() as progress:
         done, rejected = spectra_of(
             sources, output, Processing(), grid, os.cpu_count() or 1, progress
         )
-    shards = [one.shard for one in done if one.shard]
-    figures = (
-        [plot_station(shard, 0.05, plot_period, output.parent) for shard in shards] if plot else []
-    )
-    files = [str(output)] * bool(shards) + [str(path) for pair in figures for path in pair]
+    shards = [station.shard for station in done if station.shard]
+    files = [str(output)] if shards else []
+    for shard in shards if plot else []:
+        files += map(str, plot_station(shard, PLOT_DAMPING, plot_period, output.parent))
+    _print_stations(len(shards), rejected, files, output.with_suffix(".rejected.csv"), as_json)
+
+
+def _print_stations(
+    stations: int,
+    rejected: "Sequence[Rejection]",
+    files: "Sequence[str]",
+    reasons: Path,
+    as_json: bool,
+) -> None:
+    """Print the number of stations, the rejected ones and the files; stop if no station is left."""
     if as_json:
-        print(
-            json.dumps(
-                {
-                    "stations": len(shards),
-                    "rejected": [one._asdict() for one in rejected],
-                    "files": files,
-                }
-            )
-        )
+        rows = [rejection._asdict() for rejection in rejected]
+        print(json.dumps({"stations": stations, "rejected": rows, "files": files}))
     else:
-        print(
-            f"{len(shards)} stations, {len(rejected)} rejected",
-            output.with_suffix(".rejected.csv"),
-            *files,
-            sep="\n  ",
-        )
-    end_if_nothing(len(shards))
+        counts = f"{stations} stations, {len(rejected)} rejected"
+        print(counts, reasons, *files, sep="\n  ")
+    stop_if_nothing(stations)
 
 
 def process(
@@ -168,30 +178,31 @@ def process(
     from per_obspy.config import Processing, load
     from per_obspy.pipeline.process import process_records
 
+    # Process every station
     chosen = load(settings, Processing) if settings else Processing()
     with shown_progress() as progress:
         result = process_records(
             sources, output, chosen, event, report, (os.cpu_count() or 1, progress)
         )
-    stations = [one for one in result.done if one.shard]
+
+    # Print counts and files, for machines or people
+    stations = sum(station.shard is not None for station in result.done)
     files = [str(path) for path in result.files]
     if as_json:
-        rows = [one._asdict() for one in result.rejected]
-        resumed = sum(one.resumed for one in result.done)
-        print(
-            json.dumps(
-                {"stations": len(stations), "resumed": resumed, "rejected": rows, "files": files}
-            )
-        )
+        rows = [rejection._asdict() for rejection in result.rejected]
+        resumed = sum(station.resumed for station in result.done)
+        counts = {"stations": stations, "resumed": resumed}
+        print(json.dumps({**counts, "rejected": rows, "files": files}))
     else:
-        print(f"{len(stations)} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
-    end_if_nothing(len(stations))
+        print(f"{stations} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
+    stop_if_nothing(stations)
 
 
 def print_result(result: "Result") -> None:
-    """Print what a run has found and where it is."""
+    """Print the counts of a run, its worst pairs and its files."""
     folder, record = result.folder, result.record
     counts = record["counts"]
+    # Counts, with a warning where the motion is simulated
     if result.did_nothing:
         print("Nothing to do: the same inputs were run before.")
     if record["simulated"]:
@@ -201,6 +212,7 @@ def print_result(result: "Result") -> None:
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
         f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
     )
+    # Agreement with observed pounding, worst pairs, files
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
@@ -210,18 +222,18 @@ def print_result(result: "Result") -> None:
 
 
 def _print_evaluation(found: dict[str, Any]) -> None:
-    """Print how the prediction did where somebody looked; nothing for a share of nothing."""
+    """Print the agreement of the prediction with the pairs that were inspected."""
+    # A share of no pairs is None and left out
     shares = {
         "of the pounded ones were told yes": found["hit_rate"],
         "yes or possible": found["hit_rate_with_possible"],
         "of the others yes": found["false_alarm_rate"],
     }
-    told = ", ".join(f"{value:.0%} {name}" for name, value in shares.items() if value is not None)
-    print(f"{found['pairs']} pairs were looked at, {found['pounded']} pounded: {told}")
+    words = [f"{value:.0%} {name}" for name, value in shares.items() if value is not None]
+    print(f"{found['pairs']} pairs were looked at, {found['pounded']} pounded: {', '.join(words)}")
     if found["brier_score"] is not None:
-        print(
-            f"Brier score {found['brier_score']:.3f}; the share alone {found['brier_score_of_the_share']:.3f}"
-        )
+        share_alone = found["brier_score_of_the_share"]
+        print(f"Brier score {found['brier_score']:.3f}; the share alone {share_alone:.3f}")
 
 
 def _print_worst(path: Path, count: int) -> None:

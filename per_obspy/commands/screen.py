@@ -1,15 +1,44 @@
-"""``per-obspy screen``: pairs of buildings against whatever ground motion the configuration names."""
+"""``per-obspy screen``: screen pairs by a run, a design spectrum or an ensemble of scenarios."""
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.endings import AsJson, tell
-from per_obspy.commands.printing import shown_progress
+from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing, why_nothing
+from per_obspy.commands.printing import print_table, shown_progress
 from per_obspy.commands.run import print_result
-from per_obspy.commands.screen_ensemble import screen_ensemble
-from per_obspy.commands.screen_spectrum import screen_by_spectrum
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from per_obspy.jobs.output_folder import Result
+
+#: Columns of the worst pairs that are printed: by a design spectrum, and of an ensemble where the
+#: table has them.
+SPECTRUM_COLUMNS = (
+    "pair_id",
+    "period_1",
+    "period_2",
+    "gap",
+    "demand",
+    "demand_rule",
+    "state",
+    "probability",
+    "impact_velocity",
+)
+ENSEMBLE_COLUMNS = (
+    "rank",
+    "pair_id",
+    "probability",
+    "annual_probability",
+    "worst_scenario",
+    "gap",
+)
+
+#: Rows of the worst pairs that are printed.
+WORST = 10
 
 
 def screen(
@@ -22,7 +51,7 @@ def screen(
     as_json: AsJson = False,
 ) -> None:
     """
-    Screen pairs: in every scenario of an ensemble, by a design spectrum, or again with the stations of a run.
+    Screen pairs: in an ensemble of scenarios, by a design spectrum, or again with a run's stations.
 
     Of an ensemble and of a run only what has changed is computed. A single run must have been done
     before.
@@ -33,16 +62,102 @@ def screen(
 
     kind = screening_kind(configuration)
     if kind is Design:
-        screen_by_spectrum(configuration, output, as_json)
+        _screen_by_spectrum(configuration, output, as_json)
     elif kind is Ensemble:
-        screen_ensemble(configuration, output, as_json)
+        _screen_ensemble(configuration, output, as_json)
     else:
         _screen_again(configuration, output, as_json)
 
 
 def _screen_again(configuration: Path, output: Path | None, as_json: bool) -> None:
+    """Screen the pairs of a run again with the stations that it left."""
     from per_obspy.pipeline.run import screen as screen_again
 
     with shown_progress() as progress:
         result = screen_again(configuration, output, progress=progress)
-    tell(result, as_json, print_result)
+    print_and_end(result, as_json, print_result)
+
+
+def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
+    """Screen pairs by a design or user spectrum instead of a record, and print the result."""
+    from per_obspy.config import Design, load
+    from per_obspy.inventory.files.reading import read_pairs
+    from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
+    from per_obspy.screening.by_spectrum.design_table import design_table
+    from per_obspy.tables.design import write_design
+
+    # Screen
+    settings = load(configuration, Design)
+    spectrum = read_design_spectrum(settings.spectrum)
+    pairs = read_pairs(settings.pairs)
+    table = design_table(spectrum, pairs, settings.building, settings.screening)
+    files = write_design(table, output or settings.output)
+
+    # Print the counts, for machines or with the worst pairs
+    counts = _state_counts(table)
+    rejected = len(table.attrs["rejected"])
+    if as_json:
+        names = [str(path) for path in files]
+        print(json.dumps({"pairs": len(table), **counts, "rejected": rejected, "files": names}))
+    else:
+        _print_spectrum_result(table, counts, rejected, files)
+    if table.empty:
+        stop_if_nothing(0, why_nothing(files[-1]))
+
+
+def _state_counts(table: "pd.DataFrame") -> dict[str, int]:
+    """Return the number of pairs in each state."""
+    return {state: int((table["state"] == state).sum()) for state in ("yes", "possible", "no")}
+
+
+def _print_spectrum_result(
+    table: "pd.DataFrame", counts: dict[str, int], rejected: int, files: list[Path]
+) -> None:
+    """Print counts, worst pairs and files of a screening by a spectrum."""
+    words = ", ".join(f"{count} {state}" for state, count in counts.items())
+    print(
+        f"{len(table)} pairs ({words}), {rejected} rejected; "
+        "the radius is SD, a design spectrum has no PER"
+    )
+    _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
+    print(*files, sep="\n")
+
+
+def _screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> None:
+    """Screen pairs in every scenario and print their joint probabilities."""
+    from per_obspy.pipeline.ensemble import screen_scenarios
+
+    with shown_progress() as progress:
+        result = screen_scenarios(configuration, output, progress=progress)
+    print_and_end(result, as_json, _print_ensemble)
+
+
+def _print_ensemble(result: "Result") -> None:
+    """Print counts, worst pairs and files of an ensemble."""
+    import pandas as pd
+
+    # Counts, and a warning where the motion is simulated
+    folder, record = result.folder, result.record
+    if result.did_nothing:
+        print("Nothing to do: the same scenarios were joined before.")
+    if record["simulated"]:
+        print("The ground motion of a scenario is SIMULATED.")
+    counts = record["counts"]
+    print(
+        f"{len(record['scenarios'])} scenarios, {counts['pairs']} pairs; "
+        f"{counts['rejected_pair']} rejected"
+    )
+
+    # The worst pairs, and where everything is
+    texts = {"pair_id": str, "worst_scenario": str}
+    worst = pd.read_csv(folder / "ensemble.csv", nrows=WORST, dtype=texts)
+    _print_worst(worst, [name for name in ENSEMBLE_COLUMNS if name in worst])
+    for name in sorted({*record["outputs"], "ensemble.json"}):
+        print(f"  {folder / name}")
+
+
+def _print_worst(worst: "pd.DataFrame", columns: "tuple[str, ...] | list[str]") -> None:
+    """Print some columns of the worst pairs as a table."""
+    titles = [name.replace("_", " ") for name in columns]
+    rows = worst[list(columns)].itertuples(index=False)
+    print_table(f"The {len(worst)} worst pairs", titles, rows)

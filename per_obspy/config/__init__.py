@@ -1,15 +1,14 @@
 """
 Every default of a run, with its unit and where it comes from; read from TOML.
 
-Only ``run.py`` and the commands see a configuration as a whole. Rooms below take plain arguments or
-one section. Paths in a configuration are relative to the folder of its file.
+Only the pipeline and the commands see a configuration as a whole. Rooms below take plain arguments
+or one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
-from per_obspy.config.kinds import screening_kind
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Asdf, Columns, Fdsn, Records, Sds, Window
-from per_obspy.config.run import Design, Pairs, Run
+from per_obspy.config.run import Design, Pairs, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation

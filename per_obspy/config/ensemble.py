@@ -1,5 +1,6 @@
 """Several scenarios, each a run of its own, screened together."""
 
+from collections import Counter
 from typing import Self
 
 from pydantic import Field, model_validator
@@ -35,25 +36,28 @@ class Ensemble(Section):
     def weights(self) -> dict[str, float]:
         """Weight of each scenario, or its rate (1/year)."""
         return {
-            one.name: one.rate if one.rate is not None else one.weight or 0.0
-            for one in self.scenario
+            scenario.name: scenario.rate if scenario.rate is not None else scenario.weight or 0.0
+            for scenario in self.scenario
         }
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:
-        names = [one.name.lower() for one in self.scenario]
-        if twice := [one.name for one in self.scenario if names.count(one.name.lower()) > 1]:
-            raise ValueError(f"name: {twice[-1]!r} stands twice (capitals do not count)")
+        names = [scenario.name for scenario in self.scenario]
+        counts = Counter(name.lower() for name in names)
+        if repeated := [name for name in names if counts[name.lower()] > 1]:
+            raise ValueError(f"name: {repeated[-1]!r} stands twice (capitals do not count)")
         return self
 
     @model_validator(mode="after")
     def _weights_or_rates(self) -> Self:
-        for one in self.scenario:
-            if (one.weight is None) == (one.rate is None):
-                raise ValueError(f"{one.name!r} needs either a weight or a rate")
-            if (one.rate is None) == self.yearly:
+        for scenario in self.scenario:
+            # One of the two, and the same one for all scenarios
+            if (scenario.weight is None) == (scenario.rate is None):
+                raise ValueError(f"{scenario.name!r} needs either a weight or a rate")
+            if (scenario.rate is None) == self.yearly:
                 raise ValueError(
-                    f"{one.name!r} has a {'weight' if self.yearly else 'rate'}, others have the other one"
+                    f"{scenario.name!r} has a {'weight' if self.yearly else 'rate'}, others have "
+                    f"the other one"
                 )
         if not sum(self.weights.values()) > 0.0:
             raise ValueError("weights or rates must have a positive sum, all are 0")

@@ -1,4 +1,4 @@
-"""The chain from raw record to one that spectra may be computed from, and the grid of the spectra."""
+"""Settings of the processing chain, and of the grid of the spectra."""
 
 from itertools import pairwise
 from typing import Annotated, Self
@@ -23,55 +23,50 @@ class Check(Section):
 
 
 class Checks(Section):
-    """Thresholds of ``processing/quality.py``, ``processing/outcome.py`` and ``processing/corners.py``."""
+    """Thresholds of the record checks (``processing/quality``, ``processing/filter/corners``)."""
 
-    sampling_rate: Check = Check(threshold=20.0, level="reject")  # Hz, at least
-    duration: Check = Check(threshold=5.0, level="reject")  # s, at least
-    levels: Check = Check(threshold=16, level="reject")  # different values a sample takes, at least
-    clipped_run: Check = Check(
-        threshold=5, level="reject"
-    )  # equal samples at an extreme, fewer than
-    counter_use: Check = Check(
-        threshold=0.8, level="warn"
-    )  # peak over full scale of a 24-bit counter, at most
-    dropout: Check = Check(
-        threshold=0.5, level="reject"
-    )  # s without change during the shaking, less than
-    spike: Check = Check(
-        threshold=6.0, level="reject"
-    )  # jump of one sample over others within 0.5 s, at most
-    zero_crossings: Check = Check(threshold=0.1, level="reject")  # a second, at least
-    header_peak: Check = Check(
-        threshold=0.01, level="warn"
-    )  # relative, between header and samples, at most
-    outlier: Check = Check(
-        threshold=5.0, level="reject"
-    )  # peak over the largest peak of two sisters, at most
-    late_trigger: Check = Check(
-        threshold=0.1, level="warn"
-    )  # motion of the first second over the peak, at most
-    cut_off: Check = Check(
-        threshold=0.1, level="warn"
-    )  # motion of the last second over the peak, at most
-    second_event: Check = Check(
-        threshold=0.3, level="warn"
-    )  # later peak after quiet over the peak, at most
-    signal_to_noise: Check = Check(threshold=2.0, level="reject")  # somewhere at least
-    clear_band: Check = Check(
-        threshold=2.0, level="warn"
-    )  # signal to noise over ``required_band``, at least
-    bandwidth: Check = Check(
-        threshold=4.0, level="reject"
-    )  # low-pass over high-pass corner, at least
-    final_velocity: Check = Check(threshold=0.1, level="reject")  # over its peak, at most
-    final_displacement: Check = Check(threshold=0.2, level="reject")  # over its peak, at most
-    baseline_shift: Check = Check(
-        threshold=0.5, level="warn"
-    )  # velocity before the filter that stays, over the peak
+    # Hz, at least
+    sampling_rate: Check = Check(threshold=20.0, level="reject")
+    # s, at least
+    duration: Check = Check(threshold=5.0, level="reject")
+    # Different values a sample takes, at least
+    levels: Check = Check(threshold=16, level="reject")
+    # Equal samples at an extreme, fewer than
+    clipped_run: Check = Check(threshold=5, level="reject")
+    # Peak over full scale of a 24-bit counter, at most
+    counter_use: Check = Check(threshold=0.8, level="warn")
+    # s without change during the shaking, less than
+    dropout: Check = Check(threshold=0.5, level="reject")
+    # Jump of one sample over others within 0.5 s, at most
+    spike: Check = Check(threshold=6.0, level="reject")
+    # A second, at least
+    zero_crossings: Check = Check(threshold=0.1, level="reject")
+    # Relative, between header and samples, at most
+    header_peak: Check = Check(threshold=0.01, level="warn")
+    # Peak over the largest peak of two sisters, at most
+    outlier: Check = Check(threshold=5.0, level="reject")
+    # Motion of the first second over the peak, at most
+    late_trigger: Check = Check(threshold=0.1, level="warn")
+    # Motion of the last second over the peak, at most
+    cut_off: Check = Check(threshold=0.1, level="warn")
+    # Later peak after quiet over the peak, at most
+    second_event: Check = Check(threshold=0.3, level="warn")
+    # Somewhere at least
+    signal_to_noise: Check = Check(threshold=2.0, level="reject")
+    # Signal to noise over ``required_band``, at least
+    clear_band: Check = Check(threshold=2.0, level="warn")
+    # Low-pass over high-pass corner, at least
+    bandwidth: Check = Check(threshold=4.0, level="reject")
+    # Over its peak, at most
+    final_velocity: Check = Check(threshold=0.1, level="reject")
+    # Over its peak, at most
+    final_displacement: Check = Check(threshold=0.2, level="reject")
+    # Velocity before the filter that stays, over the peak
+    baseline_shift: Check = Check(threshold=0.5, level="warn")
 
 
 class Processing(Section):
-    """The chain from raw record to one that spectra may be computed from (Boore 2005; gmprocess 2.8)."""
+    """Settings of the processing chain of a record (Boore 2005; gmprocess 2.8)."""
 
     highpass: float | None = Field(
         None, gt=0, description="corner, Hz; not given: found for each record"
@@ -119,7 +114,9 @@ class Processing(Section):
     )
     fallback_highpass: dict[float, Annotated[float, Field(gt=0)]] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
-        description="without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)",
+        description=(
+            "without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)"
+        ),
     )
     unknown_highpass: float = Field(
         0.08, gt=0, description="Hz, without noise to measure and without magnitude"
@@ -150,7 +147,8 @@ class Processing(Section):
     def _one_long_period_limit(self) -> Self:
         if self.permanent_offset and self.highpass is not None:
             raise ValueError(
-                f"permanent_offset keeps what highpass = {self.highpass:g} Hz removes: give one of them"
+                f"permanent_offset keeps what highpass = {self.highpass:g} Hz removes: give "
+                f"one of them"
             )
         return self
 

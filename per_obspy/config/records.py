@@ -55,7 +55,9 @@ class Fdsn(Window):
 
     providers: tuple[str, ...] = Field(
         min_length=1,
-        description="in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator",
+        description=(
+            "in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator"
+        ),
     )
     cache: RelativePath = Field(description="folder that keeps what was fetched")
     event_id: str | None = Field(None, description="of the event service, instead of records.event")
@@ -132,7 +134,9 @@ class Records(Section):
     asdf: Asdf | None = Field(None, description="ASDF workspace of gmprocess")
     shakemap: RelativePath | None = Field(
         None,
-        description="grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach",
+        description=(
+            "grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach"
+        ),
     )
     shakemap_uncertainty: RelativePath | None = Field(
         None, description="uncertainty.xml of the same ShakeMap"

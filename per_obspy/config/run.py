@@ -1,5 +1,6 @@
-"""A whole run, and a screening without records."""
+"""Settings of a whole run and of a screening by a spectrum, and the kind of a TOML file."""
 
+from pathlib import Path
 from typing import Self
 
 from pydantic import (
@@ -7,15 +8,17 @@ from pydantic import (
     model_validator,
 )
 
+from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, Screening, Totals
-from per_obspy.config.section import RelativePath, Section
+from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.config.simulation import SimulatedPairs
+from per_obspy.errors import CatalogError
 
 
 class Pairs(Section):
-    """Where the pairs of buildings come from: a table, stored inventories, or simulated ones around the stations."""
+    """Source of the building pairs: a table, stored inventories, or simulated pairs."""
 
     file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
     catalog: RelativePath | None = Field(
@@ -74,9 +77,10 @@ class Run(Section):
     def _comparable_stations(self) -> Self:
         dampings = self.spectra.dampings
         if not dampings[0] <= 0.05 <= dampings[-1]:
-            told = ", ".join(f"{one:g}" for one in dampings)
+            given = ", ".join(f"{damping:g}" for damping in dampings)
             raise ValueError(
-                f"spectra.dampings must reach from 0.05 or below to 0.05 or above, got {told}: stations are "
+                f"spectra.dampings must reach from 0.05 or below to 0.05 or above, got {given}: "
+                f"stations are "
                 "compared at 5 %"
             )
         return self
@@ -90,3 +94,27 @@ class Design(Section):
     output: RelativePath = Field(description="folder of the results")
     building: Building = Building()
     screening: Screening = Screening()
+
+
+def screening_kind(path: Path) -> type[Run] | type[Design] | type[Ensemble]:
+    """
+    Return the kind of screening of a TOML file, by the key that other kinds do not have.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read or is none of them.
+    """
+    content = read_toml(path)
+    if isinstance(content.get("spectrum"), str):
+        return Design
+    if isinstance(content.get("scenario"), list):
+        return Ensemble
+    if content.keys() & {"records", "simulation"}:
+        return Run
+    raise CatalogError(
+        str(path),
+        "nothing to screen by: give records or simulation (a run), spectrum (a design "
+        "spectrum) or [[scenario]] "
+        "(an ensemble)",
+    )

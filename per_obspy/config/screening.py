@@ -10,9 +10,12 @@ from pydantic import (
 
 from per_obspy.config.section import Section
 
+#: Largest offset of two floors that still hit floor to floor, m: 2 ft in FEMA P-154.
+FLOOR_TOLERANCE = 0.61
+
 
 class Building(Section):
-    """What is assumed of a building where the inventory is silent; each use is marked as derived."""
+    """Assumptions about a building that the inventory leaves open; each use is marked derived."""
 
     damping: float = Field(0.05, ge=0, lt=1, description="fraction of critical")
     damping_log_std: float = Field(
@@ -25,7 +28,10 @@ class Building(Section):
     )
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
     floor_tolerance: float = Field(
-        0.61, ge=0, le=12, description="m; floors further apart misalign; 2 ft: FEMA P-154"
+        FLOOR_TOLERANCE,
+        ge=0,
+        le=12,
+        description="m; floors further apart misalign; 2 ft: FEMA P-154",
     )
     period_formula: str = Field(
         "asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds"
@@ -47,7 +53,7 @@ class Interpolation(Section):
 
 
 class Codes(Section):
-    """What code rules ask of a region (``screening/codes.py``); a rule stays empty where its value is not given."""
+    """Inputs of code rules (``screening/codes.py``); a rule is empty where its input is missing."""
 
     ntc_zone: str | None = Field(
         None, pattern="^(I|II|III)$", description="NTC Mexico City 2004: I, II or III"
@@ -61,7 +67,10 @@ class Codes(Section):
         description="FEMA P-154: of the region",
     )
     floor_tolerance: float = Field(
-        0.61, ge=0, le=12, description="m; floors no further apart align; 2 ft: FEMA P-154"
+        FLOOR_TOLERANCE,
+        ge=0,
+        le=12,
+        description="m; floors no further apart align; 2 ft: FEMA P-154",
     )
 
 

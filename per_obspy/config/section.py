@@ -1,4 +1,4 @@
-"""What all settings share: frozen groups, paths seen from the file, reading, and the wording of every fault."""
+"""Base of all settings: frozen sections, relative paths, TOML reading and error messages."""
 
 import os
 import tomllib
@@ -44,7 +44,7 @@ RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to
 
 
 class Section(BaseModel):
-    """A frozen group of settings; an unknown key is an error, and so is a number that is not finite."""
+    """A frozen group of settings; unknown keys and numbers that are not finite are errors."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="strings"
@@ -128,24 +128,27 @@ def checked(
 
 def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
     """Return whether a list is too short only because what stands in it is wrong."""
-    above = len(fault["loc"])
+    depth = len(fault["loc"])
     inside = [
-        one for one in faults if len(one["loc"]) > above and one["loc"][:above] == fault["loc"]
+        other
+        for other in faults
+        if len(other["loc"]) > depth and other["loc"][:depth] == fault["loc"]
     ]
     return fault["type"] == "too_short" and bool(inside)
 
 
 def _fault(fault: ErrorDetails, section: type[Section]) -> str:
     """Return one fault of a configuration: key, what is wrong, value, and what is expected."""
+    # The key, and the value unless it is missing or already in the message
     key = ".".join(map(str, fault["loc"]))
-    said = f"{key}: " if key else ""
+    prefix = f"{key}: " if key else ""
     given = "" if fault["type"] in {"missing", "value_error"} else f" (got {fault['input']!r:.60})"
     fields, name = _fields_at(section, fault["loc"])
     if fault["type"] == "extra_forbidden":
-        return f"{said}unknown key{given}{_place_of(name, fields) or did_you_mean(name, fields)}"
+        return f"{prefix}unknown key{given}{_place_of(name, fields) or did_you_mean(name, fields)}"
     meaning = fields[name].description if name in fields else None
     expected = f", expected: {meaning}" if meaning and given else ""
-    return f"{said}{fault['msg'].removeprefix('Value error, ')}{given}{expected}"
+    return f"{prefix}{fault['msg'].removeprefix('Value error, ')}{given}{expected}"
 
 
 def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
@@ -153,8 +156,8 @@ def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
     inside = (
         name
         for name, field in fields.items()
-        for one in _sections(field.annotation)
-        if key in one.model_fields
+        for inner in _sections(field.annotation)
+        if key in inner.model_fields
     )
     return next((f", it belongs to [{name}]" for name in inside), "")
 
@@ -162,7 +165,7 @@ def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
 def _fields_at(
     section: type[Section], keys: Sequence[str | int]
 ) -> tuple[dict[str, FieldInfo], str]:
-    """Return the last of some keys that is no place in a list or a table, and the fields beside it."""
+    """Return the last key that is neither a list index nor a table, and the fields next to it."""
     name = ""
     for key in keys:
         if isinstance(key, int):
@@ -175,7 +178,7 @@ def _fields_at(
 
 
 def _sections(annotation: Any) -> Iterator[type[Section]]:
-    """Give the sections that stand in the type of a field: itself, or one, or several, or none of it."""
+    """Yield the sections named in the type of a field, whether single, optional or repeated."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield annotation
     for inner in get_args(annotation):

@@ -1,4 +1,4 @@
-"""A made-up city of footprints with what digitised ones have: party walls, narrow gaps, courtyards and mistakes."""
+"""A simulated city of footprints with party walls, narrow gaps, courtyards and faults."""
 
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class City(NamedTuple):
 
 
 def city(houses: int, seed: int = 1) -> City:
-    """Return about so many houses, in whole blocks, with the sheds in their courtyards and the mistakes."""
+    """Return about ``count`` houses in whole blocks, with courtyard sheds and digitising errors."""
     random = np.random.default_rng(seed)
     blocks = [_block(random, *divmod(number, ACROSS)) for number in range(-(-houses // (2 * ROW)))]
     outlines = _with_mistakes(random, np.concatenate(blocks))
@@ -87,7 +87,7 @@ def _house(random: np.random.Generator, plot: shapely.Polygon) -> list[shapely.P
 
 
 def _with_mistakes(random: np.random.Generator, houses: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Return the houses with outlines that cross themselves, that are missing, and at the end those given twice."""
+    """Return the houses with self-crossing, missing and, at the end, repeated outlines."""
     kind, outlines = random.random(len(houses)), houses.copy()
     for i in np.flatnonzero(kind < INVALID):
         corners = shapely.get_coordinates(shapely.box(*outlines[i].bounds))

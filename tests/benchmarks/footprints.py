@@ -1,5 +1,5 @@
 """
-Time and memory of ``pairs_from_footprints`` for a made-up city with party walls, courtyards and mistakes.
+Time and memory of ``pairs_from_footprints`` for a simulated city.
 
 Run: ``python tests/benchmarks/footprints.py [houses]``; prints features, pairs, rejections by kind,
 seconds of processor and clock, and the largest memory (of the whole process, and before the call).
@@ -44,7 +44,8 @@ def main(houses: int) -> None:
         clock, processor = time.perf_counter() - clock, time.process_time() - processor
     lost = Counter(one.kind for one in pairs.attrs["rejected"])
     print(
-        f"{features} features: {len(pairs)} pairs; {lost['building']} buildings and {lost['pair']} pairs rejected; "
+        f"{features} features: {len(pairs)} pairs; {lost['building']} buildings and "
+        f"{lost['pair']} pairs rejected; "
         f"{processor:.1f} s processor, {clock:.1f} s, {memory():.2f} GB ({before:.2f} GB before)"
     )
 

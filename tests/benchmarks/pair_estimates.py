@@ -61,7 +61,7 @@ def random_pairs(count: int) -> dict[str, np.ndarray]:
 
 
 def numpy_single_hit(r1, r2, t1, t2, m1, m2, e, critical, gap):
-    """Return the amplification of structure 1 for one branch by plain NumPy, twenty steps of the first-root search."""
+    """Return the amplification of structure 1 for one branch by plain NumPy, in twenty steps."""
     w1, w2 = 2 * np.pi / t1, 2 * np.pi / t2
     a, b = w2**2 - w1**2, w2**2 * critical
     c = (w1 * r1) ** 2 - (w2 * r2) ** 2 + (w2 * critical) ** 2
@@ -95,10 +95,12 @@ def main() -> None:
     rows = best(lambda: few.apply(lambda row: numpy_single_hit(*row), axis=1), 1) / len(few)
     print(f"single_hit                {1e-6 / ours:8.3f} million pairs/s")
     print(
-        f"  plain NumPy, one branch {1e-6 / plain:8.3f} million pairs/s  {plain / ours:8.1f} times the time"
+        f"  plain NumPy, one branch {1e-6 / plain:8.3f} million pairs/s  {plain / ours:8.1f} "
+        f"times the time"
     )
     print(
-        f"  pandas apply            {1e-6 / rows:8.3f} million pairs/s  {rows / ours:8.0f} times the time"
+        f"  pandas apply            {1e-6 / rows:8.3f} million pairs/s  {rows / ours:8.0f} "
+        f"times the time"
     )
     motion, periods = ground_motion(), np.geomspace(0.1, 5.0, 100)
     surface = best(lambda: critical_gap_surface(motion, DT, periods, periods), 3)
@@ -145,7 +147,7 @@ def of_a_record(motion: np.ndarray) -> None:
 
 
 def resampled_rate() -> float:
-    """Return pairs a second of the probability over 128 nodes of period and damping of both buildings."""
+    """Return pairs per second of the probability over 128 nodes of period and damping."""
     rng = np.random.default_rng(3)
     grid = (
         np.log(np.geomspace(0.05, 10.0, 100)),

@@ -95,7 +95,7 @@ def opensees_rate(ops, acceleration, pairs, count):
 
 
 def yardstick(acceleration):
-    """Return what this machine does now: oscillator-steps a second of ``per_spectrum``, on one core."""
+    """Return the present speed of ``per_spectrum``, oscillator-steps per second on one core."""
     periods = np.geomspace(0.5, 5.0, 1024)
     best = np.inf
     for _ in range(3):
@@ -122,13 +122,15 @@ def main():
             f"OpenSeesPy, linear, {SAMPLES} samples, record's step: {peer:.1f} pairs/s on one core"
         )
     print(
-        f"per_spectrum, the yardstick: {yardstick(acceleration) / 1e9:.2f} billion oscillator-steps/s on one core"
+        f"per_spectrum, the yardstick: {yardstick(acceleration) / 1e9:.2f} billion "
+        f"oscillator-steps/s on one core"
     )
     print(f"{'case':>12} {'pairs/s core':>13} {'impacts':>8} {'x OpenSees':>11}")
     for name, fields in cases.items():
         speed, impacts = rate(acceleration, fields)
         print(
-            f"{name:>12} {speed:13.0f} {impacts:8.1f} {speed / peer if peer else float('nan'):11.0f}"
+            f"{name:>12} {speed:13.0f} {impacts:8.1f} "
+            f"{speed / peer if peer else float('nan'):11.0f}"
         )
 
 

@@ -1,5 +1,5 @@
 """
-Time of the processing of the eleven Ridgecrest stations, step by step, and of gmprocess on the same files.
+Time of the processing of the eleven Ridgecrest stations, and of gmprocess on the same files.
 
 Run: ``python tests/benchmarks/processing.py FOLDER [PYTHON]``, where FOLDER holds MiniSEED and
 StationXML, and PYTHON is the interpreter of an environment of its own with gmprocess 2.x in it
@@ -43,7 +43,8 @@ from gmprocess.core.streamcollection import StreamCollection
 from gmprocess.utils.config import get_config
 from gmprocess.waveform_processing.processing import process_streams
 from obspy import UTCDateTime
-event = ScalarEvent.from_params("ci38457511", UTCDateTime("2019-07-06T03:19:53.04"), 35.7695, -117.5993, 8.0, 7.1, "mw")
+origin = UTCDateTime("2019-07-06T03:19:53.04")
+event = ScalarEvent.from_params("ci38457511", origin, 35.7695, -117.5993, 8.0, 7.1, "mw")
 start = time.process_time(); streams = StreamCollection.from_directory(sys.argv[1])
 read = time.process_time(); done = process_streams(streams, event, config=get_config())
 end = time.process_time()
@@ -90,7 +91,8 @@ def main(folder: Path, python: str | None) -> None:
     seconds = seconds_of(folder)
     stations, kept = work(folder)
     print(
-        f"per_obspy: {stations} stations, {kept} kept, {seconds:.2f} s: {stations / seconds:.1f} stations a second"
+        f"per_obspy: {stations} stations, {kept} kept, {seconds:.2f} s: "
+        f"{stations / seconds:.1f} stations a second"
     )
     print_steps(folder)
     if python:
@@ -99,7 +101,8 @@ def main(folder: Path, python: str | None) -> None:
         )
         number, passed, read, processed = map(float, done.stdout.split()[-4:])
         print(
-            f"gmprocess: {number:.0f} stations, {passed:.0f} kept, {read:.2f} s to read, {processed:.2f} s to process"
+            f"gmprocess: {number:.0f} stations, {passed:.0f} kept, {read:.2f} s to read, "
+            f"{processed:.2f} s to process"
         )
         print(f"ratio, reading included: {(read + processed) / seconds:.1f}")
 

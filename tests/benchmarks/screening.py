@@ -44,7 +44,10 @@ file = "pairs.parquet"
 [screening]
 exact = {exact}
 """
-HEADER = f"{'pairs':>10} {'way':9} {'screening':>9} {'report':>7} {'whole':>7} {'processors':>10} {'memory':>9} a pair"
+HEADER = (
+    f"{'pairs':>10} {'way':9} {'screening':>9} {'report':>7} {'whole':>7} "
+    f"{'processors':>10} {'memory':>9} per pair"
+)
 
 
 def write_inventory(path: Path, count: int, stations: Path) -> None:
@@ -68,7 +71,7 @@ def write_inventory(path: Path, count: int, stations: Path) -> None:
 
 
 def memory(process: int) -> int:
-    """Return the memory of a process and its descendants, bytes; 0 for those that have ended meanwhile."""
+    """Return the memory of a process and its descendants, bytes; 0 for those that have ended."""
     try:
         rollup = Path(f"/proc/{process}/smaps_rollup").read_text()
         own = next(
@@ -83,7 +86,7 @@ def memory(process: int) -> int:
 
 
 def measured(configuration: Path) -> dict[str, float]:
-    """Run the command and return its seconds, by the clock and of the processors, and its memory in bytes."""
+    """Run the command; return its wall and processor seconds, and its memory in bytes."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     command = [sys.executable, "-m", "per_obspy", "run", str(configuration)]
     said = configuration.with_suffix(".log")
@@ -122,7 +125,8 @@ def main(sizes: list[int]) -> None:
 def _row(count: int, exact: str, seconds: dict[str, float], found: dict[str, float]) -> str:
     way, each = "exact" if exact == "true" else "estimates", found["processors"] / count * 1e6
     return (
-        f"{count:10} {way:9} {seconds['screening']:7.1f} s {seconds['report']:5.1f} s {found['whole']:5.1f} s"
+        f"{count:10} {way:9} {seconds['screening']:7.1f} s {seconds['report']:5.1f} s "
+        f"{found['whole']:5.1f} s"
         f" {found['processors']:8.1f} s {found['memory'] / 1e6:6.0f} MB {each:4.0f} us"
     )
 

@@ -1,5 +1,5 @@
 """
-Speed and agreement of the spectra, beside other programs, in one process on one core unless the table says otherwise.
+Speed and agreement of the spectra next to other programs, in one process and on one core.
 
     OPENBLAS_NUM_THREADS=1 python tests/benchmarks/spectra.py
 
@@ -111,7 +111,7 @@ def module(name: str, install: str) -> Any:
 
 
 def pyrotd_sd_sv(pyrotd: Any, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and velocity spectra by FFT, each its own pass; the record is padded to twice its length."""
+    """Displacement and velocity spectra by FFT, in separate passes, padded to twice the length."""
     padded = np.concatenate([motion, np.zeros(motion.size)])
     sd, sv = (
         pyrotd.calc_spec_accels(DT, padded, 1 / PERIODS, DAMPING, osc_type=kind)["spec_accel"]
@@ -148,7 +148,7 @@ def lsim_per(motion: np.ndarray) -> np.ndarray:
 
 
 def obspy_psa(motion: np.ndarray) -> np.ndarray:
-    """PSA from ObsPy, which wants the ground displacement and simulates a seismometer of each frequency."""
+    """PSA from ObsPy, which simulates a seismometer of each frequency on ground displacement."""
     displacement = DT**2 * np.cumsum(np.cumsum(motion))
     return np.array(
         [peak_ground_motion(displacement, DT, 1 / period, DAMPING)[0] for period in PERIODS]
@@ -159,7 +159,8 @@ def one_component() -> None:
     """One record, 100 periods."""
     motion = ground_motion(SAMPLES)
     print(
-        f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, damping {DAMPING}"
+        f"\nOne component, {SAMPLES} samples at {DT} s, {PERIODS.size} periods 0.05-10 s, "
+        f"damping {DAMPING}"
     )
     print(f"{'':<56}{'processor':>14} {'clock':>14}")
     for count in (SAMPLES, 4 * SAMPLES):
@@ -194,7 +195,8 @@ def share_of_peak(samples: int) -> None:
         PEAK_ROUNDS * PEAK_LANES * PEAK_CHAIN / rounds,
         samples * periods.size / seconds.processor,
     )
-    share = f"{rate / 1e9:.2f} billion steps/s, {100 * PER_STEP * rate / peak:.0f} % of {peak / 1e9:.0f} billion FMA/s"
+    percent = 100 * PER_STEP * rate / peak
+    share = f"{rate / 1e9:.2f} billion steps/s, {percent:.0f} % of {peak / 1e9:.0f} billion FMA/s"
     row(f"PER at samples, {samples} samples, 128 periods", seconds, share)
 
 
@@ -270,7 +272,8 @@ def azimuths() -> None:
             row(f"pyrotd {method}: RotD50, RotD100 of SD", seconds, ratio(seconds, ours), others)
             for column, percentile in enumerate((50, 100)):
                 print(
-                    f"{'':>12}RotD{percentile} {error(rotd(sd, percentile) * pseudo, table[:, column])}"
+                    f"{'':>12}RotD{percentile} "
+                    f"{error(rotd(sd, percentile) * pseudo, table[:, column])}"
                 )
         seconds, _ = best(
             lambda: pyrotd.calc_rotated_spec_accels(
@@ -319,7 +322,7 @@ def scaling() -> None:
 
 
 def threads() -> None:
-    """The same job on one core and on all; beside it what the machine grants to one multiply-add loop a core."""
+    """The same job on one core and on all, next to a plain multiply-add loop per core."""
     cores = os.sched_getaffinity(0)
     motion, periods = ground_motion(200_000), np.geomspace(0.05, 10, 640)
     print("\nThreads: 200000 samples, 640 periods, PER exact")
@@ -338,7 +341,8 @@ def threads() -> None:
         f"{one.clock / every.clock:.2f} times faster by the clock, {same}",
     )
     print(
-        f"{'':>12}the machine grants {len(cores) * loop.clock / loops.clock:.2f} times one core to multiply-adds"
+        f"{'':>12}the machine grants {len(cores) * loop.clock / loops.clock:.2f} times one "
+        f"core to multiply-adds"
     )
 
 

@@ -17,7 +17,7 @@ BAD_ROW = "b,0.3,0.0,10,0.3001,0.0,12,50"
 
 @pytest.fixture
 def footprints(tmp_path):
-    """Three houses of about 11 m in a row on the equator, the second and third 1.1 m apart; one repeats another."""
+    """Three houses of 11 m in a row on the equator, two 1.1 m apart; one repeats another."""
     west = [0.3, 0.3001, 0.30021, 0.3]
     boxes = [shapely.box(x, 0.0, x + 0.0001, 0.0001) for x in west]
     heights = pd.Series([9.0, 12.0, 6.0, 9.0]).to_numpy()

@@ -1,4 +1,4 @@
-"""``per-obspy events``, ``fetch``, ``info`` and a run whose records come from a service on loopback."""
+"""``per-obspy events``, ``fetch``, ``info`` and a run with records of a service on loopback."""
 
 import json
 import time
@@ -223,7 +223,8 @@ def test_a_record_without_samples_is_rejected(simulation, tmp_path, call, comman
     write_simulation(simulation, tmp_path / "in")
     for waveforms in (tmp_path / "in").glob("*.mseed"):
         waveforms.unlink()
-    head = "TIMESERIES XX_S001__HNN_D, 0 samples, 100 sps, 2000-01-01T00:00:00.000000, SLIST, INTEGER, Counts"
+    head = "TIMESERIES XX_S001__HNN_D, 0 samples, 100 sps, 2000-01-01T00:00:00.000000, "
+    head += "SLIST, INTEGER, Counts"
     (tmp_path / "in" / "S001.txt").write_text(f"{head}\n")
     output = ("-o", tmp_path / "out") if command == "process" else ()
     code, out, _ = call(command, tmp_path / "in", *output, "--json")

@@ -1,4 +1,9 @@
-"""A configuration that is wrong is refused with file, key and value."""
+"""
+A configuration that is wrong is refused with file, key and value.
+
+Covers ``per_obspy.config.run``, ``per_obspy.config.records``, ``per_obspy.config.processing``,
+``per_obspy.config.screening``, ``per_obspy.config.simulation`` and ``per_obspy.config.ensemble``.
+"""
 
 from pathlib import Path
 
@@ -102,7 +107,8 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
                 'folder = "in"',
                 'columns = [{file = "a", station = "A", units = "mg", channels = {}}]',
             ),
-            r"records\.columns\.0\.units: .*\(got 'mg'\), expected: of the samples: m/s2, cm/s2, gal, g",
+            r"records\.columns\.0\.units: .*\(got 'mg'\), expected: of the samples: m/s2, "
+            r"cm/s2, gal, g",
         ),
         (
             GOOD.replace('folder = "in"\n', ""),

@@ -1,4 +1,4 @@
-"""Probabilities against exact outcomes in simulated motion: what the calibration rests on, on few pairs."""
+"""Probabilities against exact outcomes in simulated motion: the calibration on few pairs."""
 
 import subprocess
 import sys

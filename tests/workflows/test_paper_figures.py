@@ -1,4 +1,4 @@
-"""The scripts that redraw the paper and repeat its reliability run, without and with real records."""
+"""Scripts that redraw the paper and repeat its reliability, with and without real records."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Workflows as a user runs them, on real records or made smaller; the others run with the demo and the figures."""
+"""Workflows as a user runs them, on real records or on smaller inputs."""
 
 from pathlib import Path
 
@@ -89,7 +89,7 @@ def _pairs_of(city, real_data, folder):
 
 
 def _run_city(city, workflow, real_data, folder):
-    """Run a workflow of a city, with two stations where they are simulated; return its table and its totals."""
+    """Run a city's workflow, simulated ones with two stations; return its table and totals."""
     (folder / "workflows").mkdir(exist_ok=True)
     (folder / "catalogs" / city).mkdir(parents=True, exist_ok=True)
     scenario = (CHECKOUT / "catalogs" / city / "scenario.toml").read_text(encoding="utf-8")

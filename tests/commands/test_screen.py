@@ -18,7 +18,8 @@ def screened(call, tmp_path):
     (tmp_path / "code.csv").write_text("period,damping,sd\n0.1,0.05,0.01\n4.0,0.05,0.4\n")
     (tmp_path / "pairs.csv").write_text(PAIRS)
     (tmp_path / "design.toml").write_text(
-        'spectrum = "code.csv"\npairs = "pairs.csv"\noutput = "out"\n[screening.codes]\nfema_seismicity = "high"\n'
+        'spectrum = "code.csv"\npairs = "pairs.csv"\noutput = '
+        '"out"\n[screening.codes]\nfema_seismicity = "high"\n'
     )
 
     return lambda *arguments: call("screen", tmp_path / "design.toml", *arguments)
