@@ -19,6 +19,7 @@ test: .venv/test
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/kernels
 
 check: .venv/check
+	$(BIN)/python tests/check_density.py
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -33,7 +34,7 @@ wheel: .venv/check
 	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
 
 benchmark: .venv/benchmark
-	@for script in spectra pounding pair_estimates footprints screening; do \
+	@for script in start_up spectra pounding pair_estimates footprints screening; do \
 	  echo "== $$script"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/$$script.py || exit 1; done
 	@if [ -z "$(RECORDS)" ]; then echo "== processing: left out, name a folder of MiniSEED with RECORDS=..."; \
 	  else echo "== processing"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/processing.py "$(RECORDS)"; fi

@@ -1,7 +1,6 @@
 """``per-obspy events``, ``fetch``, ``info`` and a run with records of a service on loopback."""
 
 import json
-import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from pathlib import Path
@@ -248,10 +247,8 @@ def test_info_of_a_workspace(real_data, call):
     assert raw == pytest.approx(processed, rel=0.01)
 
 
-def test_help_is_quick(call):
-    start = time.perf_counter()
+def test_help_has_an_example(call):
     for command in ("events", "fetch", "info"):
         code, out, _ = call(command, "--help")
         assert code == 0
         assert "Example: per-obspy" in out
-    assert time.perf_counter() - start < 2.0  # 0.1 s measured; nothing heavy is imported
