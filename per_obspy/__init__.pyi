@@ -1,4 +1,6 @@
 # One line a module; ``__init__.py`` reads this file to know where each public name lives.
+__version__: str
+
 from .inventory.files.reading import read_pairs as read_pairs
 from .inventory.footprints.pairs import pairs_from_footprints as pairs_from_footprints
 from .inventory.periods import asce7_period as asce7_period

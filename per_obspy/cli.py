@@ -1,14 +1,17 @@
 """
-The command line: each command parses, calls one function, prints.
+Command line: each command parses its arguments, calls one function and prints.
 
-Exit codes: 0 done, 2 wrong input (one line says what), 3 nothing usable was left, 75 a service is
-unavailable.
+Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 a service
+is unavailable.
 """
 
+import os
 import sys
+from typing import Annotated
 
 import typer
 
+import per_obspy
 from per_obspy.commands.endings import SERVICE_UNAVAILABLE, WRONG_INPUT
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
@@ -33,16 +36,53 @@ for command in (run, simulate, process, spectra, screen, report, events, fetch, 
     app.command()(command)
 
 
+def _print_version(asked: bool) -> None:
+    """Print the version and stop, if asked."""
+    if asked:
+        print(per_obspy.__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version and exit.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Offer the options of the program itself."""
+
+
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
+    code = _exit_code()
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The interpreter would flush again at its end and complain
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    raise SystemExit(code)
+
+
+def _exit_code() -> int:
+    """Run a command and return its exit code."""
     try:
         app()
     except ServiceError as error:
-        _stop(error, SERVICE_UNAVAILABLE)
+        return _failed(error, SERVICE_UNAVAILABLE)
     except PerError as error:
-        _stop(error, WRONG_INPUT)
+        return _failed(error, WRONG_INPUT)
+    except SystemExit as ending:
+        # A reader that has enough, such as ``head``, is no failure
+        if isinstance(ending.__context__, BrokenPipeError):
+            return 0
+        return ending.code if isinstance(ending.code, int) else 0
+    return 0
 
 
-def _stop(error: PerError, code: int) -> None:
+def _failed(error: PerError, code: int) -> int:
+    """Print an error as one line and return the exit code."""
     print(f"per-obspy: {' '.join(str(error).split())}", file=sys.stderr)
-    raise SystemExit(code)
+    return code

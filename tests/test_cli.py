@@ -6,12 +6,18 @@ Covers ``per_obspy.commands.endings``, ``per_obspy.commands.printing`` and
 """
 
 import json
+import os
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
+import per_obspy
+
+CHECKOUT = Path(__file__).parents[1]
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap"
 ROW = "a,0.3,0.0,10,0.3001,0.0,12,0.05"
 
@@ -45,6 +51,32 @@ def configuration(records, tmp_path):
         '[pairs]\nfile = "pairs.csv"\n[screening]\nlargest_distance = 1e5\n[spectra]\ncount = 5\n'
     )
     return file
+
+
+def test_version(call):
+    code, out, _ = call("--version")
+    assert (code, out.strip()) == (0, per_obspy.__version__)
+    assert out.strip() == version("per_obspy")
+
+
+def test_help_names_the_section_of_the_configuration(call):
+    # would catch: square brackets taken for markup
+    code, out, _ = call("fetch", "-h")
+    assert code == 0
+    assert "[records.fdsn]" in out
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["catalog", "list"]])
+def test_a_reader_that_has_enough_is_no_failure(arguments):
+    # 1 is left to crashes
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "per_obspy", *arguments]
+    done = subprocess.run(
+        command, check=False, stdout=write, stderr=subprocess.PIPE, text=True, cwd=CHECKOUT
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_help_loads_nothing_heavy():

@@ -1,7 +1,7 @@
 """Print tables and progress."""
 
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -56,4 +56,6 @@ def shown_progress() -> "Iterator[Progress]":
 
 
 def _print_line(stage: str, done: int, total: int) -> None:
-    print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+    """Print a step of progress; a log that is no longer read does not stop the work."""
+    with suppress(BrokenPipeError):
+        print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)

@@ -60,7 +60,7 @@ def events(
 
 def fetch(
     configuration: Annotated[
-        Path, typer.Argument(help="TOML file of a run with a section [records.fdsn].")
+        Path, typer.Argument(help="TOML file of a run with a section \\[records.fdsn].")
     ],
     again: Annotated[
         bool, typer.Option("--again", help="Ask again for stations that had no data.")
