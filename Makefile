@@ -1,4 +1,5 @@
 # `make demo` and `make test` need Python 3.11 or newer and nothing else; they install into .venv.
+# Run a command of the environment as .venv/bin/per-obspy, or activate it: source .venv/bin/activate
 PYTHON ?= python3
 BIN := .venv/bin
 
@@ -48,7 +49,7 @@ benchmark: .venv/benchmark
 .venv/run: .venv/bin/python pyproject.toml
 	@echo "== install per_obspy and what it needs (a minute or two)"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
-	@echo "== compile the kernels on a small run (once, about a minute)"
+	@echo "== compile the kernels on a small run (once, one to two and a half minutes)"
 	$(BIN)/per-obspy run workflows/smoke.toml -o .venv/smoke >/dev/null
 	@touch $@
 
