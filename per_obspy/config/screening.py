@@ -39,7 +39,7 @@ class Building(Section):
 
 
 class Interpolation(Section):
-    """How the motion between stations is estimated (``screening/interpolation.py``)."""
+    """How the motion between stations is estimated (``screening/ground_motion/kriging.py``)."""
 
     log_std: float = Field(
         0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7"
