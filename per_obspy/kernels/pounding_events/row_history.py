@@ -6,7 +6,6 @@ import numpy as np
 
 from per_obspy.kernels._jit import kernel, lean
 from per_obspy.kernels.polynomial_roots import first_fall, size_and_curvature, value_and_slope
-from per_obspy.kernels.pounding_events.events import find_event, finish_piece
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCES,
     CURVE,
@@ -31,6 +30,7 @@ from per_obspy.kernels.pounding_events.motion import (
     fill_force,
     taylor_terms,
 )
+from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 
 # columns of the work done on each structure since the start
 INPUT, DAMPING, HYSTERETIC, TRANSFER = 0, 1, 2, 3

@@ -24,7 +24,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.lanes import GUARD as CLOSING
 from per_obspy.kernels.pounding_lanes.maxima_in_step import may_rise, may_yield, raise_inside, state
-from per_obspy.kernels.pounding_lanes.pairs import load_pair
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair
 
 #: A clearance below this share of displacements and gap is not certain to be open.
 OPEN = 1e-12

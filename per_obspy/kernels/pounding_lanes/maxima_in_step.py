@@ -11,7 +11,6 @@ import math
 
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import first_fall, is_last_root, value_and_slope
-from per_obspy.kernels.pounding_events.events import fill_power, fill_velocity
 from per_obspy.kernels.pounding_events.motion import (
     CURVE,
     GUARD,
@@ -20,6 +19,7 @@ from per_obspy.kernels.pounding_events.motion import (
     WIDEST,
     fill_taylor,
 )
+from per_obspy.kernels.pounding_events.next_event import fill_power, fill_velocity
 from per_obspy.kernels.pounding_lanes.lanes import (
     ANGLE,
     CENTRE,

@@ -9,7 +9,7 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     write_lane,
 )
 from per_obspy.kernels.pounding_lanes.lanes import LANES, TILE, sweep
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, rest, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, rest, write_constants, write_phase
 from per_obspy.kernels.pounding_lanes.step_by_step import revisit
 
 #: Steps between two looks at whether a pair is settled after the record.

@@ -10,8 +10,8 @@ import math
 
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.polynomial_roots import first_fall, size_and_curvature, value_and_slope
-from per_obspy.kernels.pounding_events.events import find_event, finish_piece
 from per_obspy.kernels.pounding_events.motion import CURVE, GUARD, OPENING, YIELD, U
+from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_events.row_history import is_settled, reach_in_free_vibration
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     fill_ground,
@@ -44,7 +44,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     raise_inside,
     step,
 )
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, rest, store_pair
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, rest, store_pair
 from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS, prepare_block
 from per_obspy.kernels.pounding_lanes.step_by_step import at_start, present, segment_of, write_back
 

@@ -9,7 +9,6 @@ histories.
 import math
 
 from per_obspy.kernels._jit import inlined, lean
-from per_obspy.kernels.pounding_events.events import find_event, finish_piece
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCES,
     HIGHEST,
@@ -20,6 +19,7 @@ from per_obspy.kernels.pounding_events.motion import (
     YIELD,
     Segment,
 )
+from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     find_maxima,
     read_lane,
@@ -49,7 +49,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
     state,
     step,
 )
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, store_pair
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, store_pair
 
 
 @inlined

@@ -11,7 +11,7 @@ from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes import free_impacts as bounces
 from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.maxima_in_step import state, step
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
 from per_obspy.kernels.pounding_lanes.step_by_step import repeat_step, segment_of
 from per_obspy.pounding.history.pair_blocks import pair_table
 from per_obspy.pounding.history.tables import row_at_rest

@@ -14,7 +14,7 @@ from per_obspy.kernels.pounding_lanes import lanes
 from per_obspy.kernels.pounding_lanes.deferred_maxima import write_lane
 from per_obspy.kernels.pounding_lanes.lanes import sweep
 from per_obspy.kernels.pounding_lanes.maxima_in_step import state, step
-from per_obspy.kernels.pounding_lanes.pairs import write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.pair_rows import write_constants, write_phase
 from per_obspy.pounding.history.pair_blocks import pair_table
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.row_history import pounding_history
