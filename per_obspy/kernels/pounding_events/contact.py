@@ -1,11 +1,11 @@
 """
-What happens at the instant of a contact: stereomechanical impacts, and which interfaces stay closed.
+Contact at one instant: stereomechanical impacts, and the interfaces that stay closed after them.
 
 Impacts are pairwise and sequential, from left to right, repeated until no touching pair approaches.
 Interfaces that touch without speed then stay closed where the forces that keep them closed are
-compressive. Bounces end, and an interface may stay closed, when it separates slower than STILL
-(m/s), or slower than DELAY (s) times its closing acceleration, or after MOST_BOUNCES impacts in a
-segment.
+compressive. Bounces end, and an interface may stay closed, when it separates slower than
+STICKING_SPEED (m/s), or slower than STICKING_DELAY (s) times its closing acceleration, or after
+BOUNCE_LIMIT impacts in a segment.
 """
 
 import math
@@ -13,126 +13,145 @@ import math
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.motion import (
     APPROACH,
+    BOUNCE_LIMIT,
     BOUNCES,
-    CURVE,
-    DELAY,
+    CLEARANCE_ORDER,
+    DAMPING_RATE,
     GAP,
-    GIVEN,
     IMPACTS,
+    IN_CONTACT,
     LINGERING,
     MASS,
-    MOST_BOUNCES,
-    ORDER,
     PARTICIPATION,
     PHASE,
     PLASTIC,
-    RATE,
     RESTITUTION,
-    STILL,
-    STUCK,
+    STICKING_DELAY,
+    STICKING_SPEED,
+    TAYLOR,
+    TRANSFERRED,
     UNLOADING,
     YIELD,
     U,
     V,
-    fill_curves,
-    last_in_contact,
+    fill_displacements,
+    last_of_cluster,
     mass_share,
-    restoring,
+    restoring_force,
     size_of_forces,
 )
 
-# columns of the log of impacts, one line an impact as long as there is room
-TIME, LEFT, BEFORE_1, AFTER_1, BEFORE_2, AFTER_2, IMPULSE, PLACE_1, PLACE_2 = range(9)
+# columns of the log of impacts, one line per impact as long as there is room
+#: time (s), index of the structure left of the gap
+LOG_TIME, LOG_LEFT = 0, 1
+#: velocities of the left and of the right structure (m/s), before and after the impact
+LOG_BEFORE_1, LOG_AFTER_1, LOG_BEFORE_2, LOG_AFTER_2 = 2, 3, 4, 5
+#: impulse (N s), displacements (m)
+LOG_IMPULSE, LOG_DISPLACEMENT_1, LOG_DISPLACEMENT_2 = 6, 7, 8
 LOG_COLUMNS = 9
 #: Clearance below which two structures touch at the instant of another contact, relative to
 #: displacements and gap.
-TOUCH = 1e-12
+TOUCH_ROUNDING = 1e-12
 #: Opening acceleration, relative to the forces per unit mass, that is rounding.
-PRESSED = 1e-14
+PRESSED_ROUNDING = 1e-14
 
 
 @lean
-def touches(row, interface):
-    """Tell whether an interface is closed or has no clearance."""
-    if row[interface, STUCK] or row[interface, ORDER] > 0:
+def is_touching(row, j):
+    """Return whether an interface is closed or has no clearance."""
+    if row[j, IN_CONTACT] or row[j, CLEARANCE_ORDER] > 0:
         return True
-    left, right = row[interface, U], row[interface + 1, U]
-    clearance = row[interface, GAP] - left + right
-    return clearance <= TOUCH * (abs(left) + abs(right) + row[interface, GAP])
+    # clearance against the rounding of its terms
+    left = row[j, U]
+    right = row[j + 1, U]
+    clearance = row[j, GAP] - left + right
+    return clearance <= TOUCH_ROUNDING * (abs(left) + abs(right) + row[j, GAP])
 
 
 @lean
-def write_impact(log, row, j, time, impulse, before_1, before_2):
+def log_impact(log, row, j, time, impulse, before_1, before_2):
     """Write an impact that has just changed the velocities to the log, if it has room."""
+    # the number of impacts before this one is its line
     count = 0.0
     for k in range(row.shape[0] - 1):
         count += row[k, IMPACTS]
     if count < log.shape[0]:
         line = int(count)
-        log[line, TIME], log[line, LEFT], log[line, IMPULSE] = time, j, impulse
-        log[line, BEFORE_1], log[line, AFTER_1], log[line, PLACE_1] = before_1, row[j, V], row[j, U]
-        log[line, BEFORE_2], log[line, AFTER_2], log[line, PLACE_2] = (
-            before_2,
-            row[j + 1, V],
-            row[j + 1, U],
-        )
+        log[line, LOG_TIME] = time
+        log[line, LOG_LEFT] = j
+        log[line, LOG_IMPULSE] = impulse
+        log[line, LOG_BEFORE_1] = before_1
+        log[line, LOG_AFTER_1] = row[j, V]
+        log[line, LOG_DISPLACEMENT_1] = row[j, U]
+        log[line, LOG_BEFORE_2] = before_2
+        log[line, LOG_AFTER_2] = row[j + 1, V]
+        log[line, LOG_DISPLACEMENT_2] = row[j + 1, U]
 
 
 @lean
-def strike(row, log, j, time):
-    """Let the two structures of an interface hit each other."""
-    before_1, before_2 = row[j, V], row[j + 1, V]
+def apply_impact(row, log, j, time):
+    """Apply one impact to the two structures of an interface: equations (7) to (10)."""
+    before_1 = row[j, V]
+    before_2 = row[j + 1, V]
     approach = before_1 - before_2
+    # velocities after the impact, (7) and (8)
     change = (1.0 + row[j, RESTITUTION]) * approach
     after_1 = before_1 - change * mass_share(row, j, j + 1, j + 1)
     after_2 = before_2 + change * mass_share(row, j, j + 1, j)
+    # impulse, from the structure that is no wall
     if row[j, MASS] < math.inf:
         impulse = row[j, MASS] * (before_1 - after_1)
     else:
         impulse = row[j + 1, MASS] * (after_2 - before_2)
-    row[j, V], row[j + 1, V] = after_1, after_2
-    row[j, GIVEN] += 0.5 * impulse * (before_1 + after_1)
-    row[j + 1, GIVEN] -= 0.5 * impulse * (before_2 + after_2)
+    row[j, V] = after_1
+    row[j + 1, V] = after_2
+    # transferred energies, (9) and (10) in their short form: impulse times mean velocity
+    row[j, TRANSFERRED] += 0.5 * impulse * (before_1 + after_1)
+    row[j + 1, TRANSFERRED] -= 0.5 * impulse * (before_2 + after_2)
+    # results and counters
     row[j, APPROACH] = max(row[j, APPROACH], approach)
-    write_impact(log, row, j, time, impulse, before_1, before_2)
+    log_impact(log, row, j, time, impulse, before_1, before_2)
     row[j, IMPACTS] += 1.0
     row[0, BOUNCES] += 1.0
 
 
 @lean
-def strike_all(row, log, hit, time):
-    """Let touching pairs hit each other, from left to right, until none approaches."""
+def apply_impacts(row, log, hit, time):
+    """Apply impacts to touching pairs, from left to right, until no pair approaches."""
     approaching = True
     while approaching:
         approaching = False
+        # one pass over the row; another one follows, because an impact may press neighbours
         for j in range(row.shape[0] - 1):
-            if row[j, V] - row[j + 1, V] > row[0, STILL] and (j == hit or touches(row, j)):
-                strike(row, log, j, time)
-                approaching = row[0, BOUNCES] < row[0, MOST_BOUNCES]
+            if row[j, V] - row[j + 1, V] > row[0, STICKING_SPEED] and (
+                j == hit or is_touching(row, j)
+            ):
+                apply_impact(row, log, j, time)
+                approaching = row[0, BOUNCES] < row[0, BOUNCE_LIMIT]
 
 
 @lean
 def free_acceleration(row, i, acceleration):
-    """Return the acceleration that a structure has by itself."""
-    stiffness, constant = restoring(row, i)
-    damping = 2.0 * row[i, RATE] * row[i, V]
+    """Return the acceleration of a structure without contact."""
+    stiffness, constant = restoring_force(row, i)
+    damping = 2.0 * row[i, DAMPING_RATE] * row[i, V]
     return constant - stiffness * row[i, U] - damping - row[i, PARTICIPATION] * acceleration
 
 
 @lean
-def lingers(row, interface, acceleration):
-    """Tell whether a touching pair separates so slowly that it may stay in contact."""
-    separation = row[interface + 1, V] - row[interface, V]
-    if separation <= row[0, STILL] or row[0, BOUNCES] >= row[0, MOST_BOUNCES]:
+def may_stay_in_contact(row, j, acceleration):
+    """Return whether a touching pair separates so slowly that it may stay in contact."""
+    separation = row[j + 1, V] - row[j, V]
+    if separation <= row[0, STICKING_SPEED] or row[0, BOUNCES] >= row[0, BOUNCE_LIMIT]:
         return True
-    closing = free_acceleration(row, interface, acceleration) - free_acceleration(
-        row, interface + 1, acceleration
-    )
-    return separation <= row[0, DELAY] * closing
+    # a bounce lasts 2 separation / closing acceleration
+    left = free_acceleration(row, j, acceleration)
+    right = free_acceleration(row, j + 1, acceleration)
+    return separation <= row[0, STICKING_DELAY] * (left - right)
 
 
 @lean
-def close_pressed(row, acceleration, slope, duration):
+def close_pressed_interfaces(row, acceleration, slope, duration):
     """
     Close lingering interfaces whose structures would accelerate into each other, until none would.
 
@@ -142,27 +161,31 @@ def close_pressed(row, acceleration, slope, duration):
     closed = True
     while closed:
         closed = False
-        fill_curves(row, acceleration, 0.0, 4)
+        # accelerations with the interfaces that are closed now
+        fill_displacements(row, acceleration, 0.0, 4)
         for j in range(row.shape[0] - 1):
-            if row[j, LINGERING] and not row[j, STUCK]:
-                opening = 2.0 * (row[j + 1, CURVE + 2] - row[j, CURVE + 2])
+            if row[j, LINGERING] and not row[j, IN_CONTACT]:
+                # opening acceleration, against the rounding of the forces
+                opening = 2.0 * (row[j + 1, TAYLOR + 2] - row[j, TAYLOR + 2])
                 size = size_of_forces(row, j, acceleration, slope, duration)
                 size += size_of_forces(row, j + 1, acceleration, slope, duration)
-                if opening <= PRESSED * size:
-                    row[j, STUCK] = 1.0
+                if opening <= PRESSED_ROUNDING * size:
+                    row[j, IN_CONTACT] = 1.0
                     closed = True
 
 
 @lean
-def join(row, first, last):
+def join_cluster(row, first, last):
     """Give a cluster its common velocity, by momentum."""
     common = 0.0
     for i in range(first, last + 1):
         common += mass_share(row, first, last, i) * row[i, V]
+    # the change of kinetic energy goes to the neighbours
     for i in range(first, last + 1):
-        mass, velocity = row[i, MASS], row[i, V]
+        mass = row[i, MASS]
+        velocity = row[i, V]
         if mass < math.inf:
-            row[i, GIVEN] += 0.5 * mass * (velocity - common) * (velocity + common)
+            row[i, TRANSFERRED] += 0.5 * mass * (velocity - common) * (velocity + common)
         row[i, V] = common
 
 
@@ -172,29 +195,48 @@ def unload_reversed(row):
     for i in range(row.shape[0]):
         side = row[i, PHASE]
         if side != 0 and side * row[i, V] <= 0.0:
-            row[i, PHASE], row[i, UNLOADING] = 0.0, side
+            # on the edge of yielding, where the distance to it is zero
+            row[i, PHASE] = 0.0
+            row[i, UNLOADING] = side
             row[i, PLASTIC] = row[i, U] - side * row[i, YIELD]
 
 
 @lean
-def meet(row, log, segment, elapsed, hit):
-    """Carry out a contact of one interface, with all that it causes in the row at the same instant."""
+def resolve_contact(row, log, segment, elapsed, hit):
+    """
+    Carry out a contact of one interface, with all its consequences in the row at the same instant.
+
+    Parameters
+    ----------
+    row : (n_structures, ROW_COLUMNS) ndarray
+        Row of structures at the instant of the contact; see `motion` for its columns.
+    log : (n_lines, LOG_COLUMNS) ndarray
+        Log of impacts, which receives one line per impact.
+    segment : Segment
+        Current segment of the ground acceleration.
+    elapsed : float
+        Time since the start of the segment, s.
+    hit : int
+        Interface whose clearance has just closed.
+    """
     acceleration = segment.acceleration + segment.slope * elapsed
-    strike_all(row, log, hit, segment.start + elapsed)
+    apply_impacts(row, log, hit, segment.start + elapsed)
+    # open every touching interface; note where it may stay closed
     lingering = False
     for j in range(row.shape[0] - 1):
         row[j, LINGERING] = 0.0
-        if j == hit or touches(row, j):
-            row[j, ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
-            row[j, STUCK] = 0.0
-            row[j, LINGERING] = lingers(row, j, acceleration)
+        if j == hit or is_touching(row, j):
+            row[j, CLEARANCE_ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
+            row[j, IN_CONTACT] = 0.0
+            row[j, LINGERING] = may_stay_in_contact(row, j, acceleration)
             lingering |= row[j, LINGERING] != 0.0
     if lingering:
-        close_pressed(row, acceleration, segment.slope, segment.duration)
+        close_pressed_interfaces(row, acceleration, segment.slope, segment.duration)
+    # structures in contact move on with one velocity
     first = 0
     while first < row.shape[0]:
-        last = last_in_contact(row, first)
+        last = last_of_cluster(row, first)
         if last > first:
-            join(row, first, last)
+            join_cluster(row, first, last)
         first = last + 1
     unload_reversed(row)

@@ -1,9 +1,13 @@
 """
-Two linear structures with an element between them whose force is piecewise linear, exact between samples.
+Two linear structures with an element between them: exact motion between samples.
 
-In each of its phases the element pulls the structures together with ``F = k z + c z' + f`` (z = u1
-- u2), so that both displacements are Taylor polynomials again, ``pounding_motion`` with coupling. A
-link is elastic or yields; a contact is open or closed, without tension.
+The force of the element is piecewise linear. In each of its phases it pulls the structures together
+with ``F = k z + c z' + f`` (``z = u1 - u2``), so that both displacements are Taylor polynomials
+again, as in ``motion`` but coupled. A link is elastic or yields; a contact is open or closed,
+without tension.
+
+The row of structures has the columns of ``motion``; the event functions of the element are in line
+0.
 """
 
 import math
@@ -12,28 +16,47 @@ from typing import NamedTuple
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.polynomial_roots import first_fall, value_and_slope
 from per_obspy.kernels.pounding_events.motion import (
-    CURVE,
-    GUARD,
+    DAMPING_RATE,
+    EVENT_FUNCTION,
     MASS,
     PARTICIPATION,
-    RATE,
     STIFFNESS,
+    TAYLOR,
     U,
     V,
 )
 
 # phases of an element
 ELASTIC, PULLED, PUSHED, OPEN, CLOSED = 0, 1, -1, 2, 3
-# columns of the maxima: both displacements, largest z, largest -z, largest |F|
-PLACE_1, PLACE_2, CLOSING, PARTING, FORCE = 0, 1, 2, 3, 4
-
+# columns of the maxima
+#: largest displacement of structure 1, then of structure 2 (m)
+MAXIMUM_DISPLACEMENT = 0
+#: largest z and largest -z (m)
+MAXIMUM_CLOSING, MAXIMUM_PARTING = 2, 3
+#: largest size of the element's force (N)
+MAXIMUM_FORCE = 4
 
 #: Changes of phase in one segment, above which a history is given up.
-MOST_CHANGES = 1000
+MOST_PHASE_CHANGES = 1000
 
 
 class Element(NamedTuple):
-    """Stiffness (N/m), damping (N s/m), yield force (N), hardening; gap (m), used by contacts."""
+    """
+    Properties of the element between two structures.
+
+    Attributes
+    ----------
+    stiffness : float
+        Of its spring, N/m.
+    damping : float
+        Of its dashpot, N s/m.
+    yield_force : float
+        Of its spring, N; infinite for an elastic one.
+    hardening : float
+        Stiffness after yielding over that before, dimensionless.
+    gap : float
+        Clear distance at rest, m; used by contacts.
+    """
 
     stiffness: float
     damping: float
@@ -43,193 +66,261 @@ class Element(NamedTuple):
 
 
 @lean
-def element_form(element, phase, plastic):
-    """Return k, c and f of an element in a phase; ``plastic`` is the plastic part of z."""
+def element_force(element, phase, plastic):
+    """Return k, c and f of the element in a phase; ``plastic`` is the plastic part of z."""
+    # contact
     if phase == OPEN:
         return 0.0, 0.0, 0.0
     if phase == CLOSED:
         return element.stiffness, element.damping, -element.stiffness * element.gap
+    # link
     if element.yield_force == math.inf:
         return element.stiffness, element.damping, 0.0
-    lost = (1.0 - element.hardening) * element.stiffness
+    elastoplastic = (1.0 - element.hardening) * element.stiffness
     if phase == ELASTIC:
-        return element.stiffness, element.damping, -lost * plastic
-    soft = element.hardening * element.stiffness
-    return soft, element.damping, phase * (1.0 - element.hardening) * element.yield_force
+        return element.stiffness, element.damping, -elastoplastic * plastic
+    yielded = element.hardening * element.stiffness
+    return yielded, element.damping, phase * (1.0 - element.hardening) * element.yield_force
 
 
 @lean
-def fill_linked(row, form, acceleration, slope, terms):
-    """Fill the Taylor coefficients of both displacements."""
-    stiffness, damping, force = form
-    force += stiffness * (row[0, U] - row[1, U])
+def fill_coupled_displacements(row, force, acceleration, slope, terms):
+    """Fill the Taylor coefficients of both displacements; ``force`` is the element's k, c and f."""
+    stiffness, damping, constant = force
+    # force of the spring at the start of the piece
+    constant += stiffness * (row[0, U] - row[1, U])
     for i in range(2):
-        row[i, CURVE], row[i, CURVE + 1] = row[i, U], row[i, V]
+        row[i, TAYLOR] = row[i, U]
+        row[i, TAYLOR + 1] = row[i, V]
+    # coefficient n + 2 from the equation of motion of order n
     for n in range(terms - 2):
-        closing = row[0, CURVE + n] - row[1, CURVE + n] if n else 0.0
-        rate = (n + 1) * (row[0, CURVE + n + 1] - row[1, CURVE + n + 1])
-        pull = stiffness * closing + damping * rate + (force if n == 0 else 0.0)
+        # force of the element, from coefficients of z and z'
+        closing = row[0, TAYLOR + n] - row[1, TAYLOR + n] if n else 0.0
+        rate = (n + 1) * (row[0, TAYLOR + n + 1] - row[1, TAYLOR + n + 1])
+        pull = stiffness * closing + damping * rate + (constant if n == 0 else 0.0)
+        # ground acceleration, linear in time
+        ground = acceleration if n == 0 else (slope if n == 1 else 0.0)
         for i in range(2):
-            own = (
-                2.0 * row[i, RATE] * (n + 1) * row[i, CURVE + n + 1]
-                + row[i, STIFFNESS] * row[i, CURVE + n]
-            )
-            ground = acceleration if n == 0 else (slope if n == 1 else 0.0)
-            total = (
-                own + row[i, PARTICIPATION] * ground + (pull if i == 0 else -pull) / row[i, MASS]
-            )
-            row[i, CURVE + n + 2] = -total / ((n + 2) * (n + 1))
+            dashpot = 2.0 * row[i, DAMPING_RATE] * (n + 1) * row[i, TAYLOR + n + 1]
+            restoring = dashpot + row[i, STIFFNESS] * row[i, TAYLOR + n]
+            drive = row[i, PARTICIPATION] * ground
+            total = restoring + drive + (pull if i == 0 else -pull) / row[i, MASS]
+            row[i, TAYLOR + n + 2] = -total / ((n + 2) * (n + 1))
 
 
 @lean
-def fill_force_of(row, form, terms):
-    """Fill the guard of line 0 with the element's force."""
-    stiffness, damping, force = form
+def fill_element_force(row, force, terms):
+    """Fill the event function with the element's force; ``force`` is k, c and f."""
+    stiffness, damping, constant = force
+    # k z + c z', coefficient by coefficient
     for n in range(terms - 1):
-        closing = row[0, CURVE + n] - row[1, CURVE + n]
-        rate = (n + 1) * (row[0, CURVE + n + 1] - row[1, CURVE + n + 1])
-        row[0, GUARD + n] = stiffness * closing + damping * rate
-    row[0, GUARD] += force
+        closing = row[0, TAYLOR + n] - row[1, TAYLOR + n]
+        rate = (n + 1) * (row[0, TAYLOR + n + 1] - row[1, TAYLOR + n + 1])
+        row[0, EVENT_FUNCTION + n] = stiffness * closing + damping * rate
+    row[0, EVENT_FUNCTION] += constant
 
 
 @lean
-def fill_difference(row, sign, constant, terms):
-    """Fill the guard of line 0 with ``constant + sign * z``."""
+def fill_distance(row, sign, constant, terms):
+    """Fill the event function with ``constant + sign * z``."""
     for n in range(terms):
-        row[0, GUARD + n] = sign * (row[0, CURVE + n] - row[1, CURVE + n])
-    row[0, GUARD] += constant
+        row[0, EVENT_FUNCTION + n] = sign * (row[0, TAYLOR + n] - row[1, TAYLOR + n])
+    row[0, EVENT_FUNCTION] += constant
 
 
 @lean
-def fill_rate(row, sign, terms):
-    """Fill the guard of line 0 with ``sign * z'``."""
+def fill_closing_rate(row, sign, terms):
+    """Fill the event function with ``sign * z'``."""
     for n in range(terms - 1):
-        row[0, GUARD + n] = sign * (n + 1) * (row[0, CURVE + n + 1] - row[1, CURVE + n + 1])
+        closing = row[0, TAYLOR + n + 1] - row[1, TAYLOR + n + 1]
+        row[0, EVENT_FUNCTION + n] = sign * (n + 1) * closing
 
 
 @lean
 def divide_by_square(row, terms):
-    """Divide the guard of line 0 by t², its first two coefficients being zero but for rounding."""
+    """Divide the event function by t²; its first two coefficients are zero but for rounding."""
     for n in range(terms - 2):
-        row[0, GUARD + n] = row[0, GUARD + n + 2]
-    row[0, GUARD + terms - 2] = row[0, GUARD + terms - 1] = 0.0
+        row[0, EVENT_FUNCTION + n] = row[0, EVENT_FUNCTION + n + 2]
+    row[0, EVENT_FUNCTION + terms - 2] = 0.0
+    row[0, EVENT_FUNCTION + terms - 1] = 0.0
 
 
 @lean
-def next_phase(row, element, phase, left, plastic, span, terms):
+def next_phase(row, element, phase, previous, plastic, span, terms):
     """
-    Return when the element changes phase within a span (-1: not) and to which.
+    Return the time at which the element changes phase within a span (-1: none), and the new phase.
 
-    ``left`` is the phase that ended at the start of the piece: if it was yielding, distance and
+    ``previous`` is the phase that ended at the start of the piece: if it was yielding, distance and
     rate are zero there.
     """
     limit = element.yield_force / element.stiffness if element.stiffness > 0.0 else math.inf
+    # a yielding link unloads when z' changes its sign
     if phase in (PULLED, PUSHED):
-        fill_rate(row, float(phase), terms)
-        return first_fall(row, 0, GUARD, terms - 1, 1.0, 0.0, span, 0.0), ELASTIC
+        fill_closing_rate(row, float(phase), terms)
+        return first_fall(row, 0, EVENT_FUNCTION, terms - 1, 1.0, 0.0, span, 0.0), ELASTIC
+    # an elastic link yields at either end of its elastic range
     if phase == ELASTIC:
-        earliest, to = -1.0, ELASTIC
+        earliest = -1.0
+        following = ELASTIC
         if limit < math.inf:
             for side in (PULLED, PUSHED):
-                fill_difference(row, -float(side), limit + side * plastic, terms)
-                if side == left:
+                fill_distance(row, -float(side), limit + side * plastic, terms)
+                if side == previous:
                     divide_by_square(row, terms)
-                time = first_fall(row, 0, GUARD, terms, 1.0, 0.0, span, 1e-15 * limit)
+                time = first_fall(row, 0, EVENT_FUNCTION, terms, 1.0, 0.0, span, 1e-15 * limit)
                 if time >= 0.0:
-                    earliest, to, span = time, side, time
-        return earliest, to
+                    earliest = time
+                    following = side
+                    span = time
+        return earliest, following
+    # a contact opens when its force falls to zero
     if phase == CLOSED:
-        fill_force_of(row, element_form(element, CLOSED, 0.0), terms)
-        return first_fall(row, 0, GUARD, terms - 1, 1.0, 0.0, span, 0.0), OPEN
-    return _closing_time(row, element, left, span, terms), CLOSED
+        fill_element_force(row, element_force(element, CLOSED, 0.0), terms)
+        return first_fall(row, 0, EVENT_FUNCTION, terms - 1, 1.0, 0.0, span, 0.0), OPEN
+    return _closing_time(row, element, previous, span, terms), CLOSED
 
 
 @lean
-def _closing_time(row, element, left, span, terms):
-    """Return when an open contact closes: overlap and the force it would have are both positive."""
-    fill_difference(row, -1.0, element.gap, terms)
+def _closing_time(row, element, previous, span, terms):
+    """Return the time at which a contact closes: overlap and its force are then both positive."""
+    fill_distance(row, -1.0, element.gap, terms)
     rounding = 1e-14 * (abs(row[0, U]) + abs(row[1, U]) + element.gap)
-    if row[0, GUARD] > -rounding:
-        if left == CLOSED:  # the clearance is zero but for rounding
-            row[0, GUARD] = max(row[0, GUARD], 0.0)
+    # open: the clearance falls to zero
+    if row[0, EVENT_FUNCTION] > -rounding:
+        if previous == CLOSED:  # the clearance is zero but for rounding
+            row[0, EVENT_FUNCTION] = max(row[0, EVENT_FUNCTION], 0.0)
             rounding = 0.0
-        return first_fall(row, 0, GUARD, terms, 1.0, 0.0, span, 0.1 * rounding)
-    fill_force_of(row, element_form(element, CLOSED, 0.0), terms)
-    return first_fall(row, 0, GUARD, terms - 1, -1.0, 0.0, span, 0.0)
+        return first_fall(row, 0, EVENT_FUNCTION, terms, 1.0, 0.0, span, 0.1 * rounding)
+    # overlapping without force: the force would rise above zero
+    fill_element_force(row, element_force(element, CLOSED, 0.0), terms)
+    return first_fall(row, 0, EVENT_FUNCTION, terms - 1, -1.0, 0.0, span, 0.0)
 
 
 @lean
-def largest_on(row, i, column, terms, span):
-    """Return the largest and the least value of a polynomial on [0, span]."""
-    start, end = row[i, column], value_and_slope(row, i, column, terms, span)[0]
-    low, high = min(start, end), max(start, end)
-    line, rate = 1, GUARD  # room that the element does not use
+def extremes_in_piece(row, i, column, terms, span):
+    """Return the least and the largest value of a polynomial on [0, span]."""
+    start = row[i, column]
+    end = value_and_slope(row, i, column, terms, span)[0]
+    low = min(start, end)
+    high = max(start, end)
+    # derivative, in the event function of line 1, which the element does not use
     for n in range(1, terms):
-        row[line, rate + n - 1] = n * row[i, column + n]
-    sign = 1.0 if row[line, rate] > 0.0 else -1.0
-    time = first_fall(row, line, rate, terms - 1, sign, 0.0, span, 0.0)
+        row[1, EVENT_FUNCTION + n - 1] = n * row[i, column + n]
+    # values at its roots
+    sign = 1.0 if row[1, EVENT_FUNCTION] > 0.0 else -1.0
+    time = first_fall(row, 1, EVENT_FUNCTION, terms - 1, sign, 0.0, span, 0.0)
     while time >= 0.0:
         value = value_and_slope(row, i, column, terms, time)[0]
-        low, high, sign = min(low, value), max(high, value), -sign
-        time = first_fall(row, line, rate, terms - 1, sign, time, span, 0.0)
+        low = min(low, value)
+        high = max(high, value)
+        sign = -sign
+        time = first_fall(row, 1, EVENT_FUNCTION, terms - 1, sign, time, span, 0.0)
     return low, high
 
 
 @lean
-def raise_linked(row, form, maxima, span, terms):
+def raise_linked_maxima(row, force, maxima, span, terms):
     """Raise the maxima to those of a piece, exact between its ends."""
     for i in range(2):
-        low, high = largest_on(row, i, CURVE, terms, span)
-        maxima[PLACE_1 + i] = max(maxima[PLACE_1 + i], high, -low)
-    fill_difference(row, 1.0, 0.0, terms)
-    low, high = largest_on(row, 0, GUARD, terms, span)
-    maxima[CLOSING], maxima[PARTING] = max(maxima[CLOSING], high), max(maxima[PARTING], -low)
-    fill_force_of(row, form, terms)
-    low, high = largest_on(row, 0, GUARD, terms - 1, span)
-    maxima[FORCE] = max(maxima[FORCE], high, -low)
+        low, high = extremes_in_piece(row, i, TAYLOR, terms, span)
+        maxima[MAXIMUM_DISPLACEMENT + i] = max(maxima[MAXIMUM_DISPLACEMENT + i], high, -low)
+    # z to either side
+    fill_distance(row, 1.0, 0.0, terms)
+    low, high = extremes_in_piece(row, 0, EVENT_FUNCTION, terms, span)
+    maxima[MAXIMUM_CLOSING] = max(maxima[MAXIMUM_CLOSING], high)
+    maxima[MAXIMUM_PARTING] = max(maxima[MAXIMUM_PARTING], -low)
+    # force of the element
+    fill_element_force(row, force, terms)
+    low, high = extremes_in_piece(row, 0, EVENT_FUNCTION, terms - 1, span)
+    maxima[MAXIMUM_FORCE] = max(maxima[MAXIMUM_FORCE], high, -low)
 
 
 @lean
 def advance_linked(row, element, phase, plastic, maxima, duration, acceleration, slope, terms):
-    """Carry both structures through a segment; return the element's phase, plastic part, and whether it got through."""
-    elapsed, left = 0.0, phase
-    for _ in range(MOST_CHANGES):
-        form = element_form(element, phase, plastic)
-        fill_linked(row, form, acceleration + slope * elapsed, slope, terms)
+    """
+    Carry both structures through a segment, from one change of the element's phase to the next.
+
+    Return the element's phase, its plastic part, and whether the end of the segment was reached.
+    """
+    elapsed = 0.0
+    previous = phase
+    for _ in range(MOST_PHASE_CHANGES):
+        # motion with the element in its phase, until this changes or the segment ends
+        force = element_force(element, phase, plastic)
+        fill_coupled_displacements(row, force, acceleration + slope * elapsed, slope, terms)
         span = duration - elapsed
-        time, to = next_phase(row, element, phase, left, plastic, span, terms)
+        time, following = next_phase(row, element, phase, previous, plastic, span, terms)
         if time >= 0.0:
             span = time
-        raise_linked(row, form, maxima, span, terms)
+        raise_linked_maxima(row, force, maxima, span, terms)
+        # state at the end of the piece
         for i in range(2):
-            row[i, U], row[i, V] = value_and_slope(row, i, CURVE, terms, span)
+            row[i, U], row[i, V] = value_and_slope(row, i, TAYLOR, terms, span)
         if time < 0.0:
             return phase, plastic, True
-        if to == ELASTIC:
+        if following == ELASTIC:
             plastic = row[0, U] - row[1, U] - phase * element.yield_force / element.stiffness
-        left, phase, elapsed = phase, to, elapsed + span
+        previous = phase
+        phase = following
+        elapsed += span
     return phase, plastic, False
 
 
 @lean
 def run_linked(acceleration, dt, refinement, row, element, phase, terms, motion, force, maxima):
-    """Fill motion (n_time, 2, 2) and force (n_time,) at the samples; tell whether the history got to its end."""
-    duration, plastic = dt / refinement, 0.0
+    """
+    Run two structures with an element between them through a record and the time after it.
+
+    Parameters
+    ----------
+    acceleration : (n_samples,) ndarray
+        Ground acceleration, positive from structure 1 to 2, m/s². The ground rests after it.
+    dt : float
+        Sampling interval, s.
+    refinement : int
+        Number of segments into which each sampling interval is cut.
+    row : (2, ROW_COLUMNS) ndarray
+        Both structures at rest, then at the end; see `motion` for its columns.
+    element : Element
+        Link or contact.
+    phase : int
+        Of the element at the start: ELASTIC or OPEN.
+    terms : int
+        Number of Taylor terms.
+    motion : (n_time, 2, 2) ndarray
+        Receives displacement (m) and velocity (m/s) of both structures at every sample.
+    force : (n_time,) ndarray
+        Receives the force of the element at every sample, N, positive in compression.
+    maxima : (5,) ndarray
+        Receives the largest displacements, closing, parting (m) and force (N), exact between
+        samples.
+
+    Returns
+    -------
+    bool
+        Whether the end was reached; a segment with too many changes of phase ends the history.
+    """
+    duration = dt / refinement
+    plastic = 0.0
     for k in range(1, force.size):
+        # ground acceleration and its slope in this sampling interval; zero after the record
         start = slope = 0.0
         if k < acceleration.size:
-            start, slope = acceleration[k - 1], (acceleration[k] - acceleration[k - 1]) / dt
+            start = acceleration[k - 1]
+            slope = (acceleration[k] - acceleration[k - 1]) / dt
+        # the interval, segment by segment
         for part in range(refinement):
             begin = start + slope * part * duration
-            phase, plastic, through = advance_linked(
+            phase, plastic, is_through = advance_linked(
                 row, element, phase, plastic, maxima, duration, begin, slope, terms
             )
-            if not through:
+            if not is_through:
                 return False
-        stiffness, damping, constant = element_form(element, phase, plastic)
-        force[k] = (
-            stiffness * (row[0, U] - row[1, U]) + damping * (row[0, V] - row[1, V]) + constant
-        )
+        # results at the sample
+        stiffness, damping, constant = element_force(element, phase, plastic)
+        spring = stiffness * (row[0, U] - row[1, U])
+        force[k] = spring + damping * (row[0, V] - row[1, V]) + constant
         for i in range(2):
-            motion[k, i, 0], motion[k, i, 1] = row[i, U], row[i, V]
+            motion[k, i, 0] = row[i, U]
+            motion[k, i, 1] = row[i, V]
     return True

@@ -6,6 +6,9 @@ with a linear right-hand side, ``x'' + 2 B x' + K x = P0 + P1 t``, where ``x`` i
 since the start of the piece. Its Taylor coefficients follow from each other; with ``omega h`` at
 most 0.7 they fall below rounding within 24 terms, whatever the sign of ``K - B²``, so elastic,
 yielding (even without hardening) and touching phases are one formula.
+
+A row of structures is one table (n_structures, ROW_COLUMNS): a line per structure, which also
+holds the interface to the next structure on its right. The constants below are its columns.
 """
 
 import math
@@ -15,54 +18,96 @@ import numpy as np
 
 from per_obspy.kernels._jit import lean
 
-# A row of structures is one table, a line for each structure and for the interface to the next one
-# on its right:
-#: xi omega, omega², hardening, yield displacement, participation, mass
-RATE, STIFFNESS, HARDENING, YIELD, PARTICIPATION, MASS = 0, 1, 2, 3, 4, 5
-#: displacement, velocity, plastic displacement; phase: 0 elastic, 1 or -1 yielding towards that
-#: side; how many derivatives of the distance to yielding, from the 0th, are zero now, with the sign
-#: of the side
-U, V, PLASTIC, PHASE, UNLOADING = 6, 7, 8, 9, 10
-#: largest displacement, squared radius and squared energy radius so far; energy given to the
-#: neighbours by impacts
-HIGHEST, WIDEST, RICHEST, GIVEN = 11, 12, 13, 14
-#: interface: gap, restitution, is it closed, how many derivatives of the clearance are zero now,
-#: may it close now
-GAP, RESTITUTION, STUCK, ORDER, LINGERING = 15, 16, 17, 18, 19
-#: interface: number of impacts and largest approach speed so far
-IMPACTS, APPROACH = 20, 21
-#: first line only: when bounces end (see pounding_contact), and impacts in the current segment
-STILL, DELAY, MOST_BOUNCES, BOUNCES = 22, 23, 24, 25
-#: Taylor coefficients of the displacement, and of the function whose root is the next event
-CURVE, GUARD = 26, 50
-#: Taylor terms needed (first line only), and what one elastic or yielding step makes of speed,
-#: force and ramp
-TERMS, ELASTIC, YIELDED = 74, 75, 81
-#: interface: how far it opened at most, beyond its gap
-OPENING = 87
-#: Taylor coefficients of the displacement over the share of a step whose acceleration starts at 0
-#: and grows by 1 a step
-SHAPE = 88
-COLUMNS = 112
+# properties of a structure
+#: xi omega (1/s), omega² (1/s²), hardening (dimensionless), yield displacement (m)
+DAMPING_RATE, STIFFNESS, HARDENING, YIELD = 0, 1, 2, 3
+#: participation (dimensionless), mass (kg)
+PARTICIPATION, MASS = 4, 5
 
-#: Largest phase omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1
+# state of a structure
+#: displacement (m), velocity (m/s), plastic displacement (m)
+U, V, PLASTIC = 6, 7, 8
+#: 0 elastic, 1 or -1 yielding towards that side
+PHASE = 9
+#: number of derivatives of the distance to yielding, from the 0th, that are zero now, with the sign
+#: of the side
+UNLOADING = 10
+
+# results of a structure so far
+#: largest displacement (m), squared radius and squared energy radius (m²)
+LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED, LARGEST_ENERGY_RADIUS_SQUARED = 11, 12, 13
+#: energy given to the neighbours by impacts (J)
+TRANSFERRED = 14
+
+# interface
+#: gap (m), coefficient of restitution (dimensionless)
+GAP, RESTITUTION = 15, 16
+#: 1 while the interface is closed, else 0
+IN_CONTACT = 17
+#: number of derivatives of the clearance, from the 0th, that are zero now
+CLEARANCE_ORDER = 18
+#: 1 where the interface separates so slowly that it may stay closed, else 0
+LINGERING = 19
+#: number of impacts and largest approach speed (m/s) so far
+IMPACTS, APPROACH = 20, 21
+
+# first line only: when bounces end (see `contact`)
+#: separation speed (m/s), and separation speed over closing acceleration (s), below which they do
+STICKING_SPEED, STICKING_DELAY = 22, 23
+#: number of impacts in a segment after which bounces end, and number of impacts in it so far
+BOUNCE_LIMIT, BOUNCES = 24, 25
+
+# Taylor polynomials of a structure and its interface, MOST_TERMS columns each
+#: displacement in the current piece
+TAYLOR = 26
+#: event function: the function whose root is the next event or the next maximum
+EVENT_FUNCTION = 50
+
+# numbers that only the lanes use
+#: number of Taylor terms needed (first line only)
+TERM_COUNT = 74
+#: displacement and velocity after one elastic or yielding step, from unit velocity, by unit force
+#: and by unit ramp: six columns each
+ELASTIC_RESPONSES, YIELDED_RESPONSES = 75, 81
+
+#: interface: largest opening so far, beyond its gap (m)
+OPENING = 87
+#: Taylor coefficients of the displacement over the share of a step, from rest, with an acceleration
+#: that starts at 0 and grows by 1 per step (lanes only)
+RAMP_RESPONSE = 88
+ROW_COLUMNS = 112
+
+#: Largest angle omega * h of one piece, and the Taylor terms that it may need (rates reach omega (1
 #: + xi)).
-LARGEST_PHASE = 0.7
+LARGEST_ANGLE = 0.7
 MOST_TERMS = 24
-#: 1 / (n (n - 1)), from n = 2 on.
-INVERSE = np.array([0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, MOST_TERMS))])
 #: 1 / n, from n = 1 on.
 RECIPROCAL = np.array([0.0, *(1.0 / n for n in range(1, MOST_TERMS))])
-#: What is dropped of a Taylor series, relative to the motion.
+#: 1 / (n (n - 1)), from n = 2 on.
+RECIPROCAL_PRODUCT = np.array([0.0, 0.0, *(1.0 / (n * (n - 1)) for n in range(2, MOST_TERMS))])
+#: Part of a Taylor series that is dropped, relative to the motion.
 TRUNCATION = 1e-18
-#: Below this share of its own terms a contact force is rounding, as is a clearance below the other
-#: share.
+#: Below this share of its own terms a contact force is rounding.
 FORCE_ROUNDING = 1e-13
+#: Below this share of its own terms a clearance, or a distance to yielding, is rounding.
 GAP_ROUNDING = 1e-15
 
 
 class Segment(NamedTuple):
-    """Ground acceleration (m/s²) with a slope (m/s³) from a start (s) over a duration (s), and the Taylor terms."""
+    """
+    A stretch of time over which the ground acceleration is linear.
+
+    Attributes
+    ----------
+    start, duration : float
+        Time at its start since the first sample, and its length, s.
+    acceleration : float
+        Ground acceleration at its start, m/s².
+    slope : float
+        Rate of the ground acceleration, m/s³.
+    terms : int
+        Number of Taylor terms that a piece of this duration needs.
+    """
 
     start: float
     duration: float
@@ -74,10 +119,13 @@ class Segment(NamedTuple):
 @lean
 def taylor_terms(row, duration):
     """Return how many Taylor coefficients a piece of this duration needs."""
+    # largest rate omega (1 + xi) of the row, times the duration
     largest = 0.0
     for i in range(row.shape[0]):
-        largest = max(largest, (math.sqrt(row[i, STIFFNESS]) + row[i, RATE]) * duration)
-    terms, size = 4, largest**4 / 24.0
+        largest = max(largest, (math.sqrt(row[i, STIFFNESS]) + row[i, DAMPING_RATE]) * duration)
+    # the n-th term is below largest**n / n!
+    terms = 4
+    size = largest**4 / 24.0
     while size > TRUNCATION and terms < MOST_TERMS:
         terms += 1
         size *= largest / terms
@@ -85,42 +133,58 @@ def taylor_terms(row, duration):
 
 
 @lean
-def restoring(row, i):
-    """Return stiffness K and constant b of a structure's restoring force ``K u - b`` per unit mass in its phase."""
+def restoring_force(row, i):
+    """Return stiffness K and constant b of the restoring force ``K u - b`` per unit mass."""
     stiffness = row[i, STIFFNESS]
     if row[i, YIELD] == math.inf:
         return stiffness, 0.0
-    lost = (1.0 - row[i, HARDENING]) * stiffness
+    # bilinear: the elastoplastic part (1 - hardening) omega² is missing from the slope while it
+    # yields, and is measured from the plastic displacement while elastic
+    elastoplastic = (1.0 - row[i, HARDENING]) * stiffness
     if row[i, PHASE] == 0:
-        return stiffness, lost * row[i, PLASTIC]
-    return stiffness - lost, -lost * row[i, PHASE] * row[i, YIELD]
+        return stiffness, elastoplastic * row[i, PLASTIC]
+    return stiffness - elastoplastic, -elastoplastic * row[i, PHASE] * row[i, YIELD]
 
 
 @lean
 def fill_taylor(row, i, column, terms, velocity, damping, stiffness, force, force_rate):
-    """Fill the coefficients from the first on of ``x'' + damping x' + stiffness x = force + force_rate t``."""
-    before, last = velocity, 0.5 * (force - damping * velocity)
-    row[i, column + 1], row[i, column + 2] = before, last
-    before, last = last, (force_rate - 2.0 * damping * last - stiffness * before) / 6.0
+    """
+    Fill the coefficients from the first on of ``x'' + damping x' + stiffness x = force + rate t``.
+
+    ``x`` starts at zero with a velocity; ``force_rate`` is the rate of the force.
+    """
+    # x' and x'' / 2 at the start
+    before = velocity
+    last = 0.5 * (force - damping * velocity)
+    row[i, column + 1] = before
+    row[i, column + 2] = last
+    # x''' / 6: the only coefficient that the ramp of the force enters
+    third = (force_rate - 2.0 * damping * last - stiffness * before) / 6.0
+    before = last
+    last = third
     row[i, column + 3] = last
+    # recurrence of the homogeneous equation
     for n in range(4, terms):
-        before, last = last, -(damping * RECIPROCAL[n]) * last - (stiffness * INVERSE[n]) * before
+        following = -(damping * RECIPROCAL[n]) * last - (stiffness * RECIPROCAL_PRODUCT[n]) * before
+        before = last
+        last = following
         row[i, column + n] = last
 
 
 @lean
-def last_in_contact(row, first):
-    """Return the last structure of the cluster that starts with the first."""
+def last_of_cluster(row, first):
+    """Return the last structure of the cluster in contact that starts with the first."""
     last = first
-    while last < row.shape[0] - 1 and row[last, STUCK]:
+    while last < row.shape[0] - 1 and row[last, IN_CONTACT]:
         last += 1
     return last
 
 
 @lean
 def mass_share(row, first, last, i):
-    """Return the share of structure i in the mass of a cluster; a wall (infinite mass) has it all."""
-    total, walls = 0.0, 0
+    """Return the share of structure i in the mass of a cluster; a wall (infinite mass) has all."""
+    total = 0.0
+    walls = 0
     for k in range(first, last + 1):
         total += row[k, MASS]
         walls += row[k, MASS] == math.inf
@@ -131,51 +195,61 @@ def mass_share(row, first, last, i):
 
 @lean
 def cluster_equation(row, first, last, acceleration, slope):
-    """Return velocity, damping, stiffness, force and force rate of the equation of a cluster."""
+    """
+    Return velocity, damping, stiffness, force and force rate of the equation of a cluster.
+
+    These are the means of its structures' coefficients, weighted by mass: the contact forces inside
+    the cluster cancel.
+    """
     velocity = damping = stiffness = force = force_rate = 0.0
     for i in range(first, last + 1):
         share = 1.0 if first == last else mass_share(row, first, last, i)
-        k, constant = restoring(row, i)
+        k, constant = restoring_force(row, i)
         velocity += share * row[i, V]
-        damping += share * 2.0 * row[i, RATE]
+        damping += share * 2.0 * row[i, DAMPING_RATE]
         stiffness += share * k
+        # with x measured from the displacement at the start of the piece
         force += share * (constant - k * row[i, U] - row[i, PARTICIPATION] * acceleration)
         force_rate -= share * row[i, PARTICIPATION] * slope
     return velocity, damping, stiffness, force, force_rate
 
 
 @lean
-def fill_curves(row, acceleration, slope, terms):
+def fill_displacements(row, acceleration, slope, terms):
     """Fill the Taylor coefficients of every displacement of the row."""
     first = 0
     while first < row.shape[0]:
-        last = last_in_contact(row, first)
+        # solve the equation of the cluster, in the line of its first structure
+        last = last_of_cluster(row, first)
         velocity, damping, stiffness, force, force_rate = cluster_equation(
             row, first, last, acceleration, slope
         )
-        fill_taylor(row, first, CURVE, terms, velocity, damping, stiffness, force, force_rate)
-        row[first, CURVE] = row[first, U]
+        fill_taylor(row, first, TAYLOR, terms, velocity, damping, stiffness, force, force_rate)
+        row[first, TAYLOR] = row[first, U]
+        # its other structures move alike
         for i in range(first + 1, last + 1):
-            row[i, CURVE] = row[i, U]
+            row[i, TAYLOR] = row[i, U]
             for n in range(1, terms):
-                row[i, CURVE + n] = row[first, CURVE + n]
+                row[i, TAYLOR + n] = row[first, TAYLOR + n]
         first = last + 1
 
 
 @lean
 def fill_clearance(row, j, terms, span):
     """
-    Fill the guard with an open interface's clearance over t**order.
+    Fill the event function with an open interface's clearance over t**order.
 
     Return the rounding of its first coefficient, and its bounds as ``size_and_curvature`` does: in
     the same loop, because a vector of numbers just written one by one is slow to read.
     """
-    order = int(row[j, ORDER])
+    order = int(row[j, CLEARANCE_ORDER])
     size = curvature = 0.0
     power = 1.0  # span**(n - 2)
     for n in range(terms - order):
-        coefficient = row[j + 1, CURVE + n + order] - row[j, CURVE + n + order]
-        row[j, GUARD + n] = coefficient
+        # coefficient of u_right - u_left
+        coefficient = row[j + 1, TAYLOR + n + order] - row[j, TAYLOR + n + order]
+        row[j, EVENT_FUNCTION + n] = coefficient
+        # its part in the bounds of the function without its constant, and of its second derivative
         if n == 1:
             size = abs(coefficient) * span
         elif n > 1:
@@ -184,52 +258,77 @@ def fill_clearance(row, j, terms, span):
             curvature += n * (n - 1) * term
             power *= span
     for n in range(terms - order, terms):
-        row[j, GUARD + n] = 0.0
+        row[j, EVENT_FUNCTION + n] = 0.0
     if order:
         return 0.0, size, curvature
-    row[j, GUARD] += row[j, GAP]
-    return GAP_ROUNDING * (abs(row[j, U]) + abs(row[j + 1, U]) + row[j, GAP]), size, curvature
+    # clearance = gap + u_right - u_left; below the rounding of these terms it is zero
+    row[j, EVENT_FUNCTION] += row[j, GAP]
+    terms_size = abs(row[j, U]) + abs(row[j + 1, U]) + row[j, GAP]
+    return GAP_ROUNDING * terms_size, size, curvature
 
 
 @lean
 def size_of_forces(row, i, acceleration, slope, duration):
-    """Return the sum of the sizes of the forces on a structure per unit mass, and of their changes in a duration."""
-    stiffness, constant = restoring(row, i)
+    """Return a bound of the forces on a structure per unit mass over a duration: sum of sizes."""
+    stiffness, constant = restoring_force(row, i)
+    u = abs(row[i, U])
+    v = abs(row[i, V])
+    # constant, spring, dashpot and ground
+    spring = stiffness * (u + v * duration)
     drive = row[i, PARTICIPATION] * (abs(acceleration) + abs(slope) * duration)
-    u, v = abs(row[i, U]), abs(row[i, V])
-    return abs(constant) + stiffness * (u + v * duration) + 2.0 * row[i, RATE] * v + drive
+    return abs(constant) + spring + 2.0 * row[i, DAMPING_RATE] * v + drive
 
 
 @lean
-def _add_force(row, i, j, factor, acceleration, slope, terms):
-    """Add the outer force that structure i's motion needs, times a factor, to the guard of interface j."""
+def _add_outer_force(row, i, j, factor, acceleration, slope, terms):
+    """
+    Add the outer force that structure i needs for its motion to the event function of interface j.
+
+    The force ``m (u'' + 2 xi omega u' + K u - b + q a)`` is multiplied by the factor.
+    """
     factor *= row[i, MASS]
-    damping = 2.0 * row[i, RATE]
-    stiffness, constant = restoring(row, i)
+    damping = 2.0 * row[i, DAMPING_RATE]
+    stiffness, constant = restoring_force(row, i)
+    # inertia, dashpot and spring, coefficient by coefficient
     for n in range(terms - 2):
-        pull = (n + 2) * (n + 1) * row[i, CURVE + n + 2] + damping * (n + 1) * row[i, CURVE + n + 1]
-        row[j, GUARD + n] += factor * (pull + stiffness * row[i, CURVE + n])
-    row[j, GUARD] += factor * (row[i, PARTICIPATION] * acceleration - constant)
-    row[j, GUARD + 1] += factor * row[i, PARTICIPATION] * slope
+        inertia = (n + 2) * (n + 1) * row[i, TAYLOR + n + 2]
+        dashpot = damping * (n + 1) * row[i, TAYLOR + n + 1]
+        spring = stiffness * row[i, TAYLOR + n]
+        row[j, EVENT_FUNCTION + n] += factor * (inertia + dashpot + spring)
+    # constant of the restoring force, and linear ground acceleration
+    row[j, EVENT_FUNCTION] += factor * (row[i, PARTICIPATION] * acceleration - constant)
+    row[j, EVENT_FUNCTION + 1] += factor * row[i, PARTICIPATION] * slope
 
 
 @lean
-def fill_force(row, j, acceleration, slope, duration, terms):
-    """Fill the guard with a closed interface's force, positive in compression; return its rounding."""
-    first, last = j, last_in_contact(row, j)
-    while first > 0 and row[first - 1, STUCK]:
+def fill_contact_force(row, j, acceleration, slope, duration, terms):
+    """
+    Fill the event function with a closed interface's force, positive in compression.
+
+    Return its rounding. The force is the one that the cluster's structures on one side need.
+    """
+    # the cluster of which j is an interface
+    first = j
+    last = last_of_cluster(row, j)
+    while first > 0 and row[first - 1, IN_CONTACT]:
         first -= 1
     size = 0.0
     for i in range(first, last + 1):
         size = max(size, size_of_forces(row, i, acceleration, slope, duration))
-    begin, end, factor = first, j, -1.0
+    # structures on the left; on the right if a wall (infinite mass) is among those
+    begin = first
+    end = j
+    factor = -1.0
     for i in range(first, j + 1):
-        if row[i, MASS] == math.inf:  # then the force follows from the structures on the other side
-            begin, end, factor = j + 1, last, 1.0
+        if row[i, MASS] == math.inf:
+            begin = j + 1
+            end = last
+            factor = 1.0
+    # sum of their outer forces
     for n in range(terms):
-        row[j, GUARD + n] = 0.0
+        row[j, EVENT_FUNCTION + n] = 0.0
     mass = 0.0
     for i in range(begin, end + 1):
-        _add_force(row, i, j, factor, acceleration, slope, terms)
+        _add_outer_force(row, i, j, factor, acceleration, slope, terms)
         mass += row[i, MASS]
     return FORCE_ROUNDING * mass * size

@@ -1,8 +1,9 @@
 """
-Tiles that may hold a maximum wait until it is certain that no later sample passes it: while a motion grows few do.
+Deferred search for maxima between samples: a tile is searched once no later sample exceeds it.
 
-Each structure of a lane has one waiting tile at most. A tile that comes to wait while another still
-may hold more has that one searched first, as has every change of the pair's equations.
+While a motion grows most tiles are never searched. Each structure of a lane has one deferred tile
+at most. A tile that is deferred while another one may still hold more has that one searched first,
+as has every change of the pair's equations.
 """
 
 from typing import NamedTuple
@@ -11,34 +12,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.kernels._jit import lean
-from per_obspy.kernels.pounding_events.motion import HIGHEST, WIDEST
+from per_obspy.kernels.pounding_events.motion import LARGEST_DISPLACEMENT, LARGEST_RADIUS_SQUARED
 from per_obspy.kernels.pounding_lanes.lanes import (
-    HIGH,
-    HIGHEST_PLACE,
-    LANES,
-    LOW,
-    PEAK,
-    ROWS,
-    SAG,
-    START_PLACE,
-    START_SPEED,
+    LANE_ROWS,
+    MAXIMUM_SO_FAR,
+    PAIR_LANES,
+    PEAK_FLAGS,
+    RADIUS_SQUARED_SO_FAR,
+    START_DISPLACEMENT,
+    START_VELOCITY,
     STRUCTURE_ROWS,
-    TILE,
-    WIDE,
-    WIDER,
-    WIDEST_RADIUS,
+    TILE_DISPLACEMENT_ERROR,
+    TILE_HIGH,
+    TILE_LOW,
+    TILE_RADIUS_SQUARED,
+    TILE_RADIUS_SQUARED_BOUND,
+    TILE_STEPS,
     at,
 )
-from per_obspy.kernels.pounding_lanes.maxima_in_step import search
+from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 
-#: First step and number of steps (0: none waits), displacement and speed at the start, what the
-#: maxima may be.
-STEP, COUNT, PLACE, SPEED, REACH, RADIUS = range(6)
-WAITING_COLUMNS = 6
+# columns of the deferred tile of a structure
+#: first step, number of steps (0: no tile is deferred)
+FIRST_STEP, STEP_COUNT = 0, 1
+#: displacement and velocity over omega at its start (m)
+FIRST_DISPLACEMENT, FIRST_VELOCITY = 2, 3
+#: upper bounds of its displacement (m) and squared radius (m²)
+DISPLACEMENT_BOUND, RADIUS_SQUARED_BOUND = 4, 5
+DEFERRED_COLUMNS = 6
 
 
 class Record(NamedTuple):
-    """North and east component (2, n_samples), in how many steps a sampling interval is cut, and their duration."""
+    """
+    A ground motion and the steps through it.
+
+    Attributes
+    ----------
+    components : (2, n_samples) ndarray
+        North and east acceleration, m/s².
+    refinement : int
+        Number of steps into which each sampling interval is cut.
+    duration : float
+        Of a step, s.
+    """
 
     components: NDArray[np.float64]
     refinement: int
@@ -48,102 +64,115 @@ class Record(NamedTuple):
 @lean
 def fill_ground(record, step, ground):
     """
-    Fill the north and east acceleration at a step and the TILE steps after it.
+    Fill the north and east acceleration at a step and the TILE_STEPS steps after it.
 
     Steps count the parts of all sampling intervals; after the record the ground rests.
     """
-    components, refinement = record.components, record.refinement
-    k, part = step // refinement, step % refinement
-    for place in range(TILE + 1):
+    components = record.components
+    refinement = record.refinement
+    k = step // refinement
+    part = step % refinement
+    for column in range(TILE_STEPS + 1):
+        # linear between the samples k and k + 1
         for i in range(2):
-            here = components[i, k] if k < components.shape[1] else 0.0
+            before = components[i, k] if k < components.shape[1] else 0.0
             after = components[i, k + 1] if k + 1 < components.shape[1] else 0.0
-            ground[i, place] = here + (after - here) * (part / refinement)
+            ground[i, column] = before + (after - before) * (part / refinement)
         part += 1
         if part == refinement:
-            k, part = k + 1, 0
+            k += 1
+            part = 0
 
 
 @lean
 def read_lane(lanes, lane, pair):
     """Copy the numbers of a lane to a line."""
-    for k in range(ROWS):
-        pair[k] = lanes[k * LANES + lane]
+    for k in range(LANE_ROWS):
+        pair[k] = lanes[k * PAIR_LANES + lane]
 
 
 @lean
 def write_lane(lanes, lane, pair):
     """Copy a line to its lane."""
-    for k in range(ROWS):
-        lanes[k * LANES + lane] = pair[k]
+    for k in range(LANE_ROWS):
+        lanes[k * PAIR_LANES + lane] = pair[k]
 
 
 @lean
-def may_hold_more(waiting, row, i):
-    """Tell whether a tile waits for structure i that may hold more than its maxima so far."""
-    return (waiting[i, COUNT] > 0.0) & (
-        (waiting[i, REACH] > row[i, HIGHEST]) | (waiting[i, RADIUS] > row[i, WIDEST])
+def may_hold_maximum(deferred, row, i):
+    """Return whether structure i has a deferred tile that may exceed its maxima so far."""
+    return (deferred[i, STEP_COUNT] > 0.0) & (
+        (deferred[i, DISPLACEMENT_BOUND] > row[i, LARGEST_DISPLACEMENT])
+        | (deferred[i, RADIUS_SQUARED_BOUND] > row[i, LARGEST_RADIUS_SQUARED])
     )
 
 
 @lean
-def search_waiting(lanes, lane, pair, row, waiting, record, ground):
-    """Search the waiting tiles of a lane where they may hold more than its maxima so far; then none waits."""
-    loaded = False
+def search_deferred(lanes, lane, pair, row, deferred, record, ground):
+    """Search the deferred tiles of a lane that may hold a maximum; no tile remains deferred."""
+    is_loaded = False
     for i in range(2):
-        if may_hold_more(waiting, row, i):
-            if not loaded:
+        if may_hold_maximum(deferred, row, i):
+            # coefficients of the lane and ground motion of the tile
+            if not is_loaded:
                 read_lane(lanes, lane, pair)
-                loaded = True
-            fill_ground(record, int(waiting[i, STEP]), ground)
-            search(
-                pair, row, i, waiting[i, PLACE], waiting[i, SPEED], ground, int(waiting[i, COUNT])
-            )
-            lanes[at(i * STRUCTURE_ROWS + HIGHEST_PLACE, lane)] = row[i, HIGHEST]
-            lanes[at(i * STRUCTURE_ROWS + WIDEST_RADIUS, lane)] = row[i, WIDEST]
-        waiting[i, COUNT] = 0.0
+                is_loaded = True
+            fill_ground(record, int(deferred[i, FIRST_STEP]), ground)
+            # maxima of the tile
+            u = deferred[i, FIRST_DISPLACEMENT]
+            z = deferred[i, FIRST_VELOCITY]
+            search_tile(pair, row, i, u, z, ground, int(deferred[i, STEP_COUNT]))
+            first = i * STRUCTURE_ROWS
+            lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
+            lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
+        deferred[i, STEP_COUNT] = 0.0
 
 
 @lean
-def raise_to_samples(lanes, lane, row, i):
+def raise_maxima_to_samples(lanes, lane, row, i):
     """Raise the maxima of structure i of a lane to those at the samples of the tile."""
     first = i * STRUCTURE_ROWS
-    row[i, HIGHEST] = max(
-        row[i, HIGHEST], lanes[at(first + HIGH, lane)], -lanes[at(first + LOW, lane)]
+    # in the row
+    row[i, LARGEST_DISPLACEMENT] = max(
+        row[i, LARGEST_DISPLACEMENT],
+        lanes[at(first + TILE_HIGH, lane)],
+        -lanes[at(first + TILE_LOW, lane)],
     )
-    row[i, WIDEST] = max(row[i, WIDEST], lanes[at(first + WIDE, lane)])
-    lanes[at(first + HIGHEST_PLACE, lane)], lanes[at(first + WIDEST_RADIUS, lane)] = (
-        row[i, HIGHEST],
-        row[i, WIDEST],
+    row[i, LARGEST_RADIUS_SQUARED] = max(
+        row[i, LARGEST_RADIUS_SQUARED], lanes[at(first + TILE_RADIUS_SQUARED, lane)]
     )
+    # in the lane
+    lanes[at(first + MAXIMUM_SO_FAR, lane)] = row[i, LARGEST_DISPLACEMENT]
+    lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)] = row[i, LARGEST_RADIUS_SQUARED]
 
 
 @lean
-def wait(lanes, lane, waiting, i, step, count):
-    """Let the tile from a step on wait for structure i of a lane."""
+def defer_tile(lanes, lane, deferred, i, step, count):
+    """Defer the search of the tile from a step on for structure i of a lane."""
     first = i * STRUCTURE_ROWS
-    waiting[i, STEP], waiting[i, COUNT] = step, count
-    waiting[i, PLACE], waiting[i, SPEED] = (
-        lanes[at(first + START_PLACE, lane)],
-        lanes[at(first + START_SPEED, lane)],
-    )
-    reach = max(lanes[at(first + HIGH, lane)], -lanes[at(first + LOW, lane)])
-    waiting[i, REACH], waiting[i, RADIUS] = (
-        reach + lanes[at(first + SAG, lane)],
-        lanes[at(first + WIDER, lane)],
-    )
+    # steps and state at the start
+    deferred[i, FIRST_STEP] = step
+    deferred[i, STEP_COUNT] = count
+    deferred[i, FIRST_DISPLACEMENT] = lanes[at(first + START_DISPLACEMENT, lane)]
+    deferred[i, FIRST_VELOCITY] = lanes[at(first + START_VELOCITY, lane)]
+    # bounds of its maxima
+    reach = max(lanes[at(first + TILE_HIGH, lane)], -lanes[at(first + TILE_LOW, lane)])
+    error = lanes[at(first + TILE_DISPLACEMENT_ERROR, lane)]
+    deferred[i, DISPLACEMENT_BOUND] = reach + error
+    deferred[i, RADIUS_SQUARED_BOUND] = lanes[at(first + TILE_RADIUS_SQUARED_BOUND, lane)]
 
 
 @lean
-def find_maxima(lanes, lane, flag, pair, row, waiting, record, ground, step, count):
-    """Raise the maxima of a lane to those of a tile in which nothing else happens, or let it wait."""
-    more = False
+def raise_maxima_of_tile(lanes, lane, flag, pair, row, deferred, record, ground, step, count):
+    """Raise the maxima of a lane to the samples of a tile without events, and defer its search."""
+    may_hold = False
     for i in range(2):
-        if flag & PEAK[i]:
-            raise_to_samples(lanes, lane, row, i)
-            more |= may_hold_more(waiting, row, i)
-    if more:
-        search_waiting(lanes, lane, pair, row, waiting, record, ground)
+        if flag & PEAK_FLAGS[i]:
+            raise_maxima_to_samples(lanes, lane, row, i)
+            may_hold |= may_hold_maximum(deferred, row, i)
+    # an earlier tile may still hold more
+    if may_hold:
+        search_deferred(lanes, lane, pair, row, deferred, record, ground)
     for i in range(2):
-        if flag & PEAK[i]:
-            wait(lanes, lane, waiting, i, step, count)
+        if flag & PEAK_FLAGS[i]:
+            defer_tile(lanes, lane, deferred, i, step, count)

@@ -1,246 +1,329 @@
 """
-Many pairs against one record: 32 side by side as SIMD lanes, swept a tile of steps at a time as if nothing happened.
+Sweep of 32 pairs, side by side as SIMD lanes, through a tile of steps as if no event happened.
 
 In each of its phases a pair is two linear equations, so that one step is the same arithmetic for
-every lane; only the coefficients differ between free, touching and yielding pairs. A sweep keeps
-nothing but the extremes at the samples of the tile. They bound what lies between the samples,
-because over a step a function leaves its chord by an eighth of the step squared times its largest
-second derivative at most. A lane that may have met, parted, yielded or passed a maximum in the tile
-is walked again from the tile's start by scalar code (``pounding_walk``).
+every lane; only the coefficients differ between free, touching and yielding pairs. A sweep records
+only the extremes at the samples of the tile (a time block of 32 steps). They bound the motion
+between the samples, because over a step a function leaves its chord by an eighth of the step
+squared times its largest second derivative at most. A lane that may have met, parted, yielded or
+passed a maximum in the tile is stepped again from the tile's start by scalar code
+(``step_by_step``).
 
-Time is measured in the angle ``omega t`` of each structure: speeds are divided by its omega and
-accelerations by omega² and all are displacements. Everything of a lane stands in one array, row by
-row of 32 lanes, because the compiler would have to check every pair of arrays for overlap; each
-function is one loop over the lanes, so that it vectorises. A lane's numbers depend on nothing but
-the pair: 32 lanes are always computed.
+Time is measured in the angle ``omega t`` of each structure: velocities are divided by its omega and
+accelerations by omega², so that all are displacements (m). All numbers of a lane are in one array,
+row by row of 32 lanes, because the compiler would have to check every pair of arrays for overlap;
+each function is one loop over the lanes, so that it vectorises. The numbers of a lane depend on its
+pair alone: 32 lanes are always computed. The constants below are the rows of this array.
 """
 
 import math
 
 from per_obspy.kernels._jit import lean
 
-LANES = 32
-#: Steps of a tile: a multiple of what one loop over the lanes takes.
-TILE, UNROLLED = 32, 4
-#: Flags, which add up: structure 1 or 2 may pass a maximum in the tile, something may happen.
-PEAK, EVENT = (1, 2), 4
+#: Pairs that are computed side by side.
+PAIR_LANES = 32
+#: Steps of a tile: a multiple of the steps that one loop over the lanes takes.
+TILE_STEPS, UNROLLED_STEPS = 32, 4
+#: Flags, which add up: structure 1 or 2 may pass a maximum in the tile, an event may happen.
+PEAK_FLAGS, EVENT_FLAG = (1, 2), 4
 #: Displacements below this (m) are zero: denormal numbers are slow.
-STILL_PLACE = 1e-140
+SMALLEST_DISPLACEMENT = 1e-140
 
-# rows of one structure; those of the second follow after STRUCTURE_ROWS
-#: Displacement and speed, now and at the start of the tile.
-PLACE, SPEED, START_PLACE, START_SPEED = 0, 1, 2, 3
-#: One step: place and speed from place, speed, ground acceleration at both ends, and a constant.
-STEP_PLACE, STEP_SPEED = 4, 9
-#: Acceleration from place, speed, ground acceleration and a constant.
-PULL = 14
-#: Extremes at the samples of the tile: both displacements, squared radius.
-HIGH, LOW, WIDE = 18, 19, 20
-#: Maxima before the tile; infinite where nothing can happen any more.
-HIGHEST_PLACE, WIDEST_RADIUS = 21, 22
-#: Elastic range: how far from which centre; which side yields.
-LIMIT, CENTRE, SIDE = 23, 24, 25
-#: omega and angle of a step; what, times the larger acceleration at its ends, bounds how far
-#: displacement, speed and power leave their chords inside a step, and by how much the acceleration
-#: exceeds its ends.
-OMEGA, ANGLE, PLACE_SAG, SPEED_SAG, POWER_SAG, BEND = 26, 27, 28, 29, 30, 31
-#: The first two bounds in the tile, and what the squared radius may be in it.
-SAG, SAG_OF_SPEED, WIDER = 32, 33, 34
+# rows of structure 1; those of structure 2 follow after STRUCTURE_ROWS
+#: displacement and velocity, now and at the start of the tile
+DISPLACEMENT, VELOCITY, START_DISPLACEMENT, START_VELOCITY = 0, 1, 2, 3
+#: displacement and velocity after a step: five coefficients each, of displacement, velocity, ground
+#: acceleration at its start and at its end, and a constant
+STEP_DISPLACEMENT, STEP_VELOCITY = 4, 9
+#: acceleration: four coefficients, of displacement, velocity, ground acceleration, and a constant
+ACCELERATION = 14
+#: extremes at the samples of the tile: displacement to both sides, squared radius
+TILE_HIGH, TILE_LOW, TILE_RADIUS_SQUARED = 18, 19, 20
+#: maxima before the tile; infinite where they can no longer be passed
+MAXIMUM_SO_FAR, RADIUS_SQUARED_SO_FAR = 21, 22
+#: elastic range: its half width and centre; side that yields (0: none)
+YIELD_LIMIT, YIELD_CENTRE, YIELD_SIDE = 23, 24, 25
+#: omega (rad/s), angle of a step (rad)
+OMEGA, ANGLE = 26, 27
+#: error bounds, over the larger acceleration at the ends of a step: of the chords of displacement,
+#: velocity and power inside it, and of the larger acceleration itself
+DISPLACEMENT_ERROR, VELOCITY_ERROR, POWER_ERROR, ACCELERATION_ERROR = 28, 29, 30, 31
+#: error bounds of displacement and velocity in the tile, and upper bound of its squared radius
+TILE_DISPLACEMENT_ERROR, TILE_VELOCITY_ERROR, TILE_RADIUS_SQUARED_BOUND = 32, 33, 34
 STRUCTURE_ROWS = 35
+
 # rows of the pair
-COSINE, SINE = 70, 71
-#: What stays positive until something happens, the clearance of a free pair and the contact force
-#: per unit mass of a touching one: from both places, speed 1, ground acceleration and a constant;
-#: how far below zero it is rounding, over displacement; its least value at the samples of the tile.
-GUARD, FLOOR, LEAST = 72, 77, 78
-ROWS = 79
+#: direction from structure 1 to 2
+AXIS_COSINE, AXIS_SINE = 70, 71
+#: contact function, positive until the pair meets or parts (clearance of a free pair, contact force
+#: per unit mass of a touching one): five coefficients, of both displacements, velocity 1, ground
+#: acceleration, and a constant
+CONTACT_FUNCTION = 72
+#: rounding of the contact function over displacement; its least value at the samples of the tile
+CONTACT_ROUNDING, TILE_CONTACT = 77, 78
+LANE_ROWS = 79
 
 
 @lean
 def at(row, lane):
-    """Return where a lane's number of a row stands."""
-    return row * LANES + lane
+    """Return the index of a row of a lane."""
+    return row * PAIR_LANES + lane
 
 
 @lean
-def step(lanes, row, lane, place, speed, here, there):
-    """Return what one step makes of place or speed, under the ground acceleration at both its ends."""
-    form = lanes[at(row + 2, lane)] * here + (
-        lanes[at(row + 3, lane)] * there + lanes[at(row + 4, lane)]
+def step_value(lanes, row, lane, displacement, velocity, ground_start, ground_end):
+    """Return displacement or velocity after one step, by the five coefficients from a row on."""
+    form = lanes[at(row + 2, lane)] * ground_start + (
+        lanes[at(row + 3, lane)] * ground_end + lanes[at(row + 4, lane)]
     )
-    return lanes[at(row, lane)] * place + (lanes[at(row + 1, lane)] * speed + form)
+    return lanes[at(row, lane)] * displacement + (lanes[at(row + 1, lane)] * velocity + form)
 
 
 @lean
-def guard(lanes, lane, left, right, speed, ground):
-    """Return what stays positive until a pair meets or parts."""
-    form = lanes[at(GUARD + 2, lane)] * speed + (
-        lanes[at(GUARD + 3, lane)] * ground + lanes[at(GUARD + 4, lane)]
+def contact_value(lanes, lane, left, right, velocity, ground):
+    """Return the contact function of a lane: positive until its pair meets or parts."""
+    form = lanes[at(CONTACT_FUNCTION + 2, lane)] * velocity + (
+        lanes[at(CONTACT_FUNCTION + 3, lane)] * ground + lanes[at(CONTACT_FUNCTION + 4, lane)]
     )
-    return lanes[at(GUARD, lane)] * left + (lanes[at(GUARD + 1, lane)] * right + form)
+    return lanes[at(CONTACT_FUNCTION, lane)] * left + (
+        lanes[at(CONTACT_FUNCTION + 1, lane)] * right + form
+    )
 
 
 @lean
 def start_tile(lanes, north, east):
-    """Keep the states at the start of a tile, and let its extremes begin with them."""
-    for lane in range(LANES):
+    """Store the states at the start of a tile, and begin its extremes with them."""
+    for lane in range(PAIR_LANES):
         for first in (0, STRUCTURE_ROWS):
-            place, speed = lanes[at(first + PLACE, lane)], lanes[at(first + SPEED, lane)]
-            place, speed = (
-                place if abs(place) > STILL_PLACE else 0.0,
-                speed if abs(speed) > STILL_PLACE else 0.0,
-            )
-            lanes[at(first + PLACE, lane)] = lanes[at(first + START_PLACE, lane)] = place
-            lanes[at(first + SPEED, lane)] = lanes[at(first + START_SPEED, lane)] = speed
-            lanes[at(first + HIGH, lane)] = lanes[at(first + LOW, lane)] = place
-            lanes[at(first + WIDE, lane)] = place * place + speed * speed
-        ground = lanes[at(COSINE, lane)] * north + lanes[at(SINE, lane)] * east
-        left, right = lanes[at(PLACE, lane)], lanes[at(STRUCTURE_ROWS + PLACE, lane)]
-        lanes[at(LEAST, lane)] = guard(lanes, lane, left, right, lanes[at(SPEED, lane)], ground)
+            # state, without denormal numbers
+            displacement = lanes[at(first + DISPLACEMENT, lane)]
+            velocity = lanes[at(first + VELOCITY, lane)]
+            displacement = displacement if abs(displacement) > SMALLEST_DISPLACEMENT else 0.0
+            velocity = velocity if abs(velocity) > SMALLEST_DISPLACEMENT else 0.0
+            lanes[at(first + DISPLACEMENT, lane)] = displacement
+            lanes[at(first + START_DISPLACEMENT, lane)] = displacement
+            lanes[at(first + VELOCITY, lane)] = velocity
+            lanes[at(first + START_VELOCITY, lane)] = velocity
+            # extremes of displacement and radius
+            lanes[at(first + TILE_HIGH, lane)] = displacement
+            lanes[at(first + TILE_LOW, lane)] = displacement
+            radius_squared = displacement * displacement + velocity * velocity
+            lanes[at(first + TILE_RADIUS_SQUARED, lane)] = radius_squared
+        # contact function under the ground acceleration along the pair
+        ground = lanes[at(AXIS_COSINE, lane)] * north + lanes[at(AXIS_SINE, lane)] * east
+        left = lanes[at(DISPLACEMENT, lane)]
+        right = lanes[at(STRUCTURE_ROWS + DISPLACEMENT, lane)]
+        velocity = lanes[at(VELOCITY, lane)]
+        lanes[at(TILE_CONTACT, lane)] = contact_value(lanes, lane, left, right, velocity, ground)
 
 
 @lean
-def _step(lanes, first, lane, place, speed, high, low, wide, here, there):
-    """Return displacement and speed of a structure after a step, and its extremes."""
-    after = step(lanes, first + STEP_PLACE, lane, place, speed, here, there)
-    speed = step(lanes, first + STEP_SPEED, lane, place, speed, here, there)
-    return after, speed, max(high, after), min(low, after), max(wide, after * after + speed * speed)
+def _step_structure(lanes, first, lane, u, z, high, low, radius_squared, ground, next_ground):
+    """Return displacement, velocity and extremes of a structure after a step."""
+    after = step_value(lanes, first + STEP_DISPLACEMENT, lane, u, z, ground, next_ground)
+    z = step_value(lanes, first + STEP_VELOCITY, lane, u, z, ground, next_ground)
+    return after, z, max(high, after), min(low, after), max(radius_squared, after * after + z * z)
 
 
 @lean
-def advance_one(lanes, n0, e0, n1, e1):
+def advance_one_step(lanes, n0, e0, n1, e1):
     """Step every lane from one north and east acceleration to the next."""
     second = STRUCTURE_ROWS
-    for lane in range(LANES):
-        cosine, sine, least = lanes[at(COSINE, lane)], lanes[at(SINE, lane)], lanes[at(LEAST, lane)]
-        u1, z1 = lanes[at(PLACE, lane)], lanes[at(SPEED, lane)]
-        u2, z2 = lanes[at(second + PLACE, lane)], lanes[at(second + SPEED, lane)]
-        high_1, low_1, wide_1 = lanes[at(HIGH, lane)], lanes[at(LOW, lane)], lanes[at(WIDE, lane)]
-        high_2, low_2 = lanes[at(second + HIGH, lane)], lanes[at(second + LOW, lane)]
-        wide_2 = lanes[at(second + WIDE, lane)]
+    for lane in range(PAIR_LANES):
+        # load direction and least contact function of the pair
+        cosine = lanes[at(AXIS_COSINE, lane)]
+        sine = lanes[at(AXIS_SINE, lane)]
+        least = lanes[at(TILE_CONTACT, lane)]
+        # load states u, z (velocity over omega) and extremes of both structures
+        u1 = lanes[at(DISPLACEMENT, lane)]
+        z1 = lanes[at(VELOCITY, lane)]
+        u2 = lanes[at(second + DISPLACEMENT, lane)]
+        z2 = lanes[at(second + VELOCITY, lane)]
+        high_1 = lanes[at(TILE_HIGH, lane)]
+        low_1 = lanes[at(TILE_LOW, lane)]
+        squared_1 = lanes[at(TILE_RADIUS_SQUARED, lane)]
+        high_2 = lanes[at(second + TILE_HIGH, lane)]
+        low_2 = lanes[at(second + TILE_LOW, lane)]
+        squared_2 = lanes[at(second + TILE_RADIUS_SQUARED, lane)]
+        # ground acceleration along the pair at both ends of the step
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        u1, z1, high_1, low_1, wide_1 = _step(lanes, 0, lane, u1, z1, high_1, low_1, wide_1, a0, a1)
-        u2, z2, high_2, low_2, wide_2 = _step(
-            lanes, second, lane, u2, z2, high_2, low_2, wide_2, a0, a1
+        # step
+        u1, z1, high_1, low_1, squared_1 = _step_structure(
+            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
         )
-        least = min(least, guard(lanes, lane, u1, u2, z1, a1))
-        lanes[at(PLACE, lane)], lanes[at(SPEED, lane)] = u1, z1
-        lanes[at(second + PLACE, lane)], lanes[at(second + SPEED, lane)] = u2, z2
-        lanes[at(HIGH, lane)], lanes[at(LOW, lane)], lanes[at(WIDE, lane)] = high_1, low_1, wide_1
-        lanes[at(second + HIGH, lane)], lanes[at(second + LOW, lane)] = high_2, low_2
-        lanes[at(second + WIDE, lane)], lanes[at(LEAST, lane)] = wide_2, least
+        u2, z2, high_2, low_2, squared_2 = _step_structure(
+            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
+        )
+        least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
+        # store
+        lanes[at(DISPLACEMENT, lane)] = u1
+        lanes[at(VELOCITY, lane)] = z1
+        lanes[at(second + DISPLACEMENT, lane)] = u2
+        lanes[at(second + VELOCITY, lane)] = z2
+        lanes[at(TILE_HIGH, lane)] = high_1
+        lanes[at(TILE_LOW, lane)] = low_1
+        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared_1
+        lanes[at(second + TILE_HIGH, lane)] = high_2
+        lanes[at(second + TILE_LOW, lane)] = low_2
+        lanes[at(second + TILE_RADIUS_SQUARED, lane)] = squared_2
+        lanes[at(TILE_CONTACT, lane)] = least
 
 
 @lean
-def advance_four(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
-    """Step every lane four times, without a store between."""
+def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
+    """Step every lane four times, without a store between the steps."""
     second = STRUCTURE_ROWS
-    for lane in range(LANES):
-        cosine, sine, least = lanes[at(COSINE, lane)], lanes[at(SINE, lane)], lanes[at(LEAST, lane)]
-        u1, z1 = lanes[at(PLACE, lane)], lanes[at(SPEED, lane)]
-        u2, z2 = lanes[at(second + PLACE, lane)], lanes[at(second + SPEED, lane)]
-        high_1, low_1, wide_1 = lanes[at(HIGH, lane)], lanes[at(LOW, lane)], lanes[at(WIDE, lane)]
-        high_2, low_2 = lanes[at(second + HIGH, lane)], lanes[at(second + LOW, lane)]
-        wide_2 = lanes[at(second + WIDE, lane)]
+    for lane in range(PAIR_LANES):
+        # load direction and least contact function of the pair
+        cosine = lanes[at(AXIS_COSINE, lane)]
+        sine = lanes[at(AXIS_SINE, lane)]
+        least = lanes[at(TILE_CONTACT, lane)]
+        # load states u, z (velocity over omega) and extremes of both structures
+        u1 = lanes[at(DISPLACEMENT, lane)]
+        z1 = lanes[at(VELOCITY, lane)]
+        u2 = lanes[at(second + DISPLACEMENT, lane)]
+        z2 = lanes[at(second + VELOCITY, lane)]
+        high_1 = lanes[at(TILE_HIGH, lane)]
+        low_1 = lanes[at(TILE_LOW, lane)]
+        squared_1 = lanes[at(TILE_RADIUS_SQUARED, lane)]
+        high_2 = lanes[at(second + TILE_HIGH, lane)]
+        low_2 = lanes[at(second + TILE_LOW, lane)]
+        squared_2 = lanes[at(second + TILE_RADIUS_SQUARED, lane)]
+        # first step, from a0 to a1: ground accelerations along the pair
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        u1, z1, high_1, low_1, wide_1 = _step(lanes, 0, lane, u1, z1, high_1, low_1, wide_1, a0, a1)
-        u2, z2, high_2, low_2, wide_2 = _step(
-            lanes, second, lane, u2, z2, high_2, low_2, wide_2, a0, a1
+        u1, z1, high_1, low_1, squared_1 = _step_structure(
+            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
         )
-        least = min(least, guard(lanes, lane, u1, u2, z1, a1))
+        u2, z2, high_2, low_2, squared_2 = _step_structure(
+            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
+        )
+        least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
+        # second step
         a2 = cosine * n2 + sine * e2
-        u1, z1, high_1, low_1, wide_1 = _step(lanes, 0, lane, u1, z1, high_1, low_1, wide_1, a1, a2)
-        u2, z2, high_2, low_2, wide_2 = _step(
-            lanes, second, lane, u2, z2, high_2, low_2, wide_2, a1, a2
+        u1, z1, high_1, low_1, squared_1 = _step_structure(
+            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a1, a2
         )
-        least = min(least, guard(lanes, lane, u1, u2, z1, a2))
+        u2, z2, high_2, low_2, squared_2 = _step_structure(
+            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a1, a2
+        )
+        least = min(least, contact_value(lanes, lane, u1, u2, z1, a2))
+        # third step
         a3 = cosine * n3 + sine * e3
-        u1, z1, high_1, low_1, wide_1 = _step(lanes, 0, lane, u1, z1, high_1, low_1, wide_1, a2, a3)
-        u2, z2, high_2, low_2, wide_2 = _step(
-            lanes, second, lane, u2, z2, high_2, low_2, wide_2, a2, a3
+        u1, z1, high_1, low_1, squared_1 = _step_structure(
+            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a2, a3
         )
-        least = min(least, guard(lanes, lane, u1, u2, z1, a3))
+        u2, z2, high_2, low_2, squared_2 = _step_structure(
+            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a2, a3
+        )
+        least = min(least, contact_value(lanes, lane, u1, u2, z1, a3))
+        # fourth step
         a4 = cosine * n4 + sine * e4
-        u1, z1, high_1, low_1, wide_1 = _step(lanes, 0, lane, u1, z1, high_1, low_1, wide_1, a3, a4)
-        u2, z2, high_2, low_2, wide_2 = _step(
-            lanes, second, lane, u2, z2, high_2, low_2, wide_2, a3, a4
+        u1, z1, high_1, low_1, squared_1 = _step_structure(
+            lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a3, a4
         )
-        least = min(least, guard(lanes, lane, u1, u2, z1, a4))
-        lanes[at(PLACE, lane)], lanes[at(SPEED, lane)] = u1, z1
-        lanes[at(second + PLACE, lane)], lanes[at(second + SPEED, lane)] = u2, z2
-        lanes[at(HIGH, lane)], lanes[at(LOW, lane)], lanes[at(WIDE, lane)] = high_1, low_1, wide_1
-        lanes[at(second + HIGH, lane)], lanes[at(second + LOW, lane)] = high_2, low_2
-        lanes[at(second + WIDE, lane)], lanes[at(LEAST, lane)] = wide_2, least
+        u2, z2, high_2, low_2, squared_2 = _step_structure(
+            lanes, second, lane, u2, z2, high_2, low_2, squared_2, a3, a4
+        )
+        least = min(least, contact_value(lanes, lane, u1, u2, z1, a4))
+        # store
+        lanes[at(DISPLACEMENT, lane)] = u1
+        lanes[at(VELOCITY, lane)] = z1
+        lanes[at(second + DISPLACEMENT, lane)] = u2
+        lanes[at(second + VELOCITY, lane)] = z2
+        lanes[at(TILE_HIGH, lane)] = high_1
+        lanes[at(TILE_LOW, lane)] = low_1
+        lanes[at(TILE_RADIUS_SQUARED, lane)] = squared_1
+        lanes[at(second + TILE_HIGH, lane)] = high_2
+        lanes[at(second + TILE_LOW, lane)] = low_2
+        lanes[at(second + TILE_RADIUS_SQUARED, lane)] = squared_2
+        lanes[at(TILE_CONTACT, lane)] = least
 
 
 @lean
 def flag_structures(lanes, flags, i, peak, jump):
     """
-    Bound one structure of every lane between the samples, and flag where it may pass a maximum or its elastic range.
+    Bound structure i of every lane between the samples; flag lanes where it may peak or yield.
 
     ``peak`` and ``jump`` are the largest acceleration (north, east) in the tile, and its largest
     change over a step. The radius grows inside a step only from an end to a root of the power
-    (``raise_maxima`` of ``pounding_search``).
+    (``raise_maxima_inside`` of ``maxima_in_step``).
     """
     first = i * STRUCTURE_ROWS
-    for lane in range(LANES):
-        cosine, sine = abs(lanes[at(COSINE, lane)]), abs(lanes[at(SINE, lane)])
-        high, low = lanes[at(first + HIGH, lane)], lanes[at(first + LOW, lane)]
-        reach, radius = max(high, -low), math.sqrt(lanes[at(first + WIDE, lane)])
-        by_place, by_speed = lanes[at(first + PULL, lane)], abs(lanes[at(first + PULL + 1, lane)])
-        by_ground, constant = (
-            abs(lanes[at(first + PULL + 2, lane)]),
-            abs(lanes[at(first + PULL + 3, lane)]),
-        )
+    for lane in range(PAIR_LANES):
+        # extremes at the samples
+        cosine = abs(lanes[at(AXIS_COSINE, lane)])
+        sine = abs(lanes[at(AXIS_SINE, lane)])
+        high = lanes[at(first + TILE_HIGH, lane)]
+        low = lanes[at(first + TILE_LOW, lane)]
+        reach = max(high, -low)
+        radius = math.sqrt(lanes[at(first + TILE_RADIUS_SQUARED, lane)])
+        # largest acceleration at the samples, by its coefficients
+        by_displacement = lanes[at(first + ACCELERATION, lane)]
+        by_velocity = abs(lanes[at(first + ACCELERATION + 1, lane)])
+        by_ground = abs(lanes[at(first + ACCELERATION + 2, lane)])
+        constant = abs(lanes[at(first + ACCELERATION + 3, lane)])
         strength = (
-            abs(by_place) * reach
-            + by_speed * radius
+            abs(by_displacement) * reach
+            + by_velocity * radius
             + by_ground * (cosine * peak[0] + sine * peak[1])
             + constant
         )
-        angle, inside = (
-            lanes[at(first + ANGLE, lane)],
-            (1.0 + lanes[at(first + BEND, lane)]) * strength,
+        # error bounds of displacement and velocity, and largest acceleration inside a step
+        angle = lanes[at(first + ANGLE, lane)]
+        inside = (1.0 + lanes[at(first + ACCELERATION_ERROR, lane)]) * strength
+        error = lanes[at(first + DISPLACEMENT_ERROR, lane)] * strength
+        lanes[at(first + TILE_DISPLACEMENT_ERROR, lane)] = error
+        lanes[at(first + TILE_VELOCITY_ERROR, lane)] = (
+            lanes[at(first + VELOCITY_ERROR, lane)] * strength
         )
-        sag = lanes[at(first + PLACE_SAG, lane)] * strength
-        lanes[at(first + SAG, lane)] = sag
-        lanes[at(first + SAG_OF_SPEED, lane)] = lanes[at(first + SPEED_SAG, lane)] * strength
-        change = angle * (abs(1.0 + by_place) * (radius + 0.5 * angle * inside) + by_speed * inside)
+        # largest change of the power u'' + omega² u over a step, and by it the largest radius
+        fastest = radius + 0.5 * angle * inside
+        change = angle * (abs(1.0 + by_displacement) * fastest + by_velocity * inside)
         change += by_ground * (cosine * jump[0] + sine * jump[1])
-        widest = radius + 0.125 * angle * (
-            change + 8.0 * lanes[at(first + POWER_SAG, lane)] * strength
-        )
-        lanes[at(first + WIDER, lane)] = widest * widest
-        further = reach + sag > lanes[at(first + HIGHEST_PLACE, lane)]
-        rises = further | (widest * widest > lanes[at(first + WIDEST_RADIUS, lane)])
-        centre = lanes[at(first + CENTRE, lane)]
-        yields = max(high - centre, centre - low) + sag > lanes[at(first + LIMIT, lane)]
-        flags[lane] |= (PEAK[i] if rises else 0) | (EVENT if yields else 0)
+        power_error = 8.0 * lanes[at(first + POWER_ERROR, lane)] * strength
+        widest = radius + 0.125 * angle * (change + power_error)
+        lanes[at(first + TILE_RADIUS_SQUARED_BOUND, lane)] = widest * widest
+        # maxima so far that may be passed
+        is_further = reach + error > lanes[at(first + MAXIMUM_SO_FAR, lane)]
+        rises = is_further | (widest * widest > lanes[at(first + RADIUS_SQUARED_SO_FAR, lane)])
+        # elastic range that may be left
+        centre = lanes[at(first + YIELD_CENTRE, lane)]
+        distance = max(high - centre, centre - low)
+        yields = distance + error > lanes[at(first + YIELD_LIMIT, lane)]
+        flags[lane] |= (PEAK_FLAGS[i] if rises else 0) | (EVENT_FLAG if yields else 0)
 
 
 @lean
-def flag_pairs(lanes, flags):
+def flag_contacts(lanes, flags):
     """Flag lanes whose pair may meet or part."""
     second = STRUCTURE_ROWS
-    for lane in range(LANES):
-        margin = abs(lanes[at(GUARD, lane)]) * lanes[at(SAG, lane)]
-        margin += abs(lanes[at(GUARD + 1, lane)]) * lanes[at(second + SAG, lane)]
-        margin += abs(lanes[at(GUARD + 2, lane)]) * lanes[at(SAG_OF_SPEED, lane)]
-        floor = lanes[at(FLOOR, lane)] * max(lanes[at(HIGH, lane)], -lanes[at(LOW, lane)])
-        flags[lane] |= EVENT if lanes[at(LEAST, lane)] - margin < -floor else 0
+    for lane in range(PAIR_LANES):
+        # error bound of the contact function between the samples
+        margin = abs(lanes[at(CONTACT_FUNCTION, lane)]) * lanes[at(TILE_DISPLACEMENT_ERROR, lane)]
+        margin += (
+            abs(lanes[at(CONTACT_FUNCTION + 1, lane)])
+            * lanes[at(second + TILE_DISPLACEMENT_ERROR, lane)]
+        )
+        margin += abs(lanes[at(CONTACT_FUNCTION + 2, lane)]) * lanes[at(TILE_VELOCITY_ERROR, lane)]
+        # its rounding
+        reach = max(lanes[at(TILE_HIGH, lane)], -lanes[at(TILE_LOW, lane)])
+        rounding = lanes[at(CONTACT_ROUNDING, lane)] * reach
+        flags[lane] |= EVENT_FLAG if lanes[at(TILE_CONTACT, lane)] - margin < -rounding else 0
 
 
 @lean
-def extremes(ground, count):
-    """Return the largest acceleration of a tile (north, east), and the largest change over a step."""
-    peak_north, peak_east, jump_north, jump_east = abs(ground[0, 0]), abs(ground[1, 0]), 0.0, 0.0
+def ground_extremes(ground, count):
+    """Return the largest acceleration of a tile (north, east), and its largest change."""
+    peak_north = abs(ground[0, 0])
+    peak_east = abs(ground[1, 0])
+    jump_north = 0.0
+    jump_east = 0.0
+    # step by step
     for k in range(count):
-        peak_north, peak_east = (
-            max(peak_north, abs(ground[0, k + 1])),
-            max(peak_east, abs(ground[1, k + 1])),
-        )
+        peak_north = max(peak_north, abs(ground[0, k + 1]))
+        peak_east = max(peak_east, abs(ground[1, k + 1]))
         jump_north = max(jump_north, abs(ground[0, k + 1] - ground[0, k]))
         jump_east = max(jump_east, abs(ground[1, k + 1] - ground[1, k]))
     return (peak_north, peak_east), (jump_north, jump_east)
@@ -248,47 +331,59 @@ def extremes(ground, count):
 
 @lean
 def flag_tile(lanes, flags, ground, count):
-    """Flag every lane to which something may happen in the tile that has just been stepped through."""
-    peak, jump = extremes(ground, count)
-    for lane in range(LANES):
+    """Flag every lane in which an event or a maximum may lie in the tile just stepped through."""
+    peak, jump = ground_extremes(ground, count)
+    for lane in range(PAIR_LANES):
         flags[lane] = 0
     flag_structures(lanes, flags, 0, peak, jump)
     flag_structures(lanes, flags, 1, peak, jump)
-    flag_pairs(lanes, flags)
+    flag_contacts(lanes, flags)
 
 
 @lean
-def sweep(lanes, flags, ground, count):
+def sweep_tile(lanes, flags, ground, count):
     """
-    Step every lane through a tile, as if nothing happened; flag those where something may; return the sum of flags.
+    Step every lane through a tile as if no event happened, and flag lanes where one may.
 
-    ``ground`` (2, TILE + 1) is the north and east acceleration at the tile's samples, of which
-    ``count + 1`` are used.
+    Parameters
+    ----------
+    lanes : (LANE_ROWS * PAIR_LANES,) ndarray
+        Numbers of all lanes at the start of the tile, then at its end.
+    flags : (PAIR_LANES,) ndarray of int
+        Receives the flags of each lane: sums of PEAK_FLAGS and EVENT_FLAG.
+    ground : (2, TILE_STEPS + 1) ndarray
+        North and east acceleration at the tile's samples, m/s².
+    count : int
+        Number of steps of the tile.
+
+    Returns
+    -------
+    int
+        Sum of the flags.
     """
     start_tile(lanes, ground[0, 0], ground[1, 0])
+    # four steps at a time
     k = 0
-    while k + UNROLLED <= count:
-        n0, n1, n2, n3, n4 = (
-            ground[0, k],
-            ground[0, k + 1],
-            ground[0, k + 2],
-            ground[0, k + 3],
-            ground[0, k + 4],
-        )
-        e0, e1, e2, e3, e4 = (
-            ground[1, k],
-            ground[1, k + 1],
-            ground[1, k + 2],
-            ground[1, k + 3],
-            ground[1, k + 4],
-        )
-        advance_four(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
-        k += UNROLLED
+    while k + UNROLLED_STEPS <= count:
+        n0 = ground[0, k]
+        n1 = ground[0, k + 1]
+        n2 = ground[0, k + 2]
+        n3 = ground[0, k + 3]
+        n4 = ground[0, k + 4]
+        e0 = ground[1, k]
+        e1 = ground[1, k + 1]
+        e2 = ground[1, k + 2]
+        e3 = ground[1, k + 3]
+        e4 = ground[1, k + 4]
+        advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4)
+        k += UNROLLED_STEPS
+    # remaining steps
     while k < count:
-        advance_one(lanes, ground[0, k], ground[1, k], ground[0, k + 1], ground[1, k + 1])
+        advance_one_step(lanes, ground[0, k], ground[1, k], ground[0, k + 1], ground[1, k + 1])
         k += 1
+    # flags
     flag_tile(lanes, flags, ground, count)
     total = 0
-    for lane in range(LANES):
+    for lane in range(PAIR_LANES):
         total += flags[lane]
     return total

@@ -1,181 +1,202 @@
 """
-One structure through the steps of a tile: its states at the samples, and its maxima inside steps, exactly.
+States of one structure at the samples of a tile, and its exact maxima inside steps.
 
-The steps are those of ``pounding_lanes``; the numbers of a lane are copied to one line, ``pair``,
-row for row. A state is displacement, speed and acceleration, all as displacements. Where a maximum
-may be passed between two states the peak is found on the exact solution, a short Taylor polynomial
-over the share of a step.
+The steps are those of ``lanes``; the numbers of a lane are copied to one line, ``pair``, row for
+row. A state is displacement, velocity over omega and acceleration over omega² (all m). Where a
+maximum may be passed between two states the peak is found on the exact solution, a short Taylor
+polynomial over the share of a step.
 """
 
 import math
 
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import first_fall, is_last_root, value_and_slope
-from per_obspy.kernels.pounding_events.events import fill_power, fill_velocity
 from per_obspy.kernels.pounding_events.motion import (
-    CURVE,
-    GUARD,
-    HIGHEST,
-    TERMS,
-    WIDEST,
+    EVENT_FUNCTION,
+    LARGEST_DISPLACEMENT,
+    LARGEST_RADIUS_SQUARED,
+    TAYLOR,
+    TERM_COUNT,
     fill_taylor,
 )
+from per_obspy.kernels.pounding_events.next_event import fill_power, fill_velocity
 from per_obspy.kernels.pounding_lanes.lanes import (
+    ACCELERATION,
     ANGLE,
-    CENTRE,
-    COSINE,
-    LIMIT,
-    PLACE_SAG,
-    POWER_SAG,
-    PULL,
-    SIDE,
-    SINE,
-    SPEED_SAG,
-    STEP_PLACE,
-    STEP_SPEED,
+    AXIS_COSINE,
+    AXIS_SINE,
+    DISPLACEMENT_ERROR,
+    POWER_ERROR,
+    STEP_DISPLACEMENT,
+    STEP_VELOCITY,
     STRUCTURE_ROWS,
+    VELOCITY_ERROR,
+    YIELD_CENTRE,
+    YIELD_LIMIT,
+    YIELD_SIDE,
 )
 
 
 @inlined
-def _form(pair, row, place, speed, here, there):
-    """Return what one step makes of place or speed."""
-    form = pair[row + 2] * here + (pair[row + 3] * there + pair[row + 4])
-    return pair[row] * place + (pair[row + 1] * speed + form)
+def _step_value(pair, row, displacement, velocity, ground_start, ground_end):
+    """Return displacement or velocity after one step, as ``step_value`` of ``lanes``."""
+    form = pair[row + 2] * ground_start + (pair[row + 3] * ground_end + pair[row + 4])
+    return pair[row] * displacement + (pair[row + 1] * velocity + form)
 
 
 @inlined
-def along(pair, ground, k):
+def ground_along(pair, ground, k):
     """Return the ground acceleration along a pair at a sample of the tile."""
-    return pair[COSINE] * ground[0, k] + pair[SINE] * ground[1, k]
+    return pair[AXIS_COSINE] * ground[0, k] + pair[AXIS_SINE] * ground[1, k]
 
 
 @inlined
-def state(pair, first, place, speed, ground):
-    """Return displacement, speed and acceleration of a structure."""
-    form = pair[first + PULL + 2] * ground + pair[first + PULL + 3]
-    return place, speed, pair[first + PULL] * place + (pair[first + PULL + 1] * speed + form)
+def complete_state(pair, first, displacement, velocity, ground):
+    """Return the state of a structure: displacement, velocity and acceleration."""
+    form = pair[first + ACCELERATION + 2] * ground + pair[first + ACCELERATION + 3]
+    acceleration = pair[first + ACCELERATION] * displacement + (
+        pair[first + ACCELERATION + 1] * velocity + form
+    )
+    return displacement, velocity, acceleration
 
 
 @inlined
-def step(pair, first, before, here, there):
+def state_after_step(pair, first, state, ground_start, ground_end):
     """Return the state of a structure after a step."""
-    place = _form(pair, first + STEP_PLACE, before[0], before[1], here, there)
-    speed = _form(pair, first + STEP_SPEED, before[0], before[1], here, there)
-    return state(pair, first, place, speed, there)
+    u = _step_value(pair, first + STEP_DISPLACEMENT, state[0], state[1], ground_start, ground_end)
+    z = _step_value(pair, first + STEP_VELOCITY, state[0], state[1], ground_start, ground_end)
+    return complete_state(pair, first, u, z, ground_end)
 
 
 @inlined
 def may_yield(pair, first, start, end):
-    """Tell whether a bilinear structure may yield or unload inside a step or a part of it, between two states."""
-    (u0, z0, y0), (u1, z1, y1) = start, end
-    strength, side, centre = max(abs(y0), abs(y1)), pair[first + SIDE], pair[first + CENTRE]
+    """Return whether a structure may yield or unload between two states at most a step apart."""
+    u0, z0, y0 = start
+    u1, z1, y1 = end
+    strength = max(abs(y0), abs(y1))
+    side = pair[first + YIELD_SIDE]
+    centre = pair[first + YIELD_CENTRE]
+    # yielding: the velocity may change its sign
     if side != 0.0:
-        return min(side * z0, side * z1) < pair[first + SPEED_SAG] * strength
-    return (
-        max(abs(u0 - centre), abs(u1 - centre)) + pair[first + PLACE_SAG] * strength
-        > pair[first + LIMIT]
-    )
+        return min(side * z0, side * z1) < pair[first + VELOCITY_ERROR] * strength
+    # elastic: the displacement may leave the elastic range
+    distance = max(abs(u0 - centre), abs(u1 - centre))
+    return distance + pair[first + DISPLACEMENT_ERROR] * strength > pair[first + YIELD_LIMIT]
 
 
 @inlined
-def may_rise(pair, row, i, start, end):
+def may_exceed_maxima(pair, row, i, start, end):
     """
-    Raise the maxima of structure i to two states, and tell whether it may pass them in the step or less between.
+    Raise the maxima of structure i to two states; return whether it may pass them in between.
 
-    The radius grows with the angle by the power p = u'' + omega² u at most, which in a step is
-    within its chord and its sag: by ``growth`` from a root to the nearer end. And its square by
-    growth (2 r + growth), with r below |u| + |z|.
+    The states are at most a step apart. The radius grows with the angle by the power p = u'' +
+    omega² u at most, which in a step is within its chord and its error bound: by ``growth`` from a
+    root to the nearer end. And its square by growth (2 r + growth), with r below |u| + |z|.
     """
     first = i * STRUCTURE_ROWS
-    (u0, z0, y0), (u1, z1, y1) = start, end
+    u0, z0, y0 = start
+    u1, z1, y1 = end
     strength = max(abs(y0), abs(y1))
-    growth = (
-        0.125
-        * pair[first + ANGLE]
-        * (abs((u1 + y1) - (u0 + y0)) + 8.0 * pair[first + POWER_SAG] * strength)
-    )
-    reach, radius = max(abs(u0), abs(u1)), max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
-    highest, widest = max(row[i, HIGHEST], reach), max(row[i, WIDEST], radius)
-    row[i, HIGHEST], row[i, WIDEST] = highest, widest
-    longest = 2.0 * max(abs(u0) + abs(z0), abs(u1) + abs(z1))
-    further = reach + pair[first + PLACE_SAG] * strength > highest
-    return further | (radius + growth * (longest + growth) > widest)
+    # growth of the radius between the states
+    power_change = abs((u1 + y1) - (u0 + y0))
+    power_error = 8.0 * pair[first + POWER_ERROR] * strength
+    growth = 0.125 * pair[first + ANGLE] * (power_change + power_error)
+    # maxima at the states
+    reach = max(abs(u0), abs(u1))
+    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
+    largest = max(row[i, LARGEST_DISPLACEMENT], reach)
+    largest_squared = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
+    row[i, LARGEST_DISPLACEMENT] = largest
+    row[i, LARGEST_RADIUS_SQUARED] = largest_squared
+    # bounds between them
+    twice_radius = 2.0 * max(abs(u0) + abs(z0), abs(u1) + abs(z1))
+    is_further = reach + pair[first + DISPLACEMENT_ERROR] * strength > largest
+    return is_further | (radius_squared + growth * (twice_radius + growth) > largest_squared)
 
 
 @lean
-def raise_inside(pair, row, i, start, end, change, share):
+def raise_maxima_inside(pair, row, i, start, end, change, share):
     """
-    Raise the maxima of structure i to those between two states: at roots of its speed or of its power.
+    Raise the maxima of structure i to those between two states: at roots of velocity and power.
 
-    They are this share of a step apart, over all of which the ground changes by so much.
+    They are this share of a step apart; over a complete step the ground changes by ``change``.
     """
-    (u0, z0, y0), (u1, z1, y1) = start, end
-    first, strength, terms = i * STRUCTURE_ROWS, max(abs(y0), abs(y1)), int(row[0, TERMS])
+    u0, z0, y0 = start
+    u1, z1, y1 = end
+    first = i * STRUCTURE_ROWS
+    strength = max(abs(y0), abs(y1))
+    terms = int(row[0, TERM_COUNT])
     angle = pair[first + ANGLE]
-    turns = abs(z0 + z1) <= abs(z1 - z0) + 2.0 * pair[first + SPEED_SAG] * strength
-    turns &= max(abs(u0), abs(u1)) + pair[first + PLACE_SAG] * strength > row[i, HIGHEST]
-    bend, sag = abs((u1 + y1) - (u0 + y0)), pair[first + POWER_SAG] * strength
+    # the displacement turns where the velocity, within its error bound, has a root
+    velocity_error = 2.0 * pair[first + VELOCITY_ERROR] * strength
+    turns = abs(z0 + z1) <= abs(z1 - z0) + velocity_error
+    reach = max(abs(u0), abs(u1)) + pair[first + DISPLACEMENT_ERROR] * strength
+    turns &= reach > row[i, LARGEST_DISPLACEMENT]
+    # the radius turns where the power, within its error bound, has a root
+    power_change = abs((u1 + y1) - (u0 + y0))
+    power_error = pair[first + POWER_ERROR] * strength
     radius = math.sqrt(max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)) + 0.125 * angle * (
-        bend + 8.0 * sag
+        power_change + 8.0 * power_error
     )
-    widens = (abs(u0 + u1 + y0 + y1) <= bend + 2.0 * sag) & (radius * radius > row[i, WIDEST])
+    widens = abs(u0 + u1 + y0 + y1) <= power_change + 2.0 * power_error
+    widens &= radius * radius > row[i, LARGEST_RADIUS_SQUARED]
+    # maxima at these roots
     if turns | widens:
-        fill_step(pair, row, 0, first, start, change)
+        fill_displacement_in_step(pair, row, 0, first, start, change)
     if turns:
         fill_velocity(row, 0, terms)
-        _raise_at_roots(row, i, terms - 1, angle, share)
+        _raise_maxima_at_roots(row, i, terms - 1, angle, share)
     if widens:
         fill_power(row, 0, angle * angle, 0.0, terms)
-        _raise_at_roots(row, i, terms - 2, angle, share)
+        _raise_maxima_at_roots(row, i, terms - 2, angle, share)
 
 
 @lean
-def fill_step(pair, row, line, first, start, change):
-    """Fill a line's Taylor coefficients of a displacement over the share of a step, from a state on."""
+def fill_displacement_in_step(pair, row, line, first, state, change):
+    """Fill a line's Taylor coefficients of the displacement after a state, by shares of a step."""
+    terms = int(row[0, TERM_COUNT])
     angle = pair[first + ANGLE]
-    square, speed, damping = angle * angle, angle * start[1], -angle * pair[first + PULL + 1]
-    row[line, CURVE] = start[0]
-    force, rate = square * start[2] + damping * speed, square * pair[first + PULL + 2] * change
-    fill_taylor(
-        row,
-        line,
-        CURVE,
-        int(row[0, TERMS]),
-        speed,
-        damping,
-        -square * pair[first + PULL],
-        force,
-        rate,
-    )
+    square = angle * angle
+    # equation of motion with time as the share of a step
+    velocity = angle * state[1]
+    damping = -angle * pair[first + ACCELERATION + 1]
+    stiffness = -square * pair[first + ACCELERATION]
+    force = square * state[2] + damping * velocity
+    force_rate = square * pair[first + ACCELERATION + 2] * change
+    row[line, TAYLOR] = state[0]
+    fill_taylor(row, line, TAYLOR, terms, velocity, damping, stiffness, force, force_rate)
 
 
 @lean
-def _raise_at_roots(row, i, guard_terms, angle, share):
-    """Raise the maxima of a structure at the roots of the guard in the first line of its row, within a share."""
-    value, slope = value_and_slope(row, 0, GUARD, guard_terms, 0.0)
+def _raise_maxima_at_roots(row, i, function_terms, angle, share):
+    """Raise the maxima of structure i at the roots of line 0's event function within a share."""
+    # sign of the function just after the start
+    value, slope = value_and_slope(row, 0, EVENT_FUNCTION, function_terms, 0.0)
     sign = 1.0 if value > 0.0 or (value == 0.0 and slope > 0.0) else -1.0
-    time = first_fall(row, 0, GUARD, guard_terms, sign, 0.0, share, 0.0)
+    # roots one after another; the sign changes at each
+    time = first_fall(row, 0, EVENT_FUNCTION, function_terms, sign, 0.0, share, 0.0)
     while time >= 0.0:
-        place, speed = value_and_slope(row, 0, CURVE, int(row[0, TERMS]), time)
-        speed /= angle
-        row[i, HIGHEST] = max(row[i, HIGHEST], abs(place))
-        row[i, WIDEST] = max(row[i, WIDEST], place * place + speed * speed)
-        if is_last_root(row, 0, GUARD, guard_terms, time, share):
+        u, z = value_and_slope(row, 0, TAYLOR, int(row[0, TERM_COUNT]), time)
+        z /= angle
+        row[i, LARGEST_DISPLACEMENT] = max(row[i, LARGEST_DISPLACEMENT], abs(u))
+        row[i, LARGEST_RADIUS_SQUARED] = max(row[i, LARGEST_RADIUS_SQUARED], u * u + z * z)
+        if is_last_root(row, 0, EVENT_FUNCTION, function_terms, time, share):
             return
         sign = -sign
-        time = first_fall(row, 0, GUARD, guard_terms, sign, time, share, 0.0)
+        time = first_fall(row, 0, EVENT_FUNCTION, function_terms, sign, time, share, 0.0)
 
 
 @lean
-def search(pair, row, i, place, speed, ground, count):
-    """Find the maxima of structure i in a tile in which nothing else happens, from its start on."""
+def search_tile(pair, row, i, displacement, velocity, ground, count):
+    """Raise the maxima of structure i to those of a tile without events, from its start on."""
     first = i * STRUCTURE_ROWS
-    here = along(pair, ground, 0)
-    before = state(pair, first, place, speed, here)
+    ground_start = ground_along(pair, ground, 0)
+    state = complete_state(pair, first, displacement, velocity, ground_start)
+    # step by step
     for k in range(1, count + 1):
-        there = along(pair, ground, k)
-        after = step(pair, first, before, here, there)
-        if may_rise(pair, row, i, before, after):
-            raise_inside(pair, row, i, before, after, there - here, 1.0)
-        before, here = after, there
+        ground_end = ground_along(pair, ground, k)
+        after = state_after_step(pair, first, state, ground_start, ground_end)
+        if may_exceed_maxima(pair, row, i, state, after):
+            raise_maxima_inside(pair, row, i, state, after, ground_end - ground_start, 1.0)
+        state = after
+        ground_start = ground_end

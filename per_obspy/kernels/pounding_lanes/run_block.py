@@ -1,61 +1,75 @@
-"""Histories of 32 pairs at once: the loop over the record and the free vibration that follows it."""
+"""Histories of 32 pairs at once: the loop over the record and the free vibration after it."""
 
 from per_obspy.kernels._jit import lean
 from per_obspy.kernels.pounding_events.row_history import is_settled
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     fill_ground,
     read_lane,
-    search_waiting,
+    search_deferred,
     write_lane,
 )
-from per_obspy.kernels.pounding_lanes.lanes import LANES, TILE, sweep
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, rest, write_constants, write_phase
-from per_obspy.kernels.pounding_lanes.step_by_step import revisit
+from per_obspy.kernels.pounding_lanes.lanes import PAIR_LANES, TILE_STEPS, sweep_tile
+from per_obspy.kernels.pounding_lanes.pair_rows import (
+    load_pair,
+    rest_pair,
+    write_constants,
+    write_phase,
+)
+from per_obspy.kernels.pounding_lanes.step_by_step import treat_flagged_lane
 
-#: Steps between two looks at whether a pair is settled after the record.
+#: Sampling intervals of free vibration between two checks whether a pair is settled.
 SETTLING_STEPS = 16
 
 
 @lean
 def prepare_block(lanes, pair, rows, cosine, sine, free_steps, duration):
-    """Set all lanes to rest, for good those that no pair has (``free_steps`` < 0)."""
-    for lane in range(LANES):
+    """Set all lanes to rest, for good those without a pair (``free_steps`` < 0)."""
+    for lane in range(PAIR_LANES):
         pair[:] = 0.0
         write_constants(pair, rows[lane], cosine[lane], sine[lane], duration)
         write_phase(pair, rows[lane], duration)
         if free_steps[lane] < 0:
-            rest(pair)
+            rest_pair(pair)
         write_lane(lanes, lane, pair)
 
 
 @lean
-def advance_block(lanes, flags, pair, rows, log, waiting, record, grounds, step, last):
-    """Carry all lanes from a step to the last one; tell whether all got through."""
-    through = True
+def advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, step, last):
+    """Carry all lanes from a step to the last one; return whether all got through."""
+    is_through = True
     while step < last:
+        # all lanes side by side through one tile
         fill_ground(record, step, grounds[0])
-        count = min(TILE, last - step)
-        if sweep(lanes, flags, grounds[0], count):
-            for lane in range(LANES):
+        count = min(TILE_STEPS, last - step)
+        if sweep_tile(lanes, flags, grounds[0], count):
+            # flagged lanes one by one
+            for lane in range(PAIR_LANES):
                 if flags[lane]:
-                    own = pair, rows[lane], log, waiting[lane]
-                    through &= revisit(lanes, lane, flags[lane], own, record, grounds, step, count)
+                    memory = pair, rows[lane], log, deferred[lane]
+                    is_through &= treat_flagged_lane(
+                        lanes, lane, flags[lane], memory, record, grounds, step, count
+                    )
         step += count
-    return through
+    return is_through
 
 
 @lean
-def retire_lanes(lanes, pair, rows, waiting, record, grounds, free_steps, step):
-    """Rest the lanes in which nothing can happen any more after so many steps of free vibration; count the others."""
+def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+    """
+    Rest the lanes whose result is final after so many sampling intervals of free vibration.
+
+    Return the number of the others.
+    """
     active = 0
-    for lane in range(LANES):
+    for lane in range(PAIR_LANES):
         if free_steps[lane] >= 0:
-            search_waiting(lanes, lane, pair, rows[lane], waiting[lane], record, grounds[1])
+            # maxima so far, and the state as a row
+            search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
             read_lane(lanes, lane, pair)
             load_pair(pair, rows[lane])
-            if step >= free_steps[lane] or is_settled(rows[lane]):
+            if elapsed >= free_steps[lane] or is_settled(rows[lane]):
                 free_steps[lane] = -1
-                rest(pair)
+                rest_pair(pair)
                 write_lane(lanes, lane, pair)
             else:
                 active += 1
@@ -63,21 +77,52 @@ def retire_lanes(lanes, pair, rows, waiting, record, grounds, free_steps, step):
 
 
 @lean
-def run_block(record, lanes, flags, grounds, pair, waiting, rows, log, cosine, sine, free_steps):
+def run_block(record, lanes, flags, grounds, pair, deferred, rows, log, cosine, sine, free_steps):
     """
-    Run 32 pairs through a record and the free vibration after it; tell whether all got through.
+    Run 32 pairs through a record and the free vibration after it.
 
-    ``free_steps`` is how many sampling intervals of free vibration each pair has at most, negative
-    where there is no pair; it is used up.
+    Parameters
+    ----------
+    record : Record
+        Ground motion and the steps through it.
+    lanes : (LANE_ROWS * PAIR_LANES,) ndarray
+        Room for the numbers of all lanes.
+    flags : (PAIR_LANES,) ndarray of int
+        Room for their flags.
+    grounds : (2, 2, TILE_STEPS + 1) ndarray
+        Room for the north and east acceleration of the current tile and of a deferred one.
+    pair : (LANE_ROWS,) ndarray
+        Room for the numbers of one lane.
+    deferred : (PAIR_LANES, 2, DEFERRED_COLUMNS) ndarray
+        Deferred tiles of both structures; zero at the start.
+    rows : (PAIR_LANES, 2, ROW_COLUMNS) ndarray
+        Rows of structures of the pairs at rest, then at the end; see `motion` for the columns. They
+        hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and
+        APPROACH (m/s).
+    log : (n_lines, LOG_COLUMNS) ndarray
+        Log of impacts; without lines where impacts are not of interest.
+    cosine, sine : (PAIR_LANES,) ndarray
+        Of the azimuth of the axis from structure 1 to 2.
+    free_steps : (PAIR_LANES,) ndarray of int
+        Largest number of sampling intervals of free vibration for each pair, negative for a lane
+        without pair; it is overwritten.
+
+    Returns
+    -------
+    bool
+        Whether all pairs got through: no step had too many events.
     """
     prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
+    # the record
     last = (record.components.shape[1] - 1) * record.refinement
-    through = advance_block(lanes, flags, pair, rows, log, waiting, record, grounds, 0, last)
-    free = 0
-    while retire_lanes(lanes, pair, rows, waiting, record, grounds, free_steps, free):
-        step, last = last, last + SETTLING_STEPS * record.refinement
-        through &= advance_block(
-            lanes, flags, pair, rows, log, waiting, record, grounds, step, last
+    is_through = advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, 0, last)
+    # free vibration, until every pair is settled
+    elapsed = 0
+    while retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
+        step = last
+        last += SETTLING_STEPS * record.refinement
+        is_through &= advance_block(
+            lanes, flags, pair, rows, log, deferred, record, grounds, step, last
         )
-        free += SETTLING_STEPS
-    return through
+        elapsed += SETTLING_STEPS
+    return is_through

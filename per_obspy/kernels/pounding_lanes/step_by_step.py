@@ -1,155 +1,202 @@
 """
-One pair through a tile of steps in which something may happen to it, one step after another.
+Scalar steps of one pair through a tile that may hold an event.
 
-Steps inside which nothing can happen are the same formulas as in ``pounding_lanes``; the others are
-repeated: plain impacts by ``pounding_bounce``, and all else event by event, by the code of single
-histories.
+Steps that certainly hold no event use the same formulas as ``lanes``; the others are repeated:
+single impacts by ``free_impacts``, and all else from event to event, by the code of single
+histories (``next_event``).
 """
 
 import math
 
 from per_obspy.kernels._jit import inlined, lean
-from per_obspy.kernels.pounding_events.events import find_event, finish_piece
 from per_obspy.kernels.pounding_events.motion import (
+    BOUNCE_LIMIT,
     BOUNCES,
-    HIGHEST,
-    MOST_BOUNCES,
-    STUCK,
-    TERMS,
-    WIDEST,
+    IN_CONTACT,
+    LARGEST_DISPLACEMENT,
+    LARGEST_RADIUS_SQUARED,
+    TERM_COUNT,
     YIELD,
     Segment,
 )
+from per_obspy.kernels.pounding_events.next_event import find_event, finish_piece
 from per_obspy.kernels.pounding_lanes.deferred_maxima import (
-    find_maxima,
+    raise_maxima_of_tile,
     read_lane,
-    search_waiting,
+    search_deferred,
     write_lane,
 )
-from per_obspy.kernels.pounding_lanes.free_impacts import bounce, put
+from per_obspy.kernels.pounding_lanes.free_impacts import run_free_impacts, set_states
 from per_obspy.kernels.pounding_lanes.lanes import (
-    EVENT,
-    FLOOR,
-    HIGHEST_PLACE,
-    PLACE,
-    PLACE_SAG,
-    SPEED,
-    SPEED_SAG,
-    START_PLACE,
-    START_SPEED,
+    CONTACT_FUNCTION,
+    CONTACT_ROUNDING,
+    DISPLACEMENT,
+    DISPLACEMENT_ERROR,
+    EVENT_FLAG,
+    MAXIMUM_SO_FAR,
+    RADIUS_SQUARED_SO_FAR,
+    START_DISPLACEMENT,
+    START_VELOCITY,
     STRUCTURE_ROWS,
-    WIDEST_RADIUS,
+    VELOCITY,
+    VELOCITY_ERROR,
 )
-from per_obspy.kernels.pounding_lanes.lanes import GUARD as CLOSING
 from per_obspy.kernels.pounding_lanes.maxima_in_step import (
-    along,
-    may_rise,
+    complete_state,
+    ground_along,
+    may_exceed_maxima,
     may_yield,
-    raise_inside,
-    state,
-    step,
+    raise_maxima_inside,
+    state_after_step,
 )
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, store_pair
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, store_pair
 
 
 @inlined
-def present(pair, first, ground):
-    """Return the state of a structure of a pair."""
-    return state(pair, first, pair[first + PLACE], pair[first + SPEED], ground)
+def present_state(pair, first, ground):
+    """Return the state of a structure of a pair now."""
+    return complete_state(pair, first, pair[first + DISPLACEMENT], pair[first + VELOCITY], ground)
 
 
 @inlined
-def at_start(pair, first, ground):
+def state_at_tile_start(pair, first, ground):
     """Return the state of a structure at the start of the tile."""
-    return state(pair, first, pair[first + START_PLACE], pair[first + START_SPEED], ground)
+    u = pair[first + START_DISPLACEMENT]
+    z = pair[first + START_VELOCITY]
+    return complete_state(pair, first, u, z, ground)
 
 
 @lean
-def segment_of(row, here, there, duration):
-    """Return the segment that a step is."""
-    return Segment(0.0, duration, here, (there - here) / duration, int(row[0, TERMS]))
+def segment_of_step(row, ground_start, ground_end, duration):
+    """Return a step as a segment of linear ground acceleration."""
+    slope = (ground_end - ground_start) / duration
+    return Segment(0.0, duration, ground_start, slope, int(row[0, TERM_COUNT]))
 
 
 @inlined
-def _guard(pair, left, right, ground):
-    """Return what stays positive until the pair meets or parts."""
-    form = pair[CLOSING + 2] * left[1] + (pair[CLOSING + 3] * ground + pair[CLOSING + 4])
-    return pair[CLOSING] * left[0] + (pair[CLOSING + 1] * right[0] + form)
+def _contact_value(pair, left, right, ground):
+    """Return the contact function: positive until the pair meets or parts."""
+    form = pair[CONTACT_FUNCTION + 2] * left[1] + (
+        pair[CONTACT_FUNCTION + 3] * ground + pair[CONTACT_FUNCTION + 4]
+    )
+    return pair[CONTACT_FUNCTION] * left[0] + (pair[CONTACT_FUNCTION + 1] * right[0] + form)
 
 
 @inlined
 def _may_meet_or_part(pair, row, least, left, next_left, right, next_right):
-    """Tell whether the guard, with this least value at the ends of a step, may fall through zero inside it."""
-    margin = abs(pair[CLOSING]) * pair[PLACE_SAG] + abs(pair[CLOSING + 2]) * pair[SPEED_SAG]
+    """Return whether the contact function may fall through zero inside a step, by its least end."""
+    # error bound of the contact function: part of structure 1, then of structure 2
+    margin = (
+        abs(pair[CONTACT_FUNCTION]) * pair[DISPLACEMENT_ERROR]
+        + abs(pair[CONTACT_FUNCTION + 2]) * pair[VELOCITY_ERROR]
+    )
     margin *= max(abs(left[2]), abs(next_left[2]))
-    other = abs(pair[CLOSING + 1]) * pair[STRUCTURE_ROWS + PLACE_SAG]
+    other = abs(pair[CONTACT_FUNCTION + 1]) * pair[STRUCTURE_ROWS + DISPLACEMENT_ERROR]
     return (
         least - margin - other * max(abs(right[2]), abs(next_right[2]))
-        < -pair[FLOOR] * row[0, HIGHEST]
+        < -pair[CONTACT_ROUNDING] * row[0, LARGEST_DISPLACEMENT]
     )
 
 
 @lean
-def repeat_step(row, log, segment, elapsed):
-    """Carry a pair through what is left of one step, event by event; tell whether it got through."""
-    for _ in range(100 * int(row[0, MOST_BOUNCES])):
-        span, kind, place = find_event(row, segment, elapsed)
+def run_events(row, log, segment, elapsed):
+    """Carry a row through the rest of one step, event by event; return whether it got through."""
+    for _ in range(100 * int(row[0, BOUNCE_LIMIT])):
+        span, kind, index = find_event(row, segment, elapsed)
         elapsed = elapsed + span if kind else segment.duration
-        finish_piece(row, log, segment, elapsed, span, kind, place)
+        finish_piece(row, log, segment, elapsed, span, kind, index)
         if elapsed >= segment.duration:
             return True
     return False
 
 
 @lean
-def _repeat(pair, row, log, left, right, next_left, next_right, segment, yields):
-    """Carry a pair through a step in which it may meet or part, or one may yield; tell whether it got through."""
-    put(pair, left, right)
-    row[0, BOUNCES], elapsed = 0.0, -1.0
-    if not (yields or row[0, STUCK]):
-        elapsed = bounce(pair, row, log, left, right, next_left, next_right, segment)
+def _repeat_step(pair, row, log, left, right, next_left, next_right, segment, yields):
+    """Carry a pair through a step that may hold an event; return whether it got through."""
+    set_states(pair, left, right)
+    row[0, BOUNCES] = 0.0
+    elapsed = -1.0
+    # single impacts of a free pair
+    if not (yields or row[0, IN_CONTACT]):
+        elapsed = run_free_impacts(pair, row, log, left, right, next_left, next_right, segment)
         if elapsed == segment.duration:
             return True
+    # the rest event by event; the row has the state only after an impact
     if elapsed < 0.0:
         load_pair(pair, row)
-    through = repeat_step(row, log, segment, max(elapsed, 0.0))
+    is_through = run_events(row, log, segment, max(elapsed, 0.0))
     store_pair(pair, row, segment.duration)
-    return through
+    return is_through
 
 
 @lean
-def walk(pair, row, log, ground, count, duration):
-    """Carry a pair through a tile in which something may happen; tell whether it got through."""
-    second, through, bilinear = STRUCTURE_ROWS, True, min(row[0, YIELD], row[1, YIELD]) < math.inf
-    here = along(pair, ground, 0)
-    left, right = at_start(pair, 0, here), at_start(pair, second, here)
-    least = _guard(pair, left, right, here)
+def step_through_tile(pair, row, log, ground, count, duration):
+    """
+    Carry a pair through a tile that may hold an event.
+
+    Parameters
+    ----------
+    pair : (LANE_ROWS,) ndarray
+        Numbers of its lane; see `lanes` for its rows.
+    row : (2, ROW_COLUMNS) ndarray
+        Its row of structures; see `motion` for its columns.
+    log : (n_lines, LOG_COLUMNS) ndarray
+        Log of impacts.
+    ground : (2, TILE_STEPS + 1) ndarray
+        North and east acceleration at the tile's samples, m/s².
+    count : int
+        Number of steps of the tile.
+    duration : float
+        Of a step, s.
+
+    Returns
+    -------
+    bool
+        Whether it got through: no step had too many events.
+    """
+    second = STRUCTURE_ROWS
+    is_through = True
+    is_bilinear = min(row[0, YIELD], row[1, YIELD]) < math.inf
+    # states and contact function at the start of the tile
+    ground_start = ground_along(pair, ground, 0)
+    left = state_at_tile_start(pair, 0, ground_start)
+    right = state_at_tile_start(pair, second, ground_start)
+    least = _contact_value(pair, left, right, ground_start)
     for k in range(1, count + 1):
-        there = along(pair, ground, k)
-        next_left, next_right = (
-            step(pair, 0, left, here, there),
-            step(pair, second, right, here, there),
-        )
-        next_least = _guard(pair, next_left, next_right, there)
+        # states after the step, as if no event happened in it
+        ground_end = ground_along(pair, ground, k)
+        next_left = state_after_step(pair, 0, left, ground_start, ground_end)
+        next_right = state_after_step(pair, second, right, ground_start, ground_end)
+        next_least = _contact_value(pair, next_left, next_right, ground_end)
+        # events that the error bounds do not exclude
         happens = _may_meet_or_part(
             pair, row, min(least, next_least), left, next_left, right, next_right
         )
-        yields = bilinear and (
+        yields = is_bilinear and (
             may_yield(pair, 0, left, next_left) or may_yield(pair, second, right, next_right)
         )
         if happens | yields:
-            segment = segment_of(row, here, there, duration)
-            through &= _repeat(pair, row, log, left, right, next_left, next_right, segment, yields)
-            next_left, next_right = present(pair, 0, there), present(pair, second, there)
-            next_least = _guard(pair, next_left, next_right, there)
+            # repeat the step with its events
+            segment = segment_of_step(row, ground_start, ground_end, duration)
+            is_through &= _repeat_step(
+                pair, row, log, left, right, next_left, next_right, segment, yields
+            )
+            next_left = present_state(pair, 0, ground_end)
+            next_right = present_state(pair, second, ground_end)
+            next_least = _contact_value(pair, next_left, next_right, ground_end)
         else:
-            if may_rise(pair, row, 0, left, next_left):
-                raise_inside(pair, row, 0, left, next_left, there - here, 1.0)
-            if may_rise(pair, row, 1, right, next_right):
-                raise_inside(pair, row, 1, right, next_right, there - here, 1.0)
-        left, right, least, here = next_left, next_right, next_least, there
-    put(pair, left, right)
-    return through
+            # maxima inside the step
+            change = ground_end - ground_start
+            if may_exceed_maxima(pair, row, 0, left, next_left):
+                raise_maxima_inside(pair, row, 0, left, next_left, change, 1.0)
+            if may_exceed_maxima(pair, row, 1, right, next_right):
+                raise_maxima_inside(pair, row, 1, right, next_right, change, 1.0)
+        left = next_left
+        right = next_right
+        least = next_least
+        ground_start = ground_end
+    set_states(pair, left, right)
+    return is_through
 
 
 @lean
@@ -157,23 +204,29 @@ def write_back(lanes, lane, pair, row):
     """Copy a pair back to its lane, with the maxima of its row."""
     for i in range(2):
         first = i * STRUCTURE_ROWS
-        pair[first + HIGHEST_PLACE], pair[first + WIDEST_RADIUS] = row[i, HIGHEST], row[i, WIDEST]
+        pair[first + MAXIMUM_SO_FAR] = row[i, LARGEST_DISPLACEMENT]
+        pair[first + RADIUS_SQUARED_SO_FAR] = row[i, LARGEST_RADIUS_SQUARED]
     write_lane(lanes, lane, pair)
 
 
 @lean
-def revisit(lanes, lane, flag, own, record, grounds, step, count):
+def treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count):
     """
-    Do for a flagged lane what the sweep cannot; tell whether it got through.
+    Treat one flagged lane after the sweep of a tile; return whether it got through.
 
-    ``own`` is room for its numbers, its row, the log and its waiting tiles.
+    ``memory`` is that of the lane: its line of numbers, its row, the log and its deferred
+    tiles; ``grounds`` is the ground of this tile and room for that of a deferred one.
     """
-    pair, row, log, waiting = own
-    if not flag & EVENT:
-        find_maxima(lanes, lane, flag, pair, row, waiting, record, grounds[1], step, count)
+    pair, row, log, deferred = memory
+    # a maximum only
+    if not flag & EVENT_FLAG:
+        raise_maxima_of_tile(
+            lanes, lane, flag, pair, row, deferred, record, grounds[1], step, count
+        )
         return True
-    search_waiting(lanes, lane, pair, row, waiting, record, grounds[1])
+    # an event: earlier maxima first, then the tile again from its start
+    search_deferred(lanes, lane, pair, row, deferred, record, grounds[1])
     read_lane(lanes, lane, pair)
-    through = walk(pair, row, log, grounds[0], count, record.duration)
+    is_through = step_through_tile(pair, row, log, grounds[0], count, record.duration)
     write_back(lanes, lane, pair, row)
-    return through
+    return is_through

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes.deferred_maxima import WAITING_COLUMNS, Record
-from per_obspy.kernels.pounding_lanes.lanes import LANES, ROWS, TILE
+from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
+from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.pounding.history.tables import refinement
 
 #: Bytes of a line of the processor's cache.
@@ -55,7 +55,7 @@ def pair_blocks(parts: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     blocks = []
     for part in np.unique(parts):
         same = np.flatnonzero(parts == part)
-        blocks += [same[start : start + LANES] for start in range(0, same.size, LANES)]
+        blocks += [same[start : start + PAIR_LANES] for start in range(0, same.size, PAIR_LANES)]
     return blocks
 
 
@@ -75,14 +75,14 @@ def run_blocks(
     Parameters
     ----------
     kernel : callable
-        ``run_block`` or ``run_apart``.
+        ``run_block`` or ``run_without_contact``.
     lane_rows : int
         Rows of its lanes.
     components : (2, n_samples) ndarray
         North and east acceleration, m/s².
     dt : float
         Sampling interval, s.
-    rows : (n_pairs, 2, COLUMNS) ndarray
+    rows : (n_pairs, 2, ROW_COLUMNS) ndarray
         Of the pairs at rest; then at the end.
     parts : (n_pairs,) ndarray of int
         Steps of a sampling interval.
@@ -98,12 +98,16 @@ def run_blocks(
     """
 
     def run(block: NDArray[np.int64]) -> None:
-        filled, steps = np.resize(block, LANES), int(parts[block[0]])
+        filled, steps = np.resize(block, PAIR_LANES), int(parts[block[0]])
         record, own = Record(components, steps, dt / steps), rows[filled]
-        lanes, flags = aligned(lane_rows * LANES), aligned(LANES).view(np.int64)
-        room = np.empty((2, 2, TILE + 1)), np.empty(ROWS), np.zeros((LANES, 2, WAITING_COLUMNS))
+        lanes, flags = aligned(lane_rows * PAIR_LANES), aligned(PAIR_LANES).view(np.int64)
+        room = (
+            np.empty((2, 2, TILE_STEPS + 1)),
+            np.empty(LANE_ROWS),
+            np.zeros((PAIR_LANES, 2, DEFERRED_COLUMNS)),
+        )
         along = np.cos(azimuth[filled]), np.sin(azimuth[filled])
-        free = np.where(np.arange(LANES) < block.size, free_steps[filled], -1)
+        free = np.where(np.arange(PAIR_LANES) < block.size, free_steps[filled], -1)
         if not kernel(record, lanes, flags, *room, own, np.zeros((0, LOG_COLUMNS)), *along, free):
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
         rows[block] = own[: block.size]

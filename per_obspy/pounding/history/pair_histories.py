@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes.lanes import ROWS
+from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks
 from per_obspy.pounding.history.row_history import SPEED_SHARE
@@ -183,19 +183,19 @@ def _maxima(
     parts = refinements(table, dt)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
     ground_velocity = sum(largest_ground_velocity(component, dt) for component in components)
-    rows[:, 0, columns.STILL] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
-    rows[:, 0, columns.DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
-    rows[:, 0, columns.MOST_BOUNCES] = MOST_BOUNCES
+    rows[:, 0, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
+    rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    rows[:, 0, columns.BOUNCE_LIMIT] = MOST_BOUNCES
     longest = np.maximum(fields["period_1"], fields["period_2"])
     free_steps = np.array(
         [free_samples(period, dt) * free_vibration for period in longest], dtype=np.int64
     )
     run_blocks(
-        run_block, ROWS, components, dt, rows, parts, free_steps, np.radians(fields["azimuth"])
+        run_block, LANE_ROWS, components, dt, rows, parts, free_steps, np.radians(fields["azimuth"])
     )
     return PoundingMaxima(
-        per=np.sqrt(rows[:, :, columns.WIDEST]).T.reshape(2, *shape),
-        displacement_maxima=rows[:, :, columns.HIGHEST].T.reshape(2, *shape),
+        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
+        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
         impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
         impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
     )

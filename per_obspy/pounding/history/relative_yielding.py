@@ -9,7 +9,11 @@ from numpy.typing import ArrayLike
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes.run_without_contact import FAR, ROWS_APART, run_apart
+from per_obspy.kernels.pounding_lanes.run_without_contact import (
+    LANE_ROWS_WITHOUT_CONTACT,
+    UNREACHABLE,
+    run_without_contact,
+)
 from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks
 from per_obspy.pounding.history.tables import closed_record, free_samples, row_at_rest
 
@@ -117,7 +121,7 @@ def yielding_relative_displacement(
         "hardening_2": checks.fraction_of_critical("hardening_2", hardening_2),
         "mass_1": np.ones(()),  # without contact no mass matters
         "mass_2": np.ones(()),
-        "gap": np.full((), FAR),
+        "gap": np.full((), UNREACHABLE),
     }
     shape = np.broadcast_shapes(*(values.shape for values in fields.values()))
     flat = {name: np.broadcast_to(values, shape).ravel() for name, values in fields.items()}
@@ -130,8 +134,8 @@ def yielding_relative_displacement(
         one_before_two=towards,
         two_before_one=away,
         largest=np.maximum(towards, away),
-        per=np.sqrt(rows[:, :, columns.WIDEST]).T.reshape(2, *shape),
-        displacement_maxima=rows[:, :, columns.HIGHEST].T.reshape(2, *shape),
+        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
+        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
     )
 
 
@@ -143,6 +147,13 @@ def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> Fl
     free_steps = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
     angles = np.radians(fields["azimuth"])
     run_blocks(
-        run_apart, ROWS_APART, components, dt, rows, refinements(table, dt), free_steps, angles
+        run_without_contact,
+        LANE_ROWS_WITHOUT_CONTACT,
+        components,
+        dt,
+        rows,
+        refinements(table, dt),
+        free_steps,
+        angles,
     )
     return rows

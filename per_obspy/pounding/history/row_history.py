@@ -176,9 +176,9 @@ def pounding_history(
         velocity=velocity,
         plastic_displacement=plastic,
         impacts=impact_table(log),
-        per=np.sqrt(row[:, columns.WIDEST]),
-        displacement_maxima=row[:, columns.HIGHEST].copy(),
-        energy_radius=np.sqrt(row[:, columns.RICHEST]),
+        per=np.sqrt(row[:, columns.LARGEST_RADIUS_SQUARED]),
+        displacement_maxima=row[:, columns.LARGEST_DISPLACEMENT].copy(),
+        energy_radius=np.sqrt(row[:, columns.LARGEST_ENERGY_RADIUS_SQUARED]),
         opening_maxima=row[:-1, columns.OPENING].copy(),
         energies=energies,
         closure=closure_of(energies),
@@ -200,10 +200,10 @@ def _run(
     while room < impacts:
         room = impacts
         row, log = row_at_rest(table, gap, bounce), np.zeros((room, LOG_COLUMNS))
-        row[0, columns.STILL] = (
+        row[0, columns.STICKING_SPEED] = (
             SPEED_SHARE * largest_ground_velocity(record, step) * table[:, 4].max()
         )
-        row[0, columns.MOST_BOUNCES] = MOST_BOUNCES
+        row[0, columns.BOUNCE_LIMIT] = MOST_BOUNCES
         used = run_history(record, step, parts, row, log, motion, work)
         if used < 0:
             raise RuntimeError(

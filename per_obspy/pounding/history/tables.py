@@ -59,14 +59,14 @@ def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) ->
 
     Returns
     -------
-    (..., n_structures, COLUMNS) ndarray
+    (..., n_structures, ROW_COLUMNS) ndarray
         For the kernels; when bounces end is still to be set.
     """
-    row = np.zeros((*table.shape[:-1], motion.COLUMNS))
+    row = np.zeros((*table.shape[:-1], motion.ROW_COLUMNS))
     row[..., :6] = table
     row[..., :-1, motion.GAP] = gaps
     row[..., :-1, motion.RESTITUTION] = restitution
-    row[..., :-1, motion.STUCK] = gaps <= 0.0
+    row[..., :-1, motion.IN_CONTACT] = gaps <= 0.0
     return row
 
 
@@ -86,7 +86,7 @@ def refinement(largest_frequency: float, dt: float) -> int:
     int
         A power of two; 1 where the shortest period is above about 9 dt.
     """
-    doublings = max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_PHASE)))
+    doublings = max(0, math.ceil(math.log2(largest_frequency * dt / motion.LARGEST_ANGLE)))
     return 1 << doublings
 
 

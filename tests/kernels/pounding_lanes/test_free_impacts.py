@@ -1,20 +1,18 @@
-"""Plain impacts inside one step, against the event code of single histories and against sampled clearances."""
+"""Single impacts inside one step, against the event code and against sampled clearances."""
 
 import itertools
-import math
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes import free_impacts as bounces
-from per_obspy.kernels.pounding_lanes import lanes
-from per_obspy.kernels.pounding_lanes.maxima_in_step import state, step
-from per_obspy.kernels.pounding_lanes.pairs import load_pair, write_constants, write_phase
-from per_obspy.kernels.pounding_lanes.step_by_step import repeat_step, segment_of
-from per_obspy.pounding.history.pair_blocks import pair_table
-from per_obspy.pounding.history.tables import row_at_rest
+from per_obspy.kernels.pounding_lanes import free_impacts, lanes
+from per_obspy.kernels.pounding_lanes.maxima_in_step import complete_state, state_after_step
+from per_obspy.kernels.pounding_lanes.pair_rows import load_pair, write_constants, write_phase
+from per_obspy.kernels.pounding_lanes.step_by_step import run_events, segment_of_step
+from per_obspy.pounding.history.tables import row_at_rest, structure_table
+from per_obspy.pounding.structure import Structure
 
 DURATION, GAP, LOG = 0.02, 0.01, np.zeros((0, 9))
 SECOND = lanes.STRUCTURE_ROWS
@@ -22,19 +20,14 @@ SHARES = np.linspace(0.0, 1.0, 201)
 
 
 def resting_pair(period_1=0.3, period_2=0.2, damping=0.3, restitution=0.6):
-    """Return the line of numbers that the lanes hold of a pair at rest, and its row."""
-    own = {"participation": 1.0, "yield_displacement": math.inf, "hardening": 0.0}
-    fields = {f"{name}_{i}": np.array([value]) for name, value in own.items() for i in (1, 2)}
-    fields |= {
-        "period_1": np.array([period_1]),
-        "period_2": np.array([period_2]),
-        "gap": np.array([GAP]),
-    }
-    fields |= {"mass_1": np.array([2.0]), "mass_2": np.array([1.0])}
-    fields |= {"damping_1": np.array([damping]), "damping_2": np.array([0.5 * damping])}
-    row = row_at_rest(pair_table(fields), np.array([[GAP]]), np.array([[restitution]]))[0]
-    row[0, columns.STILL], row[0, columns.DELAY], row[0, columns.MOST_BOUNCES] = 1e-12, 1e-5, 25
-    pair = np.zeros(lanes.ROWS)
+    """Return the numbers of the lane of a pair at rest, and its row."""
+    structures = (Structure(period_1, damping, 2.0), Structure(period_2, 0.5 * damping, 1.0))
+    row = row_at_rest(structure_table(structures), np.array([GAP]), np.array([restitution]))
+    # end of bounces
+    row[0, columns.STICKING_SPEED] = 1e-12
+    row[0, columns.STICKING_DELAY] = 1e-5
+    row[0, columns.BOUNCE_LIMIT] = 25
+    pair = np.zeros(lanes.LANE_ROWS)
     write_constants(pair, row, 1.0, 0.0, DURATION)
     write_phase(pair, row, DURATION)
     return pair, row
@@ -42,156 +35,171 @@ def resting_pair(period_1=0.3, period_2=0.2, damping=0.3, restitution=0.6):
 
 def cases(pair, row, count, seed=0):
     """
-    Yield states of both structures at a step's start, those after it without contact, and the ground at both ends.
+    Yield a step: states of both structures at its start and end, and ground acceleration at both.
 
-    They start apart and are once almost in contact, with a rate of any size and pressed together or
-    drawn apart.
+    The structures start with a clearance and are once almost in contact, with a rate of any size
+    and pressed together or drawn apart.
     """
     random = np.random.default_rng(seed)
     for _ in range(count):
-        share, here, there, (u, z) = random.uniform(), *random.normal(size=2), random.normal(size=2)
+        share = random.uniform()
+        ground_start, ground_end = random.normal(size=2)
+        u, z = random.normal(size=2)
         share *= random.choice([0, 0, 1])  # often at the start
+        # almost in contact after the share of the step
         clear = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-9.0, -4.0)
         rate = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-4.0, 0.0)
         u *= random.choice([0.001, 0.1])
-        middle = [
-            (0, u, 0.01 * z),
-            (
-                1,
-                u - GAP + clear,
-                (0.01 * z * pair[lanes.OMEGA] + rate) / pair[SECOND + lanes.OMEGA],
-            ),
-        ]
-        ground, start = here + share * (there - here), []
-        for i, place, speed in middle:
-            now = state(pair, i * SECOND, place, speed, ground)
-            back = bounces.inside(pair, row, i, now, there - here, -share)
-            start.append(state(pair, i * SECOND, *back[:2], here))
+        other_z = (0.01 * z * pair[lanes.OMEGA] + rate) / pair[SECOND + lanes.OMEGA]
+        ground, change = (
+            ground_start + share * (ground_end - ground_start),
+            ground_end - ground_start,
+        )
+        # from there back to the start, and on to the end
+        start = []
+        for i, displacement, velocity in ((0, u, 0.01 * z), (1, u - GAP + clear, other_z)):
+            now = complete_state(pair, i * SECOND, displacement, velocity, ground)
+            back = free_impacts.state_inside_step(pair, row, i, now, change, -share)
+            start.append(complete_state(pair, i * SECOND, *back[:2], ground_start))
         if GAP - start[0][0] + start[1][0] < 0.0:
             continue
-        after = [step(pair, i * SECOND, start[i], here, there) for i in range(2)]
-        yield *start, *after, here, there
+        end = [
+            state_after_step(pair, i * SECOND, start[i], ground_start, ground_end) for i in range(2)
+        ]
+        yield *start, *end, ground_start, ground_end
 
 
 def clearances(pair, row, left, right, change):
     """Return the clearance at SHARES of the step."""
-    inside = [
-        [bounces.inside(pair, row, i, s, change, t)[0] for t in SHARES]
-        for i, s in enumerate((left, right))
+    displacements = [
+        [free_impacts.state_inside_step(pair, row, i, state, change, share)[0] for share in SHARES]
+        for i, state in enumerate((left, right))
     ]
-    return GAP - np.array(inside[0]) + np.array(inside[1])
+    return GAP - np.array(displacements[0]) + np.array(displacements[1])
 
 
 @pytest.mark.parametrize(("period", "damping"), [(0.2, 0.0), (0.2, 0.9), (5.0, 0.05)])
 def test_two_parts_of_a_step_make_the_step(period, damping):
     # catches: any term of the motion inside a step wrong or left out; the second part starts from
-    # what the first gives
+    # the end of the first
     pair, row = resting_pair(period_1=period, damping=damping)
-    start, here, there = state(pair, 0, 0.3, -0.7, 4.0), 4.0, -3.0
-    middle = bounces.inside(pair, row, 0, start, there - here, 0.37)
-    end = bounces.inside(pair, row, 0, middle, there - here, 0.63)
-    assert_allclose(end, step(pair, 0, start, here, there), rtol=1e-13)  # rounding
-    assert_allclose(middle, state(pair, 0, *middle[:2], here + 0.37 * (there - here)), rtol=1e-13)
+    start = complete_state(pair, 0, 0.3, -0.7, 4.0)
+    middle = free_impacts.state_inside_step(pair, row, 0, start, -7.0, 0.37)
+    end = free_impacts.state_inside_step(pair, row, 0, middle, -7.0, 0.63)
+    assert_allclose(end, state_after_step(pair, 0, start, 4.0, -3.0), rtol=1e-13)  # rounding
+    expected = complete_state(pair, 0, *middle[:2], 4.0 - 0.37 * 7.0)
+    assert_allclose(middle, expected, rtol=1e-13)
 
 
-def test_what_is_foreseen_comes_true():
+def test_predictions_come_true():
     # catches: the bounds of rate or acceleration left out or halved, rising and falling exchanged
     pair, row = resting_pair()
-    seen = dict.fromkeys(range(4), 0)
-    for left, right, next_left, next_right, here, there in cases(pair, row, 300):
-        fate = bounces.foreseen(pair, left, right, next_left, next_right, 1.0)
-        seen[fate] += 1
-        clear = clearances(pair, row, left, right, there - here)
-        if fate == bounces.STAYS_OPEN:
+    counts = dict.fromkeys(range(4), 0)
+    for *states, ground_start, ground_end in cases(pair, row, 300):
+        prediction = free_impacts.predict_clearance(pair, *states, 1.0)
+        counts[prediction] += 1
+        clear = clearances(pair, row, *states[:2], ground_end - ground_start)
+        if prediction == free_impacts.STAYS_OPEN:
             assert clear.min() > -1e-16  # rounding
-        if fate == bounces.CLOSES_ONCE:
+        if prediction == free_impacts.CLOSES_ONCE:
             assert clear[-1] < 0.0
             assert np.count_nonzero(np.diff(np.sign(clear))) == 1
-    assert seen[bounces.STAYS_OPEN] > 25  # or it would be of no use
-    assert seen[bounces.CLOSES_ONCE] > 15
+    assert counts[free_impacts.STAYS_OPEN] > 25  # or it would be of no use
+    assert counts[free_impacts.CLOSES_ONCE] > 15
 
 
 def test_the_clearance_is_zero_where_they_meet():
     # catches: an impact located by the first guess only
     pair, row = resting_pair()
     met = 0
-    for left, right, next_left, next_right, here, there in cases(pair, row, 200):
-        if bounces.foreseen(pair, left, right, next_left, next_right, 1.0) == bounces.CLOSES_ONCE:
-            segment = segment_of(row, here, there, DURATION)
-            share, *hit = bounces.meeting(
-                pair, row, left, right, next_left, next_right, 1.0, segment
+    for *states, ground_start, ground_end in cases(pair, row, 200):
+        prediction = free_impacts.predict_clearance(pair, *states, 1.0)
+        if prediction != free_impacts.CLOSES_ONCE:
+            continue
+        segment = segment_of_step(row, ground_start, ground_end, DURATION)
+        share, *hit = free_impacts.locate_impact(pair, row, *states, 1.0, segment)
+        assert abs(GAP - hit[0][0] + hit[1][0]) < 1e-15  # rounding of a few 0.1 m
+        # both states lie on the motion of the step
+        for i in range(2):
+            expected = free_impacts.state_inside_step(
+                pair, row, i, states[i], ground_end - ground_start, share
             )
-            assert abs(GAP - hit[0][0] + hit[1][0]) < 1e-15  # rounding of a few 0.1 m
-            for i, (one, start) in enumerate(zip(hit, (left, right), strict=True)):
-                expected = bounces.inside(pair, row, i, start, there - here, share)
-                assert_allclose(one[:2], expected[:2], rtol=1e-12, atol=1e-16)  # rounding
-            met += 1
+            assert_allclose(hit[i][:2], expected[:2], rtol=1e-12, atol=1e-16)  # rounding
+        met += 1
     assert met > 10
 
 
 def turning_points(pair):
-    """Yield states at which the rate of the clearance, or its own rate, has an extreme and is almost zero."""
+    """Yield states where the rate of the clearance, or its own rate, has an extreme near zero."""
     squares = pair[lanes.OMEGA] ** 2, pair[SECOND + lanes.OMEGA] ** 2
-    for speed, tiny, of_rate, apart in itertools.product(
+    for velocity, tiny, of_rate, distance in itertools.product(
         (-1.0, 1.0), (-1e-6, 1e-6), (True, False), (-GAP, GAP)
     ):
-        # undamped, under no ground motion; the displacement that makes the acceleration of the
+        # undamped, under no ground motion: the displacement that makes the acceleration of the
         # clearance zero or tiny
-        place = ((0.0 if of_rate else tiny) - squares[1] * apart) / (squares[0] - squares[1])
-        other = (
-            speed + tiny if of_rate else speed * squares[0] / squares[1]
-        )  # or that of its rate zero
+        displacement = (0.0 if of_rate else tiny) - squares[1] * distance
+        displacement /= squares[0] - squares[1]
+        # the other velocity makes its rate tiny, or the rate of its acceleration zero
+        other = velocity + tiny if of_rate else velocity * squares[0] / squares[1]
         yield (
-            state(pair, 0, place, speed / squares[0] ** 0.5, 0.0),
-            state(pair, SECOND, place - apart, other / squares[1] ** 0.5, 0.0),
+            complete_state(pair, 0, displacement, velocity / squares[0] ** 0.5, 0.0),
+            complete_state(pair, SECOND, displacement - distance, other / squares[1] ** 0.5, 0.0),
         )
 
 
 def test_bounds_hold_where_a_rate_is_about_to_change_its_sign():
     # catches: the bounds of rate or acceleration left out, so that the ends alone decide
     pair, row = resting_pair(damping=0.0)
-    omega, wrong_by_ends = np.array([pair[lanes.OMEGA], pair[SECOND + lanes.OMEGA]]), 0
+    omega, other_omega = pair[lanes.OMEGA], pair[SECOND + lanes.OMEGA]
+    wrong_by_ends = 0
     for middle in turning_points(pair):
-        moved = np.array(
-            [
-                [bounces.inside(pair, row, i, middle[i], 0.0, t) for t in SHARES - 0.5]
-                for i in range(2)
-            ]
-        )
-        rate = omega[1] * moved[1, :, 1] - omega[0] * moved[0, :, 1]
-        growth = omega[1] ** 2 * moved[1, :, 2] - omega[0] ** 2 * moved[0, :, 2]
-        ends = [tuple(moved[i, k]) for k in (0, -1) for i in range(2)]
-        rises, falls, turns = bounces.course(pair, *ends, 1.0)
+        # states over a step around the turning point
+        states = [
+            [free_impacts.state_inside_step(pair, row, i, middle[i], 0.0, t) for t in SHARES - 0.5]
+            for i in range(2)
+        ]
+        left, right = np.array(states)
+        rate = other_omega * right[:, 1] - omega * left[:, 1]
+        growth = other_omega**2 * right[:, 2] - omega**2 * left[:, 2]
+        ends = [tuple(left[0]), tuple(right[0]), tuple(left[-1]), tuple(right[-1])]
+        rises, falls, turns = free_impacts.clearance_trend(pair, *ends, 1.0)
+        # the trend holds all through the step
         assert not rises or rate.min() > 0.0
         assert not falls or rate.max() < 0.0
         assert not turns or growth.max() < 0.0
-        wrong_by_ends += (
-            rate[[0, -1]].min() > 0.0 > rate.min() or growth[[0, -1]].max() < 0.0 < growth.max()
-        )
+        # though the ends alone would have another one
+        wrong_rate = rate[[0, -1]].min() > 0.0 > rate.min()
+        wrong_by_ends += wrong_rate or growth[[0, -1]].max() < 0.0 < growth.max()
     assert wrong_by_ends > 0
 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.6, 1.0])
 def test_agrees_with_the_event_code(restitution):
-    # catches: an impact missed or counted twice, speeds exchanged, the rest of the step from the
-    # state before impact
+    # catches: an impact missed or counted twice, velocities exchanged, the rest of the step from
+    # the state before impact
     pair, row = resting_pair(restitution=restitution)
     most = carried = 0
-    for left, right, next_left, next_right, here, there in cases(pair, row, 600, seed=1):
-        segment = segment_of(row, here, there, DURATION)
-        own, other = row.copy(), row.copy()
-        bounces.put(pair, left, right)
-        load_pair(pair, other)
-        assert repeat_step(other, LOG, segment, 0.0)
-        if bounces.bounce(pair, own, LOG, left, right, next_left, next_right, segment) < DURATION:
+    for *states, ground_start, ground_end in cases(pair, row, 600, seed=1):
+        segment = segment_of_step(row, ground_start, ground_end, DURATION)
+        # event by event
+        fast, expected = row.copy(), row.copy()
+        free_impacts.set_states(pair, *states[:2])
+        load_pair(pair, expected)
+        assert run_events(expected, LOG, segment, 0.0)
+        # by single impacts, where these carry through the step
+        if free_impacts.run_free_impacts(pair, fast, LOG, *states, segment) < DURATION:
             continue
-        load_pair(pair, own)
-        assert own[0, columns.IMPACTS] == other[0, columns.IMPACTS]
-        for column in (columns.U, columns.V, columns.HIGHEST, columns.WIDEST):
-            assert_allclose(
-                own[:, column], other[:, column], rtol=1e-9, atol=1e-14
-            )  # rounding over impacts that graze
-        assert_allclose(own[0, columns.APPROACH], other[0, columns.APPROACH], rtol=1e-9, atol=1e-14)
-        most, carried = max(most, own[0, columns.IMPACTS]), carried + 1
+        load_pair(pair, fast)
+        assert fast[0, columns.IMPACTS] == expected[0, columns.IMPACTS]
+        compared = [
+            columns.U,
+            columns.V,
+            columns.LARGEST_DISPLACEMENT,
+            columns.LARGEST_RADIUS_SQUARED,
+            columns.APPROACH,
+        ]
+        # rounding over impacts that graze
+        assert_allclose(fast[:, compared], expected[:, compared], rtol=1e-9, atol=1e-14)
+        most, carried = max(most, fast[0, columns.IMPACTS]), carried + 1
     assert carried > 100
     assert most >= 2.0  # two impacts in one step
