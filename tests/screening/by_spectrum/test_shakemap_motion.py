@@ -12,6 +12,7 @@ from per_obspy.screening.by_record.stored_spectra import stored_log
 from per_obspy.screening.by_spectrum.demand import spectral_demand
 from per_obspy.screening.by_spectrum.shakemap_motion import (
     DAMPINGS,
+    MapMotion,
     at_period,
     damping_factor,
     displacement_on_map,
@@ -81,8 +82,22 @@ def uncertain():
     return *uncertain_map_motion(motion, pairs, demand), pairs, demand
 
 
+def test_every_resampled_pair_has_its_own_spectrum():
+    # would catch: the spectrum of another pair, which has another form here
+    derived, given = {"period_1": np.nan, "height_1": 60.0, "storeys_1": 20.0}, {"period_1": 0.7}
+    pairs = completed_pairs(make_pairs([derived, given, derived]), Building())
+    ln_sd = np.array([[-3.0, -2.0, -1.0], [0.0, 0.0, 0.0], [-1.0, -2.0, -4.0]])
+    place = MapMotion(PERIODS, ln_sd, np.full((3, 3), 0.5))
+    demand = spectral_demand(pairs, (np.full(3, 0.1), np.full(3, 0.2)))
+    motion, spectra = uncertain_map_motion(place, pairs, demand)
+    # at 1 and 3 s, of the first and the third pair
+    row, damping = motion.row[[0, 2]], np.full(2, np.log(0.05))
+    at_1_s = stored_log(spectra, row, np.zeros(2), damping)
+    at_3_s = stored_log(spectra, row, np.full(2, np.log(3.0)), damping)
+    assert_allclose(at_3_s - at_1_s, [1.0, -2.0], rtol=1e-12)
+
+
 def test_only_resampled_pairs_have_spectra(uncertain):
-    # would catch: the spectrum of another pair
     motion, spectra, _, _ = uncertain
     assert spectra.radii.shape == (1, DAMPINGS.size, PERIODS.size)
     assert motion.row[1] == 0
