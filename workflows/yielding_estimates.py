@@ -18,8 +18,9 @@ from per_obspy import process, station_spectra
 from per_obspy.config import Simulation, load
 from per_obspy.records.simulation.earthquake import simulate
 from per_obspy.records.text_table import read_columns
-from per_obspy.screening.by_record.estimates import judged
+from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.pair_radii import motion_along_azimuths
+from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.values import Columns
 
 #: Periods of the buildings, s; how many times weaker than elastic they are; slope after yielding /
@@ -68,12 +69,13 @@ def yielding_pairs(station: xr.Dataset, count: int, draw: np.random.Generator) -
             f"contact_mass_{i}": 1e6 * every,
         }
         pairs[f"hardening_{i}"] = HARDENING * every
-    motion = motion_along_azimuths(station, pairs, pairs["azimuth"])
+    record = station_motion(station)
+    motion = motion_along_azimuths(record, pairs, pairs["azimuth"])
     for i in (1, 2):
         pairs[f"yield_displacement_{i}"] = motion.sd[i - 1][:, 0] / np.exp(
             draw.uniform(*np.log(WEAKNESS), count)
         )
-    return judged(station, pairs, motion, "given", exact=True)
+    return demand_columns(record, pairs, motion, "given", exact=True)
 
 
 def row(name: str, estimate: str, tables: list[Columns]) -> str:

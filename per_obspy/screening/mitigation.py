@@ -1,22 +1,23 @@
 """
-What would have kept a pair from pounding, or from harm: more gap, more damping, or a softer contact.
+Measures that would have kept a pair from pounding or from harm: gap, damping, or softer contact.
 
 Added damping and bumpers are estimates. The critical gap, eq. (15) and (16), follows the added
 damping on the station's stored spectra, scaled to the pair's own radii, and above the stored
 dampings on their last slope; it is scaled to the demand that decides, so that a pair whose gap is
-enough needs nothing. A bumper is judged by the single hit. A building that yields is its equivalent
-linear one, whose period and damping are not followed as damping is added.
+enough needs no measure. A bumper is assessed by the single hit. A building that yields is its
+equivalent linear one, whose period and damping are not followed as damping is added.
 """
 
 import numpy as np
-import xarray as xr
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.added_damping import least_dampings
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap, srss_gap
 from per_obspy.pounding.mitigation.bumpers import required_restitution
-from per_obspy.screening.by_record.stored_spectra import azimuth_row, log_spectra, stored_log
+from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
+from per_obspy.screening.by_record.stored_spectra import stored_log
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, values
 
@@ -27,13 +28,15 @@ LARGEST_DAMPING = 0.4
 ROUND_OFF = 1e-12
 
 
-def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: float) -> Columns:
+def mitigation_columns(
+    station: StationMotion, table: Table, target_amplification: float
+) -> Columns:
     """
-    Return what would have prevented pounding or its harm, as columns of the risk table.
+    Compute the measures that would have prevented pounding or its harm.
 
     Parameters
     ----------
-    station : Dataset
+    station : StationMotion
         The record, with its stored spectra.
     table : Table
         Rows of the risk table with demand, radii and the columns of
@@ -57,10 +60,12 @@ def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: 
     """
     gap, demand = values(table, "gap"), values(table, "demand")
     pounds = demand > gap
+    separated = pounds & (gap > 0)
     damping, restitution = np.zeros_like(gap), np.ones_like(gap)
+    # no damping keeps a pair that touches from pounding
     damping[pounds] = np.nan
-    if (apart := pounds & (gap > 0)).any():
-        damping[apart] = _supplemental_damping(station, chosen(table, apart))
+    if separated.any():
+        damping[separated] = _supplemental_damping(station, chosen(table, separated))
     if pounds.any():
         restitution[pounds] = _bumper_restitution(chosen(table, pounds), target_amplification)
     return {
@@ -70,48 +75,66 @@ def mitigation_columns(station: xr.Dataset, table: Table, target_amplification: 
     }
 
 
-def _supplemental_damping(station: xr.Dataset, table: Table) -> FloatArray:
-    """Return the least equal damping to add to pairs that pound and do not touch; NaN where none is enough."""
-    (period_1, period_2), (damping_1, damping_2) = (
-        both(table, "equivalent_period"),
-        both(table, "equivalent_damping"),
-    )
-    radii = at_contact(table, "equivalent_per")
-    correlated = critical_gap(*radii, ddc_correlation(period_1, damping_1, period_2, damping_2))
-    alone = np.asarray(table["demand_rule"] == "srss") | (correlated <= ROUND_OFF * np.add(*radii))
-    estimate = np.where(alone, srss_gap(*radii), correlated)
-    pairs = np.stack(
-        [
-            np.where(alone, np.nan, np.log(period_1 / period_2)),
-            damping_1,
-            damping_2,
-            *(np.log(np.maximum(radius, np.finfo(np.float64).tiny)) for radius in radii),
-            values(table, "gap") * (estimate / values(table, "demand")),
-        ],
-        axis=1,
-    )
-    spectra, row = log_spectra(station), azimuth_row(station, table)[:, None]
-    stored = [
-        stored_log(spectra, row, np.log(period)[:, None], spectra.dampings)
-        for period in (period_1, period_2)
+def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
+    """Return the least damping to add to both buildings of a pair; NaN where none is enough."""
+    period_1, period_2 = both(table, "equivalent_period")
+    damping_1, damping_2 = both(table, "equivalent_damping")
+    radius_1, radius_2 = at_contact(table, "equivalent_per")
+    uncorrelated, estimate = _estimated_gap(table)
+    log_ratio = np.where(uncorrelated, np.nan, np.log(period_1 / period_2))
+    # one row per pair, in the order of the kernel; the gap is that of the estimate in proportion
+    tiny = np.finfo(np.float64).tiny
+    columns = [
+        log_ratio,
+        damping_1,
+        damping_2,
+        np.log(np.maximum(radius_1, tiny)),
+        np.log(np.maximum(radius_2, tiny)),
+        values(table, "gap") * (estimate / values(table, "demand")),
     ]
+    pairs = np.stack(columns, axis=1)
+    # stored PER of either building at every stored damping
+    row = nearest_azimuth(station, table)[:, None]
+    stored = np.stack(
+        [_stored_by_damping(station, row, period) for period in (period_1, period_2)], axis=1
+    )
     added = np.empty(len(pairs))
-    least_dampings(spectra.dampings, np.stack(stored, axis=1), pairs, LARGEST_DAMPING, added)
+    least_dampings(station.per.dampings, stored, pairs, LARGEST_DAMPING, added)
     return added
+
+
+def _estimated_gap(table: Table) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which pairs count as uncorrelated, and the critical gap of eq. (15) or by SRSS, m."""
+    period_1, period_2 = both(table, "equivalent_period")
+    damping_1, damping_2 = both(table, "equivalent_damping")
+    radii = at_contact(table, "equivalent_per")
+    # eq. (16) of the equivalent oscillators
+    correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
+    correlated = critical_gap(*radii, correlation)
+    in_step = correlated <= ROUND_OFF * np.add(*radii)
+    uncorrelated = np.asarray(table["demand_rule"] == "srss") | in_step
+    return uncorrelated, np.where(uncorrelated, srss_gap(*radii), correlated)
+
+
+def _stored_by_damping(
+    station: StationMotion, row: NDArray[np.intp], period: FloatArray
+) -> FloatArray:
+    """Return the stored ln PER at the period of each pair and every stored damping."""
+    return stored_log(station.per, row, np.log(period)[:, None], station.per.dampings)
 
 
 def _bumper_restitution(table: Table, target_amplification: float) -> FloatArray:
     """
-    Return the largest restitution that keeps the amplifications of pairs that pound within the target.
+    Return the largest restitution with which pairs that pound stay within the target amplification.
 
     The critical gap of the single hit is the larger of the estimated demand and the one that
     decides.
     """
-    names = ["demand", "critical_gap_per", "critical_gap_record", "critical_gap_linearized"]
-    critical = np.max([*(values(table, name) for name in names)], axis=0)
-    critical = np.where(
-        period_is_derived(table), np.maximum(critical, values(table, "srss_gap")), critical
-    )
+    names = ("demand", "critical_gap_per", "critical_gap_record", "critical_gap_linearized")
+    largest = np.max([values(table, name) for name in names], axis=0)
+    # derived periods are uncorrelated
+    at_least_srss = np.maximum(largest, values(table, "srss_gap"))
+    critical = np.where(period_is_derived(table), at_least_srss, largest)
     return required_restitution(
         *at_contact(table, "equivalent_per"),
         *both(table, "equivalent_period"),

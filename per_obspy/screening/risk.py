@@ -1,4 +1,4 @@
-"""The risk table of an inventory that fits in memory: one row a pair, worst first."""
+"""Risk table of an inventory that fits in memory: one row per pair, worst first."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ def risk_table(
     screening: Screening = SCREENING,
 ) -> pd.DataFrame:
     """
-    Return one row a pair: ground motion, demand, whether it pounds, and how hard; worst first.
+    Compute ground motion, demand, state and severity of pairs: one row per pair, worst first.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def risk_table(
     pairs : DataFrame
         From :func:`per_obspy.read_pairs`.
     building : Building
-        What is assumed where the inventory is silent.
+        Assumptions for values that the inventory lacks.
     screening : Screening
         Distances, and thresholds of flags and classes.
 
@@ -44,11 +44,13 @@ def risk_table(
         table. ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair
         without a station in reach.
     """
-    stations, nowhere = stations_of([spectra] if isinstance(spectra, xr.Dataset) else list(spectra))
+    datasets = [spectra] if isinstance(spectra, xr.Dataset) else list(spectra)
+    stations, unlocated = stations_of(datasets)
     located = [stations.read(index) for index in range(stations.names.size)]
+    # motion between the stations, for pairs at a distance from theirs
     field = prepared_field(located, screening.interpolation) if located else None
-    rows, far = risk_rows(pairs, Ground(stations, field, None), building, screening)
+    rows, unreached = risk_rows(pairs, Ground(stations, field, None), building, screening)
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
-    table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *nowhere, *far)
+    table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *unlocated, *unreached)
     return table

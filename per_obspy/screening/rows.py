@@ -1,5 +1,5 @@
 """
-The rows of the risk table, not ranked yet: pairs with the records of their stations, station by station.
+Rows of the risk table, not ranked yet: pairs with the records of their stations.
 
 A row depends on its pair, its station and the settings, and on no other row.
 """
@@ -16,7 +16,7 @@ from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
-from per_obspy.screening.by_record.estimates import judged
+from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.by_record.pair_radii import (
     PairMotion,
@@ -24,6 +24,7 @@ from per_obspy.screening.by_record.pair_radii import (
     motion_along_every_azimuth,
     motion_of_one_horizontal,
 )
+from per_obspy.screening.by_record.station_motion import StationMotion, station_motion
 from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback
 from per_obspy.screening.codes import code_columns, rule_columns
 from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
@@ -39,10 +40,12 @@ from per_obspy.screening.ground_motion.site_motion import motion_at_pairs
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, risk_class
 from per_obspy.screening.uncertainty.probability import pair_probability
+from per_obspy.screening.uncertainty.record_motion import record_motion
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
-#: Needed on the way only; flags tell what is to be known of them.
-ON_THE_WAY = (
+#: Columns that other columns are computed from and that are dropped at the end; flags report what
+#: a reader must know of them.
+INTERMEDIATE = (
     "station_index",
     "other_site_class",
     "linearized_converged",
@@ -50,7 +53,7 @@ ON_THE_WAY = (
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
 
-#: Pairs of unknown azimuth that are judged together: at 180 azimuths every array of theirs stays
+#: Pairs of unknown azimuth that are computed together: at 180 azimuths every array of theirs stays
 #: below 3 MB.
 BLOCK = 2000
 
@@ -59,7 +62,7 @@ def risk_rows(
     pairs: pd.DataFrame, ground: Ground, building: Building, screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
-    Return one row a pair, in no particular order, and the pairs that have no station in reach.
+    Compute one row per pair, in no particular order, and the rejections of pairs out of reach.
 
     Parameters
     ----------
@@ -69,7 +72,7 @@ def risk_rows(
     ground : Ground
         The ground motion; only stations that serve a pair are read.
     building, screening : Building, Screening
-        What is assumed; thresholds.
+        Assumptions for missing values; thresholds.
 
     Returns
     -------
@@ -81,7 +84,10 @@ def risk_rows(
     """
     complete = completed_pairs(_without_results(pairs), building)
     placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
-    tables = [_of_stations(placed.reset_index(drop=True), ground, screening)] if len(placed) else []
+    tables = []
+    if len(placed):
+        tables.append(_rows_at_stations(placed.reset_index(drop=True), ground, screening))
+    # pairs without a station in reach fall back on the map
     if ground.shakemap is not None and rejected:
         mapped, rejected = shakemap_fallback(ground.shakemap, complete, rejected, screening)
         tables += [mapped] if len(mapped) else []
@@ -90,85 +96,97 @@ def risk_rows(
 
 
 def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
-    """Return the pairs without columns named as those of this table: an earlier one may serve as a pair table."""
-    ours = {*RESULTS, *rule_columns(), *ON_THE_WAY, *KEYS, *(f"raised_{flag}" for flag in FLAGS)}
-    return pairs.drop(columns=[name for name in pairs if name in ours])
+    """Return the pairs without columns of results: an earlier risk table may be the pair table."""
+    flags = {f"raised_{flag}" for flag in FLAGS}
+    results = {*RESULTS, *rule_columns(), *INTERMEDIATE, *KEYS, *flags}
+    return pairs.drop(columns=[name for name in pairs if name in results])
 
 
-def _of_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:
+def _rows_at_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:
     """Return the rows of pairs that have a station."""
-    if ground.field is not None:
-        pairs = pairs.assign(
-            **motion_at_pairs(ground.field, pairs, pairs["station_index"].to_numpy())
-        )
     index = pairs["station_index"].to_numpy(np.int64)
-    known = {
-        name: pairs[name].to_numpy()
-        for name in pairs
-        if name == "derived" or is_numeric_dtype(pairs[name])
-    }
-    blocks = [(station, np.flatnonzero(index == station)) for station in np.unique(index).tolist()]
-    told = [
-        (rows, _told(ground.stations.read(one), chosen(known, rows), screening))
-        for one, rows in blocks
-    ]
-    return _judged_as_a_whole(pairs.assign(**joined(told)), screening)
+    if ground.field is not None:
+        pairs = pairs.assign(**motion_at_pairs(ground.field, pairs, index))
+    # as arrays: records need no other columns than these
+    known: Columns = {}
+    for name in pairs:
+        if name == "derived" or is_numeric_dtype(pairs[name]):
+            known[str(name)] = pairs[name].to_numpy()
+    # one station after the other
+    parts = []
+    for number in np.unique(index).tolist():
+        rows = np.flatnonzero(index == number)
+        block = chosen(known, rows)
+        parts.append((rows, _record_columns(ground.stations.read(number), block, screening)))
+    return _with_states_and_flags(pairs.assign(**joined(parts)), screening)
 
 
-def _told(station: xr.Dataset, block: Columns, screening: Screening) -> Columns:
-    """Return what a record tells of its pairs; flags that it raises as columns ``raised_...``."""
-    table = joined(
-        [
-            (rows, judged(station, chosen(block, rows), motion, rule, screening.exact))
-            for rows, motion, rule in _motions(station, block, screening.exact)
-        ]
-    )
+def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:
+    """Compute the columns that need the record of a station, flags as booleans ``raised_...``."""
+    station = station_motion(dataset)
+    # demand, by groups of pairs whose azimuth is found alike
+    parts = []
+    for rows, motion, azimuth_rule in _motions(station, pairs, screening.exact):
+        group = chosen(pairs, rows)
+        demands = demand_columns(station, group, motion, azimuth_rule, screening.exact)
+        parts.append((rows, demands))
+    table = joined(parts)
+    # measures, flags and probability follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
-    raised = {
-        f"raised_{name}": rows for name, rows in raised_by_record(table, station, screening).items()
-    }
-    table |= {"probability": pair_probability(station, table, screening), **raised}
-    return {name: column for name, column in table.items() if name not in block}
+    raised = raised_by_record(table, dataset, screening)
+    motion_and_doubt = record_motion(station, table, screening)
+    table["probability"] = pair_probability(motion_and_doubt, station.per, table)
+    table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
+    return {name: column for name, column in table.items() if name not in pairs}
 
 
-def _judged_as_a_whole(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
-    """Return the table with everything that needs no record any more: state, class, code rules, flags."""
-    gap, demand, probability = (values(table, name) for name in ("gap", "demand", "probability"))
+def _motions(
+    station: StationMotion, pairs: Columns, exact: bool
+) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
+    """Yield rows of pairs with their motion and the rule by which their azimuth is found."""
+    azimuth = values(pairs, "azimuth")
+    if station.horizontals == 1:
+        yield np.arange(azimuth.size), motion_of_one_horizontal(station, pairs), "station"
+        return
+    unknown, decides = np.isnan(azimuth), exact & exact_decides(station, pairs)
+    given = np.flatnonzero(~unknown)
+    if given.size:
+        motion = motion_along_azimuths(station, chosen(pairs, given), azimuth[given])
+        yield given, motion, "given"
+    # unknown azimuth where the exact demand decides: the axis that the record makes worst
+    worst = np.flatnonzero(unknown & decides)
+    if worst.size:
+        block = chosen(pairs, worst)
+        yield (
+            worst,
+            motion_along_azimuths(station, block, furthest_azimuth(station, block)),
+            "worst",
+        )
+    # unknown azimuth where an estimate decides: every azimuth
+    worst = np.flatnonzero(unknown & ~decides)
+    for first in range(0, worst.size, BLOCK):
+        rows = worst[first : first + BLOCK]
+        yield rows, motion_along_every_azimuth(station, chosen(pairs, rows)), "worst"
+
+
+def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return the table with all columns that need no record: state, class, flags, code rules."""
+    gap, demand = values(table, "gap"), values(table, "demand")
+    # possible: likely enough, or an assumed period could turn a no into a yes
+    likely = values(table, "probability") >= screening.possible_from
+    state = pounding_state(gap, demand, period_is_derived(table) | likely)
     ratio = demand_ratio(gap, demand)
-    possible = period_is_derived(table) | (probability >= screening.possible_from)
-    state, named = pounding_state(gap, demand, possible), risk_class(ratio, screening.classes)
+    named = risk_class(ratio, screening.classes)
     table = table.assign(demand_ratio=ratio, state=state, risk_class=named)
+    # flags of the record and of the pairs, joined to one text
     by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}
     raised = {flag: table[name].to_numpy(dtype=bool) for flag, name in by_record.items()}
     flags = joined_flags(raised_by_pairs(table) | raised)
     rules = code_columns(table, *at_contact(table, "sd"), codes=screening.codes)
-    return table.drop(columns=[*ON_THE_WAY, *by_record.values()]).assign(flags=flags).join(rules)
+    return table.drop(columns=[*INTERMEDIATE, *by_record.values()]).assign(flags=flags).join(rules)
 
 
 def _ordered(table: pd.DataFrame) -> pd.DataFrame:
     """Return the leading columns in their order, then the others."""
     first = [name for name in ORDER if name != "rank"]
     return table[[*first, *(name for name in table if name not in ORDER)]]
-
-
-def _motions(
-    station: xr.Dataset, block: Columns, exact: bool
-) -> Iterator[tuple[NDArray[np.intp], PairMotion, str]]:
-    """Give the rows of a block by how their azimuth is found, with their motion and the name of that way."""
-    azimuth = values(block, "azimuth")
-    if station.sizes["horizontal"] == 1:
-        yield np.arange(azimuth.size), motion_of_one_horizontal(station, block), "station"
-        return
-    unknown, decides = np.isnan(azimuth), exact & exact_decides(station, block)
-    if (given := np.flatnonzero(~unknown)).size:
-        yield given, motion_along_azimuths(station, chosen(block, given), azimuth[given]), "given"
-    if (worst := np.flatnonzero(unknown & decides)).size:
-        pairs = chosen(block, worst)
-        yield (
-            worst,
-            motion_along_azimuths(station, pairs, furthest_azimuth(station, pairs)),
-            "worst",
-        )
-    worst = np.flatnonzero(unknown & ~decides)
-    for some in (worst[first : first + BLOCK] for first in range(0, worst.size, BLOCK)):
-        yield some, motion_along_every_azimuth(station, chosen(block, some)), "worst"

@@ -1,4 +1,4 @@
-"""A station with a record, and pairs of buildings beside it."""
+"""Samples: a station with a record, and pairs of buildings next to it."""
 
 import numpy as np
 import pandas as pd
@@ -9,8 +9,9 @@ import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.estimates import judged
+from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.pair_radii import motion_along_azimuths
+from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.values import values
 
 
@@ -18,10 +19,9 @@ def make_station(
     name="ONE", scale=1.0, channels=("HNN", "HNE"), latitude=10.0, longest=9.0, seed=4
 ):
     """Return the Dataset of a station with a burst of noise, 40 s at 0.01 s."""
-    motion = (
-        np.random.default_rng(seed).normal(size=(len(channels), 4000)) * np.hanning(4000) * scale
-    )
-    motion = np.cumsum(motion, axis=1)
+    # integrated noise: long periods prevail, as in strong motion
+    noise = np.random.default_rng(seed).normal(size=(len(channels), 4000))
+    motion = np.cumsum(noise * np.hanning(4000) * scale, axis=1)
     motion = (motion - motion.mean(axis=1, keepdims=True)) * np.hanning(4000)
     traces = [
         Trace(
@@ -38,13 +38,12 @@ def make_station(
         )
         for channel, data in zip(channels, motion, strict=True)
     ]
-    return per_obspy.station_spectra(
-        Stream(traces), np.geomspace(0.05, 10.0, 60), (0.02, 0.05, 0.1), 10
-    )
+    periods, dampings = np.geomspace(0.05, 10.0, 60), (0.02, 0.05, 0.1)
+    return per_obspy.station_spectra(Stream(traces), periods, dampings, 10)
 
 
 def make_pairs(rows):
-    """Return a checked pair table; every row is a dict of what differs from two plain buildings beside the station."""
+    """Return a checked pair table; every row holds the differences from two plain buildings."""
     plain = {
         "longitude_1": 20.0,
         "latitude_1": 10.0,
@@ -66,5 +65,6 @@ def make_pairs(rows):
 def table_of(station, rows):
     """Return pairs with radii and demands along their azimuths."""
     pairs = completed_pairs(make_pairs(rows), Building())
-    motion = motion_along_azimuths(station, pairs, values(pairs, "azimuth"))
-    return pd.DataFrame(judged(station, pairs, motion, "given", exact=True))
+    record = station_motion(station)
+    motion = motion_along_azimuths(record, pairs, values(pairs, "azimuth"))
+    return pd.DataFrame(demand_columns(record, pairs, motion, "given", exact=True))

@@ -1,4 +1,4 @@
-"""What would have prevented pounding: limits, monotony, scaling, and the same by the record itself."""
+"""Measures against pounding: limits, monotony, scaling, and a comparison with the record itself."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,12 @@ from scipy.interpolate import RegularGridInterpolator
 from screening_samples import make_station, table_of
 
 import per_obspy
+from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.values import at_contact, both, components, values
+from per_obspy.screening.values import at_contact, both, values
 
 TARGET = 1.25
 
@@ -21,148 +22,143 @@ def with_demand(station, rows, share=0.7):
     table = table_of(station, rows)
     table = table.assign(demand=table["critical_gap_per"], demand_rule="per_white_noise")
     table = table.assign(gap=share * table["demand"])
-    return table.assign(**linearized_columns(station, table))
+    return table.assign(**linearized_columns(station_motion(station), table))
 
 
 @pytest.fixture(scope="module")
 def table(station):
     periods = [(0.5, 0.8), (1.0, 0.6), (1.3, 1.5), (2.0, 0.9)]
-    return with_demand(
-        station, [{"period_1": a, "period_2": b, "azimuth": 40.0} for a, b in periods]
-    )
+    rows = [{"period_1": first, "period_2": second, "azimuth": 40.0} for first, second in periods]
+    return with_demand(station, rows)
 
 
-def test_every_column_is_described(station, table):
-    assert set(mitigation_columns(station, table, TARGET)) <= set(RESULTS)
+def test_every_column_is_described(record, table):
+    assert set(mitigation_columns(record, table, TARGET)) <= set(RESULTS)
 
 
-def test_nothing_is_asked_of_a_pair_whose_gap_is_enough(station, table):
+def test_nothing_is_asked_of_a_pair_whose_gap_is_enough(record, table):
     # catches: the estimate alone decides, although the exact demand is below the gap
     for enough in (
         table.assign(gap=table["demand"]),
         table.assign(demand=0.9 * table["gap"], demand_rule="exact"),
     ):
-        found = mitigation_columns(station, enough, TARGET)
+        found = mitigation_columns(record, enough, TARGET)
         assert_array_equal(found["missing_gap"], 0.0)
         assert_array_equal(found["supplemental_damping"], 0.0)
         assert_array_equal(found["bumper_restitution"], 1.0)
 
 
-def test_touching_pairs_lack_their_whole_demand_and_no_damping_helps(station, table):
-    found = mitigation_columns(station, table.assign(gap=0.0), TARGET)
+def test_touching_pairs_lack_their_whole_demand_and_no_damping_helps(record, table):
+    found = mitigation_columns(record, table.assign(gap=0.0), TARGET)
     assert_array_equal(found["missing_gap"], table["demand"])
     assert np.isnan(found["supplemental_damping"]).all()
 
 
-def test_a_wider_gap_needs_less(station, table):
-    shares = np.linspace(0.3, 1.0, 15)
-    found = [
-        mitigation_columns(station, table.assign(gap=share * table["demand"]), TARGET)
-        for share in shares
-    ]
-    damping = np.nan_to_num(
-        [one["supplemental_damping"] for one in found], nan=1.0
-    )  # not enough: more than any
+def test_a_wider_gap_needs_less(record, table):
+    damping, missing = [], []
+    for share in np.linspace(0.3, 1.0, 15):
+        found = mitigation_columns(record, table.assign(gap=share * table["demand"]), TARGET)
+        damping.append(found["supplemental_damping"])
+        missing.append(found["missing_gap"])
+    # not enough is more than any
+    damping = np.nan_to_num(damping, nan=1.0)
     assert np.all(np.diff(damping, axis=0) <= 0.0)
     assert np.all(damping[0] > 0.1)
-    assert np.all(np.diff([one["missing_gap"] for one in found], axis=0) < 0.0)
+    assert np.all(np.diff(missing, axis=0) < 0.0)
 
 
-def test_the_added_damping_brings_the_critical_gap_to_the_gap(station, table):
+def _stored_per(station):
+    """Return ln PER of the stored spectra at 40 degrees, by ln damping and ln period."""
+    axes = np.log(station["damping"].to_numpy()), np.log(station["period"].to_numpy())
+    per = station["per_azimuthal"].sel(azimuth=40.0).to_numpy().astype(float)
+    return RegularGridInterpolator(axes, np.log(per))
+
+
+def test_the_added_damping_brings_the_critical_gap_to_the_gap(station, record, table):
     # catches: damping added to one building only, the correlation of the dampings before, a radius
     # not at contact
     table = table.assign(gap=0.95 * table["demand"])
-    added = mitigation_columns(station, table, TARGET)["supplemental_damping"]
-    axes = np.log(station["damping"].to_numpy()), np.log(station["period"].to_numpy())
-    stored = RegularGridInterpolator(
-        axes, np.log(station["per_azimuthal"].sel(azimuth=40.0).to_numpy().astype(float))
-    )
-    assert np.all(0.05 + added < 0.1)  # within the stored dampings
+    damping = 0.05 + mitigation_columns(record, table, TARGET)["supplemental_damping"]
+    # within the stored dampings
+    assert np.all(damping < 0.1)
+    stored, before = _stored_per(station), np.full(4, np.log(0.05))
     radii = []
     for i, radius in enumerate(at_contact(table, "per"), start=1):
         period = np.log(values(table, f"period_{i}"))
-        change = stored((np.log(0.05 + added), period)) - stored((np.full(4, np.log(0.05)), period))
+        change = stored((np.log(damping), period)) - stored((before, period))
         radii.append(radius * np.exp(change))
-    (period_1, period_2), damping = both(table, "period"), 0.05 + added
-    rho = per_obspy.ddc_correlation(period_1, damping, period_2, damping)
+    period_1, period_2 = both(table, "period")
+    correlation = per_obspy.ddc_correlation(period_1, damping, period_2, damping)
     # halved until the step is 0.02 / 2**20
-    assert_allclose(per_obspy.critical_gap(*radii, rho), table["gap"], rtol=1e-5)
+    assert_allclose(per_obspy.critical_gap(*radii, correlation), table["gap"], rtol=1e-5)
 
 
-def test_against_the_record_itself(station, table):
+def test_against_the_record_itself(record, table):
     # catches: the spectrum of another azimuth or building
-    added = mitigation_columns(station, table.assign(gap=0.85 * table["demand"]), TARGET)[
-        "supplemental_damping"
-    ]
-    north, east, dt = components(station)
-    along = north * np.cos(np.radians(40.0)) + east * np.sin(np.radians(40.0))
-    for index, row in enumerate(table.to_dict("records")):
-        shares = row["participation_1"], row["participation_2"]
-        gaps = np.array([0.85 * row["demand"]])
+    table = table.assign(gap=0.85 * table["demand"])
+    added = mitigation_columns(record, table, TARGET)["supplemental_damping"]
+    along = record.north * np.cos(np.radians(40.0)) + record.east * np.sin(np.radians(40.0))
+    for damping, row in zip(0.05 + added, table.to_dict("records"), strict=True):
+        periods = row["period_1"], row["period_2"]
         # the record drives each building with its participation
-        per = [
-            share * per_obspy.per_spectrum(along, dt, [row[f"period_{i}"]], 0.05 + added[index])[0]
-            for i, share in enumerate(shares, start=1)
-        ]
-        damping = 0.05 + added[index]
-        rho = per_obspy.ddc_correlation(row["period_1"], damping, row["period_2"], damping)
+        per_1, per_2 = per_obspy.per_spectrum(along, record.dt, periods, damping)
+        radii = row["participation_1"] * per_1, row["participation_2"] * per_2
+        correlation = per_obspy.ddc_correlation(periods[0], damping, periods[1], damping)
         # three dampings and 60 periods are stored, interpolated linearly on logarithmic axes
-        assert_allclose(per_obspy.critical_gap(*per, rho), gaps, rtol=0.08)
+        assert_allclose(per_obspy.critical_gap(*radii, correlation), row["gap"], rtol=0.08)
 
 
 def test_scaling_ground_and_gap_changes_no_ratio():
     rows = [{"period_1": 0.6, "period_2": 1.5}, {"period_1": 1.0, "period_2": 1.2}]
-    one, other = make_station(), make_station(scale=2.0)
-    found = mitigation_columns(one, with_demand(one, rows), TARGET)
-    scaled = mitigation_columns(other, with_demand(other, rows), TARGET)
+    station, stronger = make_station(), make_station(scale=2.0)
+    found = mitigation_columns(station_motion(station), with_demand(station, rows), TARGET)
+    scaled = mitigation_columns(station_motion(stronger), with_demand(stronger, rows), TARGET)
     assert_allclose(scaled["missing_gap"], 2.0 * found["missing_gap"], rtol=1e-9)
-    assert_allclose(
-        scaled["supplemental_damping"], found["supplemental_damping"], rtol=1e-4
-    )  # stored as float32
+    # spectra are stored as float32
+    damping = "supplemental_damping"
+    assert_allclose(scaled[damping], found[damping], rtol=1e-4)
     assert_allclose(scaled["bumper_restitution"], found["bumper_restitution"], rtol=1e-6)
 
 
-def test_an_exact_demand_is_followed_in_proportion(station, table):
+def test_an_exact_demand_is_followed_in_proportion(record, table):
     # catches: the estimate compared with the gap, whatever the demand that decides
-    usual = mitigation_columns(station, table, TARGET)["supplemental_damping"]
-    smaller = table.assign(
-        demand=0.5 * table["demand"], gap=0.5 * table["gap"], demand_rule="exact"
-    )
-    assert_allclose(
-        mitigation_columns(station, smaller, TARGET)["supplemental_damping"], usual, rtol=1e-9
-    )
+    usual = mitigation_columns(record, table, TARGET)["supplemental_damping"]
+    halves = {"demand": 0.5 * table["demand"], "gap": 0.5 * table["gap"]}
+    smaller = mitigation_columns(record, table.assign(**halves, demand_rule="exact"), TARGET)
+    assert_allclose(smaller["supplemental_damping"], usual, rtol=1e-9)
 
 
-def test_equal_derived_buildings_are_uncorrelated(station):
+def test_equal_derived_buildings_are_uncorrelated(station, record):
+    # catches: a correlation of 1, at which no damping is needed
     derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
     pair = table_of(station, [derived])
     assert period_is_derived(pair).all()
     assert (pair["demand_rule"] == "srss").all()
     pair = pair.assign(gap=0.95 * pair["demand"])
-    pair = pair.assign(**linearized_columns(station, pair))
-    found = mitigation_columns(station, pair, TARGET)["supplemental_damping"]
+    pair = pair.assign(**linearized_columns(record, pair))
+    found = mitigation_columns(record, pair, TARGET)["supplemental_damping"]
     assert 0.0 < found[0] < 0.4
 
 
-def test_a_yielding_pair_is_followed_as_its_equivalent_one(station, table):
+def test_a_yielding_pair_is_followed_as_its_equivalent_one(record, table):
     # catches: elastic periods and dampings of buildings that yield
     weak = table.assign(yield_displacement_1=table["sd_1"] / 1.5, hardening_1=0.05)
-    weak = weak.assign(**linearized_columns(station, weak))
+    weak = weak.assign(**linearized_columns(record, weak))
     weak = weak.assign(
         demand=weak["critical_gap_linearized"], gap=0.8 * weak["critical_gap_linearized"]
     )
-    found = mitigation_columns(station, weak, TARGET)["supplemental_damping"]
+    found = mitigation_columns(record, weak, TARGET)["supplemental_damping"]
     elastic = weak.drop(columns=["yield_displacement_1"]).assign(yield_displacement_1=np.inf)
-    elastic = elastic.assign(**linearized_columns(station, elastic))
-    other = mitigation_columns(station, elastic, TARGET)["supplemental_damping"]
+    elastic = elastic.assign(**linearized_columns(record, elastic))
+    other = mitigation_columns(record, elastic, TARGET)["supplemental_damping"]
     assert np.all(found != other)
 
 
-def test_the_bumper_keeps_the_single_hit_within_the_target(station, table):
+def test_the_bumper_keeps_the_single_hit_within_the_target(record, table):
     # catches: a restitution for one of the buildings only, plain periods with radii of another
     # demand
     table = table.assign(gap=0.9 * table["demand"])
-    found = mitigation_columns(station, table, 1.5)["bumper_restitution"]
+    found = mitigation_columns(record, table, 1.5)["bumper_restitution"]
     critical = np.maximum(table["critical_gap_per"], table["critical_gap_record"])
     within = np.isfinite(found) & (found < 0.98)
     assert within.any()
@@ -177,14 +173,14 @@ def test_the_bumper_keeps_the_single_hit_within_the_target(station, table):
     assert np.all(amplification(np.minimum(usual + 0.01, 1.0))[within] > 1.5)
 
 
-def test_a_row_does_not_depend_on_the_others(station, table):
-    whole = mitigation_columns(station, table, TARGET)
+def test_a_row_does_not_depend_on_the_others(record, table):
+    whole = mitigation_columns(record, table, TARGET)
     for index in range(len(table)):
-        alone = mitigation_columns(station, table.iloc[index : index + 1], TARGET)
+        alone = mitigation_columns(record, table.iloc[index : index + 1], TARGET)
         for name, column in whole.items():
             assert_array_equal(alone[name], column[index : index + 1], err_msg=name)
 
 
-def test_a_target_below_one_is_refused(station, table):
+def test_a_target_below_one_is_refused(record, table):
     with pytest.raises(ValueError, match="target must be at least 1"):
-        mitigation_columns(station, table, 0.9)
+        mitigation_columns(record, table, 0.9)

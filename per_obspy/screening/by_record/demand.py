@@ -1,5 +1,5 @@
 """
-The demand on a pair's gap: every estimate beside the others, and which of them decides.
+Demand on the gap of pairs: estimates of the critical gap, and the governing one.
 
 All quantities are at contact level: a building's radius times its participation.
 """
@@ -62,7 +62,7 @@ def gap_estimates(
     correlation_record: FloatArray,
 ) -> GapEstimates:
     """
-    Return every estimate of the critical gap.
+    Compute every estimate of the critical gap.
 
     Parameters
     ----------
@@ -88,8 +88,15 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
     """
     Return the larger PER demand of eq. (16) and of the record; with derived periods at least SRSS.
 
-    Derived periods make equal buildings seem to move as one (a correlation of 1 and no demand),
-    which nobody knows.
+    Derived periods make equal buildings seem to move as one, with a correlation of 1 and no demand,
+    for which there is no evidence.
+
+    Parameters
+    ----------
+    estimates : GapEstimates
+        Of the same pairs.
+    period_derived : ndarray of bool
+        Whether a period of the pair was derived from its height or storeys.
     """
     candidates = np.stack(
         [estimates.per, estimates.record, np.where(period_derived, estimates.srss, -np.inf)], axis=0
@@ -109,7 +116,7 @@ def pounding_state(
     gap, demand : (n_pairs,) ndarray
         m.
     possible : (n_pairs,) ndarray of bool
-        Whether pounding is likely enough, or an input that nobody gave could turn a no into a yes.
+        Whether pounding is likely enough, or an assumed input could turn a no into a yes.
     """
     states = np.where(gap < demand, "yes", np.where(possible, "possible", "no"))
     return states.astype(object)

@@ -1,13 +1,13 @@
-"""What a record says of pairs: every estimate, the single hit, the exact outcome, and which demand decides."""
+"""Demand of pairs from one record: estimates, single hit, exact outcome, and the governing one."""
 
 import numpy as np
-import xarray as xr
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.single_hit import single_hit
-from per_obspy.screening.by_record.demand import gap_estimates, governing_demand
+from per_obspy.screening.by_record.demand import GapEstimates, gap_estimates, governing_demand
 from per_obspy.screening.by_record.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.by_record.pair_radii import PairMotion
+from per_obspy.screening.by_record.station_motion import StationMotion
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.flags import period_is_derived
 from per_obspy.screening.values import Columns, Table, at_contact, both, values
@@ -17,50 +17,71 @@ from per_obspy.screening.values import Columns, Table, at_contact, both, values
 ROUND_OFF = 1e-12
 
 
-def judged(
-    station: xr.Dataset, pairs: Table, motion: PairMotion, rule: str, exact: bool
+def demand_columns(
+    station: StationMotion, pairs: Table, motion: PairMotion, azimuth_rule: str, exact: bool
 ) -> Columns:
     """
-    Return the pairs with estimates, single hit, exact outcome and the demand that decides.
+    Compute estimates, single hit, exact outcome and governing demand of pairs at one station.
 
     Parameters
     ----------
-    station : Dataset
+    station : StationMotion
         The record.
     pairs : Table
         Completed pairs.
     motion : PairMotion
-        What the record does to them, along one azimuth or many.
-    rule : str
-        How the azimuth was found: ``given``, ``worst`` or ``station``.
+        Response of the pairs to the record, along one azimuth or many.
+    azimuth_rule : str
+        Origin of the azimuth: ``given``, ``worst`` or ``station``.
     exact : bool
         Whether the exact demand and the history of every pair are computed; they are empty
         otherwise.
+
+    Returns
+    -------
+    dict of (n_pairs,) ndarray
+        The columns of the pairs and those of the demand, see ``columns.RESULTS``.
     """
-    table: Columns = {**pairs, **_at_worst(motion, pairs)}
+    count = len(motion.azimuth)
+    # estimates along the worst azimuth, elastic and linearized; the larger one is the estimate
+    table: Columns = {**pairs, **_at_worst_azimuth(motion, pairs)}
     table |= linearized_columns(station, table)
     table |= _estimated_demand(table)
     table |= {"demand_estimated": table["demand"], "estimate_rule": table["demand_rule"]}
+    # the single hit at the estimated demand
     table |= _single_hits(table)
-    table["azimuth_rule"] = np.full(len(motion.azimuth), rule, dtype=object)
+    table["azimuth_rule"] = np.full(count, azimuth_rule, dtype=object)
+    # the exact demand replaces the estimate where the record supports it
     if exact:
-        azimuth = (
-            np.zeros(len(motion.azimuth)) if rule == "station" else values(table, "azimuth_used")
-        )
+        on_sensor_axis = azimuth_rule == "station"
+        azimuth = np.zeros(count) if on_sensor_axis else values(table, "azimuth_used")
         table |= exact_outcome(station, table, azimuth)
-        decides = exact_decides(station, table)
-        table["demand"] = np.where(decides, table["demand_exact"], table["demand"])
-        table["demand_rule"] = np.where(decides, "exact", table["demand_rule"])
+        table |= _exact_demand(station, table)
     else:
-        table |= no_outcome(len(motion.azimuth))
-    return table | {
-        "demand": _without_round_off(table),
-        "estimate_over_exact": _estimate_over_exact(table),
-    }
+        table |= no_outcome(count)
+    ratio = _estimate_over_exact(table)
+    return table | {"demand": _without_round_off(table), "estimate_over_exact": ratio}
+
+
+def impact_velocity_that_counts(table: Table) -> FloatArray:
+    """
+    Return the impact velocity by which pairs are ranked, m/s.
+
+    It is that of the exact history where this decides, else the larger of it and of the single hit.
+
+    Parameters
+    ----------
+    table : Table
+        Rows of the risk table.
+    """
+    single = np.nan_to_num(values(table, "impact_velocity"))
+    estimated = np.where(table["demand_rule"] == "exact", 0.0, single)
+    larger: FloatArray = np.fmax(values(table, "impact_velocity_exact"), estimated)
+    return larger
 
 
 def _estimated_demand(table: Table) -> Columns:
-    """Return the larger of the elastic and the linearized demand: elastic alone is too small for yielding pairs."""
+    """Return the larger of the elastic demand, too small for yielding pairs, and the linearized."""
     elastic, linearized = values(table, "demand"), values(table, "critical_gap_linearized")
     larger = linearized > elastic
     return {
@@ -69,30 +90,31 @@ def _estimated_demand(table: Table) -> Columns:
     }
 
 
+def _exact_demand(station: StationMotion, table: Table) -> Columns:
+    """Return the demand and its rule with the exact one in place where it decides."""
+    decides = exact_decides(station, table)
+    return {
+        "demand": np.where(decides, table["demand_exact"], table["demand"]),
+        "demand_rule": np.where(decides, "exact", table["demand_rule"]),
+    }
+
+
 def _estimate_over_exact(table: Table) -> FloatArray:
-    """Return the governing estimate over the exact demand, NaN where that is not known, 0, or round-off."""
+    """Return the estimated over the exact demand, NaN where that is unknown, 0, or round-off."""
     exact, estimate = values(table, "demand_exact"), values(table, "demand_estimated")
     known = exact > ROUND_OFF * values(table, "absolute_gap")
     return np.divide(estimate, exact, out=np.full_like(exact, np.nan), where=known)
 
 
 def _without_round_off(table: Table) -> FloatArray:
+    """Return the demand, 0 where it is the round-off of two equal motions."""
     demand = values(table, "demand")
     return np.where(demand > ROUND_OFF * values(table, "absolute_gap"), demand, 0.0)
 
 
-def _at_worst(motion: PairMotion, pairs: Table) -> Columns:
+def _at_worst_azimuth(motion: PairMotion, pairs: Table) -> Columns:
     """Return all estimates at the azimuth where the estimated demand of a pair is largest."""
-    share = [one[:, None] for one in both(pairs, "participation")]
-    period_1, period_2 = (one[:, None] for one in both(pairs, "period"))
-    damping_1, damping_2 = (one[:, None] for one in both(pairs, "damping"))
-    estimates = gap_estimates(
-        (share[0] * motion.per[0], share[1] * motion.per[1]),
-        (share[0] * motion.sd[0], share[1] * motion.sd[1]),
-        (period_1, period_2),
-        (damping_1, damping_2),
-        motion.correlation,
-    )
+    estimates = _estimates(motion, pairs)
     demand, rule = governing_demand(estimates, period_is_derived(pairs)[:, None])
     columns: Columns = {
         "azimuth_used": motion.azimuth,
@@ -110,31 +132,39 @@ def _at_worst(motion: PairMotion, pairs: Table) -> Columns:
         "demand": demand,
         "demand_rule": rule,
     }
+    # one azimuth of (n_pairs, n_azimuths) per pair
     worst = np.argmax(demand, axis=1)[:, None]
     return {
         name: np.take_along_axis(column, worst, axis=1)[:, 0] for name, column in columns.items()
     }
 
 
+def _estimates(motion: PairMotion, pairs: Table) -> GapEstimates:
+    """Return every estimate of the critical gap along every azimuth, (n_pairs, n_azimuths)."""
+    share_1, share_2 = both(pairs, "participation")
+    period_1, period_2 = both(pairs, "period")
+    damping_1, damping_2 = both(pairs, "damping")
+    # radii at contact level; a column of pairs against the row of azimuths
+    return gap_estimates(
+        (share_1[:, None] * motion.per[0], share_2[:, None] * motion.per[1]),
+        (share_1[:, None] * motion.sd[0], share_2[:, None] * motion.sd[1]),
+        (period_1[:, None], period_2[:, None]),
+        (damping_1[:, None], damping_2[:, None]),
+        motion.correlation,
+    )
+
+
 def _single_hits(table: Table) -> Columns:
     """Return the single hit of every pair; its critical gap is the estimated demand."""
-    per_1, per_2 = at_contact(table, "equivalent_per")
-    period_1, period_2 = both(table, "equivalent_period")
-    mass_1, mass_2 = both(table, "contact_mass")
-    restitution, demand, gap = (values(table, name) for name in ("restitution", "demand", "gap"))
-    hit = single_hit(per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, demand, gap)
+    radii = at_contact(table, "equivalent_per")
+    periods = both(table, "equivalent_period")
+    masses = both(table, "contact_mass")
+    restitution, demand = values(table, "restitution"), values(table, "demand")
+    # oscillators of yielding buildings are their equivalent linear ones
+    hit = single_hit(*radii, *periods, *masses, restitution, demand, values(table, "gap"))
     return {
         "single_hit_status": hit.status,
         "amplification_1": hit.amplification_1,
         "amplification_2": hit.amplification_2,
         "impact_velocity": hit.impact_velocity,
     }
-
-
-def impact_velocity_that_counts(table: Table) -> FloatArray:
-    """Return that of the exact history where it decides, else the larger of it and of the single hit, m/s."""
-    estimated = np.where(
-        table["demand_rule"] == "exact", 0.0, np.nan_to_num(values(table, "impact_velocity"))
-    )
-    larger: FloatArray = np.fmax(values(table, "impact_velocity_exact"), estimated)
-    return larger

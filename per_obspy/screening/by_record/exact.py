@@ -1,34 +1,35 @@
 """
-What a record does to pairs exactly: the relative displacement without contact, and the history with it.
+Exact response of pairs to a record: relative displacement without contact, and pounding history.
 
-Both buildings are oscillators at contact height, driven along one azimuth; nothing is estimated but
-the oscillators.
+Both buildings are oscillators at contact height, driven along one azimuth; only the oscillators
+are estimates.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation.azimuths import worst_azimuth
-from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.history.pair_histories import PoundingMaxima, pounding_histories
 from per_obspy.pounding.history.relative import directional_relative_displacement
 from per_obspy.pounding.history.relative_yielding import (
     YieldingRelativeDisplacement,
     yielding_relative_displacement,
 )
+from per_obspy.screening.by_record.station_motion import StationMotion
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import (
-    Columns,
-    Table,
-    at_contact,
-    both,
-    chosen,
-    components,
-    number,
-    values,
+from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, values
+
+#: Columns of :func:`exact_outcome`.
+EXACT_COLUMNS = (
+    "demand_exact",
+    "demand_two_sided",
+    "impacts",
+    "impact_velocity_exact",
+    "amplification_exact_1",
+    "amplification_exact_2",
 )
 
 #: Periods and dampings of 1 and 2, azimuth, participations.
@@ -37,8 +38,17 @@ Oscillators = tuple[
 ]
 
 
-class _Apart(NamedTuple):
-    """Largest relative displacement of 1 towards 2 and in either order, and radii at contact level, m."""
+class _WithoutContact(NamedTuple):
+    """
+    Response of pairs that do not touch, at contact level, each (n_pairs,), m.
+
+    Attributes
+    ----------
+    towards, either_way : ndarray
+        Largest relative displacement of 1 towards 2, and in either direction.
+    per_1, per_2 : ndarray
+        Pseudo energy radii.
+    """
 
     towards: FloatArray
     either_way: FloatArray
@@ -46,31 +56,37 @@ class _Apart(NamedTuple):
     per_2: FloatArray
 
 
-def furthest_azimuth(station: xr.Dataset, pairs: Table) -> FloatArray:
-    """Return, for pairs of unknown azimuth, the axis from 1 to 2 that the record makes worst, degrees."""
-    (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
+def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
+    """Return the axis from 1 to 2 along which the record demands the largest gap, degrees."""
+    period_1, period_2 = both(pairs, "period")
+    damping_1, damping_2 = both(pairs, "damping")
+    motion = station.north, station.east, station.dt
     shares = both(pairs, "participation")
-    return worst_azimuth(*components(station), period_1, damping_1, period_2, damping_2, *shares)
+    return worst_azimuth(*motion, period_1, damping_1, period_2, damping_2, *shares)
 
 
-def exact_decides(station: xr.Dataset, pairs: Table) -> NDArray[np.bool_]:
+def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     """
     Return for which pairs the exact demand is the demand.
 
     The record must hold both periods in its usable range and both horizontals; no period may be
     derived. The worst azimuth is known of linear buildings only: where one can yield, the pair's
     azimuth must be given.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record.
+    pairs : Table
+        Completed pairs.
     """
     periods = np.stack(both(pairs, "period"))
-    shortest, longest = (
-        number(station, "shortest_usable_period"),
-        number(station, "longest_usable_period"),
-    )
+    shortest, longest = station.usable_periods
     usable = ((periods >= shortest) & (periods <= longest)).all(axis=0)
+    # the worst azimuth of a bilinear pair is unknown
     directed = ~can_yield(pairs) | np.isfinite(values(pairs, "azimuth"))
-    decides: NDArray[np.bool_] = (
-        usable & directed & ~period_is_derived(pairs) & (station.sizes["horizontal"] == 2)
-    )
+    two_horizontals = station.horizontals == 2
+    decides: NDArray[np.bool_] = usable & directed & ~period_is_derived(pairs) & two_horizontals
     return decides
 
 
@@ -79,94 +95,117 @@ def can_yield(pairs: Table) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
 
 
-def exact_outcome(station: xr.Dataset, table: Table, azimuth: FloatArray) -> Columns:
+def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> Columns:
     """
-    Return the exact relative displacements and pounding histories of a block, as columns of the risk table.
+    Compute exact relative displacements and pounding histories of a block of pairs.
 
     Parameters
     ----------
-    station : Dataset
+    station : StationMotion
         The record.
     table : Table
         Completed pairs with their radii along the azimuth.
     azimuth : (n_pairs,) ndarray
         Of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
+
+    Returns
+    -------
+    dict of (n_pairs,) ndarray
+        ``EXACT_COLUMNS``, see ``columns.RESULTS``.
     """
-    north, east, dt = components(station)
-    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
-    (share_1, share_2), (mass_1, mass_2) = both(table, "participation"), both(table, "contact_mass")
-    (yield_1, yield_2), (hardening_1, hardening_2) = (
-        at_contact(table, "yield_displacement"),
-        both(table, "hardening"),
-    )
-    history = pounding_histories(
-        np.stack([north, east]),
-        dt,
+    history = _pounding_maxima(station, table, azimuth)
+    free = _without_contact(station, table, azimuth)
+    # impacts amplify the radius that the same oscillator has without contact
+    return {
+        "demand_exact": free.towards,
+        "demand_two_sided": free.either_way,
+        "impacts": history.impacts,
+        "impact_velocity_exact": history.impact_velocity,
+        "amplification_exact_1": _ratio(history.per[0], free.per_1),
+        "amplification_exact_2": _ratio(history.per[1], free.per_2),
+    }
+
+
+def no_outcome(count: int) -> Columns:
+    """Return ``EXACT_COLUMNS``, all empty, for a number of pairs."""
+    return {name: np.full(count, np.nan) for name in EXACT_COLUMNS}
+
+
+def _pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) -> PoundingMaxima:
+    """Return the maxima of the pounding histories, at contact level."""
+    period_1, period_2 = both(table, "period")
+    damping_1, damping_2 = both(table, "damping")
+    mass_1, mass_2 = both(table, "contact_mass")
+    share_1, share_2 = both(table, "participation")
+    yield_1, yield_2 = at_contact(table, "yield_displacement")
+    hardening_1, hardening_2 = both(table, "hardening")
+    # bilinear oscillators in order 1, 2; an infinite yield displacement is a linear one
+    return pounding_histories(
+        np.stack([station.north, station.east]),
+        station.dt,
         period_1,
         damping_1,
         mass_1,
         period_2,
         damping_2,
         mass_2,
-        values(table, "gap"),
-        values(table, "restitution"),
-        share_1,
-        share_2,
-        azimuth,
-        yield_1,
-        hardening_1,
-        yield_2,
-        hardening_2,
+        gap=values(table, "gap"),
+        restitution=values(table, "restitution"),
+        participation_1=share_1,
+        participation_2=share_2,
+        azimuth=azimuth,
+        yield_displacement_1=yield_1,
+        hardening_1=hardening_1,
+        yield_displacement_2=yield_2,
+        hardening_2=hardening_2,
     )
-    apart = _without_contact(station, table, azimuth)
-    return {
-        "demand_exact": apart.towards,
-        "demand_two_sided": apart.either_way,
-        "impacts": history.impacts,
-        "impact_velocity_exact": history.impact_velocity,
-        "amplification_exact_1": _ratio(history.per[0], apart.per_1),
-        "amplification_exact_2": _ratio(history.per[1], apart.per_2),
-    }
 
 
-def _without_contact(station: xr.Dataset, table: Table, azimuth: FloatArray) -> _Apart:
-    """Return what the record does to pairs that do not touch; those that cannot yield take the shorter way."""
-    north, east, dt = components(station)
-    apart = _Apart(*np.empty((2, azimuth.size)), *(one.copy() for one in at_contact(table, "per")))
+def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> _WithoutContact:
+    """Return the response of pairs that do not touch; linear pairs take the shorter computation."""
+    towards, either_way = np.empty((2, azimuth.size))
+    per_1, per_2 = at_contact(table, "per")
+    free = _WithoutContact(towards, either_way, per_1.copy(), per_2.copy())
     yields = can_yield(table)
     if not yields.all():
-        linear = directional_relative_displacement(
-            north, east, dt, *_oscillators(chosen(table, ~yields), azimuth[~yields])
-        )
-        apart.towards[~yields], apart.either_way[~yields] = linear.one_before_two, linear.largest
+        # linear: the radii are those of the table
+        oscillators = _oscillators(chosen(table, ~yields), azimuth[~yields])
+        motion = station.north, station.east, station.dt
+        linear = directional_relative_displacement(*motion, *oscillators)
+        free.towards[~yields] = linear.one_before_two
+        free.either_way[~yields] = linear.largest
     if yields.any():
-        bilinear = _bilinear(np.stack([north, east]), dt, chosen(table, yields), azimuth[yields])
-        apart.towards[yields], apart.either_way[yields] = bilinear.one_before_two, bilinear.largest
-        apart.per_1[yields], apart.per_2[yields] = bilinear.per
-    return apart
+        # bilinear: the radii are those of the yielding oscillators
+        bilinear = _bilinear(station, chosen(table, yields), azimuth[yields])
+        free.towards[yields] = bilinear.one_before_two
+        free.either_way[yields] = bilinear.largest
+        free.per_1[yields], free.per_2[yields] = bilinear.per
+    return free
 
 
 def _bilinear(
-    motion: FloatArray, dt: float, pairs: Table, azimuth: FloatArray
+    station: StationMotion, pairs: Table, azimuth: FloatArray
 ) -> YieldingRelativeDisplacement:
-    limits, slopes = at_contact(pairs, "yield_displacement"), both(pairs, "hardening")
-    strength = {f"yield_displacement_{i}": limit for i, limit in enumerate(limits, start=1)}
-    strength |= {f"hardening_{i}": slope for i, slope in enumerate(slopes, start=1)}
-    return yielding_relative_displacement(motion, dt, *_oscillators(pairs, azimuth), **strength)
+    """Return the relative displacement of pairs of which a building can yield."""
+    yield_1, yield_2 = at_contact(pairs, "yield_displacement")
+    hardening_1, hardening_2 = both(pairs, "hardening")
+    return yielding_relative_displacement(
+        np.stack([station.north, station.east]),
+        station.dt,
+        *_oscillators(pairs, azimuth),
+        yield_displacement_1=yield_1,
+        hardening_1=hardening_1,
+        yield_displacement_2=yield_2,
+        hardening_2=hardening_2,
+    )
 
 
 def _oscillators(pairs: Table, azimuth: FloatArray) -> Oscillators:
-    """Return periods and dampings, azimuth and participations in the order of relative displacements."""
-    (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
+    """Return the arguments of relative displacements: oscillators, azimuth and participations."""
+    period_1, period_2 = both(pairs, "period")
+    damping_1, damping_2 = both(pairs, "damping")
     share_1, share_2 = both(pairs, "participation")
     return period_1, damping_1, period_2, damping_2, azimuth, share_1, share_2
-
-
-def no_outcome(count: int) -> Columns:
-    """Return the columns of :func:`exact_outcome`, all empty, for so many pairs."""
-    names = ("demand_exact", "demand_two_sided", "impacts", "impact_velocity_exact", "amplification_exact_1",
-             "amplification_exact_2")  # fmt: skip
-    return {name: np.full(count, np.nan) for name in names}
 
 
 def _ratio(after: FloatArray, before: FloatArray) -> FloatArray:

@@ -1,5 +1,5 @@
 """
-The ground motion that a pair of buildings is given: radii of both along one azimuth, and their correlation.
+Radii of both buildings of a pair along common azimuths, and the correlation of their responses.
 
 Every array has the shape (n_pairs, n_azimuths): one azimuth where the pair's is given or the
 station has a single horizontal, else every degree of the half circle, from which the pair's worst
@@ -9,11 +9,11 @@ is chosen by its demand. Both buildings are always driven along the same azimuth
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation.azimuths import directional_correlation
-from per_obspy.screening.values import Table, both, components
+from per_obspy.screening.by_record.station_motion import StationMotion
+from per_obspy.screening.values import Table, both
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
 from per_obspy.spectra.per_pair import azimuth_maxima
 
@@ -23,7 +23,7 @@ EVERY_AZIMUTH = np.arange(180.0)
 
 class PairMotion(NamedTuple):
     """
-    What a record does to pairs of buildings, (n_pairs, n_azimuths).
+    Response of pairs of buildings to a record, (n_pairs, n_azimuths).
 
     Attributes
     ----------
@@ -42,43 +42,48 @@ class PairMotion(NamedTuple):
     correlation: FloatArray
 
 
-def motion_along_azimuths(station: xr.Dataset, pairs: Table, azimuth: FloatArray) -> PairMotion:
-    """Return the motion along one azimuth a pair, (n_pairs,), degrees."""
-    return _along(*components(station), pairs, azimuth)
+def motion_along_azimuths(station: StationMotion, pairs: Table, azimuth: FloatArray) -> PairMotion:
+    """
+    Compute the motion along one azimuth per pair.
 
-
-def motion_of_one_horizontal(station: xr.Dataset, pairs: Table) -> PairMotion:
-    """Return the motion along the only horizontal of a station, whatever the pairs' azimuths."""
-    motion = _along(*components(station), pairs, np.zeros(len(pairs["azimuth"])))
-    return motion._replace(
-        azimuth=np.full_like(motion.azimuth, float(station["horizontal_azimuth"][0]))
-    )
-
-
-def motion_along_every_azimuth(station: xr.Dataset, pairs: Table) -> PairMotion:
-    """Return the motion along every degree of the half circle, for pairs whose azimuth is unknown."""
-    north, east, dt = components(station)
-    radii = [_every_radius(north, east, dt, *oscillator) for oscillator in _oscillators(pairs)]
-    return PairMotion(
-        azimuth=np.broadcast_to(EVERY_AZIMUTH, radii[0][0].shape),
-        per=(radii[0][0], radii[1][0]),
-        sd=(radii[0][1], radii[1][1]),
-        correlation=_correlation(north, east, dt, pairs, EVERY_AZIMUTH[None, :]),
-    )
-
-
-def _along(
-    north: FloatArray, east: FloatArray, dt: float, pairs: Table, azimuth: FloatArray
-) -> PairMotion:
-    (per_1, sd_1), (per_2, sd_2) = (
-        azimuth_maxima(north, east, dt, period, damping, azimuth)
-        for period, damping in _oscillators(pairs)
-    )
+    Parameters
+    ----------
+    station : StationMotion
+        The record.
+    pairs : Table
+        With periods and dampings of both buildings.
+    azimuth : (n_pairs,) ndarray
+        Degrees clockwise from north.
+    """
+    motion = station.north, station.east, station.dt
+    (period_1, damping_1), (period_2, damping_2) = _oscillators(pairs)
+    per_1, sd_1 = azimuth_maxima(*motion, period_1, damping_1, azimuth)
+    per_2, sd_2 = azimuth_maxima(*motion, period_2, damping_2, azimuth)
+    # every pair has one azimuth: arrays (n_pairs, 1)
     return PairMotion(
         azimuth=azimuth[:, None],
         per=(per_1[:, None], per_2[:, None]),
         sd=(sd_1[:, None], sd_2[:, None]),
-        correlation=_correlation(north, east, dt, pairs, azimuth[:, None]),
+        correlation=_correlation(station, pairs, azimuth[:, None]),
+    )
+
+
+def motion_of_one_horizontal(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along the only horizontal of a station, whatever the pairs' azimuths."""
+    motion = motion_along_azimuths(station, pairs, np.zeros(len(pairs["azimuth"])))
+    return motion._replace(azimuth=np.full_like(motion.azimuth, station.sensor_azimuth))
+
+
+def motion_along_every_azimuth(station: StationMotion, pairs: Table) -> PairMotion:
+    """Compute the motion along every degree of the half circle, for pairs of unknown azimuth."""
+    oscillators_1, oscillators_2 = _oscillators(pairs)
+    per_1, sd_1 = _every_radius(station, *oscillators_1)
+    per_2, sd_2 = _every_radius(station, *oscillators_2)
+    return PairMotion(
+        azimuth=np.broadcast_to(EVERY_AZIMUTH, per_1.shape),
+        per=(per_1, per_2),
+        sd=(sd_1, sd_2),
+        correlation=_correlation(station, pairs, EVERY_AZIMUTH[None, :]),
     )
 
 
@@ -87,25 +92,24 @@ def _oscillators(pairs: Table) -> list[tuple[FloatArray, FloatArray]]:
     return list(zip(both(pairs, "period"), both(pairs, "damping"), strict=True))
 
 
-def _correlation(
-    north: FloatArray, east: FloatArray, dt: float, pairs: Table, azimuths: FloatArray
-) -> FloatArray:
+def _correlation(station: StationMotion, pairs: Table, azimuths: FloatArray) -> FloatArray:
+    """Return the correlation of both responses along azimuths (n_pairs or 1, n_azimuths)."""
     first, second = _oscillators(pairs)
-    return directional_correlation(north, east, dt, *first, *second, azimuths)
+    motion = station.north, station.east, station.dt
+    return directional_correlation(*motion, *first, *second, azimuths)
 
 
 def _every_radius(
-    north: FloatArray, east: FloatArray, dt: float, periods: FloatArray, dampings: FloatArray
+    station: StationMotion, periods: FloatArray, dampings: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return PER and SD along every azimuth, (n, 180); equal oscillators are computed once."""
+    motion = station.north, station.east, station.dt
     per, sd = np.empty((2, periods.size, EVERY_AZIMUTH.size))
     for damping in np.unique(dampings):
-        chosen = np.flatnonzero(dampings == damping)
-        distinct, position = np.unique(periods[chosen], return_inverse=True)
-        per[chosen] = azimuthal_per_spectrum(north, east, dt, distinct, damping, EVERY_AZIMUTH)[
-            position
-        ]
-        sd[chosen] = azimuthal_sd_spectrum(north, east, dt, distinct, damping, EVERY_AZIMUTH)[
-            position
-        ]
+        damped = np.flatnonzero(dampings == damping)
+        # one spectrum of the distinct periods serves all oscillators of this damping
+        distinct, position = np.unique(periods[damped], return_inverse=True)
+        spectrum = distinct, damping, EVERY_AZIMUTH
+        per[damped] = azimuthal_per_spectrum(*motion, *spectrum)[position]
+        sd[damped] = azimuthal_sd_spectrum(*motion, *spectrum)[position]
     return per, sd

@@ -1,5 +1,5 @@
 """
-The estimated demand of pairs in which a building yields.
+Estimated demand of pairs in which a building yields, by equivalent linear buildings.
 
 A building whose displacement exceeds its yield displacement is replaced by an equivalent linear one
 (Iwan 1980) at its own ductility. This is the largest ductility up to 40 at which the equivalent
@@ -8,14 +8,13 @@ several, and the first one is far too small where yielding takes its period into
 the ground. It is found on the station's stored spectra, scaled to the building's own SD,
 interpolated in period and damping. PER at the equivalent period and damping, from the stored
 spectra too, and eq. (16) at the equivalent properties give the critical gap. Yielding raises the
-correlation under broad ground motion; under narrow one eq. (16) then makes too much of it, so that
-the smaller of the elastic and the equivalent correlation is used.
+correlation under broad ground motion; under narrow one eq. (16) then overestimates it, so that the
+smaller of the elastic and the equivalent correlation is used.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
@@ -23,24 +22,23 @@ from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.yielding.equivalent_linear import iwan
 from per_obspy.pounding.yielding.linearization import NARROW, record_bandwidth
+from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import (
     LogSpectra,
-    azimuth_row,
     log_period_and_damping,
-    log_spectra,
     stored_log,
 )
-from per_obspy.screening.values import Columns, Table, both, chosen, components, values
+from per_obspy.screening.values import Columns, Table, both, chosen, values
 
-#: Ductilities that are tried; between two of them so many more.
+#: Ductilities of the coarse scan, and the parts into which one of its intervals is divided.
 DUCTILITIES: FloatArray = np.geomspace(1.0, 40.0, 97)
 PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
 
-#: What yielding adds to a building's damping ends here: an oscillator has less than the critical
-#: one.
+#: Largest damping that yielding takes a building to, fraction of critical: an oscillator has less
+#: than the critical damping.
 LARGEST_DAMPING = 0.99
 
-#: What an equivalent building has of its own.
+#: Properties of a building that its equivalent linear one has of its own.
 EQUIVALENT = ("period", "damping", "per")
 
 
@@ -65,13 +63,30 @@ class Equivalent(NamedTuple):
     converged: NDArray[np.bool_]
 
 
-def linearized_columns(station: xr.Dataset, table: Table) -> Columns:
+class _Building(NamedTuple):
+    """Buildings of one side: row of the stored azimuth, period (s), damping (of critical)."""
+
+    row: NDArray[np.intp]
+    period: FloatArray
+    damping: FloatArray
+
+
+class _Bracket(NamedTuple):
+    """Two ductilities (n_pairs, 1) around the last zero of the excess, and the excess there."""
+
+    low: FloatArray
+    high: FloatArray
+    excess_low: FloatArray
+    excess_high: FloatArray
+
+
+def linearized_columns(station: StationMotion, table: Table) -> Columns:
     """
-    Return the estimated demand of equivalent linear buildings, as columns of the risk table.
+    Compute the estimated demand of equivalent linear buildings, as columns of the risk table.
 
     Parameters
     ----------
-    station : Dataset
+    station : StationMotion
         The record, with its stored spectra.
     table : Table
         Completed pairs with ``azimuth_used``, radii and correlation along it, and
@@ -90,42 +105,47 @@ def linearized_columns(station: xr.Dataset, table: Table) -> Columns:
     Iwan (1980), Earthquake Engineering and Structural Dynamics 8; Valles-Mattox & Reinhorn (1996),
     11WCEE, eq. (15), (16).
     """
-    ductility = [_elastic_ductility(table, i) for i in (1, 2)]
+    columns = _elastic_columns(table)
+    # pairs of which a building is taken beyond its yield displacement, and that move at all
+    ductility = np.maximum(columns["ductility_1"], columns["ductility_2"])
+    yields = (ductility > 1.0) & (values(table, "absolute_gap") > 0)
+    if yields.any():
+        for name, column in _yielding_columns(station, chosen(table, yields)).items():
+            columns[name][yields] = column
+    return columns
+
+
+def _elastic_columns(table: Table) -> Columns:
+    """Return the columns of pairs that stay elastic."""
     columns: Columns = {
         "critical_gap_linearized": values(table, "critical_gap_per").copy(),
         "correlation_linearized": values(table, "correlation").copy(),
-        **{f"ductility_{i}": ductility[i - 1] for i in (1, 2)},
-        **{
-            f"equivalent_{name}_{i}": values(table, f"{name}_{i}").copy()
-            for name in EQUIVALENT
-            for i in (1, 2)
-        },
-        "linearized_converged": np.ones(len(ductility[0]), dtype=bool),
     }
-    yields = (np.maximum(*ductility) > 1.0) & (values(table, "absolute_gap") > 0)
-    if yields.any():
-        for name, found in _of_yielding(station, chosen(table, yields)).items():
-            columns[name][yields] = found
+    for i in (1, 2):
+        columns[f"ductility_{i}"] = _elastic_ductility(table, i)
+    # equivalent buildings are the elastic ones
+    for name in EQUIVALENT:
+        for i in (1, 2):
+            columns[f"equivalent_{name}_{i}"] = values(table, f"{name}_{i}").copy()
+    columns["linearized_converged"] = np.ones(len(columns["ductility_1"]), dtype=bool)
     return columns
 
 
 def _elastic_ductility(table: Table, i: int) -> FloatArray:
+    """Return the elastic over the yield displacement of building i."""
     return values(table, f"sd_{i}") / values(table, f"yield_displacement_{i}")
 
 
-def _of_yielding(station: xr.Dataset, table: Table) -> Columns:
+def _yielding_columns(station: StationMotion, table: Table) -> Columns:
     """Return the columns of pairs in which a building yields."""
-    spectra = log_spectra(station, "sd"), log_spectra(station, "per")
-    row = azimuth_row(station, table)
-    first, second = (_equivalent(*spectra, row, table, i) for i in (1, 2))
-    correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
-    if record_bandwidth(*components(station)) < NARROW:
-        correlation = np.minimum(correlation, values(table, "correlation"))
+    row = nearest_azimuth(station, table)
+    first, second = (_equivalent(station, row, table, i) for i in (1, 2))
+    correlation = _equivalent_correlation(station, table, first, second)
+    # eq. (15) with the PER of the equivalent buildings at contact level
     share_1, share_2 = both(table, "participation")
+    radii = share_1 * first.per, share_2 * second.per
     columns: Columns = {
-        "critical_gap_linearized": critical_gap(
-            share_1 * first.per, share_2 * second.per, correlation
-        ),
+        "critical_gap_linearized": critical_gap(*radii, correlation),
         "correlation_linearized": correlation,
         "linearized_converged": first.converged & second.converged,
     }
@@ -137,75 +157,81 @@ def _of_yielding(station: xr.Dataset, table: Table) -> Columns:
     return columns
 
 
-def _equivalent(
-    sd: LogSpectra, per: LogSpectra, row: NDArray[np.intp], table: Table, i: int
-) -> Equivalent:
+def _equivalent_correlation(
+    station: StationMotion, table: Table, first: Equivalent, second: Equivalent
+) -> FloatArray:
+    """Return eq. (16) of the equivalent buildings; in narrow motion not above the elastic one."""
+    correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
+    if record_bandwidth(station.north, station.east, station.dt) < NARROW:
+        return np.minimum(correlation, values(table, "correlation"))
+    return correlation
+
+
+def _equivalent(station: StationMotion, row: NDArray[np.intp], table: Table, i: int) -> Equivalent:
     """Return the equivalent linear buildings i; those that stay elastic as they are."""
-    elastic, period, damping = (
-        _elastic_ductility(table, i),
-        values(table, f"period_{i}"),
-        values(table, f"damping_{i}"),
-    )
+    elastic = _elastic_ductility(table, i)
+    period, damping = values(table, f"period_{i}"), values(table, f"damping_{i}")
     yields = elastic > 1.0
-    own = _Building(row[yields], period[yields], damping[yields])
+    yielding = _Building(row[yields], period[yields], damping[yields])
+    # ductility on the stored SD
     ductility, converged = elastic.copy(), np.ones(elastic.size, dtype=bool)
-    ductility[yields], converged[yields] = _largest_ductility(sd, own, elastic[yields])
-    longer, more = iwan(np.maximum(ductility, 1.0), 0.0)
-    damped = np.maximum(damping, np.minimum(damping + more, LARGEST_DAMPING))
+    found = _largest_ductility(station.sd, yielding, elastic[yields])
+    ductility[yields], converged[yields] = found
+    # longer period and added damping of Iwan (1980) at that ductility
+    longer, added = iwan(np.maximum(ductility, 1.0), 0.0)
+    damped = np.maximum(damping, np.minimum(damping + added, LARGEST_DAMPING))
+    # PER changes as the stored spectrum does
     radius = values(table, f"per_{i}").copy()
-    radius[yields] *= _change(per, own, ductility[yields, None])[:, 0]
+    radius[yields] *= _change(station.per, yielding, ductility[yields, None])[:, 0]
     return Equivalent(ductility, period * longer, damped, radius, converged)
 
 
-class _Building(NamedTuple):
-    """Buildings of the same side: row of the stored azimuth, period (s), damping (fraction of critical)."""
-
-    row: NDArray[np.intp]
-    period: FloatArray
-    damping: FloatArray
-
-
 def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> FloatArray:
-    """Return the radius of the equivalent building over that of the elastic one at ductilities (n_pairs, n)."""
-    row, period, damping = (
-        building.row[:, None],
-        building.period[:, None],
-        building.damping[:, None],
-    )
-    longer, more = iwan(ductility, 0.0)
-    equivalent = stored_log(spectra, row, *log_period_and_damping(period * longer, damping + more))
-    elastic = stored_log(spectra, row, *log_period_and_damping(period, damping))
+    """Return the equivalent over the elastic radius at ductilities (n_pairs, n)."""
+    row = building.row[:, None]
+    period, damping = building.period[:, None], building.damping[:, None]
+    # the oscillator at each ductility, and the elastic one
+    longer, added = iwan(ductility, 0.0)
+    at_ductility = log_period_and_damping(period * longer, damping + added)
+    at_rest = log_period_and_damping(period, damping)
+    equivalent = stored_log(spectra, row, *at_ductility)
+    elastic = stored_log(spectra, row, *at_rest)
     return np.asarray(np.exp(equivalent - elastic))
 
 
 def _largest_ductility(
     sd: LogSpectra, building: _Building, elastic: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the ductility above which the displacement no longer exceeds it, and whether that is in reach."""
+    """Return the ductility above which none is exceeded by the displacement, and if it is found."""
 
     def excess(ductility: FloatArray) -> FloatArray:
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
 
-    tried = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
-    over = excess(tried)
-    (low, high), _ = _around(tried, over)
-    finer = low + PARTS * (high - low)
-    (low, high), (before, beyond) = _around(finer, excess(finer))
+    # coarse scan, then a finer one of its last interval with a change of sign
+    scanned = np.broadcast_to(DUCTILITIES, (elastic.size, DUCTILITIES.size))
+    over = excess(scanned)
+    coarse = _last_bracket(scanned, over)
+    finer = coarse.low + PARTS * (coarse.high - coarse.low)
+    fine = _last_bracket(finer, excess(finer))
+    # linear interpolation between the two ends
+    crosses = fine.excess_low > np.maximum(fine.excess_high, 0.0)
     part = np.divide(
-        before, before - beyond, out=np.zeros_like(before), where=before > np.maximum(beyond, 0.0)
+        fine.excess_low,
+        fine.excess_low - fine.excess_high,
+        out=np.zeros_like(fine.excess_low),
+        where=crosses,
     )
+    ductility = (fine.low + part * (fine.high - fine.low))[:, 0]
     converged = np.asarray(over[:, -1] <= 0.0)
-    return np.where(converged, (low + part * (high - low))[:, 0], DUCTILITIES[-1]), converged
+    return np.where(converged, ductility, DUCTILITIES[-1]), converged
 
 
-def _around(
-    tried: FloatArray, excess: FloatArray
-) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """Return the last ductility with an excess and the next one, at the ends the nearest two, and the excess there."""
-    lasting = excess > 0.0
-    lasting[:, 0], lasting[:, -1] = True, False
-    last = (excess.shape[1] - 1 - lasting[:, ::-1].argmax(axis=1))[:, None]
-    places = last, last + 1
-    return tuple(np.take_along_axis(tried, place, axis=1) for place in places), tuple(
-        np.take_along_axis(excess, place, axis=1) for place in places
-    )
+def _last_bracket(ductility: FloatArray, excess: FloatArray) -> _Bracket:
+    """Return the last ductility with an excess and the next one; at the ends the nearest two."""
+    positive = excess > 0.0
+    # an interval exists whatever the signs at both ends
+    positive[:, 0], positive[:, -1] = True, False
+    last = (excess.shape[1] - 1 - positive[:, ::-1].argmax(axis=1))[:, None]
+    low, high = np.take_along_axis(ductility, last, 1), np.take_along_axis(ductility, last + 1, 1)
+    excess_low = np.take_along_axis(excess, last, 1)
+    return _Bracket(low, high, excess_low, np.take_along_axis(excess, last + 1, 1))

@@ -1,8 +1,9 @@
 """
-Pairs judged by the spectral displacement of both buildings, where there is no record: rungs 2 and 3 of the ladder.
+Demand of pairs by the spectral displacement of both buildings, without a record.
 
-There is no PER in a spectrum: the radius is the spectral displacement, because the gap from it and
-eq. (16) is the one that is known to be closest to the exact one (see ``design_probability.py``).
+These are rungs 2 and 3 of the ladder of demands. There is no PER in a spectrum: the radius is the
+spectral displacement, because the gap from it and eq. (16) is the one that is known to be closest
+to the exact one (see ``SD_MEDIAN`` in ``uncertainty/probability.py``).
 """
 
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
-from per_obspy.pounding.single_hit import single_hit
+from per_obspy.pounding.single_hit import SingleHit, single_hit
 from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.flags import period_is_derived
@@ -28,7 +29,7 @@ Both = tuple[FloatArray, FloatArray]
 
 class SpectralDemand(NamedTuple):
     """
-    What spectral displacements ask of pairs at contact height, (n_pairs,).
+    Demand of spectral displacements on pairs at contact height, (n_pairs,).
 
     Attributes
     ----------
@@ -52,7 +53,7 @@ class SpectralDemand(NamedTuple):
 
 def spectral_demand(pairs: pd.DataFrame, displacement: Both) -> SpectralDemand:
     """
-    Return what the displacements of both oscillators ask of completed pairs.
+    Compute the demand of the displacements of both oscillators on completed pairs.
 
     Parameters
     ----------
@@ -63,7 +64,9 @@ def spectral_demand(pairs: pd.DataFrame, displacement: Both) -> SpectralDemand:
     """
     share_1, share_2 = both(pairs, "participation")
     radii = share_1 * displacement[0], share_2 * displacement[1]
-    (period_1, period_2), (damping_1, damping_2) = both(pairs, "period"), both(pairs, "damping")
+    period_1, period_2 = both(pairs, "period")
+    damping_1, damping_2 = both(pairs, "damping")
+    # eq. (15) with the correlation of eq. (16), and without correlation
     correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
     by_correlation, by_squares = critical_gap(*radii, correlation), srss_gap(*radii)
     squares_decide = period_is_derived(pairs) & (by_squares > by_correlation)
@@ -71,40 +74,57 @@ def spectral_demand(pairs: pd.DataFrame, displacement: Both) -> SpectralDemand:
     return SpectralDemand(radii, correlation, by_correlation, by_squares, demand, squares_decide)
 
 
-def spectral_verdict(
+def spectral_columns(
     pairs: pd.DataFrame,
     displacement: Both,
-    asked: SpectralDemand,
+    demand: SpectralDemand,
     probability: FloatArray,
     screening: Screening,
 ) -> pd.DataFrame:
-    """Return the pairs with the estimates, the single hit, state, class and code rules; not ranked yet."""
-    gap, demand = values(pairs, "gap"), asked.demand
-    ratio = demand_ratio(gap, demand)
+    """
+    Return the pairs with estimates, single hit, state, class and code rules; not ranked yet.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        Completed pairs.
+    displacement : pair of (n_pairs,) ndarray
+        SD of the oscillators, m.
+    demand : SpectralDemand
+        Of the same pairs.
+    probability : (n_pairs,) ndarray
+        Of pounding.
+    screening : Screening
+        Thresholds, risk classes and the region's values for code rules.
+    """
+    gap = values(pairs, "gap")
+    # possible: likely enough, or an assumed period could turn a no into a yes
+    ratio = demand_ratio(gap, demand.demand)
     possible = period_is_derived(pairs) | (probability >= screening.possible_from)
-    hit = single_hit(
-        *asked.radii,
-        *both(pairs, "period"),
-        *both(pairs, "contact_mass"),
-        values(pairs, "restitution"),
-        demand,
-        gap,
-    )
+    hit = _single_hit(pairs, demand)
+    # radii and gaps of SD, then the state
     columns: dict[str, NDArray[np.generic]] = {
         "sd_1": displacement[0],
         "sd_2": displacement[1],
-        "correlation": asked.correlation,
-        "critical_gap_sd": asked.by_correlation,
-        "srss_gap_sd": asked.by_squares,
-        "absolute_gap_sd": absolute_gap(*asked.radii),
-        "demand": demand,
+        "correlation": demand.correlation,
+        "critical_gap_sd": demand.by_correlation,
+        "srss_gap_sd": demand.by_squares,
+        "absolute_gap_sd": absolute_gap(*demand.radii),
+        "demand": demand.demand,
         "demand_ratio": ratio,
         "probability": probability,
-        "state": pounding_state(gap, demand, possible),
+        "state": pounding_state(gap, demand.demand, possible),
         "risk_class": risk_class(ratio, screening.classes),
         "single_hit_status": hit.status,
         "impact_velocity": hit.impact_velocity,
         "amplification_1": hit.amplification_1,
         "amplification_2": hit.amplification_2,
     }
-    return pairs.assign(**columns).join(code_columns(pairs, *asked.radii, screening.codes))
+    return pairs.assign(**columns).join(code_columns(pairs, *demand.radii, screening.codes))
+
+
+def _single_hit(pairs: pd.DataFrame, demand: SpectralDemand) -> SingleHit:
+    """Return the single hit at the radii and the critical gap of the demand."""
+    periods, masses = both(pairs, "period"), both(pairs, "contact_mass")
+    restitution, gap = values(pairs, "restitution"), values(pairs, "gap")
+    return single_hit(*demand.radii, *periods, *masses, restitution, demand.demand, gap)

@@ -1,4 +1,4 @@
-"""A design or user spectrum: displacement by period and damping, given instead of a record."""
+"""Design or user spectrum: displacement by period and damping, given instead of a record."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class DesignSpectrum(NamedTuple):
     Attributes
     ----------
     name : str
-        Where it comes from.
+        File of the spectrum.
     periods : (n_periods,) ndarray
         s, rising.
     dampings : (n_dampings,) ndarray
@@ -54,8 +54,8 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
     ----------
     path : str or Path
         CSV with the columns ``period`` (s), ``damping`` (fraction of critical) and either ``sd``
-        (m) or ``psa`` (pseudo-acceleration, m/s2), one row a value in any order; every damping has
-        the same periods. Lines that start with # are comments.
+        (m) or ``psa`` (pseudo-acceleration, m/s2), one row per value in any order; every damping
+        has the same periods. Lines that start with # are comments.
 
     Raises
     ------
@@ -66,22 +66,13 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
     source = str(path)
     table = _read(source)
     quantity = _quantity(table, source)
-    values = {name: _positive(table, name, source) for name in ("period", "damping", quantity)}
-    grid = pd.DataFrame(values)
-    if grid.duplicated(["period", "damping"]).any():
-        first = grid[grid.duplicated(["period", "damping"])].iloc[0]
-        raise CatalogError(
-            source, f"period = {first['period']:g}, damping = {first['damping']:g} stands twice"
-        )
-    full = grid.pivot(index="damping", columns="period", values=quantity)
-    if full.isna().any(axis=None) or full.shape[1] < 2:
-        raise CatalogError(source, "every damping needs the same periods, at least two")
-    periods, dampings = full.columns.to_numpy(np.float64), full.index.to_numpy(np.float64)
-    factor = (periods / (2.0 * np.pi)) ** 2 if quantity == "psa" else 1.0
-    return DesignSpectrum(source, periods, dampings, full.to_numpy() * factor)
+    names = ("period", "damping", quantity)
+    rows = pd.DataFrame({name: _positive(table, name, source) for name in names})
+    return _on_grid(rows, quantity, source)
 
 
 def _read(source: str) -> pd.DataFrame:
+    """Return the table of a CSV file as it is."""
     try:
         check_text(Path(source))
         table = pd.read_csv(source, comment="#", skipinitialspace=True)
@@ -104,42 +95,58 @@ def _quantity(table: pd.DataFrame, source: str) -> str:
 
 
 def _positive(table: pd.DataFrame, name: str, source: str) -> FloatArray:
-    """Return a column of plausible numbers above zero; rows are counted without the header and comments."""
+    """Return a column of plausible positive numbers; rows count without header and comments."""
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64)
     if not values.size:
         raise CatalogError(source, "has no row")
     largest, unit = LARGEST[name]
-    for bad, reason in (
-        (~(values > 0.0), "must be a positive number"),
-        (values > largest, "in other units?"),
-    ):
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise CatalogError(
-                source, f"{name} = {table[name].iloc[row]} {unit} in row {row + 1}: {reason}"
-            )
+    faults = {"must be a positive number": ~(values > 0.0), "in other units?": values > largest}
+    # the first row with a fault is named with its text
+    for reason, faulty in faults.items():
+        if faulty.any():
+            row = int(np.argmax(faulty))
+            text = f"{table[name].iloc[row]} {unit}"
+            raise CatalogError(source, f"{name} = {text} in row {row + 1}: {reason}")
     return values
 
 
+def _on_grid(rows: pd.DataFrame, quantity: str, source: str) -> DesignSpectrum:
+    """Return rows of period, damping and a quantity as a spectrum on a full grid."""
+    repeated = rows[rows.duplicated(["period", "damping"])]
+    if len(repeated):
+        first = repeated.iloc[0]
+        place = f"period = {first['period']:g}, damping = {first['damping']:g}"
+        raise CatalogError(source, f"{place} stands twice")
+    grid = rows.pivot(index="damping", columns="period", values=quantity)
+    if grid.isna().any(axis=None) or grid.shape[1] < 2:
+        raise CatalogError(source, "every damping needs the same periods, at least two")
+    # SD = PSA (T / 2 pi)^2
+    periods, dampings = grid.columns.to_numpy(np.float64), grid.index.to_numpy(np.float64)
+    factor = (periods / (2.0 * np.pi)) ** 2 if quantity == "psa" else 1.0
+    return DesignSpectrum(source, periods, dampings, grid.to_numpy() * factor)
+
+
 def within(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayLike) -> NDArray[np.bool_]:
-    """Return where the spectrum tells of an oscillator: inside its periods and its dampings, ends included."""
-    period, damping = (
-        checks.positive("period", period),
-        checks.fraction_of_critical("damping", damping),
-    )
+    """
+    Return where oscillators are inside the periods and the dampings of a spectrum, ends included.
+
+    Parameters
+    ----------
+    spectrum : DesignSpectrum
+        On its grid.
+    period, damping : array_like
+        s; fraction of critical.
+    """
+    period = checks.positive("period", period)
+    damping = checks.fraction_of_critical("damping", damping)
     periods, dampings = spectrum.periods, spectrum.dampings
-    inside = (
-        (period >= periods[0])
-        & (period <= periods[-1])
-        & (damping >= dampings[0])
-        & (damping <= dampings[-1])
-    )
-    return np.asarray(inside)
+    inside_periods = (period >= periods[0]) & (period <= periods[-1])
+    return np.asarray(inside_periods & (damping >= dampings[0]) & (damping <= dampings[-1]))
 
 
 def displacement_at(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayLike) -> FloatArray:
     """
-    Return the spectral displacement of oscillators.
+    Interpolate the spectral displacement of oscillators.
 
     Parameters
     ----------
@@ -157,27 +164,60 @@ def displacement_at(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayL
     Raises
     ------
     ValueError
-        If an oscillator is outside the grid: nothing is extrapolated.
+        If an oscillator is outside the grid: values are not extrapolated.
     """
-    natural, fraction = (
-        np.atleast_1d(np.asarray(period, np.float64)),
-        np.atleast_1d(np.asarray(damping, np.float64)),
-    )
-    inside = within(spectrum, natural, fraction)
+    period = np.atleast_1d(np.asarray(period, np.float64))
+    damping = np.atleast_1d(np.asarray(damping, np.float64))
+    inside = within(spectrum, period, damping)
     if not inside.all():
-        where = int(np.argmin(inside))
-        raise ValueError(
-            f"period and damping must be inside the spectrum, got {natural[where]:g} s and {fraction[where]:g}"
-        )
-    logs = np.log(spectrum.sd)
-    curves = np.array([np.interp(np.log(natural), np.log(spectrum.periods), row) for row in logs])
-    last = spectrum.dampings.size - 1
-    upper = np.clip(np.searchsorted(spectrum.dampings, fraction), min(1, last), last)
-    lower = np.maximum(upper - 1, 0)
-    low, high = np.log(spectrum.dampings)[lower], np.log(spectrum.dampings)[upper]
-    share = np.divide(np.log(fraction) - low, high - low, out=np.zeros_like(low), where=high > low)
-    column = np.arange(natural.size)
+        outside = int(np.argmin(inside))
+        values = f"{period[outside]:g} s and {damping[outside]:g}"
+        raise ValueError(f"period and damping must be inside the spectrum, got {values}")
+    # along the period at every damping of the grid
+    log_sd, log_periods = np.log(spectrum.sd), np.log(spectrum.periods)
+    curves = np.array([np.interp(np.log(period), log_periods, row) for row in log_sd])
+    # then from the damping below to the one above
+    lower, upper, share = _damping_cell(spectrum.dampings, damping)
+    column = np.arange(period.size)
     result: FloatArray = np.exp(
         (1.0 - share) * curves[lower, column] + share * curves[upper, column]
     )
     return result
+
+
+def clipped_displacement(
+    spectrum: DesignSpectrum, period: FloatArray, damping: FloatArray
+) -> FloatArray:
+    """
+    Interpolate the spectral displacement of oscillators; beyond the grid the value at its edge.
+
+    Parameters
+    ----------
+    spectrum : DesignSpectrum
+        On its grid.
+    period, damping : (n,) ndarray
+        s; fraction of critical.
+
+    Returns
+    -------
+    displacement : (n,) ndarray
+        m.
+    """
+    return displacement_at(
+        spectrum,
+        np.clip(period, spectrum.periods[0], spectrum.periods[-1]),
+        np.clip(damping, spectrum.dampings[0], spectrum.dampings[-1]),
+    )
+
+
+def _damping_cell(
+    dampings: FloatArray, damping: FloatArray
+) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
+    """Return the rows of the dampings below and above, and the share of the way in logarithms."""
+    last = dampings.size - 1
+    upper = np.clip(np.searchsorted(dampings, damping), min(1, last), last)
+    lower = np.maximum(upper - 1, 0)
+    low, high = np.log(dampings)[lower], np.log(dampings)[upper]
+    # a single damping serves itself only
+    share = np.divide(np.log(damping) - low, high - low, out=np.zeros_like(low), where=high > low)
+    return lower, upper, share

@@ -1,5 +1,5 @@
 """
-Screening by a design or user spectrum: demands and code rules without a record.
+Table of a screening by a design or user spectrum: demands and code rules without a record.
 
 There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral
 displacement. On broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact
@@ -7,6 +7,8 @@ one, a log-standard deviation of 0.14, and is too small in two of three cases. A
 yes; the probability, which knows of that error, makes others possible, and derived periods ask for
 SRSS at least.
 """
+
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -16,13 +18,18 @@ from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.by_spectrum.demand import spectral_demand, spectral_verdict
-from per_obspy.screening.by_spectrum.design_probability import design_probability
-from per_obspy.screening.by_spectrum.design_spectrum import DesignSpectrum, displacement_at, within
+from per_obspy.screening.by_spectrum.demand import spectral_columns, spectral_demand
+from per_obspy.screening.by_spectrum.design_spectrum import (
+    DesignSpectrum,
+    clipped_displacement,
+    displacement_at,
+    within,
+)
 from per_obspy.screening.ranking import worst_first
-from per_obspy.screening.values import both
+from per_obspy.screening.uncertainty.probability import design_probability
+from per_obspy.screening.values import both, values
 
-#: What this table adds to the columns that a risk table has as well.
+#: Columns of this table besides those that a risk table has as well.
 DESIGN: dict[str, Column] = {
     column.name: column
     for column in (
@@ -47,17 +54,34 @@ DESIGN: dict[str, Column] = {
 }
 
 LEADING = (
-    "rank", "pair_id", "risk_class", "state", "probability", "gap", "demand", "demand_rule", "demand_ratio",
-    "impact_velocity", "single_hit_status", "amplification_1", "amplification_2", "spectrum", "sd_1", "sd_2",
-    "correlation", "critical_gap_sd", "srss_gap_sd", "absolute_gap_sd",
-)  # fmt: skip
+    "rank",
+    "pair_id",
+    "risk_class",
+    "state",
+    "probability",
+    "gap",
+    "demand",
+    "demand_rule",
+    "demand_ratio",
+    "impact_velocity",
+    "single_hit_status",
+    "amplification_1",
+    "amplification_2",
+    "spectrum",
+    "sd_1",
+    "sd_2",
+    "correlation",
+    "critical_gap_sd",
+    "srss_gap_sd",
+    "absolute_gap_sd",
+)
 
 
 def design_table(
     spectrum: DesignSpectrum, pairs: pd.DataFrame, building: Building, screening: Screening
 ) -> pd.DataFrame:
     """
-    Return one row a pair, worst first, for a design or user spectrum.
+    Compute the demand of a design or user spectrum on pairs: one row per pair, worst first.
 
     Parameters
     ----------
@@ -66,7 +90,7 @@ def design_table(
     pairs : DataFrame
         From :func:`per_obspy.read_pairs`.
     building : Building
-        What is assumed where the inventory is silent.
+        Assumptions for values that the inventory lacks.
     screening : Screening
         Risk classes and the region's values for code rules.
 
@@ -78,9 +102,11 @@ def design_table(
         of the spectrum, with both.
     """
     complete = completed_pairs(pairs, building)
-    inside = np.all([within(spectrum, *one) for one in _oscillators(complete)], axis=0)
+    first, second = _oscillators(complete)
+    inside = np.all([within(spectrum, *first), within(spectrum, *second)], axis=0)
     rejected = _outside(spectrum, complete[~inside])
-    table = _judged(spectrum, complete[inside].reset_index(drop=True), screening)
+    # demand of the pairs inside the spectrum, worst first
+    table = _rows(spectrum, complete[inside].reset_index(drop=True), screening)
     ranked = worst_first(table, table["impact_velocity"])
     others = [name for name in ranked if name not in LEADING]
     ranked = ranked[[*LEADING, *others]]
@@ -94,23 +120,30 @@ def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def _outside(spectrum: DesignSpectrum, pairs: pd.DataFrame) -> tuple[Rejection, ...]:
-    """Return why pairs cannot be judged by the spectrum."""
-    ranges = {"period": (spectrum.periods, " s"), "damping": (spectrum.dampings, "")}
+    """Return the rejections of pairs outside the spectrum, with every value that is outside."""
     reasons: list[list[str]] = [[] for _ in range(len(pairs))]
+    grids = {"period": (spectrum.periods, " s"), "damping": (spectrum.dampings, "")}
     for name in ("period_1", "period_2", "damping_1", "damping_2"):
-        known, unit = ranges[name[:-2]]
-        for row, value in enumerate(pairs[name].to_numpy(np.float64)):
-            if not known[0] <= value <= known[-1]:
-                span = f"{known[0]:g} to {known[-1]:g}{unit}"
-                reasons[row].append(f"{name} = {value:g}{unit} is outside the spectrum's {span}")
+        grid, unit = grids[name[:-2]]
+        span = f"{grid[0]:g} to {grid[-1]:g}{unit}"
+        # both ends of the grid belong to it
+        column = values(pairs, name)
+        outside = ~((column >= grid[0]) & (column <= grid[-1]))
+        for row in np.flatnonzero(outside):
+            reason = f"{name} = {column[row]:g}{unit} is outside the spectrum's {span}"
+            reasons[row].append(reason)
+    # one rejection per pair
     named = zip(pairs["pair_id"], reasons, strict=True)
     return tuple(Rejection("pair", name, spectrum.name, None, tuple(why)) for name, why in named)
 
 
-def _judged(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
-    first, second = (displacement_at(spectrum, *one) for one in _oscillators(pairs))
-    asked = spectral_demand(pairs, (first, second))
-    probability = design_probability(spectrum, pairs)
-    rule = np.where(asked.squares_decide, "sd_srss", "sd_white_noise").astype(object)
+def _rows(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
+    """Return the rows of pairs inside the spectrum, not ranked yet."""
+    first, second = _oscillators(pairs)
+    displacement = displacement_at(spectrum, *first), displacement_at(spectrum, *second)
+    demand = spectral_demand(pairs, displacement)
+    # resampled periods reach beyond the spectrum
+    probability = design_probability(partial(clipped_displacement, spectrum), pairs)
+    rule = np.where(demand.squares_decide, "sd_srss", "sd_white_noise").astype(object)
     table = pairs.assign(spectrum=spectrum.name, demand_rule=rule)
-    return spectral_verdict(table, (first, second), asked, probability, screening)
+    return spectral_columns(table, displacement, demand, probability, screening)

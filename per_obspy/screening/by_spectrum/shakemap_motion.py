@@ -1,4 +1,4 @@
-"""The motion of a ShakeMap at places and periods: spectral displacement between nodes, periods and dampings."""
+"""Motion of a ShakeMap: spectral displacement between its nodes, periods and dampings."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,22 @@ from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.screening.by_record.stored_spectra import LogSpectra
+from per_obspy.screening.by_spectrum.demand import SpectralDemand
 from per_obspy.screening.ground_motion.kriging import on_grid
+from per_obspy.screening.uncertainty.pair_motion import pair_motion
+from per_obspy.screening.uncertainty.probability import (
+    SD_DISPERSION,
+    SD_MEDIAN,
+    UncertainMotion,
+    UncertainRadius,
+    period_is_uncertain,
+)
+from per_obspy.screening.values import Table, both, values
+
+#: Dampings between which the factor of EN 1998-1 is interpolated when dampings are resampled;
+#: beyond it is kept.
+DAMPINGS = np.geomspace(0.002, 0.4, 24)
 
 
 class MapMotion(NamedTuple):
@@ -30,8 +45,26 @@ class MapMotion(NamedTuple):
     log_std: FloatArray
 
 
+class _Nodes(NamedTuple):
+    """Cells of a map that hold places, (n_places,): its south-western node and the share beyond."""
+
+    column: NDArray[np.intp]
+    east: FloatArray
+    row: NDArray[np.intp]
+    north: FloatArray
+
+
 def seen_from(shakemap: xr.Dataset, longitude: FloatArray) -> FloatArray:
-    """Return longitudes as a map that crosses the date line counts them."""
+    """
+    Return longitudes as a map that crosses the date line counts them, degrees.
+
+    Parameters
+    ----------
+    shakemap : Dataset
+        From :func:`per_obspy.records.shakemap.read_shakemap`.
+    longitude : ndarray
+        Degrees.
+    """
     first, last = shakemap["longitude"].values[[0, -1]]
     middle = (first + last) / 2.0
     seen: FloatArray = (longitude - middle + 180.0) % 360.0 - 180.0 + middle
@@ -42,7 +75,7 @@ def motion_on_map(
     shakemap: xr.Dataset, longitude: FloatArray, latitude: FloatArray, assumed_log_std: float
 ) -> MapMotion:
     """
-    Return the motion of a ShakeMap at places inside it, bilinear between its nodes.
+    Interpolate the motion of a ShakeMap at places inside it, bilinear between its nodes.
 
     Parameters
     ----------
@@ -51,43 +84,57 @@ def motion_on_map(
     longitude, latitude : (n_places,) ndarray
         Degrees.
     assumed_log_std : float
-        Of a map that tells none, dimensionless.
+        Log-standard deviation of a map without any, dimensionless.
     """
-    column, east = _between(shakemap["longitude"].values, seen_from(shakemap, longitude))
-    row, north = _between(shakemap["latitude"].values, latitude)
-
-    def at_places(values: FloatArray) -> FloatArray:
-        south = (1.0 - east) * values[:, row, column] + east * values[:, row, column + 1]
-        further = (1.0 - east) * values[:, row + 1, column] + east * values[:, row + 1, column + 1]
-        return np.ascontiguousarray(((1.0 - north) * south + north * further).T)
-
+    nodes = _Nodes(
+        *_lower_neighbour(shakemap["longitude"].values, seen_from(shakemap, longitude)),
+        *_lower_neighbour(shakemap["latitude"].values, latitude),
+    )
     periods = shakemap["period"].values
+    # SD = PSA (T / 2 pi)^2; no motion is minus infinity
     with np.errstate(divide="ignore"):
-        ln_sd = np.log(at_places(shakemap["psa"].values) * (periods / (2.0 * np.pi)) ** 2)
+        psa = _at_places(shakemap["psa"].values, nodes)
+        ln_sd = np.log(psa * (periods / (2.0 * np.pi)) ** 2)
     if "psa_log_std" in shakemap:
-        return MapMotion(periods, ln_sd, at_places(shakemap["psa_log_std"].values))
+        return MapMotion(periods, ln_sd, _at_places(shakemap["psa_log_std"].values, nodes))
     return MapMotion(periods, ln_sd, np.full(ln_sd.shape, assumed_log_std))
 
 
-def _between(axis: FloatArray, where: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the lower neighbour on an axis and the part of the way to the next."""
-    lower = np.clip(np.searchsorted(axis, where, side="right") - 1, 0, axis.size - 2)
-    return lower, np.clip((where - axis[lower]) / (axis[lower + 1] - axis[lower]), 0.0, 1.0)
-
-
 def displacement_on_map(motion: MapMotion, period: FloatArray, damping: FloatArray) -> FloatArray:
-    """Return SD of one oscillator a place, m: linear between logarithms of the periods, times the damping's factor."""
-    displacement: FloatArray = np.exp(
-        at_period(motion.periods, motion.ln_sd, period)
-    ) * damping_factor(damping)
+    """
+    Return SD of one oscillator per place, m.
+
+    It is linear between the logarithms of the periods, times the factor of the damping.
+
+    Parameters
+    ----------
+    motion : MapMotion
+        At the places.
+    period, damping : (n_places,) ndarray
+        s; fraction of critical.
+    """
+    ln_sd = at_period(motion.periods, motion.ln_sd, period)
+    displacement: FloatArray = np.exp(ln_sd) * damping_factor(damping)
     return displacement
 
 
-def at_period(periods: FloatArray, told: FloatArray, period: FloatArray) -> FloatArray:
-    """Return values (n_places, n_periods) at one period a place, linear in its logarithm; beyond the ends kept."""
+def at_period(periods: FloatArray, ordinates: FloatArray, period: FloatArray) -> FloatArray:
+    """
+    Interpolate ordinates at one period per place, linear in its logarithm; beyond the ends kept.
+
+    Parameters
+    ----------
+    periods : (n_periods,) ndarray
+        s, rising.
+    ordinates : (n_places, n_periods) ndarray
+        At these periods.
+    period : (n_places,) ndarray
+        s.
+    """
     lower, share = on_grid(periods, period)
     place = np.arange(period.size)
-    result: FloatArray = (1.0 - share) * told[place, lower] + share * told[place, lower + 1]
+    low, high = ordinates[place, lower], ordinates[place, lower + 1]
+    result: FloatArray = (1.0 - share) * low + share * high
     return result
 
 
@@ -113,3 +160,91 @@ def damping_factor(damping: FloatArray) -> FloatArray:
         np.sqrt(10.0 / (5.0 + 100.0 * checks.fraction_of_critical("damping", damping))), 0.55
     )
     return factor
+
+
+def uncertain_map_motion(
+    motion: MapMotion, pairs: Table, demand: SpectralDemand
+) -> tuple[UncertainMotion, LogSpectra]:
+    """
+    Return the uncertain motion of pairs, and the spectra of those whose periods are resampled.
+
+    The motion of a map is uncertain once for both buildings, with the correlation of their periods.
+
+    Parameters
+    ----------
+    motion : MapMotion
+        At the pairs. Beyond its periods, which only resampled ones reach, SD at the end is kept.
+    pairs : Table
+        Completed pairs with their log-standard deviations, medians inside the map's periods.
+    demand : SpectralDemand
+        Radii at contact height and their correlation.
+    """
+    first, second = (_radius(motion, pairs, demand, i) for i in (1, 2))
+    count = len(demand.correlation)
+    _, pair_log_std = pair_motion(
+        (first.radius, second.radius),
+        (first.ln_ratio, second.ln_ratio),
+        (first.motion_log_std, second.motion_log_std),
+        both(pairs, "period"),
+    )
+    # every resampled pair has a spectrum of its own
+    resampled = period_is_uncertain(pairs)
+    row = np.zeros(count, dtype=np.intp)
+    row[resampled] = np.arange(np.count_nonzero(resampled))
+    uncertain = UncertainMotion(
+        first,
+        second,
+        correlation=demand.correlation,
+        pair_log_std=pair_log_std,
+        model_log_std=np.full(count, SD_DISPERSION),
+        exact_demand=np.full(count, np.nan),
+        row=row,
+    )
+    return uncertain, _log_spectra(motion.periods, motion.ln_sd[resampled])
+
+
+def _radius(motion: MapMotion, pairs: Table, demand: SpectralDemand, i: int) -> UncertainRadius:
+    """Return the radius of building i at contact height, with its oscillator and uncertainties."""
+    period, damping = values(pairs, f"period_{i}"), values(pairs, f"damping_{i}")
+    return UncertainRadius(
+        radius=demand.radii[i - 1] / SD_MEDIAN,
+        ln_ratio=np.zeros_like(period),
+        motion_log_std=at_period(motion.periods, motion.log_std, period),
+        damping_log_std=_damping_dispersion(pairs, i),
+        period=period,
+        damping=damping,
+    )
+
+
+def _damping_dispersion(pairs: Table, i: int) -> FloatArray:
+    """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
+    damping, deviation = values(pairs, f"damping_{i}"), values(pairs, f"damping_log_std_{i}")
+    # one deviation below and above; no damping reaches the critical one
+    low = damping * np.exp(-deviation)
+    high = np.minimum(damping * np.exp(deviation), 0.999)
+    dispersion = np.log(damping_factor(low) / damping_factor(high)) / 2.0
+    return np.where(period_is_uncertain(pairs), 0.0, dispersion)
+
+
+def _log_spectra(periods: FloatArray, ln_sd: FloatArray) -> LogSpectra:
+    """Return spectra at 5 % damping (n, n_periods) at all ``DAMPINGS``."""
+    factors = np.log(damping_factor(DAMPINGS))[None, :, None]
+    spectra = np.ascontiguousarray(ln_sd[:, None, :] + factors)
+    return LogSpectra(np.log(periods), np.log(DAMPINGS), spectra)
+
+
+def _at_places(grid: FloatArray, nodes: _Nodes) -> FloatArray:
+    """Interpolate a grid (n_periods, n_latitudes, n_longitudes) to (n_places, n_periods)."""
+    column, east, row, north = nodes
+    # along the parallel south of a place, then along the one north of it
+    south_west, south_east = grid[:, row, column], grid[:, row, column + 1]
+    south = (1.0 - east) * south_west + east * south_east
+    north_west, north_east = grid[:, row + 1, column], grid[:, row + 1, column + 1]
+    further = (1.0 - east) * north_west + east * north_east
+    return np.ascontiguousarray(((1.0 - north) * south + north * further).T)
+
+
+def _lower_neighbour(axis: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the lower neighbour on an axis and the share of the way to the next."""
+    lower = np.clip(np.searchsorted(axis, points, side="right") - 1, 0, axis.size - 2)
+    return lower, np.clip((points - axis[lower]) / (axis[lower + 1] - axis[lower]), 0.0, 1.0)

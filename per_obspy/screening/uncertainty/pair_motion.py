@@ -1,7 +1,7 @@
-"""What the motion of two oscillators at one place, and the doubt about it, mean for the gap between them."""
+"""Motion of two oscillators at one site: median and dispersion of the gap between them."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
@@ -12,7 +12,7 @@ SHORT = 0.109
 
 def period_correlation(period_1: ArrayLike, period_2: ArrayLike) -> FloatArray:
     """
-    Correlation of the residuals of ln SA at two periods of one record; used here for PER.
+    Return the correlation of the residuals of ln SA at two periods of one record; used for PER.
 
     Parameters
     ----------
@@ -42,16 +42,25 @@ def period_correlation(period_1: ArrayLike, period_2: ArrayLike) -> FloatArray:
         checks.positive("period_1", period_1), checks.positive("period_2", period_2)
     )
     low, high = np.minimum(first, second), np.maximum(first, second)
+    # equations (2) to (5)
     c1 = 1.0 - np.cos(np.pi / 2.0 - 0.366 * np.log(high / np.maximum(low, SHORT)))
-    # the exponent of long periods, whose c2 does not count, would overflow
-    fading = 1.0 / (1.0 + np.exp(100.0 * np.minimum(high, 1.0) - 5.0))
-    apart = np.where(high > low, (high - low) / np.where(high > low, high - 0.0099, 1.0), 0.0)
-    c2 = 1.0 - 0.105 * (1.0 - fading) * apart
+    c2 = _c2(low, high)
     c3 = np.where(high < SHORT, c2, c1)
     c4 = c1 + 0.5 * (np.sqrt(np.maximum(c3, 0.0)) - c3) * (1.0 + np.cos(np.pi * low / SHORT))
+    # equation (6): the branch of both periods
     mixed = np.where(high < 0.2, np.minimum(c2, c4), c4)
     correlation: FloatArray = np.where(high <= SHORT, c2, np.where(low > SHORT, c1, mixed))
     return correlation
+
+
+def _c2(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return equation (3), of short periods."""
+    # the exponent of long periods, whose c2 does not count, would overflow
+    fading = 1.0 / (1.0 + np.exp(100.0 * np.minimum(high, 1.0) - 5.0))
+    longer = high > low
+    distance = np.where(longer, (high - low) / np.where(longer, high - 0.0099, 1.0), 0.0)
+    coefficient: FloatArray = 1.0 - 0.105 * (1.0 - fading) * distance
+    return coefficient
 
 
 def pair_motion(
@@ -61,7 +70,7 @@ def pair_motion(
     periods: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return how the gap that a pair needs changes with the motion of both oscillators, and its log-standard deviation.
+    Return ln of the gap that pairs need at the site over that here, and its log-standard deviation.
 
     Parameters
     ----------
@@ -78,19 +87,26 @@ def pair_motion(
     -------
     ln_ratio, log_std : (n_pairs,) ndarray
         Dimensionless. The ratio is that of the roots of the sums of squares at the site and here:
-        both radii alike change the gap alike, a radius of nothing counts nothing, and no
-        correlation of the two responses, in which the gap of radii that nearly cancel would be
-        infinitely sensitive, is needed. The deviation is that of the same gap to first order, with
-        the correlation of :func:`period_correlation` between the two.
+        both radii alike change the gap alike, a radius of 0 has no weight, and no correlation of
+        the two responses, in which the gap of radii that nearly cancel would be infinitely
+        sensitive, is needed. The deviation is that of the same gap to first order, with the
+        correlation of :func:`period_correlation` between the two.
     """
-    squares = [np.square(radius) for radius in radii]
-    at_site = [
-        square * np.exp(2.0 * ratio) for square, ratio in zip(squares, ln_ratios, strict=True)
-    ]
-    before, after = squares[0] + squares[1], at_site[0] + at_site[1]
+    (radius_1, radius_2), (ratio_1, ratio_2) = radii, ln_ratios
+    square_1, square_2 = np.square(radius_1), np.square(radius_2)
+    site_1, site_2 = square_1 * np.exp(2.0 * ratio_1), square_2 * np.exp(2.0 * ratio_2)
+    # squared gap of uncorrelated responses, here and at the site
+    before, after = square_1 + square_2, site_1 + site_2
     moving = before > 0.0
-    weights = [np.divide(one, after, out=np.full_like(after, 0.5), where=moving) for one in at_site]
-    ln_ratio = 0.5 * np.log(np.divide(after, before, out=np.ones_like(after), where=moving))
-    first, second = (weight * std for weight, std in zip(weights, log_stds, strict=True))
+    growth = np.divide(after, before, out=np.ones_like(after), where=moving)
+    ln_ratio = 0.5 * np.log(growth)
+    # first-order propagation of both correlated deviations
+    weight_1, weight_2 = _share(site_1, after, moving), _share(site_2, after, moving)
+    first, second = weight_1 * log_stds[0], weight_2 * log_stds[1]
     variance = first**2 + second**2 + 2.0 * period_correlation(*periods) * first * second
     return ln_ratio, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _share(part: FloatArray, whole: FloatArray, moving: NDArray[np.bool_]) -> FloatArray:
+    """Return part / whole of the squared gap, one half where the pair does not move."""
+    return np.divide(part, whole, out=np.full_like(whole, 0.5), where=moving)

@@ -1,4 +1,4 @@
-"""Which estimate is the demand, and what it says of the gap."""
+"""Demand on the gap: the governing estimate, states and ratios."""
 
 import numpy as np
 import pytest
@@ -25,9 +25,8 @@ def _estimates(correlation_record):
 def test_a_record_that_moves_both_apart_governs():
     estimates = _estimates(np.full(40, -1.0))
     demand, rule = governing_demand(estimates, np.zeros(40, dtype=bool))
-    assert_allclose(
-        demand, PER[0] + PER[1], rtol=1e-12
-    )  # rho = -1 is the sum, up to the root's round-off
+    # rho = -1 is the sum, up to the root's round-off
+    assert_allclose(demand, PER[0] + PER[1], rtol=1e-12)
     assert set(rule) == {"per_record"}
 
 
@@ -44,9 +43,8 @@ def test_equal_derived_periods_do_not_make_a_pair_safe():
     estimates = gap_estimates(
         (radius, radius), (radius, radius), (period, period), (0.05, 0.05), np.array([1.0])
     )
-    assert estimates.per[0] == pytest.approx(
-        0.0, abs=1e-8
-    )  # the root of a difference of equal squares
+    # the root of a difference of equal squares
+    assert estimates.per[0] == pytest.approx(0.0, abs=1e-8)
     demand, rule = governing_demand(estimates, np.array([True]))
     assert_allclose(demand, 0.3 * np.sqrt(2.0), rtol=1e-12)  # SRSS of equal radii
     assert rule.tolist() == ["srss"]
@@ -54,10 +52,10 @@ def test_equal_derived_periods_do_not_make_a_pair_safe():
 
 def test_demands_are_proportional_to_the_motion():
     # would catch: a radius that misses its participation in one of the estimates
-    once = _estimates(np.full(40, 0.3))
-    twice = gap_estimates(
-        tuple(2 * r for r in PER), tuple(2 * r for r in SD), PERIOD, DAMPING, np.full(40, 0.3)
-    )
+    correlation = np.full(40, 0.3)
+    once = _estimates(correlation)
+    per, sd = (2 * PER[0], 2 * PER[1]), (2 * SD[0], 2 * SD[1])
+    twice = gap_estimates(per, sd, PERIOD, DAMPING, correlation)
     for name in ("per", "record", "sd", "srss", "absolute"):
         assert_allclose(getattr(twice, name), 2 * getattr(once, name), rtol=1e-12)  # round-off
 
@@ -69,6 +67,5 @@ def test_states():
 
 
 def test_ratio_is_empty_only_without_demand():
-    assert_array_equal(
-        demand_ratio(np.array([0.0, 0.1, 0.1]), np.array([0.2, 0.2, 0.0])), [0.0, 0.5, np.nan]
-    )
+    ratio = demand_ratio(np.array([0.0, 0.1, 0.1]), np.array([0.2, 0.2, 0.0]))
+    assert_array_equal(ratio, [0.0, 0.5, np.nan])

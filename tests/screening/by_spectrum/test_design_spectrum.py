@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.errors import CatalogError
 from per_obspy.screening.by_spectrum.design_spectrum import (
+    clipped_displacement,
     displacement_at,
     read_design_spectrum,
     within,
@@ -24,12 +25,13 @@ def write(tmp_path):
 
 
 def _csv(quantity, value):
-    """Return a spectrum at 2 and 5 % whose value is given by a function of period and damping; rows in no order."""
+    """Return a spectrum at 2 and 5 % with values of a function of period and damping, unsorted."""
     rows = [f"{T},{xi},{value(T, xi)!r}" for xi in (0.05, 0.02) for T in PERIODS[::-1]]
     return "\n".join(["# a comment", f"period,damping,{quantity}", *rows])
 
 
 def test_pseudo_acceleration_is_displacement_times_frequency_squared(write):
+    # would catch: a frequency in place of the circular one, rows that are not sorted
     sd = read_design_spectrum(write(_csv("sd", lambda T, _: 0.1 * T)))
     psa = read_design_spectrum(write(_csv("psa", lambda T, _: 0.1 * T * (2 * np.pi / T) ** 2)))
     assert_allclose(psa.sd, sd.sd, rtol=1e-14)
@@ -41,9 +43,8 @@ def test_pseudo_acceleration_is_displacement_times_frequency_squared(write):
 def test_branches_of_a_code_are_met_between_their_ends(write):
     # constant velocity (SD ~ T), reduced with damping as a power; would catch linear interpolation,
     # which is too large between the ends of such curves, and dampings taken in the wrong order
-    spectrum = read_design_spectrum(
-        write(_csv("sd", lambda T, xi: 0.1 * T**1.5 * (0.05 / xi) ** 0.4))
-    )
+    text = _csv("sd", lambda T, xi: 0.1 * T**1.5 * (0.05 / xi) ** 0.4)
+    spectrum = read_design_spectrum(write(text))
     period, damping = np.array([0.1, 0.3, 0.7, 4.0, 2.0]), np.array([0.02, 0.03, 0.05, 0.02, 0.04])
     expected = 0.1 * period**1.5 * (0.05 / damping) ** 0.4
     assert_allclose(displacement_at(spectrum, period, damping), expected, rtol=1e-13)
@@ -51,24 +52,23 @@ def test_branches_of_a_code_are_met_between_their_ends(write):
 
 def test_one_damping_serves_itself_only(write):
     spectrum = read_design_spectrum(write("period,damping,sd\n0.1,0.05,0.01\n1.0,0.05,0.1\n"))
-    assert_allclose(
-        displacement_at(spectrum, [0.1, 1.0], 0.05 * np.ones(2)), [0.01, 0.1], rtol=1e-14
-    )
-    assert within(
-        spectrum, [0.1, 1.0, 1.01, 0.099, 0.5], [0.05, 0.05, 0.05, 0.05, 0.02]
-    ).tolist() == [
-        True,
-        True,
-        False,
-        False,
-        False,
-    ]
+    displacement = displacement_at(spectrum, [0.1, 1.0], [0.05, 0.05])
+    assert_allclose(displacement, [0.01, 0.1], rtol=1e-14)
+    periods, dampings = [0.1, 1.0, 1.01, 0.099, 0.5], [0.05, 0.05, 0.05, 0.05, 0.02]
+    assert within(spectrum, periods, dampings).tolist() == [True, True, False, False, False]
 
 
 def test_nothing_is_extrapolated(write):
     spectrum = read_design_spectrum(write(_csv("sd", lambda T, _: 0.1 * T)))
     with pytest.raises(ValueError, match=r"inside the spectrum, got 4\.1 s and 0\.05"):
         displacement_at(spectrum, [1.0, 4.1], [0.05, 0.05])
+
+
+def test_resampled_oscillators_keep_the_value_at_the_edge(write):
+    spectrum = read_design_spectrum(write(_csv("sd", lambda T, xi: 0.1 * T / xi)))
+    period, damping = np.array([0.01, 9.0, 1.0]), np.array([0.02, 0.04, 0.3])
+    at_edge = displacement_at(spectrum, [0.1, 4.0, 1.0], [0.02, 0.04, 0.05])
+    assert_array_equal(clipped_displacement(spectrum, period, damping), at_edge)
 
 
 FAULTS = {
@@ -125,8 +125,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_named(write, fault):
-    text, said = FAULTS[fault]
-    with pytest.raises(CatalogError, match=r"spectrum\.csv: .*" + said.replace("?", r"\?")):
+    text, message = FAULTS[fault]
+    with pytest.raises(CatalogError, match=r"spectrum\.csv: .*" + message.replace("?", r"\?")):
         read_design_spectrum(write(text))
 
 

@@ -1,4 +1,4 @@
-"""Screening by a spectrum: limits that the demand must keep, and pairs that it cannot judge."""
+"""Screening by a spectrum: limits that the demand must keep, and pairs outside the spectrum."""
 
 import numpy as np
 import pandas as pd
@@ -21,16 +21,14 @@ SPECTRUM = DesignSpectrum(
 
 
 def _pairs(**columns):
-    given = {
-        "gap": 0.1,
-        "height_1": 12.0,
-        "height_2": 12.0,
-        "period_1": 0.5,
-        "period_2": 1.0,
-    } | columns
-    count = max(np.size(values) for values in given.values())
+    """Return pairs of two buildings of 0.5 and 1 s, with columns of their own."""
+    plain = {"gap": 0.1, "height_1": 12.0, "height_2": 12.0, "period_1": 0.5, "period_2": 1.0}
+    given = plain | columns
+    count = max(np.size(column) for column in given.values())
+    # all in one place: there is no record
     place = dict.fromkeys(("longitude_1", "latitude_1", "longitude_2", "latitude_2"), 0.0)
-    return pd.DataFrame({"pair_id": [f"p{i}" for i in range(count)], **place}).assign(**given)
+    names = [f"p{number}" for number in range(count)]
+    return pd.DataFrame({"pair_id": names, **place}).assign(**given)
 
 
 def _table(pairs, screening=None):
@@ -45,9 +43,8 @@ def test_the_demand_by_hand():
     assert_allclose(row["srss_gap_sd"], np.hypot(0.05, 0.1), rtol=1e-12)
     assert_allclose(row["absolute_gap_sd"], 0.15, rtol=1e-12)
     assert row["demand_rule"] == "sd_white_noise"
-    assert_allclose(
-        row["demand"] ** 2, 0.05**2 + 0.1**2 - 2 * row["correlation"] * 0.05 * 0.1, rtol=1e-10
-    )
+    squared_gap = 0.05**2 + 0.1**2 - 2 * row["correlation"] * 0.05 * 0.1
+    assert_allclose(row["demand"] ** 2, squared_gap, rtol=1e-10)
     assert 0.0 < row["correlation"] < 0.05
     assert row["state"] == "yes"
     assert_allclose(row["demand_ratio"], 0.1 / row["demand"], rtol=1e-12)
@@ -59,18 +56,14 @@ def test_demands_are_at_contact_level():
     once = _table(_pairs(participation_1=1.0, participation_2=1.0)).loc["p0"]
     twice = _table(_pairs(participation_1=2.0, participation_2=2.0)).loc["p0"]
     assert_allclose(twice["demand"], 2 * once["demand"], rtol=1e-12)
-    assert_allclose(
-        twice["required_gap_asce7_event_based"],
-        2 * once["required_gap_asce7_event_based"],
-        rtol=1e-12,
-    )
+    rule = "required_gap_asce7_event_based"
+    assert_allclose(twice[rule], 2 * once[rule], rtol=1e-12)
     assert twice["sd_1"] == once["sd_1"]
 
 
 def test_equal_buildings_are_safe_only_if_their_periods_are_known():
-    known = _table(
-        _pairs(period_1=0.7, period_2=0.7, damping_1=0.05, damping_2=0.05, gap=0.01)
-    ).loc["p0"]
+    given = {"period_1": 0.7, "period_2": 0.7, "damping_1": 0.05, "damping_2": 0.05}
+    known = _table(_pairs(**given, gap=0.01)).loc["p0"]
     assert known["demand"] == pytest.approx(0.0, abs=1e-9)
     assert (known["state"], known["probability"]) == ("no", 0.0)
     derived = _table(_pairs(period_1=np.nan, period_2=np.nan, gap=[0.01, 9.0]))
@@ -94,26 +87,23 @@ def test_a_gap_close_to_the_demand_is_possible():
 
 def test_unknown_periods_widen_the_probability_towards_one_half():
     # independent of the nodes: a hundred thousand drawn pairs of periods; standard error 0.0015
-    pairs = _pairs(
-        period_log_std_1=0.3, period_log_std_2=0.3, gap=0.12, damping_1=0.05, damping_2=0.05
-    )
+    pairs = _pairs(period_log_std_1=0.3, period_log_std_2=0.3, gap=0.12)
     pairs = pairs.assign(participation_1=1.0, participation_2=1.0)
-    got = _table(pairs).loc["p0", "probability"]
+    pairs = pairs.assign(damping_1=0.05, damping_2=0.05)
+    probability = _table(pairs).loc["p0", "probability"]
     random = np.random.default_rng(8)
     period = np.array([[0.5], [1.0]]) * np.exp(0.3 * random.normal(size=(2, 100_000)))
     demand = critical_gap(*(0.1 * period), ddc_correlation(period[0], 0.05, period[1], 0.05))
     pounded = demand / 0.97 * np.exp(0.14 * random.normal(size=100_000)) > 0.12
     # seven nodes a period integrate the probability of a gap near the middle to about 0.01
-    assert got == pytest.approx(pounded.mean(), abs=0.015)
+    assert probability == pytest.approx(pounded.mean(), abs=0.015)
 
 
 def test_pairs_outside_the_spectrum_are_rejected_with_their_values():
-    table = design_table(
-        SPECTRUM,
-        _pairs(period_1=[0.5, 0.05, 0.5], period_2=[1.0, 5.0, 1.0], damping_1=[0.05, 0.05, 0.1]),
-        Building(),
-        Screening(),
-    )
+    # would catch: one reason per pair, or the span of the other axis
+    columns = {"period_1": [0.5, 0.05, 0.5], "period_2": [1.0, 5.0, 1.0]}
+    pairs = _pairs(**columns, damping_1=[0.05, 0.05, 0.1])
+    table = design_table(SPECTRUM, pairs, Building(), Screening())
     assert table["pair_id"].tolist() == ["p0"]
     short, damped = table.attrs["rejected"]
     assert short.reasons == (
@@ -121,7 +111,7 @@ def test_pairs_outside_the_spectrum_are_rejected_with_their_values():
         "period_2 = 5 s is outside the spectrum's 0.1 to 4 s",
     )
     assert damped.reasons == ("damping_1 = 0.1 is outside the spectrum's 0.02 to 0.05",)
-    assert {one.source for one in table.attrs["rejected"]} == {"code.csv"}
+    assert {rejection.source for rejection in table.attrs["rejected"]} == {"code.csv"}
 
 
 def test_nothing_left_is_an_empty_table_with_all_columns():
@@ -140,20 +130,17 @@ def test_touching_pairs_are_answered_and_the_worst_is_first():
 
 def test_order_of_the_buildings_does_not_matter():
     pairs = _pairs(gap=0.02, height_1=12.0, height_2=18.0, contact_height=12.0, restitution=0.5)
-    swapped = pairs.rename(
-        columns=lambda n: n[:-1] + {"1": "2", "2": "1"}[n[-1]] if n[-2:] in ("_1", "_2") else n
-    )
-    one, other = _table(pairs).loc["p0"], _table(swapped).loc["p0"]
+    exchanged = {"1": "2", "2": "1"}
+    names = {n: n[:-1] + exchanged[n[-1]] for n in pairs if n[-2:] in ("_1", "_2")}
+    row, other = _table(pairs).loc["p0"], _table(pairs.rename(columns=names)).loc["p0"]
     # the grazing state is found by an iteration with an end at 1e-13
     for name in ("demand", "srss_gap_sd", "impact_velocity", "required_gap_asce7_event_based"):
-        assert_allclose(one[name], other[name], rtol=1e-9)
-    assert_allclose(one["amplification_1"], other["amplification_2"], rtol=1e-9)
+        assert_allclose(row[name], other[name], rtol=1e-9)
+    assert_allclose(row["amplification_1"], other["amplification_2"], rtol=1e-9)
 
 
 def test_every_column_is_described():
     table = _table(_pairs(), Screening(codes=Codes(gb_intensity=7))).reset_index()
     described = {*RESULTS, *DESIGN, *rule_columns(), "pair_id", "gap"}
-    leading = [
-        name for name in table if name in LEADING or name.startswith(("required", "fema", "nzsee"))
-    ]
-    assert set(leading) <= described
+    rules = {name for name in table if name.startswith(("required", "fema", "nzsee"))}
+    assert {*LEADING, *rules} <= described

@@ -1,12 +1,12 @@
-"""Pairs judged by a ShakeMap: values by hand, limits, and a Monte Carlo that shares only the map's spectrum."""
+"""Pairs screened by a ShakeMap: values by hand, limits, and a Monte Carlo of the map's spectrum."""
 
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 from screening_samples import make_pairs
+from shakemap_samples import PERIODS, make_map
 
 import per_obspy
 from per_obspy.config import Building, Screening
@@ -15,26 +15,8 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.records.shakemap import read_shakemap
-from per_obspy.screening.by_spectrum.shakemap_motion import damping_factor, motion_on_map
 from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback, shakemap_rows
 from per_obspy.screening.columns import FLAGS, ORDER
-
-PERIODS = np.array([0.3, 1.0, 3.0])
-
-
-def make_map(longitudes=(19.5, 20.0, 20.5), log_std=None, **attributes):
-    """Return a map whose PSA is 4, 2, 0.5 m/s2 in the south and three times that in the north, rising to the east."""
-    latitude, longitude = np.array([9.5, 10.5]), np.array(longitudes)
-    place = np.array([[1.0], [3.0]]) * (1.0 + np.arange(longitude.size))
-    psa = np.array([4.0, 2.0, 0.5])[:, None, None] * place
-    grid = xr.Dataset(
-        {"psa": (("period", "latitude", "longitude"), psa)},
-        coords={"period": PERIODS, "latitude": latitude, "longitude": longitude},
-        attrs={"source": "grid.xml", **attributes},
-    )
-    if log_std is not None:
-        grid["psa_log_std"] = (("period", "latitude", "longitude"), np.full(psa.shape, log_std))
-    return grid
 
 
 def _completed(rows):
@@ -42,9 +24,9 @@ def _completed(rows):
 
 
 def _rows(rows, shakemap=None, screening=None):
-    return shakemap_rows(
-        make_map() if shakemap is None else shakemap, _completed(rows), screening or Screening()
-    )
+    """Return the rows of pairs under a map, and the rejections."""
+    shakemap = make_map() if shakemap is None else shakemap
+    return shakemap_rows(shakemap, _completed(rows), screening or Screening())
 
 
 def _root_of_squares(row):
@@ -72,33 +54,43 @@ def test_the_demand_by_hand():
     assert_allclose([row["sd_1"], row["sd_2"]], sd, rtol=1e-12)
     expected = critical_gap(*sd, ddc_correlation(0.3, 0.05, 1.0, 0.05))
     assert_allclose([row["demand"], row["critical_gap_sd"]], expected, rtol=1e-12)
+    # the measure that needs no record
     assert_allclose(row["missing_gap"], max(expected - row["gap"], 0.0), rtol=1e-12)
+
+
+def test_rows_name_the_map_and_leave_columns_of_records_empty():
+    table, _ = _rows([GIVEN])
+    row = table.iloc[0]
+    flags = set(row["flags"].split())
+    # the deviation of this map is assumed
     assert row["demand_rule"] == "shakemap"
-    assert {"shakemap_demand", "shakemap_assumed_deviation"} <= set(row["flags"].split())
-    assert set(row["flags"].split()) <= set(FLAGS)
+    assert {"shakemap_demand", "shakemap_assumed_deviation"} <= flags <= set(FLAGS)
     assert {*ORDER} - {*table} == {"rank"}
     assert np.isnan(row["per_1"])
     assert row["station"] == ""
 
 
+def _grid_xml(shakemap):
+    """Return a map of PSA at 0.3, 1 and 3 s as the text of a ShakeMap grid."""
+    fields = []
+    for index, name in enumerate(("LON", "LAT", "PSA03", "PSA10", "PSA30"), start=1):
+        unit = "dd" if index < 3 else "pctg"
+        fields.append(f'<grid_field index="{index}" name="{name}" units="{unit}"/>')
+    # nodes from north-west to south-east, PSA in per cent of g
+    lines = []
+    for north in shakemap["latitude"].values[::-1].tolist():
+        for east in shakemap["longitude"].values.tolist():
+            psa = shakemap["psa"].sel(latitude=north, longitude=east).to_numpy() / 0.0980665
+            lines.append(" ".join(map(repr, [east, north, *psa.tolist()])))
+    head = '<grid_specification nlat="2" nlon="3"/>' + "".join(fields)
+    data = "\n".join(lines)
+    return f"<shakemap_grid>{head}<grid_data>{data}\n</grid_data></shakemap_grid>"
+
+
 def test_a_file_gives_what_its_map_gives(tmp_path):
     # from the text of a grid to the demand; would catch a unit or an axis that reader and screening
     # see differently
-    shakemap = make_map()
-    names = ("LON", "LAT", "PSA03", "PSA10", "PSA30")
-    fields = "".join(
-        f'<grid_field index="{i}" name="{name}" units="{"dd" if i < 3 else "pctg"}"/>'
-        for i, name in enumerate(names, start=1)
-    )
-    table = "".join(
-        f"{east!r} {north!r} {' '.join(repr(value / 0.0980665) for value in node['psa'].values.tolist())}\n"
-        for north in shakemap["latitude"].values[::-1].tolist()
-        for east in shakemap["longitude"].values.tolist()
-        for node in [shakemap.sel(latitude=north, longitude=east)]
-    )
-    head = '<grid_specification nlat="2" nlon="3"/>'
-    text = f"<shakemap_grid>{head}{fields}<grid_data>{table}</grid_data></shakemap_grid>"
-    (tmp_path / "grid.xml").write_text(text, encoding="utf-8")
+    (tmp_path / "grid.xml").write_text(_grid_xml(make_map()), encoding="utf-8")
     from_file, _ = _rows([{}, {"period_1": np.nan}], read_shakemap(tmp_path / "grid.xml"))
     from_map, _ = _rows([{}, {"period_1": np.nan}])
     for name in ("sd_1", "sd_2", "demand", "probability"):
@@ -112,33 +104,14 @@ def test_rows_have_the_columns_of_those_with_a_record(station):
     assert {*table} == {*with_record} - {"rank"}
 
 
-def test_between_nodes_it_is_bilinear_and_between_periods_a_power():
-    # would catch longitude and latitude exchanged, and periods on a linear axis
-    shakemap = make_map()
-    motion = motion_on_map(shakemap, np.array([19.75, 20.0]), np.array([9.5, 10.0]), 0.6)
-    assert_allclose(
-        np.exp(motion.ln_sd[:, 1]) * (2 * np.pi) ** 2, [2.0 * 1.5, 2.0 * 2.0 * 2.0], rtol=1e-12
-    )
-    # SD of 8 m/s2 at 0.3 s and 4 at 1 s: a power of the period between
-    power = np.log(4.0 / 8.0 / 0.3**2) / np.log(1 / 0.3)
-    table, _ = _rows([{**GIVEN, "period_1": 0.55, "period_2": 1.0}])
-    assert_allclose(
-        table["sd_1"].iloc[0], 8.0 * (0.3 / 2 / np.pi) ** 2 * (0.55 / 0.3) ** power, rtol=1e-12
-    )
-
-
 def test_damping_is_corrected_by_the_code():
-    # EN 1998-1 (3.6): sqrt(10 / 7) at 2 %, 0.55 at least
-    assert_allclose(
-        damping_factor(np.array([0.05, 0.02, 0.28, 0.6])),
-        [1.0, np.sqrt(10 / 7), 0.55, 0.55],
-        rtol=1e-2,
-    )
     table, _ = _rows([GIVEN, {**GIVEN, "damping_1": 0.02}])
-    assert_allclose(table["sd_1"].iloc[1] / table["sd_1"].iloc[0], np.sqrt(10 / 7), rtol=1e-12)
+    usual, lower = table["sd_1"]
+    assert_allclose(lower / usual, np.sqrt(10 / 7), rtol=1e-12)
 
 
 def test_demands_scale_with_the_map_and_the_participation():
+    # would catch: SD at contact height in the columns of the oscillators
     once, _ = _rows([GIVEN])
     shakemap = make_map()
     twice, _ = _rows([GIVEN], shakemap.assign(psa=shakemap["psa"] * 2.0))
@@ -149,12 +122,11 @@ def test_demands_scale_with_the_map_and_the_participation():
 
 
 def test_order_of_the_buildings_does_not_matter():
-    one = {**GIVEN, "participation_1": 1.2, "gap": 0.03}
-    other = {
-        name[:-1] + {"1": "2", "2": "1"}[name[-1]] if name[-2:] in ("_1", "_2") else name: value
-        for name, value in one.items()
-    }
-    other |= {
+    pair = {**GIVEN, "participation_1": 1.2, "gap": 0.03}
+    exchanged = {
+        **pair,
+        "participation_1": 1.0,
+        "participation_2": 1.2,
         "period_1": 0.6,
         "period_2": 1.0,
         "height_1": 18.0,
@@ -162,7 +134,7 @@ def test_order_of_the_buildings_does_not_matter():
         "storeys_1": 6.0,
         "storeys_2": 10.0,
     }
-    (first, _), (second, _) = _rows([one]), _rows([{**other, "longitude_2": 20.0}])
+    (first, _), (second, _) = _rows([pair]), _rows([exchanged])
     # integrals over the ratio and over its inverse, each to 1e-11
     for name in ("demand", "probability", "impact_velocity"):
         assert_allclose(first[name], second[name], rtol=1e-8)
@@ -170,6 +142,7 @@ def test_order_of_the_buildings_does_not_matter():
 
 
 def test_equal_periods_are_certain_only_if_they_are_given():
+    # would catch: equal heights that make two buildings move as one
     given, _ = _rows([{**GIVEN, "period_2": 1.0, "gap": 0.001}])
     assert given["demand"].iloc[0] == pytest.approx(0.0, abs=1e-9)
     derived = {
@@ -203,42 +176,45 @@ def test_the_deviation_of_the_map_makes_the_probability():
     assert_allclose(assumed["probability"], expected[2], atol=1e-3)
 
 
+#: Buildings of 60 and 30 m and unknown periods on the middle southern node.
+DERIVED = {
+    "longitude_2": 20.0,
+    "latitude_1": 9.5,
+    "latitude_2": 9.5,
+    "height_1": 60.0,
+    "height_2": 30.0,
+    "storeys_1": 20.0,
+    "storeys_2": 10.0,
+    "period_1": np.nan,
+    "period_2": np.nan,
+    "damping_1": 0.05,
+    "damping_2": 0.03,
+}
+
+
+def _drawn_radius(row, i, count, random):
+    """Return drawn periods of building i, and its radii at contact height by the map's spectrum."""
+    deviation = row[f"period_log_std_{i}"] * random.normal(size=count)
+    period = row[f"period_{i}"] * np.exp(deviation)
+    # PSA of that node is 8, 4, 1 m/s2: SD is a power of the period between
+    log_sd = np.log(np.array([8.0, 4.0, 1.0]) * (PERIODS / 2 / np.pi) ** 2)
+    sd = np.exp(np.interp(np.log(period), np.log(PERIODS), log_sd))
+    damped = sd * np.sqrt(10.0 / (5.0 + 100.0 * row[f"damping_{i}"]))
+    return period, row[f"participation_{i}"] * damped / 0.97
+
+
 def test_derived_periods_against_monte_carlo():
-    # 0.97, 0.14 and the code's damping by hand; would catch a deviation of the map that is lost or taken twice
-    derived = {
-        "period_1": np.nan,
-        "period_2": np.nan,
-        "damping_1": 0.05,
-        "damping_2": 0.03,
-        "latitude_1": 9.5,
-        "latitude_2": 9.5,
-    }
-    derived |= {
-        "height_1": 60.0,
-        "height_2": 30.0,
-        "longitude_2": 20.0,
-        "storeys_1": 20.0,
-        "storeys_2": 10.0,
-    }
+    # 0.97, 0.14 and the code's damping by hand; would catch a deviation of the map that is lost or
+    # taken twice
     shakemap = make_map(log_std=0.5)
-    gap = 0.8 * _root_of_squares(_rows([derived], shakemap)[0].iloc[0])
-    row = _rows([{**derived, "gap": gap}], shakemap)[0].iloc[0]
-    random, n = np.random.default_rng(2), 100_000
-    sd = np.array([8.0, 4.0, 1.0]) * (PERIODS / 2 / np.pi) ** 2
-    motion, radii, periods = random.normal(size=n), [], []
-    for i in (1, 2):
-        periods.append(
-            row[f"period_{i}"] * np.exp(row[f"period_log_std_{i}"] * random.normal(size=n))
-        )
-        told = np.exp(np.interp(np.log(periods[-1]), np.log(PERIODS), np.log(sd)))
-        radii.append(
-            row[f"participation_{i}"]
-            * told
-            * np.sqrt(10.0 / (5.0 + 100.0 * row[f"damping_{i}"]))
-            / 0.97
-        )
+    gap = 0.8 * _root_of_squares(_rows([DERIVED], shakemap)[0].iloc[0])
+    row = _rows([{**DERIVED, "gap": gap}], shakemap)[0].iloc[0]
+    random, count = np.random.default_rng(2), 100_000
+    motion = random.normal(size=count)
+    period_1, radius_1 = _drawn_radius(row, 1, count, random)
+    period_2, radius_2 = _drawn_radius(row, 2, count, random)
     # periods of these two agree so well that their errors of motion are nearly one
-    gaps = critical_gap(*radii, ddc_correlation(periods[0], 0.05, periods[1], 0.03))
+    gaps = critical_gap(radius_1, radius_2, ddc_correlation(period_1, 0.05, period_2, 0.03))
     closed = np.log(gaps / gap) + np.hypot(0.14, 0.5) * motion > 0
     # 128 quasi-random nodes (0.01); a deviation of the motion that is 0.9 of 0.5 changes the chance
     # by 0.01
@@ -247,16 +223,17 @@ def test_derived_periods_against_monte_carlo():
 
 
 def test_more_doubt_is_nearer_to_even():
+    # gaps far below and far above the demand
     far = [{**GIVEN, "gap": gap} for gap in (0.01, 3.0)]
-    chances = np.array(
-        [_rows(far, make_map(log_std=std))[0]["probability"] for std in (0.1, 0.5, 1.0)]
-    )
+    maps = [make_map(log_std=std) for std in (0.1, 0.5, 1.0)]
+    chances = np.array([_rows(far, shakemap)[0]["probability"] for shakemap in maps])
     assert (np.diff(chances[:, 0]) <= 0).all()
     assert (np.diff(chances[:, 1]) >= 0).all()
     assert (_rows([{**GIVEN, "gap": 0.0}])[0]["probability"] == 1.0).all()
 
 
 def test_pairs_outside_are_rejected_with_the_value():
+    # would catch: one reason per pair, latitude and longitude exchanged
     rows = [
         {},
         {"period_1": 0.2, "period_2": 3.5},
@@ -272,34 +249,32 @@ def test_pairs_outside_are_rejected_with_the_value():
     )
     assert north.reasons == ("latitude = 11 is outside the ShakeMap's 9.5 to 10.5",)
     assert east.reasons == ("longitude = 30 is outside the ShakeMap's 19.5 to 20.5",)
-    assert {one.source for one in rejected} == {"grid.xml"}
-    assert all(one.kind == "pair" for one in rejected)
+    assert {(rejection.kind, rejection.source) for rejection in rejected} == {("pair", "grid.xml")}
 
 
 def test_pairs_without_a_station_fall_back_on_the_map():
-    # one has a station, one is on the map, one is out of reach of both: it says why in both words
+    # one has a station, one is on the map, one is out of reach of both: it has both reasons
     pairs = _completed([{}, {}, {"latitude_1": 12.0, "latitude_2": 12.0}])
-    station = Rejection(
-        "pair", "", "", None, ("nearest station XX.ONE is 99999 m away, beyond 20000 m",)
-    )
-    far = (station._replace(name="P1"), station._replace(name="P2"))
-    table, (lost,) = shakemap_fallback(make_map(), pairs, far, Screening())
+    reason = "nearest station XX.ONE is 99999 m away, beyond 20000 m"
+    far = tuple(Rejection("pair", name, "", None, (reason,)) for name in ("P1", "P2"))
+    table, (rejection,) = shakemap_fallback(make_map(), pairs, far, Screening())
     assert table["pair_id"].tolist() == ["P1"]
-    assert lost.name == "P2"
-    assert lost.reasons == (*station.reasons, "latitude = 12 is outside the ShakeMap's 9.5 to 10.5")
+    assert rejection.name == "P2"
+    assert rejection.reasons == (reason, "latitude = 12 is outside the ShakeMap's 9.5 to 10.5")
 
 
-def test_a_map_without_motion_judges_nothing():
+def test_a_map_without_motion_has_no_rows():
     shakemap = make_map()
-    table, (still,) = _rows([{}], shakemap.assign(psa=shakemap["psa"] * 0.0))
+    table, (rejection,) = _rows([{}], shakemap.assign(psa=shakemap["psa"] * 0.0))
     assert table.empty
     assert {*ORDER} - {*table} == {"rank"}
-    assert still.reasons == ("the ShakeMap has no motion there",)
+    assert rejection.reasons == ("the ShakeMap has no motion there",)
 
 
 def test_a_map_across_the_date_line_and_a_scenario():
-    here = make_map((179.8, 180.0, 180.2), shakemap_event_type="SCENARIO")
-    table, rejected = _rows([{**GIVEN, "longitude_1": -179.9, "longitude_2": -179.9}], here)
+    # would catch: a longitude of -179.9 that is outside a map up to 180.2
+    pacific = make_map((179.8, 180.0, 180.2), shakemap_event_type="SCENARIO")
+    table, rejected = _rows([{**GIVEN, "longitude_1": -179.9, "longitude_2": -179.9}], pacific)
     plain, _ = _rows([{**GIVEN, "longitude_1": 20.25, "longitude_2": 20.25}])
     assert not rejected
     assert_allclose(table["demand"], plain["demand"], rtol=1e-9)
@@ -307,28 +282,29 @@ def test_a_map_across_the_date_line_and_a_scenario():
     assert "simulated" not in plain["flags"].iloc[0].split()
 
 
+def _scattered_rows(count):
+    """Return pairs all over the map, with derived periods wherever the drawn one is short."""
+    random = np.random.default_rng(4)
+    longitudes = random.uniform(19.5, 20.5, count)
+    latitudes = random.uniform(9.5, 10.5, count)
+    periods = random.uniform(0.3, 1.2, count)
+    # the derived period of 60 m is inside the map's
+    rows = []
+    for longitude, latitude, period in zip(longitudes, latitudes, periods, strict=True):
+        row = {"height_1": 60.0, "storeys_1": 20.0}
+        row |= {"longitude_1": longitude, "longitude_2": longitude}
+        row |= {"latitude_1": latitude, "latitude_2": latitude}
+        rows.append(row | {"period_1": period if period > 0.6 else np.nan})
+    return rows
+
+
 def test_rows_depend_on_no_other_row():
     # to the bit; would catch a matrix product over the rows
-    random = np.random.default_rng(4)
-    rows = [
-        {
-            "longitude_1": longitude,
-            "longitude_2": longitude,
-            "latitude_1": latitude,
-            "latitude_2": latitude,
-            "period_1": period if period > 0.6 else np.nan,
-            "height_1": 60.0,
-            "storeys_1": 20.0,
-        }
-        for longitude, latitude, period in zip(
-            *(random.uniform(*s, 40) for s in ((19.5, 20.5), (9.5, 10.5), (0.3, 1.2))), strict=True
-        )
-    ]
-    pairs = _completed(rows)
+    pairs = _completed(_scattered_rows(40))
     together, _ = shakemap_rows(make_map(), pairs, Screening())
     assert len(together) == 40
-    for some in (slice(0, 1), slice(7, 30), slice(None, None, -1)):
-        apart, _ = shakemap_rows(make_map(), pairs.iloc[some], Screening())
-        pd.testing.assert_frame_equal(
-            apart, together.iloc[some].reset_index(drop=True), check_exact=True
-        )
+    # alone, in part, and in the reverse order
+    for part in (slice(0, 1), slice(7, 30), slice(None, None, -1)):
+        rows, _ = shakemap_rows(make_map(), pairs.iloc[part], Screening())
+        expected = together.iloc[part].reset_index(drop=True)
+        pd.testing.assert_frame_equal(rows, expected, check_exact=True)

@@ -1,0 +1,126 @@
+"""
+Uncertain motion of pairs at one station, from its record and its stored spectra.
+
+Where the table holds the motion at the site relative to the record (``ln_per_ratio_i``,
+``ln_per_std_i``), the radii are those at the site and as uncertain as their motion; an exact demand
+is scaled with the pair's (``pair_motion.py``).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Screening
+from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
+from per_obspy.screening.by_record.stored_spectra import log_oscillator, stored_log
+from per_obspy.screening.uncertainty.pair_motion import pair_motion
+from per_obspy.screening.uncertainty.probability import (
+    UncertainMotion,
+    UncertainRadius,
+    period_is_uncertain,
+)
+from per_obspy.screening.values import Table, at_contact, both, values
+
+
+def record_motion(station: StationMotion, table: Table, screening: Screening) -> UncertainMotion:
+    """
+    Return the uncertain motion of every pair of a block.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record, with its stored spectra.
+    table : Table
+        Rows of the risk table with periods, dampings, their log-standard deviations, radii,
+        correlations and demand; the motion at the site, where the table has it, of
+        :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs`.
+    screening : Screening
+        Medians and log-standard deviations of the critical gap from PER, and of the linearized one,
+        over the exact one.
+
+    Returns
+    -------
+    UncertainMotion
+        Its rows are those of the stored PER of the station.
+    """
+    first, second = (_radius(station, table, i, screening) for i in (1, 2))
+    # the exact demand and its deviation change with the motion of both buildings at the site
+    pair_ln_ratio, pair_log_std = pair_motion(
+        at_contact(table, "per"),
+        (first.ln_ratio, second.ln_ratio),
+        (first.motion_log_std, second.motion_log_std),
+        both(table, "period"),
+    )
+    at_site = values(table, "demand_exact") * np.exp(pair_ln_ratio)
+    deviations = screening.linearized_dispersion, screening.model_dispersion
+    return UncertainMotion(
+        first,
+        second,
+        correlation=_governing_correlation(table),
+        pair_log_std=pair_log_std,
+        model_log_std=np.where(_linearized(table), *deviations),
+        exact_demand=np.where(_is_exact(table), at_site, np.nan),
+        row=nearest_azimuth(station, table),
+    )
+
+
+def _radius(station: StationMotion, table: Table, i: int, screening: Screening) -> UncertainRadius:
+    """Return the radius of building i at contact height, with its oscillator and uncertainties."""
+    # the median of the estimate over the exact demand is taken off the radius
+    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    ln_ratio, motion_log_std = _site_motion(table, i)
+    return UncertainRadius(
+        radius=values(table, f"participation_{i}") * _deciding(table, f"per_{i}") / bias,
+        ln_ratio=ln_ratio,
+        motion_log_std=motion_log_std,
+        damping_log_std=_damping_dispersion(station, table, i),
+        period=_deciding(table, f"period_{i}"),
+        damping=_deciding(table, f"damping_{i}"),
+    )
+
+
+def _is_exact(table: Table) -> NDArray[np.bool_]:
+    """Return where the exact demand decides."""
+    return np.asarray(table["demand_rule"] == "exact")
+
+
+def _linearized(table: Table) -> NDArray[np.bool_]:
+    """Return where the gap of equivalent linear buildings decides."""
+    return np.asarray(table["demand_rule"] == "linearized")
+
+
+def _deciding(table: Table, name: str) -> FloatArray:
+    """Return a column, that of the equivalent building where this decides."""
+    return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
+
+
+def _governing_correlation(table: Table) -> FloatArray:
+    """Return the correlation that governs the demand."""
+    by_record = np.asarray(table["demand_rule"] == "per_record")
+    elastic = np.where(by_record, table["correlation_record"], table["correlation"])
+    linearized = values(table, "correlation_linearized")
+    return np.where(_linearized(table), linearized, elastic)
+
+
+def _site_motion(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+    """Return ln of radius i at the site over that of the record and its deviation; 0 if unknown."""
+    if "ln_per_ratio_1" not in table:
+        at_record = np.zeros_like(values(table, "gap"))
+        return at_record, at_record
+    ln_ratio, log_std = values(table, f"ln_per_ratio_{i}"), values(table, f"ln_per_std_{i}")
+    return np.nan_to_num(ln_ratio), np.nan_to_num(log_std)
+
+
+def _damping_dispersion(station: StationMotion, table: Table, i: int) -> FloatArray:
+    """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
+    single = _is_exact(table) | ~period_is_uncertain(table)
+    row = nearest_azimuth(station, table)[single]
+    period, damping = log_oscillator(table, i)
+    period, damping = period[single], damping[single]
+    deviation = values(table, f"damping_log_std_{i}")[single]
+    # half the difference between one deviation below and above
+    low = stored_log(station.per, row, period, damping - deviation)
+    high = stored_log(station.per, row, period, damping + deviation)
+    dispersion = np.zeros(single.size)
+    dispersion[single] = np.abs(high - low) / 2.0
+    return dispersion
