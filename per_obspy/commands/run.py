@@ -8,6 +8,7 @@ import typer
 
 from per_obspy.commands.endings import AsJson, end_if_nothing, tell
 from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
     from per_obspy.jobs.output_folder import Result
@@ -110,8 +111,6 @@ def spectra(
 
     Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
     """
-    import os
-
     from per_obspy.config import Processing, Spectra, checked
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
@@ -119,7 +118,7 @@ def spectra(
     grid = checked(Spectra, given | ({"dampings": damping} if damping else {}))
     with shown_progress() as progress:
         done, rejected = spectra_of(
-            sources, output, Processing(), grid, os.cpu_count() or 1, progress
+            sources, output, Processing(), grid, usable_processors(), progress
         )
     shards = [one.shard for one in done if one.shard]
     figures = (
@@ -163,15 +162,13 @@ def process(
 
     Example: per-obspy process shared/records -o processed --report
     """
-    import os
-
     from per_obspy.config import Processing, load
     from per_obspy.pipeline.process import process_records
 
     chosen = load(settings, Processing) if settings else Processing()
     with shown_progress() as progress:
         result = process_records(
-            sources, output, chosen, event, report, (os.cpu_count() or 1, progress)
+            sources, output, chosen, event, report, (usable_processors(), progress)
         )
     stations = [one for one in result.done if one.shard]
     files = [str(path) for path in result.files]

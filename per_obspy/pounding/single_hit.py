@@ -1,8 +1,5 @@
 """Single-hit estimate of what pounding does to a pair: grazing state, earlier contact, impact, radius after it."""
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +9,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.single_hit import NO_POUNDING, PAIRS, estimate
 from per_obspy.pounding.impact import mass_shares
-
-#: gap/critical gap below which several impacts make the estimate unreliable (see the table of
-#: `single_hit`)
-RELIABLE_GAP_RATIO = 0.6
+from per_obspy.threads import map_in_threads
 
 #: Pairs that a thread takes at a time; a whole number of the kernel's blocks.
 SHARE = 512 * PAIRS
@@ -167,22 +161,19 @@ def single_hit(
     return _estimate(np.stack([array.ravel() for array in broadcast]), broadcast[0].shape)
 
 
-def _in_threads(work: Callable[[int, int], None], count: int) -> None:
-    """Do the work on shares of the pairs, in threads; the kernel leaves the interpreter free."""
-    shares = range(0, count, SHARE)
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        list(pool.map(lambda begin: work(begin, min(begin + SHARE, count)), shares))
-
-
 def _estimate(arguments: FloatArray, shape: tuple[int, ...]) -> SingleHit:
     """Call the kernel on whole blocks, so that no pair's rounding depends on its company; name the numbers."""
     count = arguments.shape[1]
     whole = np.pad(arguments, ((0, 0), (0, -count % PAIRS)), mode="edge") if count else arguments
     status = np.empty(whole.shape[1], dtype=np.int8)
     fields, envelope = np.empty((2, 13, status.size)), np.empty((2, status.size))
-    _in_threads(
-        lambda begin, end: estimate(whole, begin, end, status, fields, envelope), status.size
-    )
+
+    def fill(begin: int) -> None:
+        """Fill in the estimates of one share of the pairs."""
+        end = min(begin + SHARE, status.size)
+        estimate(whole, begin, end, status, fields, envelope)
+
+    map_in_threads(fill, range(0, status.size, SHARE))
     status, fields, envelope = status[:count], fields[..., :count], envelope[:, :count]
     branches = SingleHitBranches(*(fields[:, field].reshape(2, *shape) for field in range(13)))
     velocity = np.max(branches.velocity_1 - branches.velocity_2, axis=0)

@@ -1,8 +1,6 @@
 """Many pairs against one record in blocks of 32: their table of structures, and the memory that a block works in."""
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +10,7 @@ from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import WAITING_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANES, ROWS, TILE
 from per_obspy.pounding.history.tables import refinement
+from per_obspy.threads import map_in_threads
 
 #: Bytes of a line of the processor's cache.
 CACHE_LINE = 64
@@ -108,5 +107,4 @@ def run_blocks(
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
         rows[block] = own[: block.size]
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, pair_blocks(parts)))
+    map_in_threads(run, pair_blocks(parts))
