@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.azimuths import worst_azimuth
+from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.relative import directional_relative_displacement
 
 

@@ -18,7 +18,7 @@ from per_obspy.pounding.correlation.covariance import (
     linear_oscillator,
     stationary_covariance,
 )
-from per_obspy.pounding.correlation.stochastic_ground import Ground
+from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 from per_obspy.pounding.structure import Structure
 from per_obspy.pounding.yielding.estimate import LinearizedEstimate, failed
 
@@ -28,7 +28,9 @@ ITERATIONS = 3000
 ELASTIC = 8.0  # standard deviations: beyond them yielding has a probability below 1e-15
 
 
-def gauss_3(structures: tuple[Structure, Structure], ground: Ground) -> LinearizedEstimate:
+def gauss_3(
+    structures: tuple[Structure, Structure], ground: StochasticGround
+) -> LinearizedEstimate:
     """Return the estimate; without hardening a yielding structure drifts for ever and nothing converges."""
     linear = stationary_covariance(
         ground, *(linear_oscillator(s.period, s.damping) for s in structures)

@@ -13,7 +13,7 @@ from per_obspy.pounding.correlation.covariance import (
     linear_oscillator,
     stationary_covariance,
 )
-from per_obspy.pounding.correlation.stochastic_ground import Ground
+from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 from per_obspy.pounding.structure import Structure
 from per_obspy.pounding.yielding.estimate import LinearizedEstimate, failed
 
@@ -24,7 +24,7 @@ NEGLIGIBLE = 46.0  # exp(-46) is 1e-20
 
 
 def krylov_bogoliubov(
-    structures: tuple[Structure, Structure], ground: Ground
+    structures: tuple[Structure, Structure], ground: StochasticGround
 ) -> LinearizedEstimate:
     """Return the estimate in which each structure's yield displacement is compared with its own response."""
     limits = [structure.yield_displacement for structure in structures]
@@ -39,7 +39,7 @@ def prescribed_ductility(
     structures: tuple[Structure, Structure],
     ductilities: tuple[float, float],
     peak_factor: float,
-    ground: Ground,
+    ground: StochasticGround,
 ) -> LinearizedEstimate:
     """Return the estimate in which the peak response is a given multiple of the yield displacement."""
     levels = [peak_factor / ductility if ductility > 1.0 else math.inf for ductility in ductilities]
@@ -79,7 +79,7 @@ def equivalent_viscosity(level: float) -> float:
 
 def _iterate(
     structures: tuple[Structure, Structure],
-    ground: Ground,
+    ground: StochasticGround,
     levels_of: Callable[[FloatArray], Sequence[float]],
 ) -> LinearizedEstimate:
     """Alternate between the covariance of two linear oscillators and the oscillators that fit it."""

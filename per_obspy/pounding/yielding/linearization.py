@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.stochastic_ground import Ground
+from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 from per_obspy.pounding.structure import Structure
 from per_obspy.pounding.yielding.estimate import LinearizedEstimate
 from per_obspy.pounding.yielding.gauss import gauss_3
@@ -37,7 +37,7 @@ class LinearizedCorrelation(NamedTuple):
 
 
 def linearized_correlation(
-    structure_1: Structure, structure_2: Structure, ground: Ground, narrow: float = NARROW
+    structure_1: Structure, structure_2: Structure, ground: StochasticGround, narrow: float = NARROW
 ) -> LinearizedCorrelation:
     """
     Correlation of two bilinear displacements under stationary ground motion.
@@ -96,7 +96,7 @@ def ductility_correlation(
     structure_2: Structure,
     ductility_1: float,
     ductility_2: float,
-    ground: Ground,
+    ground: StochasticGround,
     peak_factor: float = 3.0,
 ) -> LinearizedEstimate:
     """
@@ -176,7 +176,7 @@ def davenport_peak_factor(frequency: float, duration: float) -> float:
     return spread + float(np.euler_gamma) / spread
 
 
-def bandwidth(ground: Ground) -> float:
+def bandwidth(ground: StochasticGround) -> float:
     """
     Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
 

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.azimuths import directional_correlation
+from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.screening.values import Table, both, components
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
 from per_obspy.spectra.per_pair import azimuth_maxima
