@@ -17,6 +17,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.relative.input_moments import TILE, input_moments
 from per_obspy.kernels.relative.worst_azimuth import furthest_apart
+from per_obspy.pounding.structure import checked_oscillators
 
 
 class _Responses(NamedTuple):
@@ -140,14 +141,8 @@ def worst_azimuth(
     ValueError
         If an argument is out of range.
     """
-    frequency_1 = 2.0 * np.pi / checks.positive("period_1", period_1)
-    damping_1 = checks.fraction_of_critical("damping_1", damping_1)
-    participation_1 = checks.not_negative("participation_1", participation_1)
-    frequency_2 = 2.0 * np.pi / checks.positive("period_2", period_2)
-    damping_2 = checks.fraction_of_critical("damping_2", damping_2)
-    participation_2 = checks.not_negative("participation_2", participation_2)
-    first = frequency_1, damping_1, participation_1
-    second = frequency_2, damping_2, participation_2
+    first = checked_oscillators(1, period_1, damping_1, participation_1)
+    second = checked_oscillators(2, period_2, damping_2, participation_2)
     pairs = np.stack([*first, *second])
     if not pairs.size:
         return np.empty(0)

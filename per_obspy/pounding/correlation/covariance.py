@@ -34,6 +34,19 @@ def ground_correlation(
     ValueError
         If a period or damping is out of range.
 
+    See Also
+    --------
+    per_obspy.psd_correlation : Tabulated power spectral densities.
+
+    Notes
+    -----
+    The covariance P of the states of both structures and of the ground filter solves the Lyapunov
+    equation ``A P + P Aᵀ = -2π S0 b bᵀ``. Under white noise the result is equation (16).
+
+    References
+    ----------
+    Lin (1967), Probabilistic theory of structural dynamics.
+
     Examples
     --------
     >>> from per_obspy.pounding.correlation.stochastic_ground import WhiteNoise
