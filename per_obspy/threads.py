@@ -16,7 +16,7 @@ from typing import TypeVar
 Block = TypeVar("Block")
 Result = TypeVar("Result")
 
-#: Folder of the control groups, in which a container finds its own CPU limit.
+#: Folder of the control groups, with the CPU limit of a container.
 CGROUP = Path("/sys/fs/cgroup")
 
 #: Largest number of threads of this process.

@@ -80,7 +80,13 @@ def test_every_public_name_is_there_and_documented():
 
 
 #: Functions of whole files and tables, whose examples are the workflows.
-WITHOUT_EXAMPLE = {"pairs_from_footprints", "process", "read_pairs", "risk_table", "station_spectra"}
+WITHOUT_EXAMPLE = {
+    "pairs_from_footprints",
+    "process",
+    "read_pairs",
+    "risk_table",
+    "station_spectra",
+}
 
 
 def test_every_function_of_physics_has_all_sections_and_an_example():

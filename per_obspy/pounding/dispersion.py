@@ -110,7 +110,8 @@ def lognormal_dispersion(mean: ArrayLike, standard_deviation: ArrayLike) -> Floa
     Returns
     -------
     dispersion : ndarray
-        Broadcast shape, ``sqrt(ln(1 + (s/mean)²))``, dimensionless; the median is ``mean exp(-dispersion²/2)``.
+        Broadcast shape, ``sqrt(ln(1 + (s/mean)²))``, dimensionless; the median is
+        ``mean exp(-dispersion²/2)``.
 
     Raises
     ------

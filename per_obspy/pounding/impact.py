@@ -37,7 +37,7 @@ def post_impact_velocities(
     ----------
     velocity_1, velocity_2 : array_like
         Velocities before the impact, m/s; an impact needs ``velocity_1 > velocity_2`` (structure 1
-        stands left).
+        is left of 2).
     mass_1, mass_2 : array_like
         Impact masses, kg; one of the two may be infinite (a wall).
     restitution : array_like

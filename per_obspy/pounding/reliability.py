@@ -68,7 +68,7 @@ def compare_gaps(
     dt: float,
     period_1: ArrayLike,
     period_2: ArrayLike,
-    damping: float = 0.05,
+    damping: float,
 ) -> GapComparison:
     """
     Compare estimates of the critical gap with the exact one.
@@ -81,7 +81,7 @@ def compare_gaps(
         Sampling interval, s.
     period_1, period_2 : (n_pairs,) array_like
         Undamped periods, s.
-    damping : float, optional
+    damping : float
         Of every structure, fraction of critical, dimensionless.
 
     Returns
@@ -97,7 +97,7 @@ def compare_gaps(
     Examples
     --------
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> gaps = compare_gaps(pulse, 0.01, [0.5], [1.5])
+    >>> gaps = compare_gaps(pulse, 0.01, [0.5], [1.5], 0.05)
     >>> bool(gaps.exact[0] < gaps.absolute_sd[0])
     True
     """
@@ -125,9 +125,9 @@ def compare_single_hit(
     period_1: ArrayLike,
     period_2: ArrayLike,
     gap_ratio: ArrayLike,
-    mass_ratio: ArrayLike = 1.0,
-    restitution: float = 0.65,
-    damping: float = 0.05,
+    mass_ratio: ArrayLike,
+    restitution: float,
+    damping: float,
 ) -> SingleHitComparison:
     """
     Compare the single hit at the exact one-sided critical gap with the exact pounding history.
@@ -142,9 +142,9 @@ def compare_single_hit(
         Undamped periods, s.
     gap_ratio : (n_pairs,) or float array_like
         Gap over the critical gap of the record, dimensionless.
-    mass_ratio : (n_pairs,) or float array_like, optional
+    mass_ratio : (n_pairs,) or float array_like
         Mass of structure 2 over that of structure 1, dimensionless.
-    restitution, damping : float, optional
+    restitution, damping : float
         Of every impact and of every structure, dimensionless.
 
     Returns
@@ -160,7 +160,7 @@ def compare_single_hit(
     Examples
     --------
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> compared = compare_single_hit(pulse, 0.01, [0.5], [1.5], 0.9)
+    >>> compared = compare_single_hit(pulse, 0.01, [0.5], [1.5], 0.9, 1.0, 0.65, 0.05)
     >>> bool(compared.impacts[0] > 0)
     True
     """

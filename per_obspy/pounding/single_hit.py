@@ -111,11 +111,11 @@ def single_hit(
 
     Notes
     -----
-    At the grazing state both structures have the same velocity v, lie on their energy circles and
-    stand at x and x - g_cr: with ``A = w2² - w1²``, ``B = w2² g_cr``, ``C = w1² r1² - w2² r2² + w2²
-    g_cr²`` the only root at which the gap is smallest is ``x = C/(B + sqrt(B² - A C))``. The sign
-    of v is not determined, so both branches are followed back along their circles to the first
-    contact at the actual gap, where the impact takes place.
+    At the grazing state both structures have the same velocity v and lie on their energy circles,
+    at the displacements x and x - g_cr. With ``A = w2² - w1²``, ``B = w2² g_cr`` and
+    ``C = w1² r1² - w2² r2² + w2² g_cr²`` the only root at which the gap is smallest is
+    ``x = C/(B + sqrt(B² - A C))``. The sign of v is not determined, so both branches are followed
+    back along their circles to the first contact at the actual gap, where the impact takes place.
 
     Largest amplification of either structure, predicted over actual: median, standard deviation of
     the logarithm, share of cases under-predicted by more than 1 %. Measured on 16 broad-band

@@ -210,9 +210,9 @@ def _along(
 ) -> _Responses:
     """Return oscillators with the integrals of their response along the angles."""
     cosine, sine = np.cos(angle), np.sin(angle)
-    north, both, east = np.moveaxis(moments, -1, 0)[..., None]  # each (n_pairs, 2, 1)
+    north, cross, east = np.moveaxis(moments, -1, 0)[..., None]  # each (n_pairs, 2, 1)
     along: FloatArray = (
-        cosine[:, None] ** 2 * north + (cosine * sine)[:, None] * both + sine[:, None] ** 2 * east
+        cosine[:, None] ** 2 * north + (cosine * sine)[:, None] * cross + sine[:, None] ** 2 * east
     )
     stiffness = (2.0 * np.pi / period[:, None]) ** 2
     viscosity = 2.0 * damping[:, None] * stiffness**0.5

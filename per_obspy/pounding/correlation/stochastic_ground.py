@@ -179,9 +179,11 @@ class CloughPenzien:
         return Filter(state, np.array([0.0, -1.0, 0.0, 0.0]), output, 0.0)
 
     def _soil(self) -> KanaiTajimi:
+        """Return the soil layer without the high-pass."""
         return KanaiTajimi(self.frequency, self.damping, self.intensity)
 
 
 def _check_positive(ground: WhiteNoise | KanaiTajimi | CloughPenzien) -> None:
+    """Refuse parameters that are not positive."""
     for field in fields(ground):
         checks.number(field.name, getattr(ground, field.name), checks.positive)

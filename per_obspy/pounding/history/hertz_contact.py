@@ -62,7 +62,7 @@ def hertz_damp_history(
     dt : float
         Sampling interval, s.
     structure_1, structure_2 : Structure
-        Linear; 1 stands left.
+        Linear; 1 is left of 2.
     gap : float
         Clear distance at rest, m, above zero.
     stiffness : float

@@ -76,7 +76,7 @@ def linked_history(
     dt : float
         Sampling interval, s.
     structure_1, structure_2 : Structure
-        Linear; 1 stands left.
+        Linear; 1 is left of 2.
     stiffness : float
         Of the link, N/m; 0 for a damper.
     damping : float
@@ -104,9 +104,9 @@ def linked_history(
     >>> import numpy as np
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
     >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
-    >>> apart = linked_history(pulse, 0.01, tower, annex, stiffness=0.0)
+    >>> free = linked_history(pulse, 0.01, tower, annex, stiffness=0.0)
     >>> joined = linked_history(pulse, 0.01, tower, annex, stiffness=1e9)
-    >>> bool(joined.closing < 0.01 * apart.closing)
+    >>> bool(joined.closing < 0.01 * free.closing)
     True
     """
     # A link has no gap: it acts from the first displacement on
@@ -149,7 +149,7 @@ def kelvin_voigt_history(
     dt : float
         Sampling interval, s.
     structure_1, structure_2 : Structure
-        Linear; 1 stands left.
+        Linear; 1 is left of 2.
     gap : float
         Clear distance at rest, m.
     stiffness : float

@@ -16,7 +16,7 @@ class RelativeDisplacement(NamedTuple):
     """
     Largest distances by which two structures approach each other at contact level, m.
 
-    ``one_before_two`` is the largest ``q1 u1 - q2 u2`` (structure 1 stands left of 2: the critical
+    ``one_before_two`` is the largest ``q1 u1 - q2 u2`` (structure 1 is left of 2: the critical
     gap of the record), ``two_before_one`` the largest ``q2 u2 - q1 u1`` (the other order),
     ``largest`` the larger of the two.
     """
@@ -70,7 +70,7 @@ def relative_displacement(
 
     See Also
     --------
-    directional_relative_displacement : pairs that each have their own azimuth.
+    directional_relative_displacement : Pairs along individual azimuths.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def directional_relative_displacement(
 
     See Also
     --------
-    relative_displacement : what is exact about it.
+    relative_displacement : One component, and notes on exactness.
     """
     components = checks.record("north", north), checks.record("east", east)
     if components[0].size != components[1].size:

@@ -99,7 +99,7 @@ def free_samples(longest_period: float, dt: float) -> int:
     Returns
     -------
     int
-        A multiple of the steps between two looks at whether a pair is settled; at least one such
+        A multiple of the steps between two checks of whether a pair is settled; at least one such
         round.
     """
     rounds = int(PERIODS_AFTER_RECORD * longest_period / (SETTLING_STEPS * dt))

@@ -17,6 +17,7 @@ from per_obspy.spectra.elastic import per_spectrum
 STEP = 0.01  # largest step of added damping in the scan: one-sided damping is not monotone
 SPLITS = 21  # shares between only structure 2 and only structure 1 that are tried
 GAPS = 2001  # scanned below the critical gap
+LARGEST_ADDED = 0.4  # damping, where a caller names no other
 
 
 class SupplementalDamping(NamedTuple):
@@ -51,7 +52,7 @@ def supplemental_damping(
     gap: float,
     share_1: float = 1.0,
     share_2: float = 1.0,
-    largest: float = 0.4,
+    largest: float = LARGEST_ADDED,
 ) -> SupplementalDamping:
     """
     Find the least damping to add to a pair so that its critical gap fits into the gap.
@@ -161,7 +162,7 @@ def optimal_damping_split(
     period_2: float,
     damping_2: float,
     gap: float,
-    largest: float = 0.4,
+    largest: float = LARGEST_ADDED,
 ) -> DampingSplit:
     """
     Find the split of added damping between both structures that needs the least in sum.

@@ -41,7 +41,7 @@ def gauss_3(
     """
     Return the estimate of the correlation of two bilinear structures.
 
-    Without hardening a yielding structure drifts for ever and nothing converges.
+    Without hardening a yielding structure drifts for ever and the estimate does not converge.
     """
     # Structures whose elastic response reaches their yield displacement
     responses = _elastic_responses(structures, ground)

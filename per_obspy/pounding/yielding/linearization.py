@@ -2,7 +2,7 @@
 Correlation of two bilinear structures under stationary ground motion, by statistical linearization.
 
 Each structure is replaced by the linear system that is closest to it for the standard deviations of
-its own response, which follow from the joint covariance of both structures and the ground.
+its response, which follow from the joint covariance of both structures and the ground.
 """
 
 from typing import NamedTuple
