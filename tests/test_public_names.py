@@ -1,5 +1,6 @@
-"""What ``import per_obspy`` offers, and that it costs nothing until it is used."""
+"""Public names of ``per_obspy``: complete, documented, and imported only when they are used."""
 
+import inspect
 import subprocess
 import sys
 
@@ -12,20 +13,38 @@ NAMES = {
     "WhiteNoise",
     "absolute_gap",
     "asce7_period",
+    "azimuthal_gap_surface",
     "azimuthal_per_spectrum",
     "bilinear_response",
+    "bridge_history",
     "bumper_restitution",
+    "combined_dispersion",
+    "combined_dispersion_correlation",
+    "constant_ductility_spectra",
+    "constant_yield_spectra",
     "critical_gap",
+    "critical_gap_surface",
+    "davenport_peak_factor",
     "ddc_correlation",
+    "ductility_correlation",
     "ec8_period",
     "equivalent_linear",
     "equivalent_sdof",
+    "ground_correlation",
+    "hertz_damp_history",
+    "jankowski_damping",
     "kelvin_voigt_damping",
+    "kelvin_voigt_history",
     "kelvin_voigt_restitution",
     "linearized_correlation",
     "linked_history",
+    "lognormal_dispersion",
+    "mahmoud_jankowski_damping",
+    "moat_history",
+    "optimal_damping_split",
     "pairs_from_footprints",
     "per_spectrum",
+    "period_dispersion",
     "post_impact_velocities",
     "pounding_histories",
     "pounding_history",
@@ -35,6 +54,9 @@ NAMES = {
     "read_pairs",
     "record_correlation",
     "relative_displacement",
+    "required_gap",
+    "required_link_damping",
+    "required_link_stiffness",
     "required_restitution",
     "response_spectra",
     "risk_table",
@@ -55,6 +77,27 @@ def test_the_public_names_are_the_intended_ones():
 def test_every_public_name_is_there_and_documented():
     for name in NAMES:
         assert getattr(per_obspy, name).__doc__, name
+
+
+#: Functions of whole files and tables, whose examples are the workflows.
+WITHOUT_EXAMPLE = {
+    "pairs_from_footprints",
+    "process",
+    "read_pairs",
+    "risk_table",
+    "station_spectra",
+}
+
+
+def test_every_function_of_physics_has_all_sections_and_an_example():
+    missing = []
+    for name in NAMES - WITHOUT_EXAMPLE:
+        public = getattr(per_obspy, name)
+        if inspect.isfunction(public):
+            sections = inspect.getdoc(public).splitlines()
+            needed = {"Parameters", "Returns", "Raises", "Examples"} - set(sections)
+            missing += [f"{name}: {section}" for section in sorted(needed)]
+    assert missing == []
 
 
 def test_import_is_lazy():

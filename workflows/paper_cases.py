@@ -69,7 +69,9 @@ def comparisons(record: Record, count: int) -> dict[float, SingleHitComparison]:
     """Return Fig. 6: single hits and exact histories of all pairs of ``count`` periods, 0.3-4 s."""
     pairs = np.array(list(combinations(np.geomspace(0.3, 4.0, count), 2))).T
     compared = {
-        ratio: compare_single_hit(record.acceleration, record.dt, *pairs, ratio)
+        ratio: compare_single_hit(
+            record.acceleration, record.dt, *pairs, ratio, 1.0, RESTITUTION, DAMPING
+        )
         for ratio in (0.95, 0.8, 0.5)
     }
     for ratio, cases in compared.items():

@@ -18,6 +18,7 @@ from per_obspy.pounding.reliability import (
 
 SHORTEST, LONGEST = 0.3, 4.0  # s
 GAP_RATIOS = (0.95, 0.8, 0.5, 0.05)
+DAMPING, RESTITUTION = 0.05, 0.65  # of every structure and impact
 MASS_RATIOS = (1.0, 5.0, 0.2)
 BELOW = 1.0 - 1e-9  # so that equality but for rounding is no under-estimate
 MEASURED = "## Measured"  # the heading below which the page is the script's
@@ -36,7 +37,7 @@ def gap_table(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterator[st
     yield "| estimate / exact | " + " | ".join(groups) + " |"
     yield "|---|" + "---|" * len(groups)
     compared = {
-        name: [compare_gaps(record.acceleration, record.dt, *pairs) for record in records]
+        name: [compare_gaps(record.acceleration, record.dt, *pairs, DAMPING) for record in records]
         for name, records in groups.items()
     }
     for title, field in ESTIMATES.items():
@@ -74,7 +75,9 @@ def both_ways(
     for record in records:
         for sign in (1.0, -1.0):
             motion = sign * record.acceleration
-            yield compare_single_hit(motion, record.dt, *pairs, gap_ratio, mass_ratio)
+            yield compare_single_hit(
+                motion, record.dt, *pairs, gap_ratio, mass_ratio, RESTITUTION, DAMPING
+            )
 
 
 def cell(ratio: np.ndarray, limits: tuple[float, ...]) -> str:

@@ -8,6 +8,7 @@ import typer
 
 from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,8 +117,6 @@ def spectra(
 
     Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
     """
-    import os
-
     from per_obspy.config import Processing, Spectra, checked
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
@@ -130,7 +129,7 @@ def spectra(
     # Spectra of all stations, and figures of each on request
     with shown_progress() as progress:
         done, rejected = spectra_of(
-            sources, output, Processing(), grid, os.cpu_count() or 1, progress
+            sources, output, Processing(), grid, usable_processors(), progress
         )
     shards = [station.shard for station in done if station.shard]
     files = [str(output)] if shards else []
@@ -173,8 +172,6 @@ def process(
 
     Example: per-obspy process shared/records -o processed --report
     """
-    import os
-
     from per_obspy.config import Processing, load
     from per_obspy.pipeline.process import process_records
 
@@ -182,7 +179,7 @@ def process(
     chosen = load(settings, Processing) if settings else Processing()
     with shown_progress() as progress:
         result = process_records(
-            sources, output, chosen, event, report, (os.cpu_count() or 1, progress)
+            sources, output, chosen, event, report, (usable_processors(), progress)
         )
 
     # Print counts and files, for machines or people

@@ -17,6 +17,7 @@ from threading import Thread
 from typing import TypeVar
 
 from per_obspy.errors import PerError
+from per_obspy.threads import use_one_thread
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -110,9 +111,13 @@ def _alone(task: Task, do: Do[Task, Result], lost: Lost[Task, Result]) -> Result
 
 def _pool(workers: int) -> ProcessPoolExecutor:
     """Return fresh processes: a fork of a process that has threads can hang."""
-    return ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_end_with_parent
-    )
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+
+
+def _begin_worker() -> None:
+    """Prepare a worker process: one thread, and an end with the process that started it."""
+    use_one_thread()
+    _end_with_parent()
 
 
 def _end_with_parent() -> None:

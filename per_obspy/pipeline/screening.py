@@ -1,6 +1,5 @@
 """The second stage: pairs and the shards of stations become the risk table, chunk by chunk."""
 
-import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
@@ -24,6 +23,7 @@ from per_obspy.pipeline.pairs import pair_files
 from per_obspy.progress import Progress
 from per_obspy.tables.risk import ranked, write_risk
 from per_obspy.tables.writing import write_rejected
+from per_obspy.threads import usable_processors
 
 KINDS = ("file", "record", "station", "service", "pair")
 STATES = ("yes", "possible", "no")
@@ -117,7 +117,7 @@ def _parts(
     parts, rows = list[Part](), 0
     jobs, workers = (
         _jobs(settings, folder, ground, inventory),
-        settings.workers or os.cpu_count() or 1,
+        settings.workers or usable_processors(),
     )
     for part in do_chunks(jobs, workers, executor):
         parts.append(part)

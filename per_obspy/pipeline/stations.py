@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -18,6 +17,7 @@ from per_obspy.progress import Progress
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import find_sources
+from per_obspy.threads import usable_processors
 
 
 def content_hash(content: dict[str, Any]) -> str:
@@ -56,7 +56,7 @@ def finished_stations(
     """Do the jobs and return every station, sorted by name."""
     progress("stations", 0, len(jobs))
     finished = []
-    for done in do_stations(jobs, workers or os.cpu_count() or 1, executor):
+    for done in do_stations(jobs, workers or usable_processors(), executor):
         finished.append(done)
         progress("stations", len(finished), len(jobs))
     return sorted(finished, key=lambda one: one.station)

@@ -1,5 +1,5 @@
 """
-The physics of a pair of buildings.
+Physics of a pair of buildings.
 
 Correlation, critical gap, impact, single hit, exact histories, linearization, mitigation,
 probability.

@@ -9,7 +9,7 @@ from per_obspy.checks import FloatArray
 
 def critical_gap(per_1: ArrayLike, per_2: ArrayLike, correlation: ArrayLike) -> FloatArray:
     """
-    Critical gap by double difference combination of two radii.
+    Compute the critical gap by double difference combination of two radii.
 
     Parameters
     ----------
@@ -44,17 +44,20 @@ def critical_gap(per_1: ArrayLike, per_2: ArrayLike, correlation: ArrayLike) -> 
     """
     per_1, per_2 = _radii(per_1, per_2)
     correlation = checks.between("correlation", correlation, -1.0, 1.0)
+
+    # Equation (15) as the hypotenuse of two lengths that are not negative
     difference = np.abs(per_1 - per_2)
-    gap: FloatArray = np.hypot(
-        difference, np.sqrt(2.0 * (1.0 - correlation)) * np.sqrt(per_1) * np.sqrt(per_2)
-    )
+    uncorrelated = np.sqrt(2.0 * (1.0 - correlation)) * np.sqrt(per_1) * np.sqrt(per_2)
+    gap: FloatArray = np.hypot(difference, uncorrelated)
+
+    # Bounds that rounding must not pass
     bounded: FloatArray = np.minimum(np.maximum(gap, difference), per_1 + per_2)
     return bounded
 
 
 def srss_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
     """
-    Gap by the square root of the sum of squares: uncorrelated responses.
+    Compute the gap by the square root of the sum of squares: uncorrelated responses.
 
     Parameters
     ----------
@@ -81,7 +84,7 @@ def srss_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
 
 def absolute_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
     """
-    Gap by the absolute sum: both peaks at once and towards each other, an upper bound.
+    Compute the gap by the absolute sum, an upper bound: both peaks at once, towards each other.
 
     Parameters
     ----------
@@ -108,4 +111,5 @@ def absolute_gap(per_1: ArrayLike, per_2: ArrayLike) -> FloatArray:
 
 
 def _radii(per_1: ArrayLike, per_2: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return checked radii of both structures, m."""
     return checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)

@@ -1,4 +1,4 @@
-"""Stereomechanical impact of two masses: velocities after it and the energy that it carries across."""
+"""Stereomechanical impact of two masses: velocities after it and the energy that it transfers."""
 
 from typing import NamedTuple
 
@@ -31,13 +31,13 @@ def post_impact_velocities(
     restitution: ArrayLike,
 ) -> ImpactVelocities:
     """
-    Velocities after a stereomechanical impact.
+    Compute the velocities after a stereomechanical impact.
 
     Parameters
     ----------
     velocity_1, velocity_2 : array_like
         Velocities before the impact, m/s; an impact needs ``velocity_1 > velocity_2`` (structure 1
-        stands left).
+        is left of 2).
     mass_1, mass_2 : array_like
         Impact masses, kg; one of the two may be infinite (a wall).
     restitution : array_like
@@ -67,14 +67,13 @@ def post_impact_velocities(
     >>> print(velocity_1, velocity_2)
     0.25 0.75
     """
-    velocity_1, velocity_2 = (
-        checks.finite("velocity_1", velocity_1),
-        checks.finite("velocity_2", velocity_2),
-    )
+    velocity_1 = checks.finite("velocity_1", velocity_1)
+    velocity_2 = checks.finite("velocity_2", velocity_2)
     share_1, share_2, _ = mass_shares(mass_1, mass_2)
-    change = (1.0 + checks.between("restitution", restitution, 0.0, 1.0)) * (
-        velocity_1 - velocity_2
-    )
+
+    # Equations (7) and (8)
+    factor = 1.0 + checks.between("restitution", restitution, 0.0, 1.0)
+    change = factor * (velocity_1 - velocity_2)
     return ImpactVelocities(velocity_1 - share_2 * change, velocity_2 + share_1 * change)
 
 
@@ -86,7 +85,7 @@ def transfer_energies(
     restitution: ArrayLike,
 ) -> TransferEnergies:
     """
-    Energy that leaves each structure in one impact.
+    Compute the energy that leaves each structure in one impact.
 
     Parameters
     ----------
@@ -101,8 +100,8 @@ def transfer_energies(
     -------
     TransferEnergies
         ``transfer_energy_1`` (the paper's E_Tr12) and ``transfer_energy_2`` (E_Tr21): broadcast
-        shape, J. Positive energy leaves the structure; their sum is the loss ``½ (1 - e²) m1 m2/(m1
-        + m2) (v1 - v2)²``.
+        shape, J. Positive energy leaves the structure; their sum is the loss
+        ``½ (1 - e²) m1 m2/(m1 + m2) (v1 - v2)²``.
 
     Raises
     ------
@@ -126,22 +125,23 @@ def transfer_energies(
     1.0 -1.0
     """
     after_1, after_2 = post_impact_velocities(velocity_1, velocity_2, mass_1, mass_2, restitution)
-    velocity_1, velocity_2 = (
-        np.asarray(velocity_1, dtype=np.float64),
-        np.asarray(velocity_2, dtype=np.float64),
-    )
+    velocity_1 = np.asarray(velocity_1, dtype=np.float64)
+    velocity_2 = np.asarray(velocity_2, dtype=np.float64)
+
+    # Impulse J = (1 + e) m1 m2/(m1 + m2) (v1 - v2)
     reduced_mass = mass_shares(mass_1, mass_2)[2]
-    impulse = (
-        (1.0 + np.asarray(restitution, dtype=np.float64)) * reduced_mass * (velocity_1 - velocity_2)
-    )
-    return TransferEnergies(
-        impulse * (velocity_1 + after_1) / 2.0, -impulse * (velocity_2 + after_2) / 2.0
-    )
+    factor = 1.0 + np.asarray(restitution, dtype=np.float64)
+    impulse = factor * reduced_mass * (velocity_1 - velocity_2)
+
+    # Equations (9) and (10) with the signs of the notes
+    leaving_1 = impulse * (velocity_1 + after_1) / 2.0
+    leaving_2 = -impulse * (velocity_2 + after_2) / 2.0
+    return TransferEnergies(leaving_1, leaving_2)
 
 
 def mass_shares(mass_1: ArrayLike, mass_2: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Shares of two masses in their sum, and the reduced mass.
+    Compute the shares of two masses in their sum, and the reduced mass.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How good the estimates are: of the critical gap, and of the single hit, against the exact histories of one record."""
+"""Reliability of critical gap and single hit: estimates against exact histories of a record."""
 
 from typing import NamedTuple
 
@@ -51,7 +51,11 @@ class SingleHitComparison(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """Predicted over actual: median, standard deviation of the logarithm, shares below each limit, number of cases."""
+    """
+    Predicted over actual.
+
+    Median, standard deviation of the logarithm, shares below each limit, and number of cases.
+    """
 
     median: float
     log_std: float
@@ -64,10 +68,10 @@ def compare_gaps(
     dt: float,
     period_1: ArrayLike,
     period_2: ArrayLike,
-    damping: float = 0.05,
+    damping: float,
 ) -> GapComparison:
     """
-    Estimates of the critical gap beside the exact one.
+    Compare estimates of the critical gap with the exact one.
 
     Parameters
     ----------
@@ -77,13 +81,13 @@ def compare_gaps(
         Sampling interval, s.
     period_1, period_2 : (n_pairs,) array_like
         Undamped periods, s.
-    damping : float, optional
+    damping : float
         Of every structure, fraction of critical, dimensionless.
 
     Returns
     -------
     GapComparison
-        One value a pair.
+        One value per pair.
 
     Raises
     ------
@@ -93,17 +97,19 @@ def compare_gaps(
     Examples
     --------
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> gaps = compare_gaps(pulse, 0.01, [0.5], [1.5])
+    >>> gaps = compare_gaps(pulse, 0.01, [0.5], [1.5], 0.05)
     >>> bool(gaps.exact[0] < gaps.absolute_sd[0])
     True
     """
     period_1, period_2 = _pairs(period_1, period_2)
     (per_1, per_2), (sd_1, sd_2) = _spectra(acceleration, dt, period_1, period_2, damping)
-    white = ddc_correlation(period_1, damping, period_2, damping)
-    own = record_correlation(acceleration, dt, period_1, damping, period_2, damping)
+    pairs = period_1, damping, period_2, damping
+
+    # Correlation by equation (16), and that of the record
+    white, own = ddc_correlation(*pairs), record_correlation(acceleration, dt, *pairs)
     ddc_per, record_per = critical_gap(per_1, per_2, white), critical_gap(per_1, per_2, own)
     return GapComparison(
-        exact=relative_displacement(acceleration, dt, period_1, damping, period_2, damping).largest,
+        exact=relative_displacement(acceleration, dt, *pairs).largest,
         ddc_sd=critical_gap(sd_1, sd_2, white),
         ddc_per=ddc_per,
         record_per=record_per,
@@ -119,12 +125,12 @@ def compare_single_hit(
     period_1: ArrayLike,
     period_2: ArrayLike,
     gap_ratio: ArrayLike,
-    mass_ratio: ArrayLike = 1.0,
-    restitution: float = 0.65,
-    damping: float = 0.05,
+    mass_ratio: ArrayLike,
+    restitution: float,
+    damping: float,
 ) -> SingleHitComparison:
     """
-    Single hit with the exact one-sided critical gap beside the exact pounding history.
+    Compare the single hit at the exact one-sided critical gap with the exact pounding history.
 
     Parameters
     ----------
@@ -136,15 +142,15 @@ def compare_single_hit(
         Undamped periods, s.
     gap_ratio : (n_pairs,) or float array_like
         Gap over the critical gap of the record, dimensionless.
-    mass_ratio : (n_pairs,) or float array_like, optional
+    mass_ratio : (n_pairs,) or float array_like
         Mass of structure 2 over that of structure 1, dimensionless.
-    restitution, damping : float, optional
+    restitution, damping : float
         Of every impact and of every structure, dimensionless.
 
     Returns
     -------
     SingleHitComparison
-        One value a pair.
+        One value per pair.
 
     Raises
     ------
@@ -154,20 +160,19 @@ def compare_single_hit(
     Examples
     --------
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    >>> compared = compare_single_hit(pulse, 0.01, [0.5], [1.5], 0.9)
+    >>> compared = compare_single_hit(pulse, 0.01, [0.5], [1.5], 0.9, 1.0, 0.65, 0.05)
     >>> bool(compared.impacts[0] > 0)
     True
     """
     period_1, period_2 = _pairs(period_1, period_2)
     (per_1, per_2), _ = _spectra(acceleration, dt, period_1, period_2, damping)
-    critical = relative_displacement(
-        acceleration, dt, period_1, damping, period_2, damping
-    ).one_before_two
+    first, second = (period_1, damping), (period_2, damping)
+    critical = relative_displacement(acceleration, dt, *first, *second).one_before_two
     gap = critical * checks.not_negative("gap_ratio", gap_ratio)
+
+    # Estimate and history of the same impact: unit mass of structure 1
     hit = single_hit(per_1, per_2, period_1, period_2, 1.0, mass_ratio, restitution, critical, gap)
-    exact = pounding_histories(
-        acceleration, dt, period_1, damping, 1.0, period_2, damping, mass_ratio, gap, restitution
-    )
+    exact = pounding_histories(acceleration, dt, *first, 1.0, *second, mass_ratio, gap, restitution)
     return SingleHitComparison(
         status=hit.status,
         per=np.stack([per_1, per_2]),
@@ -178,11 +183,12 @@ def compare_single_hit(
 
 
 def _pairs(period_1: ArrayLike, period_2: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return checked periods, one of each a pair."""
+    """Return checked periods of both structures of each pair."""
     first, second = checks.positive("period_1", period_1), checks.positive("period_2", period_2)
     if first.ndim != 1 or first.shape != second.shape:
         raise ValueError(
-            f"period_1 and period_2 must be one row each, got shapes {first.shape} and {second.shape}"
+            "period_1 and period_2 must be one row each, "
+            f"got shapes {first.shape} and {second.shape}"
         )
     return first, second
 
@@ -191,15 +197,15 @@ def _spectra(
     acceleration: ArrayLike, dt: float, period_1: FloatArray, period_2: FloatArray, damping: float
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Return radii, then peak displacements, of both structures, each (n_pairs,), m."""
-    periods, place = np.unique(np.stack([period_1, period_2]), return_inverse=True)
+    periods, index = np.unique(np.stack([period_1, period_2]), return_inverse=True)
     spectra = response_spectra(acceleration, dt, periods, damping)
-    first, second = place.reshape(2, -1)
+    first, second = index.reshape(2, -1)
     return (spectra.per[first], spectra.per[second]), (spectra.sd[first], spectra.sd[second])
 
 
 def amplifications(compared: SingleHitComparison) -> tuple[FloatArray, FloatArray]:
     """
-    Largest amplification of either structure of the pairs with a single hit.
+    Compute the largest amplification of either structure of the pairs with a single hit.
 
     Parameters
     ----------
@@ -213,16 +219,15 @@ def amplifications(compared: SingleHitComparison) -> tuple[FloatArray, FloatArra
         dimensionless.
     """
     known = compared.status == "ok"
-    predicted, actual = (
-        (radii[:, known] / compared.per[:, known]).max(axis=0)
-        for radii in (compared.predicted, compared.actual)
-    )
+    per = compared.per[:, known]
+    predicted = (compared.predicted[:, known] / per).max(axis=0)
+    actual = (compared.actual[:, known] / per).max(axis=0)
     return predicted, actual
 
 
 def summary(ratio: ArrayLike, limits: tuple[float, ...]) -> Summary:
     """
-    Bias and scatter of predicted over actual.
+    Compute bias and scatter of predicted over actual.
 
     Parameters
     ----------

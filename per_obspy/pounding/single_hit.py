@@ -1,8 +1,5 @@
-"""Single-hit estimate of what pounding does to a pair: grazing state, earlier contact, impact, radius after it."""
+"""Single-hit estimate of pounding: grazing state, earlier contact, impact, radius after it."""
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +9,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.single_hit import NO_POUNDING, PAIRS, estimate
 from per_obspy.pounding.impact import mass_shares
-
-#: gap/critical gap below which several impacts make the estimate unreliable (see the table of
-#: `single_hit`)
-RELIABLE_GAP_RATIO = 0.6
+from per_obspy.threads import map_in_threads
 
 #: Pairs that a thread takes at a time; a whole number of the kernel's blocks.
 SHARE = 512 * PAIRS
@@ -25,8 +19,9 @@ STATUS = np.array(["ok", "no_pounding", "no_grazing_state", "inconsistent_critic
 
 class SingleHitBranches(NamedTuple):
     """
-    Both possible impacts; first axis: both structures move towards 2 at the grazing state (+), then towards 1 (-).
+    Both possible impacts of each pair.
 
+    First axis: both structures move towards 2 at the grazing state (+), then towards 1 (-).
     ``time_before`` is the time from the actual contact to the grazing state, s. Displacements and
     radii are in m, velocities in m/s, transfer energies in J (positive leaves the structure),
     amplifications dimensionless.
@@ -116,11 +111,11 @@ def single_hit(
 
     Notes
     -----
-    At the grazing state both structures have the same velocity v, lie on their energy circles and
-    stand at x and x - g_cr: with ``A = w2² - w1²``, ``B = w2² g_cr``, ``C = w1² r1² - w2² r2² + w2²
-    g_cr²`` the only root at which the gap is smallest is ``x = C/(B + sqrt(B² - A C))``. The sign
-    of v is not determined, so both branches are followed back along their circles to the first
-    contact at the actual gap, where the impact takes place.
+    At the grazing state both structures have the same velocity v and lie on their energy circles,
+    at the displacements x and x - g_cr. With ``A = w2² - w1²``, ``B = w2² g_cr`` and
+    ``C = w1² r1² - w2² r2² + w2² g_cr²`` the only root at which the gap is smallest is
+    ``x = C/(B + sqrt(B² - A C))``. The sign of v is not determined, so both branches are followed
+    back along their circles to the first contact at the actual gap, where the impact takes place.
 
     Largest amplification of either structure, predicted over actual: median, standard deviation of
     the logarithm, share of cases under-predicted by more than 1 %. Measured on 16 broad-band
@@ -155,45 +150,58 @@ def single_hit(
     ok 0.3
     """
     radii = checks.not_negative("per_1", per_1), checks.not_negative("per_2", per_2)
-    frequencies = (
-        2 * np.pi / checks.positive("period_1", period_1),
-        2 * np.pi / checks.positive("period_2", period_2),
-    )
+    frequency_1 = 2 * np.pi / checks.positive("period_1", period_1)
+    frequency_2 = 2 * np.pi / checks.positive("period_2", period_2)
+
+    # Parts of the velocity difference that both structures receive, and the impulse per velocity
     share_1, share_2, reduced_mass = mass_shares(mass_1, mass_2)
-    impulse = 1.0 + checks.between("restitution", restitution, 0.0, 1.0)
+    factor = 1.0 + checks.between("restitution", restitution, 0.0, 1.0)
+    impact = factor * share_2, factor * share_1, factor * reduced_mass
     gaps = checks.not_negative("critical_gap", critical_gap), checks.not_negative("gap", gap)
-    shares = impulse * share_2, impulse * share_1, impulse * reduced_mass
-    broadcast = np.broadcast_arrays(*radii, *frequencies, *shares, *gaps)
+
+    # Prepare arrays to be passed to the jitted function
+    broadcast = np.broadcast_arrays(*radii, frequency_1, frequency_2, *impact, *gaps)
     return _estimate(np.stack([array.ravel() for array in broadcast]), broadcast[0].shape)
 
 
-def _in_threads(work: Callable[[int, int], None], count: int) -> None:
-    """Do the work on shares of the pairs, in threads; the kernel leaves the interpreter free."""
-    shares = range(0, count, SHARE)
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        list(pool.map(lambda begin: work(begin, min(begin + SHARE, count)), shares))
-
-
 def _estimate(arguments: FloatArray, shape: tuple[int, ...]) -> SingleHit:
-    """Call the kernel on whole blocks, so that no pair's rounding depends on its company; name the numbers."""
-    count = arguments.shape[1]
-    whole = np.pad(arguments, ((0, 0), (0, -count % PAIRS)), mode="edge") if count else arguments
-    status = np.empty(whole.shape[1], dtype=np.int8)
-    fields, envelope = np.empty((2, 13, status.size)), np.empty((2, status.size))
-    _in_threads(
-        lambda begin, end: estimate(whole, begin, end, status, fields, envelope), status.size
-    )
-    status, fields, envelope = status[:count], fields[..., :count], envelope[:, :count]
-    branches = SingleHitBranches(*(fields[:, field].reshape(2, *shape) for field in range(13)))
+    """Return the kernel's estimates by name, in the shape of the arguments."""
+    status, fields, envelope = _run(arguments)
+    status = status.reshape(shape)
+    branches = SingleHitBranches(*(field.reshape(2, *shape) for field in np.moveaxis(fields, 1, 0)))
+
+    # The larger of both branches; the radius before impact is reached anyway
     velocity = np.max(branches.velocity_1 - branches.velocity_2, axis=0)
     return SingleHit(
-        status=STATUS[status].reshape(shape),
+        status=STATUS[status],
         amplification_1=np.maximum(np.max(branches.amplification_1, axis=0), 1.0),
         amplification_2=np.maximum(np.max(branches.amplification_2, axis=0), 1.0),
         per_after_1=np.max(branches.per_after_1, axis=0),
         per_after_2=np.max(branches.per_after_2, axis=0),
-        impact_velocity=np.where(status.reshape(shape) == NO_POUNDING, 0.0, velocity),
+        impact_velocity=np.where(status == NO_POUNDING, 0.0, velocity),
         branches=branches,
         envelope_1=envelope[0].reshape(shape),
         envelope_2=envelope[1].reshape(shape),
     )
+
+
+def _run(arguments: FloatArray) -> tuple[NDArray[np.int8], FloatArray, FloatArray]:
+    """
+    Return status (n,), fields of both branches (2, 13, n) and bounds (2, n) of the kernel.
+
+    The kernel gets whole blocks, so that the rounding of a pair does not depend on other pairs.
+    """
+    count = arguments.shape[1]
+    whole = np.pad(arguments, ((0, 0), (0, -count % PAIRS)), mode="edge") if count else arguments
+    status = np.empty(whole.shape[1], dtype=np.int8)
+    fields = np.empty((2, len(SingleHitBranches._fields), status.size))
+    envelope = np.empty((2, status.size))
+
+    def fill(begin: int) -> None:
+        """Fill in the estimates of one share of the pairs."""
+        end = min(begin + SHARE, status.size)
+        estimate(whole, begin, end, status, fields, envelope)
+
+    # Threads take large shares of the pairs
+    map_in_threads(fill, range(0, status.size, SHARE))
+    return status[:count], fields[..., :count], envelope[:, :count]

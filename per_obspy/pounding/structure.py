@@ -1,9 +1,13 @@
 """A building as the single-degree-of-freedom structure that pounding sees: at its contact level."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, pi
 
+from numpy.typing import ArrayLike
+
 from per_obspy import checks
+from per_obspy.checks import FloatArray
 
 
 @dataclass(frozen=True)
@@ -65,3 +69,58 @@ _CHECKS = {
     "hardening": checks.fraction_of_critical,
     "participation": checks.not_negative,
 }
+
+
+def refuse_bilinear(structures: Iterable[Structure]) -> None:
+    """
+    Refuse structures that yield.
+
+    Parameters
+    ----------
+    structures : iterable of Structure
+        Arguments of a function for linear structures.
+
+    Raises
+    ------
+    ValueError
+        If a yield displacement is finite.
+    """
+    for structure in structures:
+        if structure.yield_displacement < inf:
+            raise ValueError(
+                f"yield_displacement must be infinite here, got {structure.yield_displacement}"
+            )
+
+
+def checked_oscillators(
+    number: int, period: ArrayLike, damping: ArrayLike, participation: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return circular frequency, damping and participation of many structures 1 or 2, checked.
+
+    Parameters
+    ----------
+    number : int
+        1 or 2, by which messages name the arguments.
+    period : array_like
+        Undamped periods, s.
+    damping : array_like
+        Fractions of critical, dimensionless.
+    participation : array_like
+        Contact displacement over oscillator displacement, dimensionless.
+
+    Returns
+    -------
+    frequency, damping, participation : ndarray
+        In rad/s and dimensionless, each in the shape of its argument.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+    return (
+        2.0 * pi / checks.positive(f"period_{number}", period),
+        checks.fraction_of_critical(f"damping_{number}", damping),
+        checks.not_negative(f"participation_{number}", participation),
+    )

@@ -170,6 +170,26 @@ def constant_yield_spectra(
     -------
     InelasticSpectra
         Arrays (n_periods,).
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape.
+
+    See Also
+    --------
+    bilinear_response : History of one oscillator.
+
+    References
+    ----------
+    Newmark & Hall (1982), Earthquake spectra and design, for inelastic spectra.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> spectra = constant_yield_spectra(pulse, 0.01, [0.5, 1.0, 2.0], 0.05, 0.1, 0.05)
+    >>> print(spectra.ductility.round(2), spectra.sd.round(3))
+    [3.07 2.53 1.02] [0.019 0.063 0.102]
     """
     record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
     coefficients = np.broadcast_to(
@@ -213,11 +233,28 @@ def constant_ductility_spectra(
         Arrays (n_periods,); NaN where the ductility is not reached down to 1e-4 of the elastic
         displacement.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, out of range or of the wrong shape, or the ductility is below
+        1.
+
     Notes
     -----
     Several strengths can give the same ductility. The largest is returned: the yield displacement
     is lowered from the elastic displacement in steps of 3 % until the ductility is exceeded, and
     the root in that step is found by Brent's method (two roots within one step can be missed).
+
+    References
+    ----------
+    Newmark & Hall (1982), Earthquake spectra and design, for inelastic spectra.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> spectra = constant_ductility_spectra(pulse, 0.01, [0.5, 1.0], 0.05, 4.0, 0.05)
+    >>> print(spectra.yield_coefficient.round(3), spectra.ductility.round(6))
+    [0.09  0.055] [4. 4.]
     """
     record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
     target = checks.number("ductility", ductility, checks.finite)

@@ -6,9 +6,7 @@ one ramp to zero, and filled up with zeros to whole tiles. Results do not depend
 threads: a block is computed by one of them.
 """
 
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.spectra import blocks
+from per_obspy.threads import map_in_threads
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -133,11 +132,9 @@ def over_blocks(
 
 def in_threads(work: Callable[[Part], Result], parts: Sequence[Part], steps: int) -> list[Result]:
     """Return what the work gives for each part, in threads where that many steps of all oscillators are worth them."""
-    threads = min(len(parts), len(os.sched_getaffinity(0)))
-    if threads == 1 or steps < STEPS_WORTH_THREADS:
+    if steps < STEPS_WORTH_THREADS:
         return [work(part) for part in parts]
-    with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, parts))
+    return map_in_threads(work, parts)
 
 
 def _block(oscillators: Oscillators, first: int) -> Oscillators:

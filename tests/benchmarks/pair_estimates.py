@@ -16,7 +16,7 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from per_obspy.kernels.pairs.resampling import resampled_probabilities
-from per_obspy.pounding.correlation.azimuths import directional_correlation
+from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.pounding.history.relative import (
     critical_gap_surface,
     directional_relative_displacement,

@@ -93,7 +93,7 @@ def test_company_changes_no_bit(monkeypatch):
             assert_array_equal(alone, among[part])
     monkeypatch.setattr(per_pair, "PART", 5)
     monkeypatch.setattr(oscillator_blocks, "STEPS_WORTH_THREADS", 0)
-    monkeypatch.setattr(oscillator_blocks.os, "sched_getaffinity", lambda _: range(3))
+    monkeypatch.setattr("per_obspy.threads.usable_processors", lambda: 3)
     for threaded, among in zip(
         azimuth_maxima(north, east, dt, *oscillators), together, strict=True
     ):

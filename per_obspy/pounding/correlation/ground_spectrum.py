@@ -1,10 +1,12 @@
 """Correlation of two linear structures under stationary ground motion of any spectral shape."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+
+ComplexArray = NDArray[np.complex128]
 
 
 def psd_correlation(
@@ -16,7 +18,7 @@ def psd_correlation(
     damping_2: ArrayLike,
 ) -> FloatArray:
     """
-    Correlation of two displacements under a tabulated power spectral density of the ground acceleration.
+    Compute the correlation of two displacements under a tabulated ground motion spectrum.
 
     Parameters
     ----------
@@ -55,62 +57,65 @@ def psd_correlation(
     0.229814
     """
     density, frequencies = _table(psd, frequencies)
-    period_1, period_2 = (
-        checks.positive("period_1", period_1),
-        checks.positive("period_2", period_2),
-    )
+    period_1 = checks.positive("period_1", period_1)
+    period_2 = checks.positive("period_2", period_2)
     damping_1 = checks.positive("damping_1", checks.fraction_of_critical("damping_1", damping_1))
     damping_2 = checks.positive("damping_2", checks.fraction_of_critical("damping_2", damping_2))
-    one, two = _poles(period_1, damping_1), _poles(period_2, damping_2)
-    both = _integral(one, two, density, frequencies)
-    correlation = both / np.sqrt(
-        _integral(one, one, density, frequencies) * _integral(two, two, density, frequencies)
-    )
+
+    # rho = I12 / sqrt(I11 I22)
+    first, second = _poles(period_1, damping_1), _poles(period_2, damping_2)
+    covariance = _integral(first, second, density, frequencies)
+    variance_1 = _integral(first, first, density, frequencies)
+    variance_2 = _integral(second, second, density, frequencies)
+    correlation = covariance / np.sqrt(variance_1 * variance_2)
     bounded: FloatArray = np.minimum(np.maximum(correlation, -1.0), 1.0)
     return bounded
 
 
 def _table(psd: ArrayLike, frequencies: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    density, frequencies = (
-        checks.not_negative("psd", psd),
-        checks.not_negative("frequencies", frequencies),
-    )
+    """Return the checked spectrum: a density that is not zero everywhere, at rising frequencies."""
+    density = checks.not_negative("psd", psd)
+    frequencies = checks.not_negative("frequencies", frequencies)
     if density.ndim != 1 or density.shape != frequencies.shape or density.size < 2:
         raise ValueError(
-            f"psd and frequencies must be rows of equal length, got {density.shape}, {frequencies.shape}"
+            f"psd and frequencies must be rows of equal length, got {density.shape}, "
+            f"{frequencies.shape}"
         )
-    if not np.all(np.diff(frequencies) > 0):
-        raise ValueError(
-            f"frequencies must increase, got {frequencies[int(np.argmin(np.diff(frequencies))) + 1]}"
-        )
+
+    # Name the first frequency after the steepest fall
+    steps = np.diff(frequencies)
+    if not np.all(steps > 0):
+        fallen = frequencies[int(np.argmin(steps)) + 1]
+        raise ValueError(f"frequencies must increase, got {fallen}")
     if not density.any():
         raise ValueError("psd is 0 everywhere: nothing moves")
     return density, frequencies
 
 
-def _poles(
-    period: FloatArray, damping: FloatArray
-) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
+def _poles(period: FloatArray, damping: FloatArray) -> ComplexArray:
     """Return the two poles of H over circular frequency, last axis."""
     omega, side = 2.0 * np.pi / period, np.sqrt((1.0 - damping) * (1.0 + damping))
     return np.stack([omega * (1j * damping + side), omega * (1j * damping - side)], axis=-1)
 
 
 def _integral(
-    one: np.ndarray[tuple[int, ...], np.dtype[np.complex128]],
-    two: np.ndarray[tuple[int, ...], np.dtype[np.complex128]],
-    density: FloatArray,
-    frequencies: FloatArray,
+    first: ComplexArray, second: ComplexArray, density: FloatArray, frequencies: FloatArray
 ) -> FloatArray:
     """Return the integral of Re(H1 H2*) times the linear interpolation of the density."""
-    one, two = np.broadcast_arrays(one, two)
-    poles = np.concatenate([one, two.conj()], axis=-1)
+    first, second = np.broadcast_arrays(first, second)
+    poles = np.concatenate([first, second.conj()], axis=-1)
+
+    # Density as a straight line start + slope omega in each interval
     slope = np.diff(density) / np.diff(frequencies)
     start = density[:-1] - slope * frequencies[:-1]
+
+    # Each of the four poles adds its residue times the integral of density/(omega - pole)
     total = np.zeros(poles.shape[:-1])
-    for place in range(4):
-        pole = poles[..., place]
-        residue = 1.0 / np.prod(pole[..., None] - np.delete(poles, place, axis=-1), axis=-1)
-        logarithms = np.diff(np.log(frequencies - pole[..., None]), axis=-1)
-        total += (residue * np.sum((start + slope * pole[..., None]) * logarithms, axis=-1)).real
+    for number in range(4):
+        pole = poles[..., number, None]
+        others = np.delete(poles, number, axis=-1)
+        residue = 1.0 / np.prod(pole - others, axis=-1)
+        logarithms = np.diff(np.log(frequencies - pole), axis=-1)
+        integral = np.sum((start + slope * pole) * logarithms, axis=-1)
+        total += (residue * integral).real
     return total

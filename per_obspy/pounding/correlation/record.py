@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.azimuths import directional_correlation
+from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 
 
 def record_correlation(
@@ -17,7 +17,7 @@ def record_correlation(
     damping_2: ArrayLike,
 ) -> FloatArray:
     """
-    Correlation of two displacements over all time, the free vibration after the record included.
+    Compute the correlation of two displacements under a record and the free vibration after it.
 
     Parameters
     ----------
@@ -44,7 +44,8 @@ def record_correlation(
 
     See Also
     --------
-    per_obspy.pounding.correlation.azimuths.directional_correlation : the formula, and pairs that each have their own azimuth.
+    per_obspy.pounding.correlation.by_azimuth.directional_correlation :
+        The formula, for pairs along individual azimuths.
 
     Examples
     --------
@@ -61,9 +62,11 @@ def record_correlation(
         checks.fraction_of_critical("damping_2", damping_2),
     )
     period_1, damping_1, period_2, damping_2 = (array.ravel() for array in pairs)
-    still = np.zeros_like(acceleration)
+
+    # One component: the record is that along north, and so is the axis of every pair
+    east = np.zeros_like(acceleration)
     correlation = directional_correlation(
-        acceleration, still, dt, period_1, damping_1, period_2, damping_2, azimuths=[[0.0]]
+        acceleration, east, dt, period_1, damping_1, period_2, damping_2, azimuths=[[0.0]]
     )
     shaped: FloatArray = correlation[:, 0].reshape(pairs[0].shape)
     return shaped

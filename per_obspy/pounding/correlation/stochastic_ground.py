@@ -1,5 +1,5 @@
 """
-Stationary ground motions as filtered white noise, each with its power spectral density and its state space.
+Stationary ground motions: filtered white noise with a power spectral density and a state space.
 
 Intensities are two-sided power spectral densities S0 of the white noise, m²/s³, over circular
 frequency.
@@ -16,7 +16,7 @@ from per_obspy.checks import FloatArray
 
 
 class Filter(NamedTuple):
-    """``x' = state x + force w`` and ground acceleration ``a = output x + direct w`` for white noise w."""
+    """State space ``x' = state x + force w``, ``a = output x + direct w`` for white noise w."""
 
     state: FloatArray
     force: FloatArray
@@ -24,18 +24,18 @@ class Filter(NamedTuple):
     direct: float
 
 
-class Ground(Protocol):
-    """What a stationary ground motion offers."""
+class StochasticGround(Protocol):
+    """Stationary ground motion: intensity, power spectral density and filter."""
 
     @property
     def intensity(self) -> float:
         """Two-sided power spectral density of the white noise, m²/s³."""
 
     def psd(self, frequency: ArrayLike) -> FloatArray:
-        """Two-sided power spectral density of the acceleration at circular frequencies (rad/s), m²/s³."""
+        """Return the two-sided power spectral density (m²/s³) at circular frequencies (rad/s)."""
 
     def filter(self) -> Filter:
-        """State space from white noise to ground acceleration."""
+        """Return the state space from white noise to ground acceleration."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,11 @@ class WhiteNoise:
         _check_positive(self)
 
     def psd(self, frequency: ArrayLike) -> FloatArray:
-        """Power spectral density at circular frequencies (rad/s), m²/s³."""
+        """Return the power spectral density (m²/s³) at circular frequencies (rad/s)."""
         return np.full_like(checks.finite("frequency", frequency), self.intensity)
 
     def filter(self) -> Filter:
-        """State space without a state."""
+        """Return a state space without a state."""
         return Filter(np.empty((0, 0)), np.empty(0), np.empty(0), 1.0)
 
 
@@ -105,14 +105,14 @@ class KanaiTajimi:
         _check_positive(self)
 
     def psd(self, frequency: ArrayLike) -> FloatArray:
-        """Power spectral density at circular frequencies (rad/s), m²/s³."""
+        """Return the power spectral density (m²/s³) at circular frequencies (rad/s)."""
         square = (checks.finite("frequency", frequency) / self.frequency) ** 2
         viscous = 4.0 * self.damping**2 * square
         density: FloatArray = self.intensity * (1.0 + viscous) / ((1.0 - square) ** 2 + viscous)
         return density
 
     def filter(self) -> Filter:
-        """State space of the soil layer: displacement, velocity."""
+        """Return the state space of the soil layer: displacement, velocity."""
         stiffness, viscosity = self.frequency**2, 2.0 * self.damping * self.frequency
         state = np.array([[0.0, 1.0], [-stiffness, -viscosity]])
         return Filter(state, np.array([0.0, -1.0]), np.array([-stiffness, -viscosity]), 0.0)
@@ -157,18 +157,20 @@ class CloughPenzien:
         _check_positive(self)
 
     def psd(self, frequency: ArrayLike) -> FloatArray:
-        """Power spectral density at circular frequencies (rad/s), m²/s³."""
+        """Return the power spectral density (m²/s³) at circular frequencies (rad/s)."""
         square = (checks.finite("frequency", frequency) / self.low_frequency) ** 2
         passed = square**2 / ((1.0 - square) ** 2 + 4.0 * self.low_damping**2 * square)
         density: FloatArray = self._soil().psd(frequency) * passed
         return density
 
     def filter(self) -> Filter:
-        """State space: displacement and velocity of the soil layer, then of the high-pass."""
+        """Return the state space: displacement and velocity of the soil layer and the high-pass."""
         soil = self._soil().filter()
-        high_pass = np.array(
-            [-(self.low_frequency**2), -2.0 * self.low_damping * self.low_frequency]
-        )
+        stiffness = self.low_frequency**2
+        viscosity = 2.0 * self.low_damping * self.low_frequency
+        high_pass = np.array([-stiffness, -viscosity])
+
+        # The high-pass is driven by the output of the soil layer
         state = np.zeros((4, 4))
         state[:2, :2] = soil.state
         state[2, 3] = 1.0
@@ -177,9 +179,11 @@ class CloughPenzien:
         return Filter(state, np.array([0.0, -1.0, 0.0, 0.0]), output, 0.0)
 
     def _soil(self) -> KanaiTajimi:
+        """Return the soil layer without the high-pass."""
         return KanaiTajimi(self.frequency, self.damping, self.intensity)
 
 
 def _check_positive(ground: WhiteNoise | KanaiTajimi | CloughPenzien) -> None:
+    """Refuse parameters that are not positive."""
     for field in fields(ground):
         checks.number(field.name, getattr(ground, field.name), checks.positive)

@@ -1,4 +1,4 @@
-"""Correlation of two linear structures under white noise, equation (16) of the double difference combination."""
+"""Correlation of two linear structures under white noise: double difference, equation (16)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ def ddc_correlation(
     period_1: ArrayLike, damping_1: ArrayLike, period_2: ArrayLike, damping_2: ArrayLike
 ) -> FloatArray:
     """
-    Correlation of the displacements of two oscillators under stationary white noise, exact for any damping.
+    Compute the correlation of two oscillators under white noise, exact for any damping.
 
     Parameters
     ----------
@@ -35,8 +35,9 @@ def ddc_correlation(
     -----
     With b = T2/T1, written here in a form that does not change when 1 and 2 are exchanged::
 
-        rho = 8 sqrt(xi1 xi2) (xi2 + xi1 b) b^1.5 / ((1 - b²)² + 4 xi1 xi2 (1 + b²) b + 4 (xi1² +
-        xi2²) b²)
+                        8 sqrt(xi1 xi2) (xi2 + xi1 b) b^1.5
+        rho = -------------------------------------------------------------
+              (1 - b²)² + 4 xi1 xi2 (1 + b²) b + 4 (xi1² + xi2²) b²
 
     References
     ----------
@@ -48,22 +49,28 @@ def ddc_correlation(
     >>> print(round(float(ddc_correlation(1.0, 0.05, 1.2, 0.05)), 6))
     0.229814
     """
-    period_1, period_2 = (
-        checks.positive("period_1", period_1),
-        checks.positive("period_2", period_2),
-    )
+    period_1 = checks.positive("period_1", period_1)
+    period_2 = checks.positive("period_2", period_2)
     damping_1 = checks.fraction_of_critical("damping_1", damping_1)
     damping_2 = checks.fraction_of_critical("damping_2", damping_2)
     ratio = period_1 / period_2
-    detuning = (period_1 - period_2) * (
-        1 / period_1 + 1 / period_2
-    )  # T1/T2 - T2/T1 without cancellation
-    # divided by the largest of the three, squares of small dampings cannot underflow
+
+    # T1/T2 - T2/T1 without cancellation
+    detuning = (period_1 - period_2) * (1 / period_1 + 1 / period_2)
+
+    # Divided by the largest of the three, squares of small dampings cannot underflow
     scale = np.maximum(np.maximum(damping_1, damping_2), np.abs(detuning))
     same = scale == 0
     scale = np.where(same, 1.0, scale)
-    damping_1, damping_2, detuning = damping_1 / scale, damping_2 / scale, detuning / scale
+    above, below = _fraction(ratio, damping_1 / scale, damping_2 / scale, detuning / scale)
+    return np.where(same, 1.0, np.minimum(above / np.where(same, 1.0, below), 1.0))[()]
+
+
+def _fraction(
+    ratio: FloatArray, damping_1: FloatArray, damping_2: FloatArray, detuning: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return numerator and denominator of equation (16), both divided by b²."""
     product = damping_1 * damping_2
     above = 8 * np.sqrt(product) * (damping_2 * np.sqrt(ratio) + damping_1 / np.sqrt(ratio))
     below = detuning**2 + 4 * product * (ratio + 1 / ratio) + 4 * (damping_1**2 + damping_2**2)
-    return np.where(same, 1.0, np.minimum(above / np.where(same, 1.0, below), 1.0))[()]
+    return above, below

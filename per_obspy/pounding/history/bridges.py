@@ -1,4 +1,4 @@
-"""Bridge decks in series: pounding at the joints, and unseating where a joint opens further than its seat is long."""
+"""Bridge decks in series: pounding at the joints, and unseating where a joint opens too far."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -41,7 +41,7 @@ def bridge_history(
     free_vibration: bool = True,
 ) -> BridgeHistory:
     """
-    Exact history of bridge decks in series, with unseating.
+    Compute the exact history of bridge decks in series, with unseating.
 
     Parameters
     ----------
@@ -51,22 +51,46 @@ def bridge_history(
         Sampling interval, s.
     decks : sequence of Structure
         From left to right; abutments are walls (infinite mass, participation 0).
-    gaps, restitution : float or (n_decks - 1,) array_like
-        Of the joints, m and dimensionless.
+    gaps : float or (n_decks - 1,) array_like
+        Clear distances of the joints at rest, m.
+    restitution : float or (n_decks - 1,) array_like
+        Coefficient of each joint, between 0 and 1, dimensionless.
     seat_lengths : float or (n_decks - 1,) array_like
-        Opening that a joint bears, m.
-    free_vibration : bool
-        As in `pounding_history`.
+        Largest opening beyond the gap that a joint bears, m.
+    free_vibration : bool, optional
+        Go on after the record, as in `pounding_history`.
 
     Returns
     -------
     BridgeHistory
-        The history goes on as if an unseated deck stayed in place.
+        Motion, impacts, joint openings (m) and unseating; the history goes on as if an unseated
+        deck stayed in place.
 
     Raises
     ------
     ValueError
-        As `pounding_history`, or if a seat length is not positive.
+        If an argument is out of range, a seat length is not positive, or the gaps, restitutions or
+        seat lengths do not fit the number of joints.
+
+    See Also
+    --------
+    per_obspy.pounding_history : Rows of any structures.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
+    (8), for the impacts at the joints.
+
+    Examples
+    --------
+    Two decks between abutments that move with the ground:
+
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> abutment = Structure(1.0, 0.0, np.inf, participation=0.0)
+    >>> decks = [abutment, Structure(0.8, 0.05, 1e6), Structure(1.6, 0.05, 8e5), abutment]
+    >>> bridge = bridge_history(pulse, 0.01, decks, 0.05, 0.6, seat_lengths=0.08)
+    >>> print(bridge.opening.round(3), bridge.unseated)
+    [0.06  0.069 0.095] [False False  True]
     """
     seats = checks.positive("seat_lengths", seat_lengths)
     history = pounding_history(acceleration, dt, decks, gaps, restitution, free_vibration)

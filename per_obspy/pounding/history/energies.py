@@ -9,9 +9,10 @@ from per_obspy.checks import FloatArray
 
 class Energies(NamedTuple):
     """
-    Energies of each structure over time, each (n_structures, n_time), J; NaN where the mass is infinite.
+    Energies of each structure over time, each (n_structures, n_time), J.
 
-    ``kinetic + damping + elastic + hysteretic + transfer = input``, eq. (3) and (4).
+    NaN where the mass is infinite. By eq. (3) and (4), ``kinetic + damping + elastic + hysteretic +
+    transfer = input``.
 
     Attributes
     ----------
@@ -39,7 +40,7 @@ class Energies(NamedTuple):
 
 def energies_of(table: FloatArray, motion: FloatArray, work: FloatArray) -> Energies:
     """
-    Return the energies that belong to a motion and to the work done along it.
+    Compute the energies of a motion and of the work done along it.
 
     Parameters
     ----------
@@ -59,19 +60,21 @@ def energies_of(table: FloatArray, motion: FloatArray, work: FloatArray) -> Ener
     _, stiffness, hardening, limit, _, mass = table.T
     mass = np.where(np.isinf(mass), np.nan, mass)
     displacement, velocity, plastic = np.moveaxis(motion, 2, 0)
+    kinetic = 0.5 * mass * velocity**2
+
+    # Recoverable energy: a spring of the hardened stiffness, and one that slips
     stretch = np.where(np.isinf(limit), displacement, displacement - plastic)
-    elastic = (
-        0.5 * mass * stiffness * (hardening * displacement**2 + (1.0 - hardening) * stretch**2)
-    )
-    done, dissipated, yielded, given = np.moveaxis(work + 0.0 * mass[:, np.newaxis], 2, 0)
-    return Energies(
-        done.T, (0.5 * mass * velocity**2).T, dissipated.T, elastic.T, yielded.T, given.T
-    )
+    squares = hardening * displacement**2 + (1.0 - hardening) * stretch**2
+    elastic = 0.5 * mass * stiffness * squares
+
+    # Work done along the motion, NaN for structures of infinite mass
+    done, damping, hysteretic, transfer = np.moveaxis(work + 0.0 * mass[:, np.newaxis], 2, 0)
+    return Energies(done.T, kinetic.T, damping.T, elastic.T, hysteretic.T, transfer.T)
 
 
 def closure_of(energies: Energies) -> float:
     """
-    Return the largest imbalance of the energies over the largest input or transferred energy of the structure.
+    Compute the largest imbalance of (3), (4) over the largest input or transferred energy.
 
     Parameters
     ----------
@@ -84,18 +87,14 @@ def closure_of(energies: Energies) -> float:
         Dimensionless; structures of infinite mass are left out, and one that never moves counts as
         balanced.
     """
-    gained = (
-        energies.kinetic
-        + energies.damping
-        + energies.elastic
-        + energies.hysteretic
-        + energies.transfer
-    )
+    # Left side of (3), (4)
+    stored = energies.kinetic + energies.damping + energies.elastic
+    spent = stored + energies.hysteretic + energies.transfer
     finite = ~np.isnan(energies.input[:, 0])
-    imbalance = np.abs(gained - energies.input)[finite].max(axis=1, initial=0.0)
-    scale = np.maximum(np.abs(energies.input), np.abs(energies.transfer))[finite].max(
-        axis=1, initial=0.0
-    )
-    return float(
-        np.divide(imbalance, scale, out=np.zeros_like(scale), where=scale > 0).max(initial=0.0)
-    )
+    imbalance = np.abs(spent - energies.input)[finite].max(axis=1, initial=0.0)
+
+    # Relative to the larger of input and transfer of each structure
+    exchanged = np.maximum(np.abs(energies.input), np.abs(energies.transfer))
+    scale = exchanged[finite].max(axis=1, initial=0.0)
+    share = np.divide(imbalance, scale, out=np.zeros_like(scale), where=scale > 0)
+    return float(share.max(initial=0.0))

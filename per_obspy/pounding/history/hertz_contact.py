@@ -1,6 +1,6 @@
 """Contact by the Hertz law with damping: a nonlinear alternative to impacts, for comparison."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.history.tables import closed_record
-from per_obspy.pounding.structure import Structure
+from per_obspy.pounding.structure import Structure, refuse_bilinear
 
 #: Relative and absolute (m, m/s) tolerance of the integration.
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
@@ -48,9 +48,10 @@ def hertz_damp_history(
     restitution: float,
 ) -> HertzHistory:
     """
-    History of two linear structures with the Hertz-damp contact ``F = k d^1.5 (1 + 3 (1 - e²) d' / (4 v))``.
+    Compute the history of two linear structures with a Hertz-damp contact.
 
-    d is the overlap and v the approach speed at first contact. Integrated numerically (DOP853),
+    The contact force is ``F = k d^1.5 (1 + 3 (1 - e²) d' / (4 v))`` with the overlap d and the
+    approach speed v at first contact. Integrated numerically (DOP853),
     with every contact located as an event; much slower than `pounding_history`, and meant for
     comparison.
 
@@ -61,7 +62,7 @@ def hertz_damp_history(
     dt : float
         Sampling interval, s.
     structure_1, structure_2 : Structure
-        Linear; 1 stands left.
+        Linear; 1 is left of 2.
     gap : float
         Clear distance at rest, m, above zero.
     stiffness : float
@@ -73,89 +74,146 @@ def hertz_damp_history(
     Returns
     -------
     HertzHistory
-        Over the record.
+        Motion over the record (m, m/s), number of contacts and largest force (N).
 
     Raises
     ------
     ValueError
         If an argument is outside its range, or a structure is bilinear.
 
+    See Also
+    --------
+    per_obspy.pounding_history : Exact history with instant impacts.
+    per_obspy.kelvin_voigt_history : Contact by a spring and a dashpot.
+
     References
     ----------
     Muthukumar & DesRoches (2006), A Hertz contact model with non-linear damping for pounding
     simulation, EESD 35.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> history = hertz_damp_history(pulse, 0.01, tower, annex, 0.02, 1e9, 0.6)
+    >>> print(history.contacts, history.displacement.shape)
+    3 (2, 301)
     """
-    record, step = (
-        checks.record("acceleration", acceleration),
-        checks.number("dt", dt, checks.positive),
+    record = checks.record("acceleration", acceleration)
+    step = checks.number("dt", dt, checks.positive)
+    contact = _Contact(
+        gap=checks.number("gap", gap, checks.positive),
+        stiffness=checks.number("stiffness", stiffness, checks.positive),
+        restitution=float(checks.between("restitution", restitution, 0.0, 1.0)),
     )
-    width = checks.number("gap", gap, checks.positive)
-    spring = checks.number("stiffness", stiffness, checks.positive)
-    bounce = float(checks.between("restitution", restitution, 0.0, 1.0))
     pair = (structure_1, structure_2)
-    for structure in pair:
-        if np.isfinite(structure.yield_displacement):
-            raise ValueError(
-                f"yield_displacement must be infinite here, got {structure.yield_displacement}"
-            )
-    return _integrate(closed_record(record), step, pair, (width, spring, bounce), record.size)
+    refuse_bilinear(pair)
+
+    # Ground acceleration at any time, and the samples at which the motion is returned
+    closed = closed_record(record)
+    times = step * np.arange(closed.size, dtype=np.float64)
+    return _integrate(_Pair(pair, contact, step, times, closed), times[: record.size])
 
 
-def _force(state: FloatArray, contact: tuple[float, float, float], approach: float) -> float:
+class _Contact(NamedTuple):
+    """Gap (m), stiffness (N/m^1.5) and restitution of a Hertz-damp contact."""
+
+    gap: float
+    stiffness: float
+    restitution: float
+
+
+class _Pair(NamedTuple):
+    """Two structures, their contact, and ground acceleration (m/s²) at times of interval dt (s)."""
+
+    structures: tuple[Structure, Structure]
+    contact: _Contact
+    dt: float
+    times: FloatArray
+    acceleration: FloatArray
+
+    def rates(self, time: float, state: FloatArray, approach: float) -> list[float]:
+        """Return the rates of change of displacement and velocity of both structures."""
+        force = _force(state, self.contact, approach)
+        ground = float(np.interp(time, self.times, self.acceleration))
+
+        # The contact pushes structure 1 back and structure 2 on
+        first, second = self.structures
+        rates_1 = _rates(first, state[0], state[1], -force, ground)
+        rates_2 = _rates(second, state[2], state[3], force, ground)
+        return [*rates_1, *rates_2]
+
+
+def _force(state: FloatArray, contact: _Contact, approach: float) -> float:
     """Return the contact force, N; an approach speed of 0 means that the structures are apart."""
-    gap, stiffness, restitution = contact
-    overlap, rate = state[0] - state[2] - gap, state[1] - state[3]
+    overlap, rate = state[0] - state[2] - contact.gap, state[1] - state[3]
     if approach == 0.0 or overlap <= 0.0:
         return 0.0
-    return float(stiffness * overlap**1.5 * (1.0 + 0.75 * (1.0 - restitution**2) * rate / approach))
+    damping = 0.75 * (1.0 - contact.restitution**2) * rate / approach
+    return float(contact.stiffness * overlap**1.5 * (1.0 + damping))
 
 
 def _rates(
-    state: FloatArray, pair: tuple[Structure, Structure], force: float, ground: float
-) -> list[float]:
-    """Return the rates of change of displacement and velocity of both structures."""
-    rates = []
-    for s, u, v, push in (
-        (pair[0], state[0], state[1], -force),
-        (pair[1], state[2], state[3], force),
-    ):
-        own = 2.0 * s.damping * s.frequency * v + s.frequency**2 * u
-        rates += [v, push / s.mass - own - s.participation * ground]
-    return rates
+    structure: Structure, displacement: float, velocity: float, push: float, ground: float
+) -> tuple[float, float]:
+    """Return velocity and acceleration of one structure under a push (N) and the ground motion."""
+    omega = structure.frequency
+    own = 2.0 * structure.damping * omega * velocity + omega**2 * displacement
+    return velocity, push / structure.mass - own - structure.participation * ground
 
 
-def _integrate(
-    record: FloatArray,
-    dt: float,
-    pair: tuple[Structure, Structure],
-    contact: tuple[float, float, float],
-    samples: int,
-) -> HertzHistory:
+def _integrate(pair: _Pair, times: FloatArray) -> HertzHistory:
     """Integrate from contact to separation and on to the next contact."""
-    times = dt * np.arange(record.size, dtype=np.float64)
-    states, visited = np.zeros((4, samples)), [0.0]
-    start, state, approach, contacts = 0.0, np.zeros(4), 0.0, 0
+    states, forces, contacts = np.zeros((4, times.size)), [0.0], 0
+    start, state, approach = 0.0, np.zeros(4), 0.0
+    while start < times[-1]:
+        stretch = _until_next_event(pair, start, times[-1], state, approach)
 
-    def rates(t: float, y: FloatArray) -> list[float]:
-        return _rates(y, pair, _force(y, contact, approach), float(np.interp(t, times, record)))
+        # Store the motion at the samples of this stretch, and the force wherever it was evaluated
+        _sample(stretch, times, start, states)
+        forces += [_force(visited, pair.contact, approach) for visited in stretch.y.T]
 
-    def clearance(_: float, y: FloatArray) -> float:
-        return float(contact[0] - y[0] + y[2])
+        # An event of structures apart is the next contact, one in contact the separation
+        start, state = float(stretch.t[-1]), stretch.y[:, -1]
+        touch = stretch.status == 1 and approach == 0.0
+        contacts += touch
+        approach = float(state[1] - state[3]) if touch else 0.0
+    return HertzHistory(times, states[[0, 2]], states[[1, 3]], contacts, max(forces))
 
-    clearance.terminal = True  # type: ignore[attr-defined]  # SciPy reads these attributes of a function
-    while start < times[samples - 1]:
-        clearance.direction = 1.0 if approach else -1.0  # type: ignore[attr-defined]  # as above
-        inside = times[:samples] > start
-        end = solve_ivp(
-            rates, (start, times[samples - 1]), state, "DOP853", dense_output=True, events=clearance,
-            rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, max_step=dt,
-        )  # fmt: skip
-        reached = inside & (times[:samples] <= end.t[-1])
-        if reached.any():
-            states[:, reached] = end.sol(times[:samples][reached])  # type: ignore[misc]  # dense_output gives it
-        visited += [_force(y, contact, approach) for y in end.y.T]
-        start, state = float(end.t[-1]), end.y[:, -1]
-        meets = end.status == 1 and not approach
-        contacts += meets
-        approach = float(state[1] - state[3]) if meets else 0.0
-    return HertzHistory(times[:samples], states[[0, 2]], states[[1, 3]], contacts, max(visited))
+
+def _sample(stretch: Any, times: FloatArray, start: float, states: FloatArray) -> None:
+    """Fill in the states (4, n_samples) at the times after the start of a stretch up to its end."""
+    reached = (times > start) & (times <= stretch.t[-1])
+    if reached.any():
+        states[:, reached] = stretch.sol(times[reached])
+
+
+def _until_next_event(
+    pair: _Pair, start: float, end: float, state: FloatArray, approach: float
+) -> Any:
+    """
+    Integrate until the gap closes or, in contact (approach speed above 0), opens again.
+
+    The result is that of ``solve_ivp``.
+    """
+
+    def rates(time: float, state: FloatArray) -> list[float]:
+        return pair.rates(time, state, approach)
+
+    def clearance(_: float, state: FloatArray) -> float:
+        return float(pair.contact.gap - state[0] + state[2])
+
+    # SciPy reads these attributes of a function
+    clearance.terminal = True  # type: ignore[attr-defined]
+    clearance.direction = 1.0 if approach else -1.0  # type: ignore[attr-defined]
+    return solve_ivp(
+        rates,
+        (start, end),
+        state,
+        "DOP853",
+        dense_output=True,
+        events=clearance,
+        rtol=RELATIVE_TOLERANCE,
+        atol=ABSOLUTE_TOLERANCE,
+        max_step=pair.dt,
+    )

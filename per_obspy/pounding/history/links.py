@@ -1,4 +1,4 @@
-"""Two structures joined by a link, or kept apart by a Kelvin-Voigt contact: exact coupled histories."""
+"""Exact histories of two structures joined by a link or separated by a Kelvin-Voigt contact."""
 
 import math
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from per_obspy.pounding.history.tables import (
     row_at_rest,
     structure_table,
 )
-from per_obspy.pounding.structure import Structure
+from per_obspy.pounding.structure import Structure, refuse_bilinear
 
 
 class LinkedHistory(NamedTuple):
@@ -62,11 +62,11 @@ def linked_history(
     free_vibration: bool = True,
 ) -> LinkedHistory:
     """
-    History of two structures joined by an elastic, viscous or bilinear link.
+    Compute the history of two structures joined by an elastic, viscous or bilinear link.
 
     The coupled equations are solved exactly for ground acceleration that is linear between samples;
-    a bilinear link changes its stiffness at the exact instant. Whether the structures would hit
-    each other is told by ``closing``.
+    a bilinear link changes its stiffness at the exact instant. The structures would hit each other
+    if ``closing`` exceeds their gap.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def linked_history(
     dt : float
         Sampling interval, s.
     structure_1, structure_2 : Structure
-        Linear; 1 stands left.
+        Linear; 1 is left of 2.
     stiffness : float
         Of the link, N/m; 0 for a damper.
     damping : float
@@ -104,11 +104,12 @@ def linked_history(
     >>> import numpy as np
     >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
     >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
-    >>> apart = linked_history(pulse, 0.01, tower, annex, stiffness=0.0)
+    >>> free = linked_history(pulse, 0.01, tower, annex, stiffness=0.0)
     >>> joined = linked_history(pulse, 0.01, tower, annex, stiffness=1e9)
-    >>> bool(joined.closing < 0.01 * apart.closing)
+    >>> bool(joined.closing < 0.01 * free.closing)
     True
     """
+    # A link has no gap: it acts from the first displacement on
     element = Element(
         checks.number("stiffness", stiffness, checks.not_negative),
         checks.number("damping", damping, checks.not_negative),
@@ -134,36 +135,61 @@ def kelvin_voigt_history(
     free_vibration: bool = True,
 ) -> LinkedHistory:
     """
-    History of two structures that hit each other through a spring and a dashpot without tension.
+    Compute the history of two structures that hit each other through a spring and a dashpot.
 
-    The penalty model of finite-element programs (OpenSees `ViscoelasticGap`, `ElasticPPGap`), for
-    comparison with `pounding_history`, to which it converges slowly, like the square root of the
-    compliance. Exact between samples.
+    The contact bears no tension. It is the penalty model of finite-element programs (OpenSees
+    `ViscoelasticGap`, `ElasticPPGap`), for comparison with `pounding_history`, to which it
+    converges slowly, like the square root of the compliance. Exact between samples.
 
     Parameters
     ----------
-    acceleration, dt, structure_1, structure_2, free_vibration
-        As in `linked_history`.
+    acceleration : (n_samples,) array_like
+        Ground acceleration, positive from structure 1 to 2, m/s². If it does not end at zero, it is
+        closed by one ramp.
+    dt : float
+        Sampling interval, s.
+    structure_1, structure_2 : Structure
+        Linear; 1 is left of 2.
     gap : float
         Clear distance at rest, m.
     stiffness : float
         Of the contact, N/m.
-    damping : float
-        Of the contact, N s/m.
+    damping : float, optional
+        Viscous coefficient of the contact, N s/m.
+    free_vibration : bool, optional
+        Follow 20 of the longest period after the record; else the history ends with the record's
+        last sample.
 
     Returns
     -------
     LinkedHistory
-        The force is that of the contact.
+        Motion, contact force and maxima.
 
     Raises
     ------
     ValueError
-        As `linked_history`.
+        If an argument is outside its range, or a structure is bilinear.
+
+    See Also
+    --------
+    per_obspy.pounding_history : Exact history with instant impacts.
+    per_obspy.kelvin_voigt_damping : Damping ratio of a contact with a restitution.
 
     References
     ----------
     Anagnostopoulos (1988), Pounding of buildings in series during earthquakes, EESD 16, 443-456.
+
+    Examples
+    --------
+    The stiffer the contact, the less the structures overlap:
+
+    >>> import numpy as np
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> soft = kelvin_voigt_history(pulse, 0.01, tower, annex, 0.02, stiffness=1e7)
+    >>> stiff = kelvin_voigt_history(pulse, 0.01, tower, annex, 0.02, stiffness=1e9)
+    >>> print(f"{soft.closing - 0.02:.3f} m, {stiff.closing - 0.02:.3f} m")
+    0.062 m, 0.011 m
     """
     element = Element(
         checks.number("stiffness", stiffness, checks.positive),
@@ -184,30 +210,41 @@ def _history(
     phase: int,
     free_vibration: bool,
 ) -> LinkedHistory:
-    """Check what all elements have in common, and run the kernel."""
-    record, step = (
-        checks.record("acceleration", acceleration),
-        checks.number("dt", dt, checks.positive),
-    )
+    """Check the arguments common to all elements, and run the kernel."""
+    record = checks.record("acceleration", acceleration)
+    step = checks.number("dt", dt, checks.positive)
     structures = (structure_1, structure_2)
-    for structure in structures:
-        if structure.yield_displacement < math.inf:
-            raise ValueError(
-                f"yield_displacement must be infinite here, got {structure.yield_displacement}"
-            )
+    refuse_bilinear(structures)
+
+    # Follow the free vibration after the record
     samples = record.size
     if free_vibration:
         record = closed_record(record)
         samples = record.size + free_samples(max(structure_1.period, structure_2.period), step)
+
+    # Memory for displacement and velocity of both structures, the force, and five maxima
     row = row_at_rest(structure_table(structures), np.zeros(1), np.zeros(1))
     motion, force, maxima = np.zeros((samples, 2, 2)), np.zeros(samples), np.zeros(5)
     parts = refinement(_largest_rate(structures, element), step)
     if not run_linked(record, step, parts, row, element, phase, MOST_TERMS, motion, force, maxima):
         raise RuntimeError("no end of phase changes of the link or contact within one step")
+    return _linked_history(step, motion, force, maxima)
+
+
+def _linked_history(
+    dt: float, motion: FloatArray, force: FloatArray, maxima: FloatArray
+) -> LinkedHistory:
+    """Return the kernel's motion (n_time, 2, 2), force (n_time,) and maxima (5,) by name."""
     displacement, velocity = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
-    time = step * np.arange(samples, dtype=np.float64)
     return LinkedHistory(
-        time, displacement, velocity, force, maxima[:2], maxima[2], maxima[3], maxima[4]
+        time=dt * np.arange(len(motion), dtype=np.float64),
+        displacement=displacement,
+        velocity=velocity,
+        force=force,
+        displacement_maxima=maxima[:2],
+        closing=maxima[2],
+        parting=maxima[3],
+        force_maximum=maxima[4],
     )
 
 

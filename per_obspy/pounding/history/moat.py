@@ -18,7 +18,7 @@ def moat_history(
     free_vibration: bool = True,
 ) -> PoundingHistory:
     """
-    Exact history of a building between two moat walls.
+    Compute the exact history of a building between two moat walls.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ def moat_history(
     gap_left, gap_right : float
         Clear distances to the walls at rest, m; at least one above zero.
     restitution : float
-        Coefficient of restitution against the walls.
-    free_vibration : bool
-        As in `pounding_history`.
+        Coefficient of restitution against the walls, between 0 and 1, dimensionless.
+    free_vibration : bool, optional
+        Go on after the record, as in `pounding_history`.
 
     Returns
     -------
@@ -43,7 +43,20 @@ def moat_history(
     Raises
     ------
     ValueError
-        As `pounding_history`.
+        If an argument is out of range, or there is no room between the walls.
+
+    See Also
+    --------
+    per_obspy.pounding_history : Rows of any structures.
+
+    Notes
+    -----
+    With the walls' infinite mass (7) reduces to ``v' = -e v``, so that an impact never lengthens
+    the radius of a linear building.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7).
 
     Examples
     --------

@@ -1,33 +1,82 @@
-"""Many pairs against one record in blocks of 32: their table of structures, and the memory that a block works in."""
+"""Many pairs against one record in blocks of 32: checked arguments, tables and working memory."""
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
-from per_obspy.pounding.history.tables import refinement
+from per_obspy.pounding.history.tables import free_samples, refinement
+from per_obspy.threads import map_in_threads
 
 #: Bytes of a line of the processor's cache.
 CACHE_LINE = 64
+
+#: Check of each argument of a pair; those of one structure end with its number.
+CHECKS: dict[str, Callable[[str, ArrayLike], FloatArray]] = {
+    "period": checks.positive,
+    "damping": checks.fraction_of_critical,
+    "mass": checks.positive_or_infinite,
+    "gap": checks.not_negative,
+    "restitution": lambda name, values: checks.between(name, values, 0.0, 1.0),
+    "participation": checks.not_negative,
+    "azimuth": checks.finite,
+    "yield_displacement": checks.positive_or_infinite,
+    "hardening": checks.fraction_of_critical,
+}
+
+
+def pair_fields(**arguments: ArrayLike) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
+    """
+    Return the arguments of all pairs by name, checked and flat, and their broadcast shape.
+
+    Parameters
+    ----------
+    **arguments : array_like
+        By the names of ``CHECKS``, for example ``period_1``, ``damping_1`` and ``gap``.
+
+    Returns
+    -------
+    fields : dict of str to (n_pairs,) ndarray
+        In the units of the arguments.
+    shape : tuple of int
+        Of the results.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+    checked = {}
+    for name, values in arguments.items():
+        checked[name] = CHECKS[name.rstrip("_12")](name, values)
+
+    # One value per pair
+    shapes = [values.shape for values in checked.values()]
+    shape = np.broadcast_shapes(*shapes)
+    flat = {name: np.broadcast_to(values, shape).ravel() for name, values in checked.items()}
+    return flat, shape
 
 
 def pair_table(fields: dict[str, FloatArray]) -> FloatArray:
     """Return the kernels' table of structures, (n_pairs, 2, 6)."""
     table = np.empty((fields["gap"].size, 2, 6))
-    for i, name in enumerate(("1", "2")):
-        frequency = 2.0 * np.pi / fields[f"period_{name}"]
-        table[:, i, 0] = fields[f"damping_{name}"] * frequency
-        table[:, i, 1] = frequency**2
-        table[:, i, 2] = fields[f"hardening_{name}"]
-        table[:, i, 3] = fields[f"yield_displacement_{name}"]
-        table[:, i, 4] = fields[f"participation_{name}"]
-        table[:, i, 5] = fields[f"mass_{name}"]
+    for structure in (1, 2):
+        # Half damping rate, squared frequency, backbone, drive and mass
+        columns = table[:, structure - 1]
+        frequency = 2.0 * np.pi / fields[f"period_{structure}"]
+        columns[:, 0] = fields[f"damping_{structure}"] * frequency
+        columns[:, 1] = frequency**2
+        columns[:, 2] = fields[f"hardening_{structure}"]
+        columns[:, 3] = fields[f"yield_displacement_{structure}"]
+        columns[:, 4] = fields[f"participation_{structure}"]
+        columns[:, 5] = fields[f"mass_{structure}"]
+
+    # Two walls cannot move towards each other
     walls = np.flatnonzero(np.isinf(table[:, :, 5]).all(axis=1))
     if walls.size:
         raise ValueError(
@@ -37,17 +86,26 @@ def pair_table(fields: dict[str, FloatArray]) -> FloatArray:
 
 
 def aligned(size: int) -> FloatArray:
-    """Return zeros that begin at a cache line: a step of vectors that straddle two lines takes a third longer."""
+    """
+    Return zeros that begin at a cache line.
+
+    A step of vectors that straddle two lines takes a third longer.
+    """
     numbers = np.zeros(size + CACHE_LINE // 8)
     first = -numbers.ctypes.data % CACHE_LINE // 8
     return numbers[first : first + size]
 
 
 def refinements(table: FloatArray, dt: float) -> NDArray[np.int64]:
-    """Return into how many steps a sampling interval is cut for each pair of a table from `pair_table`."""
-    return np.array(
-        [refinement(one, dt) for one in np.sqrt(table[:, :, 1].max(axis=1))], dtype=np.int64
-    )
+    """Return the number of steps per sampling interval for each pair of a table."""
+    frequencies = np.sqrt(table[:, :, 1].max(axis=1))
+    return np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
+
+
+def free_vibration_steps(fields: dict[str, FloatArray], dt: float) -> NDArray[np.int64]:
+    """Return the sampling intervals of free vibration at most, for each pair."""
+    longest = np.maximum(fields["period_1"], fields["period_2"])
+    return np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
 
 
 def pair_blocks(parts: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -98,19 +156,26 @@ def run_blocks(
     """
 
     def run(block: NDArray[np.int64]) -> None:
+        """Run one block of pairs, filled up with repetitions that have no free vibration."""
+        # Copy the rows of the pairs: the kernel changes them
         filled, steps = np.resize(block, PAIR_LANES), int(parts[block[0]])
         record, own = Record(components, steps, dt / steps), rows[filled]
-        lanes, flags = aligned(lane_rows * PAIR_LANES), aligned(PAIR_LANES).view(np.int64)
-        room = (
-            np.empty((2, 2, TILE_STEPS + 1)),
-            np.empty(LANE_ROWS),
-            np.zeros((PAIR_LANES, 2, DEFERRED_COLUMNS)),
-        )
-        along = np.cos(azimuth[filled]), np.sin(azimuth[filled])
         free = np.where(np.arange(PAIR_LANES) < block.size, free_steps[filled], -1)
-        if not kernel(record, lanes, flags, *room, own, np.zeros((0, LOG_COLUMNS)), *along, free):
+        direction = np.cos(azimuth[filled]), np.sin(azimuth[filled])
+
+        # No log of impacts: only maxima are of interest
+        log = np.zeros((0, LOG_COLUMNS))
+        if not kernel(record, *_working_memory(lane_rows), own, log, *direction, free):
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
         rows[block] = own[: block.size]
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(run, pair_blocks(parts)))
+    map_in_threads(run, pair_blocks(parts))
+
+
+def _working_memory(lane_rows: int) -> tuple[FloatArray | NDArray[np.int64], ...]:
+    """Return the memory of one block: lanes, flags, ground of two tiles, a pair, waiting tiles."""
+    lanes = aligned(lane_rows * PAIR_LANES)
+    flags = aligned(PAIR_LANES).view(np.int64)
+    grounds, pair = np.empty((2, 2, TILE_STEPS + 1)), np.empty(LANE_ROWS)
+    waiting = np.zeros((PAIR_LANES, 2, DEFERRED_COLUMNS))
+    return lanes, flags, grounds, pair, waiting

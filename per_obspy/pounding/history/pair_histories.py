@@ -11,24 +11,30 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
-from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks
+from per_obspy.pounding.history.pair_blocks import (
+    free_vibration_steps,
+    pair_fields,
+    pair_table,
+    refinements,
+    run_blocks,
+)
 from per_obspy.pounding.history.row_history import SPEED_SHARE
 from per_obspy.pounding.history.tables import (
     closed_record,
-    free_samples,
     largest_ground_velocity,
     row_at_rest,
 )
 
-#: A bounce that lasts less than this share of a sampling interval ends in contact, and so does the
-#: 25th within one.
+#: A bounce that lasts less than this share of a sampling interval ends in contact.
 SHORTEST_BOUNCE = 1e-3
-MOST_BOUNCES = 25
+
+#: Bouncing ends in contact after this many impacts in one sampling interval.
+BOUNCES_OF_PAIRS = 25
 
 
 class PoundingMaxima(NamedTuple):
     """
-    What pounding does to each pair.
+    Largest responses of each pair with pounding, and its impacts.
 
     Attributes
     ----------
@@ -70,7 +76,7 @@ def pounding_histories(
     free_vibration: bool = True,
 ) -> PoundingMaxima:
     """
-    Maxima of the exact pounding histories of many pairs.
+    Compute the maxima of the exact pounding histories of many pairs.
 
     The same physics as `pounding_history`, many pairs at once on all processors; the result of a
     pair does not depend on the others. Bouncing ends in contact a little earlier: when a bounce
@@ -108,7 +114,7 @@ def pounding_histories(
     Returns
     -------
     PoundingMaxima
-        One entry a pair, in the shape to which the arguments broadcast.
+        One entry per pair, in the shape to which the arguments broadcast.
 
     Raises
     ------
@@ -128,34 +134,37 @@ def pounding_histories(
     >>> bool(maxima.impacts[0] > 0), bool(maxima.impacts[1] > 0)
     (True, False)
     """
+    # Check every argument, and bring all to one value per pair
     step = checks.number("dt", dt, checks.positive)
-    fields = {
-        "period_1": checks.positive("period_1", period_1),
-        "damping_1": checks.fraction_of_critical("damping_1", damping_1),
-        "mass_1": checks.positive_or_infinite("mass_1", mass_1),
-        "period_2": checks.positive("period_2", period_2),
-        "damping_2": checks.fraction_of_critical("damping_2", damping_2),
-        "mass_2": checks.positive_or_infinite("mass_2", mass_2),
-        "gap": checks.not_negative("gap", gap),
-        "restitution": checks.between("restitution", restitution, 0.0, 1.0),
-        "participation_1": checks.not_negative("participation_1", participation_1),
-        "participation_2": checks.not_negative("participation_2", participation_2),
-        "azimuth": checks.finite("azimuth", 0.0 if azimuth is None else azimuth),
-        "yield_displacement_1": checks.positive_or_infinite(
-            "yield_displacement_1", yield_displacement_1
-        ),
-        "hardening_1": checks.fraction_of_critical("hardening_1", hardening_1),
-        "yield_displacement_2": checks.positive_or_infinite(
-            "yield_displacement_2", yield_displacement_2
-        ),
-        "hardening_2": checks.fraction_of_critical("hardening_2", hardening_2),
-    }
+    fields, shape = pair_fields(
+        period_1=period_1,
+        damping_1=damping_1,
+        mass_1=mass_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        mass_2=mass_2,
+        gap=gap,
+        restitution=restitution,
+        participation_1=participation_1,
+        participation_2=participation_2,
+        azimuth=0.0 if azimuth is None else azimuth,
+        yield_displacement_1=yield_displacement_1,
+        hardening_1=hardening_1,
+        yield_displacement_2=yield_displacement_2,
+        hardening_2=hardening_2,
+    )
     components = _components(acceleration, azimuth is not None)
     if free_vibration:
         components = closed_record(components)
-    shape = np.broadcast_shapes(*(values.shape for values in fields.values()))
-    flat = {name: np.broadcast_to(values, shape).ravel() for name, values in fields.items()}
-    return _maxima(components, step, flat, free_vibration, shape)
+
+    # Rows of the kernels hold the squares of the largest radii
+    rows = _run(components, step, fields, free_vibration)
+    return PoundingMaxima(
+        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
+        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
+        impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
+        impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
+    )
 
 
 def _components(acceleration: ArrayLike, has_azimuth: bool) -> FloatArray:
@@ -171,31 +180,22 @@ def _components(acceleration: ArrayLike, has_azimuth: bool) -> FloatArray:
     return np.stack([single, np.zeros_like(single)])
 
 
-def _maxima(
-    components: FloatArray,
-    dt: float,
-    fields: dict[str, FloatArray],
-    free_vibration: bool,
-    shape: tuple[int, ...],
-) -> PoundingMaxima:
-    """Run the pairs in blocks of equal refinement, on all processors."""
+def _run(
+    components: FloatArray, dt: float, fields: dict[str, FloatArray], free_vibration: bool
+) -> FloatArray:
+    """Return the rows of all pairs at the end, run in blocks on all processors."""
     table = pair_table(fields)
     parts = refinements(table, dt)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
+
+    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
     ground_velocity = sum(largest_ground_velocity(component, dt) for component in components)
     rows[:, 0, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * table[:, :, 4].max(axis=1)
     rows[:, 0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
-    rows[:, 0, columns.BOUNCE_LIMIT] = MOST_BOUNCES
-    longest = np.maximum(fields["period_1"], fields["period_2"])
-    free_steps = np.array(
-        [free_samples(period, dt) * free_vibration for period in longest], dtype=np.int64
-    )
-    run_blocks(
-        run_block, LANE_ROWS, components, dt, rows, parts, free_steps, np.radians(fields["azimuth"])
-    )
-    return PoundingMaxima(
-        per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
-        displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
-        impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
-        impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
-    )
+    rows[:, 0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS
+
+    # Run the record and, where it is asked for, the free vibration after it
+    free_steps = free_vibration_steps(fields, dt) * free_vibration
+    angles = np.radians(fields["azimuth"])
+    run_blocks(run_block, LANE_ROWS, components, dt, rows, parts, free_steps, angles)
+    return rows

@@ -1,21 +1,22 @@
-"""Largest relative displacement of two linear structures in a record: the exact counterpart of the critical gap."""
+"""Largest relative displacement of two linear structures in a record: the exact critical gap."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.relative.maxima import relative_maxima
 from per_obspy.pounding.history.tables import closed_record
+from per_obspy.pounding.structure import checked_oscillators
 
 
 class RelativeDisplacement(NamedTuple):
     """
     Largest distances by which two structures approach each other at contact level, m.
 
-    ``one_before_two`` is the largest ``q1 u1 - q2 u2`` (structure 1 stands left of 2: the critical
+    ``one_before_two`` is the largest ``q1 u1 - q2 u2`` (structure 1 is left of 2: the critical
     gap of the record), ``two_before_one`` the largest ``q2 u2 - q1 u1`` (the other order),
     ``largest`` the larger of the two.
     """
@@ -36,7 +37,7 @@ def relative_displacement(
     participation_2: ArrayLike = 1.0,
 ) -> RelativeDisplacement:
     """
-    Largest relative displacement of pairs in one component of ground motion.
+    Compute the largest relative displacement of pairs in one component of ground motion.
 
     Exact for acceleration that is linear between samples: peaks between samples count, and so does
     the free vibration after the record, followed while the radii could still exceed the maxima and
@@ -69,7 +70,7 @@ def relative_displacement(
 
     See Also
     --------
-    directional_relative_displacement : pairs that each have their own azimuth.
+    directional_relative_displacement : Pairs along individual azimuths.
 
     Examples
     --------
@@ -78,9 +79,12 @@ def relative_displacement(
     0.0 True
     """
     acceleration = checks.record("acceleration", acceleration)
-    structures = period_1, damping_1, period_2, damping_2, participation_1, participation_2
-    return directional_relative_displacement(acceleration, np.zeros_like(acceleration), dt, *structures[:4], 0.0,
-                                             *structures[4:])  # fmt: skip
+    east = np.zeros_like(acceleration)
+    structures = period_1, damping_1, period_2, damping_2
+    participations = participation_1, participation_2
+    return directional_relative_displacement(
+        acceleration, east, dt, *structures, 0.0, *participations
+    )
 
 
 def directional_relative_displacement(
@@ -96,7 +100,7 @@ def directional_relative_displacement(
     participation_2: ArrayLike = 1.0,
 ) -> RelativeDisplacement:
     """
-    Largest relative displacement of pairs in two horizontal components, each pair along its own azimuth.
+    Compute the largest relative displacement of pairs, each along the azimuth of its axis.
 
     Parameters
     ----------
@@ -125,29 +129,41 @@ def directional_relative_displacement(
 
     See Also
     --------
-    relative_displacement : what is exact about it.
+    relative_displacement : One component, and notes on exactness.
     """
     components = checks.record("north", north), checks.record("east", east)
     if components[0].size != components[1].size:
         raise ValueError(
-            f"north and east must be equally long, got {components[0].size} and {components[1].size}"
+            f"north and east must be equally long, got {components[0].size} and "
+            f"{components[1].size}"
         )
     motion = closed_record(np.stack(components))
     dt = checks.number("dt", dt, checks.positive)
-    first = _structure("1", period_1, damping_1, participation_1)
-    second = _structure("2", period_2, damping_2, participation_2)
+
+    # One column of arguments per pair: both structures, and the direction of the axis
+    first = checked_oscillators(1, period_1, damping_1, participation_1)
+    second = checked_oscillators(2, period_2, damping_2, participation_2)
     angle = np.radians(checks.finite("azimuth", azimuth))
     broadcast = np.broadcast_arrays(*first, *second, np.cos(angle), np.sin(angle))
     pairs = np.stack([array.ravel() for array in broadcast])
-    largest = np.empty((2, pairs.shape[1]))
-    order = np.argsort(-np.minimum(pairs[0], pairs[3]))  # alike pairs share a block
-    ordered = np.empty_like(largest)
-    relative_maxima(motion[0], motion[1], dt, np.ascontiguousarray(pairs[:, order]), ordered)
-    largest[:, order] = ordered
+
+    # Largest q1 u1 - q2 u2, and q2 u2 - q1 u1, of each pair
+    largest = _maxima(motion, dt, pairs)
     one_before_two, two_before_one = largest.reshape(2, *broadcast[0].shape)
-    return RelativeDisplacement(
-        one_before_two, two_before_one, np.maximum(one_before_two, two_before_one)
-    )
+    either = np.maximum(one_before_two, two_before_one)
+    return RelativeDisplacement(one_before_two, two_before_one, either)
+
+
+def _maxima(motion: FloatArray, dt: float, pairs: FloatArray) -> FloatArray:
+    """Run the kernel on pairs sorted by their longer period, so that alike pairs share a block."""
+    order = np.argsort(-np.minimum(pairs[0], pairs[3]))
+    ordered = np.empty((2, pairs.shape[1]))
+    relative_maxima(motion[0], motion[1], dt, np.ascontiguousarray(pairs[:, order]), ordered)
+
+    # Back to the order of the arguments
+    largest = np.empty_like(ordered)
+    largest[:, order] = ordered
+    return largest
 
 
 def critical_gap_surface(
@@ -159,7 +175,7 @@ def critical_gap_surface(
     damping_2: float = 0.05,
 ) -> FloatArray:
     """
-    Largest ``|u1 - u2|`` of a record over a grid of two periods.
+    Compute the largest ``|u1 - u2|`` of a record over a grid of two periods.
 
     Parameters
     ----------
@@ -186,32 +202,39 @@ def critical_gap_surface(
     -----
     ``|u1 - u2|`` does not change when the structures change places, so equal pairs are computed
     once.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (15),
+    the estimate of which this is the exact counterpart.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> print(critical_gap_surface(pulse, 0.01, [0.5, 1.0], [0.5, 1.0, 2.0]).round(3))
+    [[0.    0.154 0.101]
+     [0.154 0.    0.234]]
     """
-    periods_1, periods_2 = (
-        checks.positive("periods_1", periods_1),
-        checks.positive("periods_2", periods_2),
-    )
+    periods_1 = checks.positive("periods_1", periods_1)
+    periods_2 = checks.positive("periods_2", periods_2)
     damping_1 = checks.number("damping_1", damping_1, checks.fraction_of_critical)
     damping_2 = checks.number("damping_2", damping_2, checks.fraction_of_critical)
-    grid = np.meshgrid(periods_1, periods_2, indexing="ij")
-    one = np.stack([grid[0].ravel(), np.full(grid[0].size, damping_1)])
-    two = np.stack([grid[1].ravel(), np.full(grid[0].size, damping_2)])
-    swap = (one[0] > two[0]) | ((one[0] == two[0]) & (one[1] > two[1]))
-    pairs, place = np.unique(
-        np.concatenate([np.where(swap, two, one), np.where(swap, one, two)]),
-        axis=1,
-        return_inverse=True,
-    )
+
+    # Period and damping of both structures of every pair of the grid
+    grid_1, grid_2 = np.meshgrid(periods_1, periods_2, indexing="ij")
+    first = np.stack([grid_1.ravel(), np.full(grid_1.size, damping_1)])
+    second = np.stack([grid_2.ravel(), np.full(grid_2.size, damping_2)])
+
+    # Compute each pair once
+    pairs, index = _unordered_pairs(first, second)
     gap = relative_displacement(acceleration, dt, *pairs).largest
-    return gap[place.ravel()].reshape(grid[0].shape)
+    return gap[index].reshape(grid_1.shape)
 
 
-def _structure(
-    which: str, period: ArrayLike, damping: ArrayLike, participation: ArrayLike
-) -> tuple[FloatArray, ...]:
-    """Return checked circular frequency, damping and participation."""
-    return (
-        2.0 * np.pi / checks.positive(f"period_{which}", period),
-        checks.fraction_of_critical(f"damping_{which}", damping),
-        checks.not_negative(f"participation_{which}", participation),
-    )
+def _unordered_pairs(first: FloatArray, second: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return distinct pairs of structures (rows: period, damping of both), and their indices."""
+    # Sort both structures of a pair by period, then by damping
+    swap = (first[0] > second[0]) | ((first[0] == second[0]) & (first[1] > second[1]))
+    shorter, longer = np.where(swap, second, first), np.where(swap, first, second)
+    pairs, index = np.unique(np.concatenate([shorter, longer]), axis=1, return_inverse=True)
+    return pairs, index.ravel()

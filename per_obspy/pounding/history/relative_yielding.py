@@ -1,4 +1,4 @@
-"""Largest relative displacement of many pairs of bilinear structures in a record: exact, without contact."""
+"""Largest relative displacement of pairs of bilinear structures in a record, without contact."""
 
 import math
 from typing import NamedTuple
@@ -14,13 +14,19 @@ from per_obspy.kernels.pounding_lanes.run_without_contact import (
     UNREACHABLE,
     run_without_contact,
 )
-from per_obspy.pounding.history.pair_blocks import pair_table, refinements, run_blocks
-from per_obspy.pounding.history.tables import closed_record, free_samples, row_at_rest
+from per_obspy.pounding.history.pair_blocks import (
+    free_vibration_steps,
+    pair_fields,
+    pair_table,
+    refinements,
+    run_blocks,
+)
+from per_obspy.pounding.history.tables import closed_record, row_at_rest
 
 
 class YieldingRelativeDisplacement(NamedTuple):
     """
-    What a record does to pairs of bilinear structures that do not touch.
+    Largest responses of pairs of bilinear structures that do not touch.
 
     Attributes
     ----------
@@ -55,11 +61,12 @@ def yielding_relative_displacement(
     hardening_2: ArrayLike = 0.0,
 ) -> YieldingRelativeDisplacement:
     """
-    Largest relative displacement of pairs of bilinear structures, each pair along its own azimuth.
+    Compute the largest relative displacement of pairs of structures that yield.
 
-    The counterpart of `directional_relative_displacement` for structures that yield, exact as
-    `pounding_histories` is: peaks between samples count, and so does the free vibration after the
-    record. The result of a pair does not depend on the others.
+    Each pair moves along the azimuth of its axis. The counterpart of
+    `directional_relative_displacement` for structures that yield, exact as `pounding_histories` is:
+    peaks between samples count, and so does the free vibration after the record. The result of a
+    pair does not depend on the others.
 
     Parameters
     ----------
@@ -83,7 +90,7 @@ def yielding_relative_displacement(
     Returns
     -------
     YieldingRelativeDisplacement
-        One entry a pair, in the shape to which the arguments broadcast.
+        One entry per pair, in the shape to which the arguments broadcast.
 
     Raises
     ------
@@ -93,58 +100,64 @@ def yielding_relative_displacement(
     Examples
     --------
     >>> pulse = np.stack([np.sin(np.linspace(0.0, 6.0 * np.pi, 301)), np.zeros(301)])
-    >>> pair = yielding_relative_displacement(pulse, 0.01, 1.5, 0.05, 0.4, 0.05, 0.0, 1.0, 1.0, [math.inf, 0.05], 0.1)
+    >>> pair = yielding_relative_displacement(
+    ...     pulse, 0.01, 1.5, 0.05, 0.4, 0.05, azimuth=0.0,
+    ...     yield_displacement_1=[math.inf, 0.05], hardening_1=0.1,
+    ... )
     >>> print(pair.one_before_two.round(3), pair.displacement_maxima[0].round(3))
     [0.098 0.083] [0.094 0.08 ]
     """
     step = checks.number("dt", dt, checks.positive)
-    record = checks.finite("acceleration", acceleration)
-    if record.ndim != 2 or record.shape[0] != 2 or record.size == 0:
-        raise ValueError(
-            f"acceleration must be north and east (2, n_samples), got shape {record.shape}"
-        )
-    fields = {
-        "period_1": checks.positive("period_1", period_1),
-        "damping_1": checks.fraction_of_critical("damping_1", damping_1),
-        "period_2": checks.positive("period_2", period_2),
-        "damping_2": checks.fraction_of_critical("damping_2", damping_2),
-        "azimuth": checks.finite("azimuth", azimuth),
-        "participation_1": checks.not_negative("participation_1", participation_1),
-        "participation_2": checks.not_negative("participation_2", participation_2),
-        "yield_displacement_1": checks.positive_or_infinite(
-            "yield_displacement_1", yield_displacement_1
-        ),
-        "hardening_1": checks.fraction_of_critical("hardening_1", hardening_1),
-        "yield_displacement_2": checks.positive_or_infinite(
-            "yield_displacement_2", yield_displacement_2
-        ),
-        "hardening_2": checks.fraction_of_critical("hardening_2", hardening_2),
-        "mass_1": np.ones(()),  # without contact no mass matters
-        "mass_2": np.ones(()),
-        "gap": np.full((), UNREACHABLE),
-    }
-    shape = np.broadcast_shapes(*(values.shape for values in fields.values()))
-    flat = {name: np.broadcast_to(values, shape).ravel() for name, values in fields.items()}
-    rows = _run(np.ascontiguousarray(closed_record(record)), step, flat)
-    towards, away = (
-        rows[:, 1, columns.OPENING].reshape(shape),
-        rows[:, 0, columns.OPENING].reshape(shape),
+    record = _two_components(acceleration)
+    fields, shape = pair_fields(
+        period_1=period_1,
+        damping_1=damping_1,
+        period_2=period_2,
+        damping_2=damping_2,
+        azimuth=azimuth,
+        participation_1=participation_1,
+        participation_2=participation_2,
+        yield_displacement_1=yield_displacement_1,
+        hardening_1=hardening_1,
+        yield_displacement_2=yield_displacement_2,
+        hardening_2=hardening_2,
+        mass_1=1.0,  # without contact no mass matters
+        mass_2=1.0,
+        gap=UNREACHABLE,
     )
+
+    # Run the record and the free vibration after it
+    rows = _run(np.ascontiguousarray(closed_record(record)), step, fields)
+
+    # Opening of line 1 is u1 - u2, that of line 0 u2 - u1
+    one_before_two = rows[:, 1, columns.OPENING].reshape(shape)
+    two_before_one = rows[:, 0, columns.OPENING].reshape(shape)
     return YieldingRelativeDisplacement(
-        one_before_two=towards,
-        two_before_one=away,
-        largest=np.maximum(towards, away),
+        one_before_two=one_before_two,
+        two_before_one=two_before_one,
+        largest=np.maximum(one_before_two, two_before_one),
         per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
         displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
     )
 
 
+def _two_components(acceleration: ArrayLike) -> FloatArray:
+    """Return checked north and east components, (2, n_samples)."""
+    record = checks.finite("acceleration", acceleration)
+    if record.ndim != 2 or record.shape[0] != 2 or record.size == 0:
+        raise ValueError(
+            f"acceleration must be north and east (2, n_samples), got shape {record.shape}"
+        )
+    return record
+
+
 def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> FloatArray:
-    """Return the rows of all pairs after the record, run in blocks of equal refinement on all processors."""
+    """Return the rows of all pairs after the record, run in blocks on all processors."""
     table = pair_table(fields)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], np.zeros((len(table), 1)))
-    longest = np.maximum(fields["period_1"], fields["period_2"])
-    free_steps = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
+    parts, free_steps = refinements(table, dt), free_vibration_steps(fields, dt)
+
+    # Pairs without contact have kernels of their own
     angles = np.radians(fields["azimuth"])
     run_blocks(
         run_without_contact,
@@ -152,7 +165,7 @@ def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> Fl
         components,
         dt,
         rows,
-        refinements(table, dt),
+        parts,
         free_steps,
         angles,
     )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -30,7 +30,7 @@ from per_obspy.pounding.structure import Structure
 SPEED_SHARE = 1e-11
 #: Impacts within one sampling interval after which structures that are pressed together stay in
 #: contact.
-MOST_BOUNCES = 100_000
+BOUNCES_OF_ROWS = 100_000
 #: Impacts for which there is room at first.
 FIRST_ROOM = 1000
 #: Columns of the kernels' log of impacts.
@@ -59,7 +59,7 @@ class PoundingHistory(NamedTuple):
         At contact level, relative to the ground, positive towards the last structure, m and m/s; at
         the instant of an impact the velocity after it.
     impacts : DataFrame
-        One row an impact: ``time`` (s), ``left`` (index of the structure left of the gap),
+        One row per impact: ``time`` (s), ``left`` (index of the structure left of the gap),
         ``velocity_before_i``, ``velocity_after_i`` (m/s), ``displacement_i`` (m),
         ``transfer_energy_i`` (J) for the left (1) and right (2) structure, ``impulse`` (N s) and
         ``energy_loss`` (J).
@@ -93,6 +93,20 @@ class PoundingHistory(NamedTuple):
     closure: float
 
 
+class _KernelRun(NamedTuple):
+    """
+    Arrays that the kernel has filled.
+
+    ``row`` (n_structures, COLUMNS) at the end, ``log`` (n_impacts, 9), and per sample ``motion``
+    (n_time, n_structures, 3) and ``work`` (n_time, n_structures, 4).
+    """
+
+    row: FloatArray
+    log: FloatArray
+    motion: FloatArray
+    work: FloatArray
+
+
 def pounding_history(
     acceleration: ArrayLike,
     dt: float,
@@ -102,7 +116,7 @@ def pounding_history(
     free_vibration: bool = True,
 ) -> PoundingHistory:
     """
-    Exact history of structures that hit each other, with stereomechanical impacts (7), (8).
+    Compute the exact history of structures that hit each other, with impacts (7), (8).
 
     Between events every structure follows the exact solution for ground acceleration that is linear
     between samples; contacts are the first roots of the clearance on that solution. Structures that
@@ -157,25 +171,32 @@ def pounding_history(
     """
     record = checks.record("acceleration", acceleration)
     step = checks.number("dt", dt, checks.positive)
-    gap = _for_each_gap("gaps", checks.not_negative("gaps", gaps), len(structures))
-    bounce = _for_each_gap(
-        "restitution", checks.between("restitution", restitution, 0.0, 1.0), len(structures)
-    )
+    gap, bounce = _checked_gaps(gaps, restitution, len(structures))
     table = structure_table(structures)
     _refuse_pressed_walls(table[:, 5], gap)
+
+    # Follow the free vibration after the record
     samples = record.size
     if free_vibration:
         record = closed_record(record)
         samples = record.size + free_samples(max(s.period for s in structures), step)
-    row, log, motion, work = _run(record, step, table, gap, bounce, samples)
-    energies = energies_of(table, motion, work)
-    displacement, velocity, plastic = np.moveaxis(motion, 0, 2).swapaxes(0, 1).copy()
+    run = _run(record, step, table, gap, bounce, samples)
+    return _history(step, table, run)
+
+
+def _history(dt: float, table: FloatArray, run: _KernelRun) -> PoundingHistory:
+    """Return motion, impacts, maxima and energies by name."""
+    row = run.row
+    displacement, velocity, plastic = np.moveaxis(run.motion, 0, 2).swapaxes(0, 1).copy()
+
+    # Energy balance (3), (4)
+    energies = energies_of(table, run.motion, run.work)
     return PoundingHistory(
-        time=step * np.arange(len(motion), dtype=np.float64),
+        time=dt * np.arange(len(run.motion), dtype=np.float64),
         displacement=displacement,
         velocity=velocity,
         plastic_displacement=plastic,
-        impacts=impact_table(log),
+        impacts=impact_table(run.log),
         per=np.sqrt(row[:, columns.LARGEST_RADIUS_SQUARED]),
         displacement_maxima=row[:, columns.LARGEST_DISPLACEMENT].copy(),
         energy_radius=np.sqrt(row[:, columns.LARGEST_ENERGY_RADIUS_SQUARED]),
@@ -192,25 +213,40 @@ def _run(
     gap: FloatArray,
     bounce: FloatArray,
     samples: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Run the kernel, a second time if the log of impacts was too short; return row, log, motion and work."""
+) -> _KernelRun:
+    """Run the kernel, a second time if the log of impacts was too short."""
     parts = refinement(math.sqrt(table[:, 1].max()), step)
     motion, work = np.zeros((samples, len(table), 3)), np.zeros((samples, len(table), 4))
+
+    # Each run of the kernel starts at rest
+    start = _row_at_start(record, step, table, gap, bounce)
+
+    # Grow the log until all impacts have room
     room, impacts = -1, FIRST_ROOM
     while room < impacts:
         room = impacts
-        row, log = row_at_rest(table, gap, bounce), np.zeros((room, LOG_COLUMNS))
-        row[0, columns.STICKING_SPEED] = (
-            SPEED_SHARE * largest_ground_velocity(record, step) * table[:, 4].max()
-        )
-        row[0, columns.BOUNCE_LIMIT] = MOST_BOUNCES
+        row, log = start.copy(), np.zeros((room, LOG_COLUMNS))
         used = run_history(record, step, parts, row, log, motion, work)
         if used < 0:
-            raise RuntimeError(
-                f"no end of contacts at {-used * step:g} s: more than {2 * MOST_BOUNCES} events"
-            )
+            _raise_endless(-used * step)
         impacts = int(row[:, columns.IMPACTS].sum())
-    return row, log[:impacts], motion[:used], work[:used]
+    return _KernelRun(row, log[:impacts], motion[:used], work[:used])
+
+
+def _row_at_start(
+    record: FloatArray, step: float, table: FloatArray, gap: FloatArray, bounce: FloatArray
+) -> FloatArray:
+    """Return the row at rest, with the limits at which bouncing ends in contact."""
+    row = row_at_rest(table, gap, bounce)
+    velocity = SPEED_SHARE * largest_ground_velocity(record, step)
+    row[0, columns.STICKING_SPEED] = velocity * table[:, 4].max()
+    row[0, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS
+    return row
+
+
+def _raise_endless(time: float) -> NoReturn:
+    """Raise the error of contacts that have no end, at a time in s."""
+    raise RuntimeError(f"no end of contacts at {time:g} s: more than {2 * BOUNCES_OF_ROWS} events")
 
 
 def impact_table(log: FloatArray) -> pd.DataFrame:
@@ -229,28 +265,41 @@ def impact_table(log: FloatArray) -> pd.DataFrame:
         As in `PoundingHistory`.
     """
     table = pd.DataFrame(log, columns=LOGGED).astype({"left": np.int64})
-    for i, sign in ((1, 1.0), (2, -1.0)):  # (9), (10) in their short form
+
+    # Transfer energies (9), (10) in their short form: impulse times mean velocity
+    for i, sign in ((1, 1.0), (2, -1.0)):
         mean = 0.5 * (table[f"velocity_before_{i}"] + table[f"velocity_after_{i}"])
         table[f"transfer_energy_{i}"] = sign * table["impulse"] * mean
     return table.assign(energy_loss=table["transfer_energy_1"] + table["transfer_energy_2"])
 
 
+def _checked_gaps(
+    gaps: ArrayLike, restitution: ArrayLike, structures: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return gap and restitution of each gap of a row of structures."""
+    gap = _for_each_gap("gaps", checks.not_negative("gaps", gaps), structures)
+    coefficient = checks.between("restitution", restitution, 0.0, 1.0)
+    return gap, _for_each_gap("restitution", coefficient, structures)
+
+
 def _for_each_gap(name: str, values: FloatArray, structures: int) -> FloatArray:
-    """Return one value a gap."""
+    """Return one value per gap."""
     if structures < 2:
         raise ValueError(f"structures must be two or more, got {structures}")
     if values.shape not in {(), (1,), (structures - 1,)}:
         raise ValueError(
-            f"{name} must be one number or {structures - 1}, one a gap, got the shape {values.shape}"
+            f"{name} must be one number or {structures - 1}, one a gap, "
+            f"got the shape {values.shape}"
         )
     return np.array(np.broadcast_to(values, structures - 1))
 
 
 def _refuse_pressed_walls(mass: FloatArray, gap: FloatArray) -> None:
-    """Refuse two walls (infinite masses) that share an interface, or between which nothing can move."""
+    """Refuse two walls (infinite masses) with an interface or without a gap between them."""
     walls = np.flatnonzero(np.isinf(mass))
     for left, right in pairwise(walls):
         if right == left + 1 or not gap[left:right].any():
             raise ValueError(
-                f"mass of structures {left} and {right} is infinite, with no room to move between them"
+                f"mass of structures {left} and {right} is infinite, "
+                "with no room to move between them"
             )

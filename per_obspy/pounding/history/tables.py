@@ -1,4 +1,4 @@
-"""What the histories of pairs and rows have in common: tables for the kernels, and the record's end."""
+"""Tables of structures for the kernels, steps per sampling interval, and the end of a record."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
 from per_obspy.pounding.structure import Structure
 
 #: Free vibration after the record is followed for this many of the longest period at most.
-FREE_PERIODS = 20.0
+PERIODS_AFTER_RECORD = 20.0
 
 
 def structure_table(structures: Sequence[Structure]) -> FloatArray:
@@ -29,24 +29,19 @@ def structure_table(structures: Sequence[Structure]) -> FloatArray:
         Half damping rate ``xi omega`` (1/s), squared frequency (rad²/s²), hardening, yield
         displacement (m), participation, mass (kg).
     """
-    return np.array(
-        [
-            (
-                s.damping * s.frequency,
-                s.frequency**2,
-                s.hardening,
-                s.yield_displacement,
-                s.participation,
-                s.mass,
-            )
-            for s in structures
-        ]
-    )
+    rows = []
+    for structure in structures:
+        omega = structure.frequency
+        spring = structure.damping * omega, omega**2, structure.hardening
+        rows.append(
+            (*spring, structure.yield_displacement, structure.participation, structure.mass)
+        )
+    return np.array(rows)
 
 
 def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) -> FloatArray:
     """
-    Return rows of structures at rest, as the kernels' tables; structures without a gap start in contact.
+    Return the rows of structures at rest; structures without a gap start in contact.
 
     Parameters
     ----------
@@ -72,7 +67,7 @@ def row_at_rest(table: FloatArray, gaps: FloatArray, restitution: FloatArray) ->
 
 def refinement(largest_frequency: float, dt: float) -> int:
     """
-    Return into how many equal segments each sampling interval is cut, so that Taylor series are short.
+    Return the number of segments per sampling interval for which Taylor series are short.
 
     Parameters
     ----------
@@ -92,7 +87,7 @@ def refinement(largest_frequency: float, dt: float) -> int:
 
 def free_samples(longest_period: float, dt: float) -> int:
     """
-    Return for how many sampling intervals free vibration after the record is followed at most.
+    Return the sampling intervals for which free vibration is followed at most.
 
     Parameters
     ----------
@@ -104,15 +99,16 @@ def free_samples(longest_period: float, dt: float) -> int:
     Returns
     -------
     int
-        A multiple of the steps between two looks at whether a pair is settled; at least one such
+        A multiple of the steps between two checks of whether a pair is settled; at least one such
         round.
     """
-    return SETTLING_STEPS * max(1, int(FREE_PERIODS * longest_period / (SETTLING_STEPS * dt)))
+    rounds = int(PERIODS_AFTER_RECORD * longest_period / (SETTLING_STEPS * dt))
+    return SETTLING_STEPS * max(1, rounds)
 
 
 def closed_record(acceleration: FloatArray) -> FloatArray:
     """
-    Return a record that ends at zero: unless it does, one sample of zero is appended (a ramp of length dt).
+    Return a record that ends at zero: otherwise a sample of zero is appended (a ramp of dt).
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
-"""Bumpers between structures: the restitution that is enough, and the contact damping that provides it."""
+"""Bumpers between structures: the sufficient restitution, and the contact damping that gives it."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.impact import mass_shares
-from per_obspy.pounding.single_hit import SingleHitBranches, single_hit
+from per_obspy.pounding.single_hit import single_hit
 
 #: The stereomechanical picture (an instant impact) holds for contacts up to this share of the
 #: shortest period
@@ -17,17 +17,17 @@ LONGEST_CONTACT = 0.1
 
 class BumperRestitution(NamedTuple):
     """
-    What a linear bumper does in an impact.
+    Impact on a linear bumper.
 
     ``restitution`` and ``damping`` (fraction of critical of the contact) are dimensionless,
-    ``contact_time`` is in s; ``instant`` tells whether the contact is short enough to be treated as
-    an instant impact.
+    ``contact_time`` is in s; ``instant`` is True where the contact is short enough to be treated
+    as an instant impact.
     """
 
     restitution: FloatArray
     damping: FloatArray
     contact_time: FloatArray
-    instant: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    instant: NDArray[np.bool_]
 
 
 def required_restitution(
@@ -42,7 +42,9 @@ def required_restitution(
     target: ArrayLike,
 ) -> FloatArray:
     """
-    Largest restitution for which the single hit amplifies neither structure beyond a target.
+    Compute the largest restitution for which no structure is amplified beyond a target.
+
+    The amplification is that of the single hit.
 
     Parameters
     ----------
@@ -74,53 +76,70 @@ def required_restitution(
     >>> print(required_restitution(0.3, 0.4, 1.0, 1.3, 1e6, 1e6, 0.5, 0.2, [1.2, 5.0]).round(4))
     [0.7212 1.    ]
     """
-    target = checks.finite("target", target)
-    if np.any(target < 1.0):
-        raise ValueError(
-            f"target must be at least 1 (the radius before impact is reached anyway), got {target.min()}"
-        )
-    pair = per_1, per_2, period_1, period_2, mass_1, mass_2, critical_gap, gap, target
+    target = _checked_target(target)
+    structures = per_1, per_2, period_1, period_2, mass_1, mass_2
     per_1, per_2, period_1, period_2, mass_1, mass_2, critical_gap, gap, target = (
-        np.broadcast_arrays(*pair)
+        np.broadcast_arrays(*structures, critical_gap, gap, target)
     )
+
+    # State of both branches right before the impact: that of a plastic impact is the same
     hit = single_hit(per_1, per_2, period_1, period_2, mass_1, mass_2, 0.0, critical_gap, gap)
     share_1, share_2, _ = mass_shares(mass_1, mass_2)
     closing = hit.branches.velocity_1 - hit.branches.velocity_2
-    ends = [
-        _largest_factor(hit.branches, 1, -share_2 * closing, per_1, period_1, target),
-        _largest_factor(hit.branches, 2, share_1 * closing, per_2, period_2, target),
-    ]
-    factor = np.min(np.minimum(*ends), axis=0)
-    enough = np.where(factor >= 1.0, np.minimum(factor - 1.0, 1.0), np.nan)
-    known: FloatArray = np.where(hit.status == "no_pounding", 1.0, enough)
-    return known
+    before_1 = hit.branches.displacement_1, hit.branches.velocity_1
+    before_2 = hit.branches.displacement_2, hit.branches.velocity_2
+
+    # The worst structure in the worst branch decides
+    factor_1 = _largest_factor(before_1, -share_2 * closing, period_1, target * per_1)
+    factor_2 = _largest_factor(before_2, share_1 * closing, period_2, target * per_2)
+    factor = np.min(np.minimum(factor_1, factor_2), axis=0)
+    return _restitution_of(factor, hit.status)
+
+
+def _checked_target(target: ArrayLike) -> FloatArray:
+    """Return amplifications of at least 1."""
+    target = checks.finite("target", target)
+    if np.any(target < 1.0):
+        raise ValueError(
+            "target must be at least 1 (the radius before impact is reached anyway), "
+            f"got {target.min()}"
+        )
+    return target
 
 
 def _largest_factor(
-    branches: SingleHitBranches,
-    which: int,
+    before: tuple[FloatArray, FloatArray],
     change: FloatArray,
-    per: ArrayLike,
-    period: ArrayLike,
-    target: FloatArray,
+    period: FloatArray,
+    largest_radius: FloatArray,
 ) -> FloatArray:
-    """Return the largest admissible 1 + e of one structure in both branches; infinite where nothing changes it."""
-    displacement, velocity = (
-        (branches.displacement_1, branches.velocity_1)
-        if which == 1
-        else (branches.displacement_2, branches.velocity_2)
-    )
+    """
+    Return the largest admissible q = 1 + e of one structure in both branches.
+
+    ``before`` are displacement (m) and velocity (m/s) before the impact, ``change`` is κ of the
+    notes; the factor is infinite where no impact changes the velocity.
+    """
+    displacement, velocity = before
     omega = 2.0 * np.pi / np.asarray(period, dtype=np.float64)
-    room = (target * np.asarray(per, dtype=np.float64)) ** 2 - displacement**2
+
+    # Velocity on the circle of the largest radius, in the direction of the change
+    room = np.asarray(largest_radius, dtype=np.float64) ** 2 - displacement**2
     speed = omega * np.sqrt(np.maximum(room, 0.0))
     still = change == 0.0
     factor = (np.copysign(speed, change) - velocity) / np.where(still, 1.0, change)
     return np.where(still, np.inf, factor)
 
 
+def _restitution_of(factor: FloatArray, status: NDArray[np.str_]) -> FloatArray:
+    """Return e = q - 1, at most 1; NaN below a plastic impact, 1 without pounding."""
+    enough = np.where(factor >= 1.0, np.minimum(factor - 1.0, 1.0), np.nan)
+    known: FloatArray = np.where(status == "no_pounding", 1.0, enough)
+    return known
+
+
 def kelvin_voigt_restitution(damping: ArrayLike, tension: bool = True) -> FloatArray:
     """
-    Restitution of a contact by a spring and a dashpot side by side.
+    Compute the restitution of a contact by a spring and a parallel dashpot.
 
     Parameters
     ----------
@@ -142,8 +161,8 @@ def kelvin_voigt_restitution(damping: ArrayLike, tension: bool = True) -> FloatA
 
     Notes
     -----
-    ``e = exp(-π ξ/sqrt(1 - ξ²))``; without tension ``e = exp(-(ξ/q) atan2(2 ξ q, 2 ξ² - 1))``, ``q
-    = sqrt(1 - ξ²)``.
+    ``e = exp(-π ξ/q)`` with ``q = sqrt(1 - ξ²)``; without tension
+    ``e = exp(-(ξ/q) atan2(2 ξ q, 2 ξ² - 1))``.
 
     References
     ----------
@@ -152,8 +171,10 @@ def kelvin_voigt_restitution(damping: ArrayLike, tension: bool = True) -> FloatA
 
     Examples
     --------
-    >>> print(kelvin_voigt_restitution(0.1).round(4), kelvin_voigt_restitution(0.1, tension=False).round(4))
-    0.7292 0.7441
+    >>> print(kelvin_voigt_restitution(0.1).round(4))
+    0.7292
+    >>> print(kelvin_voigt_restitution(0.1, tension=False).round(4))
+    0.7441
     """
     damping = checks.fraction_of_critical("damping", damping)
     root = np.sqrt((1.0 - damping) * (1.0 + damping))
@@ -169,7 +190,7 @@ def _contact_phase(damping: FloatArray, root: FloatArray, tension: bool) -> Floa
 
 def kelvin_voigt_damping(restitution: ArrayLike) -> FloatArray:
     """
-    Damping of a Kelvin-Voigt contact (with tension) that has a restitution.
+    Compute the damping of a Kelvin-Voigt contact (with tension) that has a restitution.
 
     Parameters
     ----------
@@ -204,7 +225,7 @@ def kelvin_voigt_damping(restitution: ArrayLike) -> FloatArray:
 
 def mahmoud_jankowski_damping(restitution: ArrayLike) -> FloatArray:
     """
-    Damping of a linear viscoelastic contact that is damped while approaching only.
+    Compute the damping of a linear viscoelastic contact that is damped while approaching only.
 
     Parameters
     ----------
@@ -234,14 +255,14 @@ def mahmoud_jankowski_damping(restitution: ArrayLike) -> FloatArray:
     >>> print(mahmoud_jankowski_damping(0.65).round(4))
     0.324
     """
-    e = _moving_apart(restitution)
+    e = _above_zero(restitution)
     damping: FloatArray = (1.0 - e**2) / (e * (e * (np.pi - 2.0) + 2.0))
     return damping
 
 
 def jankowski_damping(restitution: ArrayLike) -> FloatArray:
     """
-    Damping of a nonlinear viscoelastic (Hertz) contact that is damped while approaching only.
+    Compute the damping of a Hertz contact that is damped while approaching only.
 
     Parameters
     ----------
@@ -272,14 +293,14 @@ def jankowski_damping(restitution: ArrayLike) -> FloatArray:
     >>> print(jankowski_damping(0.65).round(4))
     0.3728
     """
-    e = _moving_apart(restitution)
-    damping: FloatArray = (
-        4.5 * np.sqrt(5.0) * (1.0 - e**2) / (e * (e * (9.0 * np.pi - 16.0) + 16.0))
-    )
+    e = _above_zero(restitution)
+    above = 4.5 * np.sqrt(5.0) * (1.0 - e**2)
+    damping: FloatArray = above / (e * (e * (9.0 * np.pi - 16.0) + 16.0))
     return damping
 
 
-def _moving_apart(restitution: ArrayLike) -> FloatArray:
+def _above_zero(restitution: ArrayLike) -> FloatArray:
+    """Return restitutions above 0, up to 1."""
     return checks.positive("restitution", checks.between("restitution", restitution, 0.0, 1.0))
 
 
@@ -292,7 +313,7 @@ def bumper_restitution(
     tension: bool = False,
 ) -> BumperRestitution:
     """
-    Restitution of a linear bumper, and whether its contact is short enough for an instant impact.
+    Compute the restitution of a linear bumper, and check that its contact is short enough.
 
     A bumper that fills part of the gap also shortens the gap, which raises the demand.
 
@@ -327,18 +348,17 @@ def bumper_restitution(
     """
     stiffness = checks.positive("stiffness", stiffness)
     reduced_mass = mass_shares(mass_1, mass_2)[2]
-    damping = checks.not_negative("viscosity", viscosity) / (
-        2.0 * np.sqrt(stiffness * reduced_mass)
-    )
+    critical = 2.0 * np.sqrt(stiffness * reduced_mass)
+    damping = checks.not_negative("viscosity", viscosity) / critical
     if np.any(damping >= 1.0):
         raise ValueError(
             f"viscosity gives the contact a damping of {damping.max():.3g}, not below critical"
         )
+
+    # Contact lasts for a phase of the damped vibration of the reduced mass on the bumper
     root = np.sqrt((1.0 - damping) * (1.0 + damping))
-    contact_time = _contact_phase(damping, root, tension) / (
-        root * np.sqrt(stiffness / reduced_mass)
-    )
+    damped_frequency = root * np.sqrt(stiffness / reduced_mass)
+    contact_time = _contact_phase(damping, root, tension) / damped_frequency
     instant = contact_time <= LONGEST_CONTACT * checks.positive("shortest_period", shortest_period)
-    return BumperRestitution(
-        kelvin_voigt_restitution(damping, tension), damping, contact_time, instant
-    )
+    restitution = kelvin_voigt_restitution(damping, tension)
+    return BumperRestitution(restitution, damping, contact_time, instant)

@@ -1,4 +1,4 @@
-"""How stiff or how viscous a link must be to keep two structures apart: found by histories; there is no shortcut."""
+"""Least stiffness or damping of a link that keeps two structures apart, found by histories."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from per_obspy import checks
+from per_obspy.checks import FloatArray
 from per_obspy.pounding.history.links import LinkedHistory, linked_history
 from per_obspy.pounding.structure import Structure
 
@@ -51,7 +52,7 @@ def required_link_stiffness(
     largest: float,
 ) -> RequiredLink:
     """
-    Least stiffness of an elastic link with which two linear structures stay apart.
+    Find the least stiffness of an elastic link with which two linear structures stay apart.
 
     Parameters
     ----------
@@ -74,7 +75,30 @@ def required_link_stiffness(
     Raises
     ------
     ValueError
-        If an argument is out of range.
+        If an argument is out of range, or a structure is bilinear.
+
+    See Also
+    --------
+    per_obspy.linked_history : History of both structures with a link.
+
+    Notes
+    -----
+    There is no shortcut: a link changes both periods and the correlation, so that the closing
+    ``max(u1 - u2)`` need not fall steadily with its stiffness. 26 exact histories are computed for
+    the scan.
+
+    References
+    ----------
+    Westermo (1989), The dynamics of interstructural connection to prevent pounding, EESD 18, for
+    links as a measure.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> link = required_link_stiffness(pulse, 0.01, tower, annex, 0.02, 1e5, 1e9)
+    >>> print(f"{link.value:.3g} N/m, {link.force_maximum:.3g} N", link.robust)
+    5.14e+07 N/m, 1.07e+06 N True
     """
     return _required(
         lambda value: linked_history(acceleration, dt, structure_1, structure_2, value),
@@ -95,10 +119,49 @@ def required_link_damping(
     stiffness: float = 0.0,
 ) -> RequiredLink:
     """
-    Least damping of a viscous link (beside a given stiffness) with which two linear structures stay apart.
+    Find the least damping of a viscous link with which two linear structures stay apart.
 
-    Parameters, results and errors as :func:`required_link_stiffness`, with ``smallest`` and
-    ``largest`` in N s/m and ``stiffness`` of the link in N/m.
+    Parameters
+    ----------
+    acceleration : (n_samples,) array_like
+        Ground acceleration from structure 1 to 2, m/s².
+    dt : float
+        Sampling interval, s.
+    structure_1, structure_2 : Structure
+        Left and right, linear.
+    gap : float
+        Clear distance at rest, m.
+    smallest, largest : float
+        Range of viscous coefficients, N s/m.
+    stiffness : float, optional
+        Of a spring parallel to the dashpot, N/m.
+
+    Returns
+    -------
+    RequiredLink
+        The first value of a scan that suffices, refined in the interval before it.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or a structure is bilinear.
+
+    See Also
+    --------
+    per_obspy.required_link_stiffness : Elastic links, and notes.
+
+    References
+    ----------
+    Westermo (1989), The dynamics of interstructural connection to prevent pounding, EESD 18, for
+    links as a measure.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> tower, annex = Structure(1.5, 0.05, 4e5), Structure(0.4, 0.05, 2e5)
+    >>> link = required_link_damping(pulse, 0.01, tower, annex, 0.02, 1e4, 1e8)
+    >>> print(f"{link.value:.3g} N s/m, {link.force_maximum:.3g} N", link.robust)
+    3.79e+06 N s/m, 5.23e+05 N True
     """
     return _required(
         lambda value: linked_history(acceleration, dt, structure_1, structure_2, stiffness, value),
@@ -111,24 +174,32 @@ def required_link_damping(
 def _required(
     history: Callable[[float], LinkedHistory], gap: float, smallest: float, largest: float
 ) -> RequiredLink:
-    """Scan, take the first value that suffices, and refine before it: the closing need not fall steadily."""
+    """Scan, and refine before the first sufficient value: the closing need not fall steadily."""
     gap = checks.number("gap", gap, checks.not_negative)
-    low, high = (
-        checks.number(name, value, checks.positive)
-        for name, value in (("smallest", smallest), ("largest", largest))
-    )
-    if low >= high:
-        raise ValueError(f"largest must be above smallest, got {high} and {low}")
-    values = np.concatenate([[0.0], np.geomspace(low, high, TRIALS)])
+    values = _trial_values(smallest, largest)
     closing = np.array([history(value).closing for value in values.tolist()])
-    enough = closing <= gap
+    smallest_closing, enough = float(closing.min()), closing <= gap
     if not enough.any():
-        return RequiredLink(np.nan, float(closing.min()), robust=False, force_maximum=np.nan)
+        return RequiredLink(np.nan, smallest_closing, robust=False, force_maximum=np.nan)
+
+    # Refine between the first sufficient value and the one before it
     first = int(np.argmax(enough))
     value = float(values[first])
     if first > 0:
-        value = brentq(lambda one: history(one).closing - gap, values[first - 1], value, rtol=CLOSE)
+        value = _root(lambda trial: history(trial).closing - gap, values[first - 1], value)
     robust = bool(enough[first:].all())
-    return RequiredLink(
-        float(value), float(closing.min()), robust, history(float(value)).force_maximum
-    )
+    return RequiredLink(value, smallest_closing, robust, history(value).force_maximum)
+
+
+def _trial_values(smallest: float, largest: float) -> FloatArray:
+    """Return 0 (no link), then values evenly spaced in their logarithm."""
+    low = checks.number("smallest", smallest, checks.positive)
+    high = checks.number("largest", largest, checks.positive)
+    if low >= high:
+        raise ValueError(f"largest must be above smallest, got {high} and {low}")
+    return np.concatenate([[0.0], np.geomspace(low, high, TRIALS)])
+
+
+def _root(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Return the value between low and high at which the excess is 0."""
+    return float(brentq(excess, low, high, rtol=CLOSE))

@@ -1,10 +1,10 @@
-"""How much added damping, or how much gap, is enough for a pair."""
+"""Least added damping, or least gap, that is enough for a pair."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from per_obspy import checks
@@ -17,6 +17,7 @@ from per_obspy.spectra.elastic import per_spectrum
 STEP = 0.01  # largest step of added damping in the scan: one-sided damping is not monotone
 SPLITS = 21  # shares between only structure 2 and only structure 1 that are tried
 GAPS = 2001  # scanned below the critical gap
+LARGEST_ADDED = 0.4  # damping, where a caller names no other
 
 
 class SupplementalDamping(NamedTuple):
@@ -35,7 +36,7 @@ class SupplementalDamping(NamedTuple):
 
 
 class DampingSplit(NamedTuple):
-    """Least sum of dampings to add to both structures, and the share of structure 1 in it, dimensionless."""
+    """Share of structure 1 in the least sum of dampings to add to both, and that sum."""
 
     share_1: float
     added: SupplementalDamping
@@ -51,14 +52,14 @@ def supplemental_damping(
     gap: float,
     share_1: float = 1.0,
     share_2: float = 1.0,
-    largest: float = 0.4,
+    largest: float = LARGEST_ADDED,
 ) -> SupplementalDamping:
     """
-    Least damping to add to a pair so that its critical gap, equations (15) and (16), fits into the gap.
+    Find the least damping to add to a pair so that its critical gap fits into the gap.
 
-    Damping one structure only can make things worse, because the radii drift apart and the
-    correlation falls. So the added damping is scanned up to the largest in steps of at most 0.01,
-    and refined before the first that is enough.
+    The critical gap is that of equations (15) and (16). Damping one structure only can make things
+    worse, because the radii drift apart and the correlation falls. So the added damping is scanned
+    up to the largest in steps of at most 0.01, and refined before the first that is enough.
 
     Parameters
     ----------
@@ -102,50 +103,55 @@ def supplemental_damping(
     acceleration = checks.record("acceleration", acceleration)
     gap = checks.number("gap", gap, checks.not_negative)
     largest = checks.number("largest", largest, checks.positive)
-    shares = (
-        checks.number("share_1", share_1, checks.not_negative),
-        checks.number("share_2", share_2, checks.not_negative),
-    )
-    start = (
-        checks.number("damping_1", damping_1, checks.fraction_of_critical),
-        checks.number("damping_2", damping_2, checks.fraction_of_critical),
-    )
-    for which, (own, share) in enumerate(zip(start, shares, strict=True), start=1):
-        if own + share * largest >= 1.0:
-            raise ValueError(
-                f"largest adds up to a damping_{which} of {own + share * largest:.3g}, not below critical"
-            )
+    share_1 = checks.number("share_1", share_1, checks.not_negative)
+    share_2 = checks.number("share_2", share_2, checks.not_negative)
+    damping_1 = checks.number("damping_1", damping_1, checks.fraction_of_critical)
+    damping_2 = checks.number("damping_2", damping_2, checks.fraction_of_critical)
+    _refuse_critical("damping_1", damping_1 + share_1 * largest)
+    _refuse_critical("damping_2", damping_2 + share_2 * largest)
 
-    def needed(added: FloatArray) -> FloatArray:
-        dampings = start[0] + shares[0] * added, start[1] + shares[1] * added
-        per_1 = per_spectrum(acceleration, dt, [period_1], dampings[0])[:, 0]
-        per_2 = per_spectrum(acceleration, dt, [period_2], dampings[1])[:, 0]
-        return critical_gap(
-            per_1, per_2, ddc_correlation(period_1, dampings[0], period_2, dampings[1])
-        )
+    def critical_gaps(added: FloatArray) -> FloatArray:
+        """Return the critical gap for each added damping, m."""
+        xi_1, xi_2 = damping_1 + share_1 * added, damping_2 + share_2 * added
 
-    return _least(needed, gap, largest)
+        # Equation (15) with the radii, equation (16) for their correlation
+        per_1 = per_spectrum(acceleration, dt, [period_1], xi_1)[:, 0]
+        per_2 = per_spectrum(acceleration, dt, [period_2], xi_2)[:, 0]
+        return critical_gap(per_1, per_2, ddc_correlation(period_1, xi_1, period_2, xi_2))
+
+    # Scan the added damping, and refine before the first that is enough
+    return _least(critical_gaps, gap, largest)
+
+
+def _refuse_critical(name: str, damping: float) -> None:
+    """Refuse a largest damping that is not below critical."""
+    if damping >= 1.0:
+        raise ValueError(f"largest adds up to a {name} of {damping:.3g}, not below critical")
 
 
 def _least(
-    needed: Callable[[FloatArray], FloatArray], gap: float, largest: float
+    critical_gaps: Callable[[FloatArray], FloatArray], gap: float, largest: float
 ) -> SupplementalDamping:
-    """Scan the needed gap over the added damping and refine before the first that is enough."""
+    """Scan the critical gap over the added damping and refine before the first that is enough."""
     grid = np.linspace(0.0, largest, int(np.ceil(largest / STEP)) + 1)
-    gaps = needed(grid)
-    enough = gaps <= gap
+    gaps = critical_gaps(grid)
+    smallest_gap, enough = float(gaps.min()), gaps <= gap
     if not enough.any():
-        return SupplementalDamping(float("nan"), float(gaps.min()), robust=False)
+        return SupplementalDamping(float("nan"), smallest_gap, robust=False)
     first = int(np.argmax(enough))
+
+    # More damping than the first that is enough can be too much
     robust = bool(enough[first:].all())
     if first == 0:
-        return SupplementalDamping(0.0, float(gaps.min()), robust)
+        return SupplementalDamping(0.0, smallest_gap, robust)
 
     def excess(added: float) -> float:
-        return float(needed(np.array([added]))[0]) - gap
+        """Return the critical gap beyond the gap, m."""
+        return float(critical_gaps(np.array([added]))[0]) - gap
 
+    # Refine in the step before
     damping = brentq(excess, grid[first - 1], grid[first], xtol=1e-12, rtol=1e-12)
-    return SupplementalDamping(float(damping), float(gaps.min()), robust)
+    return SupplementalDamping(float(damping), smallest_gap, robust)
 
 
 def optimal_damping_split(
@@ -156,15 +162,23 @@ def optimal_damping_split(
     period_2: float,
     damping_2: float,
     gap: float,
-    largest: float = 0.4,
+    largest: float = LARGEST_ADDED,
 ) -> DampingSplit:
     """
-    Split of the added damping between both structures that needs the least in sum.
+    Find the split of added damping between both structures that needs the least in sum.
 
     Parameters
     ----------
-    acceleration, dt, period_1, damping_1, period_2, damping_2, gap : array_like and float
-        As in :func:`supplemental_damping`.
+    acceleration : (n_samples,) array_like
+        Ground acceleration, m/s².
+    dt : float
+        Sampling interval, s.
+    period_1, period_2 : float
+        Undamped periods, s.
+    damping_1, damping_2 : float
+        Dampings now, fractions of critical, dimensionless.
+    gap : float
+        Actual gap, m.
     largest : float, optional
         Largest sum to add, dimensionless.
 
@@ -176,15 +190,30 @@ def optimal_damping_split(
     Raises
     ------
     ValueError
-        As in :func:`supplemental_damping`.
+        If an argument is out of range, or a structure would become critically damped.
+
+    See Also
+    --------
+    per_obspy.supplemental_damping : Damping for a given split.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), 11WCEE, figure 8, for the damping of a given split.
+
+    Examples
+    --------
+    >>> pulse = np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    >>> split = optimal_damping_split(pulse, 0.01, 0.9, 0.05, 1.2, 0.05, 0.1)
+    >>> print(f"{split.share_1:.2f} of {split.added.damping:.3f}")
+    0.40 of 0.128
     """
     pair = acceleration, dt, period_1, damping_1, period_2, damping_2, gap
-    splits = [
-        DampingSplit(
-            float(share), supplemental_damping(*pair, float(share), 1.0 - float(share), largest)
-        )
-        for share in np.linspace(0.0, 1.0, SPLITS)
-    ]
+    splits = []
+    for share in np.linspace(0.0, 1.0, SPLITS).tolist():
+        added = supplemental_damping(*pair, share, 1.0 - share, largest)
+        splits.append(DampingSplit(share, added))
+
+    # Least damping, or the least critical gap where no split is enough
     sufficient = [split for split in splits if not np.isnan(split.added.damping)]
     if sufficient:
         return min(sufficient, key=lambda split: split.added.damping)
@@ -203,12 +232,20 @@ def required_gap(
     target: float,
 ) -> float:
     """
-    Smallest gap from which on the single hit amplifies neither structure beyond a target.
+    Find the least gap from which on the single hit amplifies no structure beyond a target.
 
     Parameters
     ----------
-    per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, critical_gap : float
-        As in :func:`per_obspy.single_hit`.
+    per_1, per_2 : float
+        Pseudo Energy Radius of each structure at contact level, m.
+    period_1, period_2 : float
+        Undamped periods, s.
+    mass_1, mass_2 : float
+        Impact masses, kg; one of the two may be infinite.
+    restitution : float
+        Coefficient of restitution, from 0 to 1, dimensionless.
+    critical_gap : float
+        Gap at which the pair would only just touch, m.
     target : float
         Largest admissible amplification of either structure, at least 1, dimensionless.
 
@@ -227,6 +264,17 @@ def required_gap(
     Notes
     -----
     2001 gaps up to the critical one are tried; the end of the admissible stretch is then bisected.
+
+    References
+    ----------
+    Valles-Mattox & Reinhorn (1996), 11WCEE, section "Estimating pounding effects", for the single
+    hit.
+
+    Examples
+    --------
+    >>> gap = required_gap(0.3, 0.4, 1.0, 1.3, 1e6, 1e6, 0.65, 0.5, target=1.2)
+    >>> print(f"{gap:.3f} m")
+    0.479 m
     """
     target = checks.number("target", target, checks.positive)
     if target < 1.0:
@@ -235,21 +283,31 @@ def required_gap(
         )
     pair = per_1, per_2, period_1, period_2, mass_1, mass_2, restitution, critical_gap
 
-    def too_much(gaps: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def exceeds(gaps: FloatArray) -> NDArray[np.bool_]:
+        """Return True for each gap at which a structure is amplified beyond the target."""
         hit = single_hit(*pair, gaps)
         amplification = np.maximum(hit.amplification_1, hit.amplification_2)
         # NaN, no grazing state, must not pass
         return ~(amplification <= target)
 
+    # Scan gaps up to the critical one
     gaps = np.linspace(0.0, checks.number("critical_gap", critical_gap, checks.not_negative), GAPS)
-    failing = np.flatnonzero(too_much(gaps))
+    failing = np.flatnonzero(exceeds(gaps))
     if failing.size == 0:
         return 0.0
     if single_hit(*pair, gaps[0]).status not in ("ok", "no_pounding"):
         return float("nan")
-    low, high = gaps[failing[-1]], gaps[failing[-1] + 1]
+
+    # Bisect between the largest gap that fails and the next one
+    return _end_of_excess(exceeds, gaps[failing[-1]], gaps[failing[-1] + 1])
+
+
+def _end_of_excess(
+    exceeds: Callable[[FloatArray], NDArray[np.bool_]], low: float, high: float
+) -> float:
+    """Bisect down to neighbouring numbers: the low gap exceeds the target, the high one not."""
     while (middle := 0.5 * (low + high)) not in (low, high):
-        if too_much(np.array([middle]))[0]:
+        if exceeds(np.array([middle]))[0]:
             low = middle
         else:
             high = middle

@@ -1,4 +1,4 @@
-"""Equivalent linear period and damping of a bilinear structure, by the formulas of several authors."""
+"""Equivalent linear period and damping of a bilinear structure, by formulas of several authors."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ class EquivalentLinear(NamedTuple):
 
 
 class UnverifiedEquivalentLinear(NamedTuple):
-    """As :class:`EquivalentLinear`, from coefficients that are unverified: no text of the source was at hand."""
+    """:class:`EquivalentLinear` from unverified coefficients: the source text was not at hand."""
 
     period: float
     damping: float
@@ -34,32 +34,32 @@ def _secant(ductility: float, hardening: float) -> float:
 
 
 def _rosenblueth_herrera(ductility: float, hardening: float) -> tuple[float, float]:
-    loop = (
-        (1.0 - hardening)
-        * (ductility - 1.0)
-        / (ductility - hardening * ductility + hardening * ductility**2)
-    )
+    """Return the period factor of the secant stiffness, and the damping of the loop's area."""
+    above = (1.0 - hardening) * (ductility - 1.0)
+    loop = above / (ductility - hardening * ductility + hardening * ductility**2)
     return _secant(ductility, hardening), 2.0 / math.pi * loop
 
 
 def _gulkan_sozen(ductility: float, hardening: float) -> tuple[float, float]:
+    """Return period factor and damping fitted to tests of reinforced concrete."""
     return _secant(ductility, hardening), 0.2 * (1.0 - 1.0 / math.sqrt(ductility))
 
 
 def iwan(ductility: Ductility, hardening: float) -> tuple[Ductility, Ductility]:
-    """Return the factor of the period and the damping to add (Iwan 1980), also of an array of ductilities from 1."""
+    """Return period factor and damping to add (Iwan 1980), of arrays of ductilities from 1 too."""
     del hardening  # fitted for one hardening
     return 1.0 + 0.121 * (ductility - 1.0) ** 0.939, 0.0587 * (ductility - 1.0) ** 0.371
 
 
 def _kowalsky(ductility: float, hardening: float) -> tuple[float, float]:
+    """Return period factor and damping of Takeda's loops (Kowalsky 1994)."""
     root = math.sqrt(ductility)
-    return _secant(ductility, hardening), (
-        1.0 - (1.0 - hardening) / root - hardening * root
-    ) / math.pi
+    loop = 1.0 - (1.0 - hardening) / root - hardening * root
+    return _secant(ductility, hardening), loop / math.pi
 
 
 def _fema_440(ductility: float, hardening: float) -> tuple[float, float]:
+    """Return period factor and damping of FEMA 440, in three ranges of ductility."""
     del hardening  # the form for any hysteresis
     over = ductility - 1.0
     if ductility < 4.0:
@@ -71,11 +71,13 @@ def _fema_440(ductility: float, hardening: float) -> tuple[float, float]:
 
 
 def _jeng(ductility: float, hardening: float) -> tuple[float, float]:
+    """Return the unverified period factor and damping of Jeng, Kasai & Maison (1992)."""
     del hardening
     return 1.0 + 0.09 * (ductility - 1.0), 0.084 * (ductility - 1.0) ** 1.3
 
 
 def _kasai(ductility: float, hardening: float) -> tuple[float, float]:
+    """Return the unverified period factor and damping of Kasai, Jagiasi & Jeng (1996)."""
     del hardening
     return 1.0 + 0.18 * (ductility - 1.0), 0.16 * (ductility - 1.0) ** 0.9
 
@@ -98,7 +100,7 @@ def equivalent_linear(
     method: str, ductility: float, period: float, damping: float, hardening: float
 ) -> EquivalentLinear | UnverifiedEquivalentLinear:
     """
-    Period and damping of the linear structure that stands for a bilinear one at a ductility.
+    Compute period and damping of the linear structure equivalent to a bilinear one.
 
     Parameters
     ----------
@@ -144,9 +146,13 @@ def equivalent_linear(
     period = checks.number("period", period, checks.positive)
     damping = checks.number("damping", damping, checks.fraction_of_critical)
     hardening = checks.number("hardening", hardening, checks.fraction_of_critical)
+
+    # The type of the result shows whether its coefficients are verified
     result = UnverifiedEquivalentLinear if method.endswith("unverified") else EquivalentLinear
     if ductility <= 1.0:
         return result(period, damping)
+
+    # Longer period and added damping of the yielding structure
     factor, added = METHODS[method](ductility, hardening)
     total = OWN_DAMPING.get(method, damping) + added
     if not 0.0 <= total < 1.0:

@@ -1,4 +1,4 @@
-"""What every statistical linearization of a pair returns."""
+"""Result of a statistical linearization of a pair."""
 
 from typing import NamedTuple
 
@@ -26,5 +26,7 @@ class LinearizedEstimate(NamedTuple):
 
 def failed() -> LinearizedEstimate:
     """Return an estimate without numbers."""
-    none = np.full(2, np.nan)
-    return LinearizedEstimate(float("nan"), none, none.copy(), none.copy(), converged=False)
+    missing = np.full(2, np.nan)
+    return LinearizedEstimate(
+        float("nan"), missing, missing.copy(), missing.copy(), converged=False
+    )

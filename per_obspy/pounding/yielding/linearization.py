@@ -2,7 +2,7 @@
 Correlation of two bilinear structures under stationary ground motion, by statistical linearization.
 
 Each structure is replaced by the linear system that is closest to it for the standard deviations of
-its own response, which follow from the joint covariance of both structures and the ground.
+its response, which follow from the joint covariance of both structures and the ground.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.stochastic_ground import Ground
+from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 from per_obspy.pounding.structure import Structure
 from per_obspy.pounding.yielding.estimate import LinearizedEstimate
 from per_obspy.pounding.yielding.gauss import gauss_3
@@ -29,7 +29,7 @@ LARGEST_FREQUENCY = 50.0 * np.pi
 
 
 class LinearizedCorrelation(NamedTuple):
-    """Both estimates, and the correlation to use; NaN where the estimates that it needs did not converge."""
+    """Both estimates and the correlation to use, NaN where the estimates did not converge."""
 
     krylov_bogoliubov: LinearizedEstimate
     gauss_3: LinearizedEstimate
@@ -37,10 +37,10 @@ class LinearizedCorrelation(NamedTuple):
 
 
 def linearized_correlation(
-    structure_1: Structure, structure_2: Structure, ground: Ground, narrow: float = NARROW
+    structure_1: Structure, structure_2: Structure, ground: StochasticGround, narrow: float = NARROW
 ) -> LinearizedCorrelation:
     """
-    Correlation of two bilinear displacements under stationary ground motion.
+    Compute the correlation of two bilinear displacements under stationary ground motion.
 
     Parameters
     ----------
@@ -79,7 +79,8 @@ def linearized_correlation(
     Examples
     --------
     >>> from per_obspy.pounding.correlation.stochastic_ground import WhiteNoise
-    >>> linear = linearized_correlation(Structure(1.0, 0.05, 1.0), Structure(1.2, 0.05, 1.0), WhiteNoise(0.01))
+    >>> pair = Structure(1.0, 0.05, 1.0), Structure(1.2, 0.05, 1.0)
+    >>> linear = linearized_correlation(*pair, WhiteNoise(0.01))
     >>> print(round(linear.recommended, 6), linear.gauss_3.converged)
     0.229814 True
     """
@@ -96,11 +97,11 @@ def ductility_correlation(
     structure_2: Structure,
     ductility_1: float,
     ductility_2: float,
-    ground: Ground,
+    ground: StochasticGround,
     peak_factor: float = 3.0,
 ) -> LinearizedEstimate:
     """
-    Correlation of two bilinear displacements whose ductilities are given instead of their yield displacements.
+    Compute the correlation of two bilinear displacements at given ductilities.
 
     Parameters
     ----------
@@ -118,12 +119,20 @@ def ductility_correlation(
     -------
     LinearizedEstimate
         Krylov-Bogoliubov estimate at ``yield displacement = peak_factor / ductility`` standard
-        deviations.
+        deviations; ``correlation`` is dimensionless.
 
     Raises
     ------
     ValueError
         If a damping is 0, or a ductility or the peak factor is not positive.
+
+    See Also
+    --------
+    per_obspy.linearized_correlation : Structures with given yield displacements.
+
+    References
+    ----------
+    Caughey (1960), Journal of Applied Mechanics 27; Valles-Mattox & Reinhorn (1996), 11WCEE.
 
     Examples
     --------
@@ -144,7 +153,7 @@ def ductility_correlation(
 
 def davenport_peak_factor(frequency: float, duration: float) -> float:
     """
-    Mean peak of a stationary Gaussian response over its standard deviation.
+    Compute the mean peak of a stationary Gaussian response over its standard deviation.
 
     Parameters
     ----------
@@ -167,6 +176,13 @@ def davenport_peak_factor(frequency: float, duration: float) -> float:
     References
     ----------
     Davenport (1964), Proceedings of the Institution of Civil Engineers 28.
+
+    Examples
+    --------
+    A period of 1 s during 20 s of strong shaking:
+
+    >>> print(round(davenport_peak_factor(2.0 * np.pi, 20.0), 3))
+    2.684
     """
     crossings = checks.number("frequency", frequency, checks.positive) / (2.0 * np.pi)
     crossings *= checks.number("duration", duration, checks.positive)
@@ -176,9 +192,9 @@ def davenport_peak_factor(frequency: float, duration: float) -> float:
     return spread + float(np.euler_gamma) / spread
 
 
-def bandwidth(ground: Ground) -> float:
+def bandwidth(ground: StochasticGround) -> float:
     """
-    Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
+    Compute the Vanmarcke bandwidth of a ground motion, from 0 (a sine) to 1.
 
     Parameters
     ----------
@@ -197,7 +213,7 @@ def bandwidth(ground: Ground) -> float:
 
 def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
     """
-    Vanmarcke bandwidth of a record: that of its power at each frequency, both components together.
+    Compute the Vanmarcke bandwidth of a record, from the power of both components together.
 
     Parameters
     ----------
@@ -220,22 +236,25 @@ def record_bandwidth(north: ArrayLike, east: ArrayLike, dt: float) -> float:
     motion = np.stack([checks.record("north", north), checks.record("east", east)])
     power: FloatArray = (np.abs(np.fft.rfft(motion)) ** 2).sum(axis=0)
     step = checks.number("dt", dt, checks.positive)
-    frequency: FloatArray = 2.0 * np.pi * np.fft.rfftfreq(motion.shape[1], step).astype(np.float64)
-    felt = frequency <= LARGEST_FREQUENCY
-    return _bandwidth(frequency[felt], power[felt]) if power.any() else 1.0
+
+    # Only frequencies of ground motion count
+    hertz = np.fft.rfftfreq(motion.shape[1], step).astype(np.float64)
+    frequency: FloatArray = 2.0 * np.pi * hertz
+    inside = frequency <= LARGEST_FREQUENCY
+    return _bandwidth(frequency[inside], power[inside]) if power.any() else 1.0
 
 
 def _bandwidth(frequency: FloatArray, density: FloatArray) -> float:
     """Return the bandwidth of a density at equally spaced frequencies."""
     power = np.cumsum(density)
-    inside = (
-        power - density <= POWER * power[-1]
-    )  # the frequency at which the share is reached belongs to it
+    # The frequency at which the share is reached belongs to the band
+    inside = power - density <= POWER * power[-1]
     frequency, density = frequency[inside], density[inside]
     moments = [float(np.sum(density * frequency**order)) for order in range(3)]
     return float(np.sqrt(max(1.0 - moments[1] ** 2 / (moments[0] * moments[2]), 0.0)))
 
 
 def _damped(structure: Structure) -> Structure:
+    """Return a structure whose damping is above 0."""
     checks.number("damping", structure.damping, checks.positive)
     return structure

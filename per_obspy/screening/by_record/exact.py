@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.pounding.correlation.azimuths import worst_azimuth
+from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.pair_histories import PoundingMaxima, pounding_histories
 from per_obspy.pounding.history.relative import directional_relative_displacement
 from per_obspy.pounding.history.relative_yielding import (

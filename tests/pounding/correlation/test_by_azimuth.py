@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import cont2discrete, lfilter
 
-from per_obspy.pounding.correlation.azimuths import directional_correlation
+from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 
 DT = 0.01
