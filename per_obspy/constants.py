@@ -9,6 +9,10 @@ GAL = 0.01
 #: Mean radius of the Earth, m (IUGG, radius R1 of GRS 80).
 EARTH_RADIUS = 6_371_008.8
 
+#: Damping at which published spectra, and here the stations of a region, are compared, fraction of
+#: critical.
+REFERENCE_DAMPING = 0.05
+
 #: Arc of one degree on the mean Earth, m, to six digits.
 METRES_PER_DEGREE = 111_195.0
 
