@@ -77,6 +77,7 @@ def fitted_group(
         The stations, averaged per place, with their trend.
     """
     places, mean, limits = _averaged_by_place(stations, values, usable)
+    # Distances from each place to each
     distance = great_circle(
         places.longitude[:, None],
         places.latitude[:, None],
@@ -156,27 +157,34 @@ def _fitted(
     # Design matrix X: a mean, and the slopes that these stations can resolve, about their means
     used = _resolved_slopes(features)
     means[used] = features[:, used].mean(axis=0)
-    columns = np.concatenate([[0], 1 + used])
     design = np.column_stack([np.ones(values.size), features[:, used] - means[used]])
+    fit, uncertainty, squares = _least_squares(design, correlation, values)
 
-    # Generalised least squares, X' C^-1 X b = X' C^-1 y
-    factor = cho_factor(correlation, lower=True)
-    normal = cho_factor(design.T @ cho_solve(factor, design), lower=True)
-    coefficients[columns] = cho_solve(normal, design.T @ cho_solve(factor, values))
-    covariance[np.ix_(columns, columns)] = cho_solve(normal, np.eye(columns.size))
+    # Unresolved slopes stay 0, and so does their covariance
+    columns = np.concatenate([[0], 1 + used])
+    coefficients[columns] = fit
+    covariance[np.ix_(columns, columns)] = uncertainty
 
-    residual = values - design @ coefficients[columns]
-    squares = residual @ cho_solve(factor, residual)
     # The deviation joins that of the stations with the assumed one s0, which counts as w stations:
     # s^2 = (w s0^2 + e' C^-1 e) / (w + n - p)
-    freedom = settings.log_std_weight + residual.size - columns.size
-    return coefficients, covariance, means, _deviation(squares, freedom, settings)
+    weight = settings.log_std_weight
+    freedom = weight + values.size - columns.size
+    variance = (weight * settings.log_std**2 + squares) / freedom
+    return coefficients, covariance, means, float(np.sqrt(variance))
 
 
-def _deviation(squares: float, freedom: float, settings: Interpolation) -> float:
-    """Return the deviation from the weighted squares of residuals and the degrees of freedom."""
-    assumed = settings.log_std_weight * settings.log_std**2
-    return float(np.sqrt((assumed + squares) / freedom))
+def _least_squares(
+    design: FloatArray, correlation: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Solve X' C^-1 X b = X' C^-1 y: b, its covariance for a deviation of 1, and e' C^-1 e."""
+    factor = cho_factor(correlation, lower=True)
+    normal = cho_factor(design.T @ cho_solve(factor, design), lower=True)
+    coefficients: FloatArray = cho_solve(normal, design.T @ cho_solve(factor, values))
+    covariance: FloatArray = cho_solve(normal, np.eye(design.shape[1]))
+
+    # Residuals e, decorrelated
+    residual = values - design @ coefficients
+    return coefficients, covariance, residual @ cho_solve(factor, residual)
 
 
 def _resolved_slopes(features: FloatArray) -> NDArray[np.intp]:
