@@ -158,33 +158,33 @@ def _fitted(
     used = _resolved_slopes(features)
     means[used] = features[:, used].mean(axis=0)
     design = np.column_stack([np.ones(values.size), features[:, used] - means[used]])
-    fit, uncertainty, squares = _least_squares(design, correlation, values)
+    fit, uncertainty, deviation = _least_squares(design, correlation, values, settings)
 
     # Unresolved slopes stay 0, and so does their covariance
     columns = np.concatenate([[0], 1 + used])
     coefficients[columns] = fit
     covariance[np.ix_(columns, columns)] = uncertainty
 
-    # The deviation joins that of the stations with the assumed one s0, which counts as w stations:
-    # s^2 = (w s0^2 + e' C^-1 e) / (w + n - p)
-    weight = settings.log_std_weight
-    freedom = weight + values.size - columns.size
-    variance = (weight * settings.log_std**2 + squares) / freedom
-    return coefficients, covariance, means, float(np.sqrt(variance))
+    return coefficients, covariance, means, deviation
 
 
 def _least_squares(
-    design: FloatArray, correlation: FloatArray, values: FloatArray
+    design: FloatArray, correlation: FloatArray, values: FloatArray, settings: Interpolation
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Solve X' C^-1 X b = X' C^-1 y: b, its covariance for a deviation of 1, and e' C^-1 e."""
+    """Solve X' C^-1 X b = X' C^-1 y: b, its covariance for a deviation of 1, and the deviation."""
     factor = cho_factor(correlation, lower=True)
     normal = cho_factor(design.T @ cho_solve(factor, design), lower=True)
     coefficients: FloatArray = cho_solve(normal, design.T @ cho_solve(factor, values))
     covariance: FloatArray = cho_solve(normal, np.eye(design.shape[1]))
 
-    # Residuals e, decorrelated
+    # The deviation of the residuals e joins the assumed one s0, which counts as w stations:
+    # s^2 = (w s0^2 + e' C^-1 e) / (w + n - p)
     residual = values - design @ coefficients
-    return coefficients, covariance, residual @ cho_solve(factor, residual)
+    squares = residual @ cho_solve(factor, residual)
+    weight = settings.log_std_weight
+    freedom = weight + residual.size - design.shape[1]
+    variance = (weight * settings.log_std**2 + squares) / freedom
+    return coefficients, covariance, float(np.sqrt(variance))
 
 
 def _resolved_slopes(features: FloatArray) -> NDArray[np.intp]:
