@@ -12,6 +12,7 @@ from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section
 from per_obspy.config.simulation import SimulatedPairs
+from per_obspy.constants import REFERENCE_DAMPING
 
 
 class Pairs(Section):
@@ -73,7 +74,7 @@ class Run(Section):
     @model_validator(mode="after")
     def _comparable_stations(self) -> Self:
         dampings = self.spectra.dampings
-        if not dampings[0] <= 0.05 <= dampings[-1]:
+        if not dampings[0] <= REFERENCE_DAMPING <= dampings[-1]:
             told = ", ".join(f"{one:g}" for one in dampings)
             raise ValueError(
                 f"spectra.dampings must reach from 0.05 or below to 0.05 or above, got {told}: stations are "

@@ -121,8 +121,8 @@ def reliability(observed: ArrayLike, probability: ArrayLike, bins: int = 10) -> 
     Returns
     -------
     DataFrame
-        One row per bin that has events: ``low, high, events, mean_probability, observed_share``, and
-        ``share_std``, the standard deviation of the share if the mean probability were true.
+        One row per bin that has events: ``low, high, events, mean_probability, observed_share``
+        and ``share_std``, the standard deviation of the share if the mean probability were true.
 
     Examples
     --------
