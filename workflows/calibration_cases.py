@@ -17,8 +17,11 @@ from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.records.simulation.earthquake import simulate
 from per_obspy.records.simulation.metadata import GAIN
 from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
-from per_obspy.screening.ground_motion.region import Ground
-from per_obspy.screening.ground_motion.site_motion import Source, prepared_field
+from per_obspy.screening.ground_motion.site_motion import (
+    Hypocentre,
+    RegionalMotion,
+    prepared_field,
+)
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle, residual_correlation
 from per_obspy.screening.rows import risk_rows
 from per_obspy.screening.values import both, values
@@ -186,9 +189,9 @@ def predicted(known: Network, sites: Sequence[Site], count: int, seed: int) -> p
     )
     pairs = checked_pairs(raw, "simulated pairs")
     stations, _ = stations_of(known.stations)
-    source = Source(known.scenario.longitude, known.scenario.latitude, known.scenario.depth)
+    source = Hypocentre(known.scenario.longitude, known.scenario.latitude, known.scenario.depth)
     field = prepared_field(known.stations, Interpolation(), source)
-    rows, _ = risk_rows(pairs, Ground(stations, field, None), Building(), Screening())
+    rows, _ = risk_rows(pairs, RegionalMotion(stations, field, None), Building(), Screening())
     return rows.sort_values("pair_id", ignore_index=True)
 
 

@@ -10,6 +10,13 @@ from pydantic import (
 )
 
 from per_obspy.config.section import Section
+from per_obspy.constants import (
+    LONGEST_STORED_PERIOD,
+    SHORTEST_STORED_PERIOD,
+    STORED_AZIMUTH_STEP,
+    STORED_DAMPINGS,
+    STORED_PERIODS,
+)
 
 
 class Check(Section):
@@ -157,13 +164,18 @@ class Spectra(Section):
     """The grid of the stored spectra; pairs are computed at their own periods, not read off it."""
 
     dampings: tuple[Annotated[float, Field(ge=0, lt=1)], ...] = Field(
-        (0.02, 0.05, 0.10, 0.20), min_length=1, description="fractions of critical, rising"
+        STORED_DAMPINGS, min_length=1, description="fractions of critical, rising"
     )
-    shortest: float = Field(0.05, ge=0.001, description="s")
-    longest: float = Field(10.0, le=100.0, description="s")
-    count: int = Field(100, ge=2, le=10_000, description="periods, logarithmically spaced")
+    shortest: float = Field(SHORTEST_STORED_PERIOD, ge=0.001, description="s")
+    longest: float = Field(LONGEST_STORED_PERIOD, le=100.0, description="s")
+    count: int = Field(
+        STORED_PERIODS, ge=2, le=10_000, description="periods, logarithmically spaced"
+    )
     azimuth_step: int = Field(
-        10, ge=1, le=90, description="degrees between stored azimuths; RotD uses every degree"
+        STORED_AZIMUTH_STEP,
+        ge=1,
+        le=90,
+        description="degrees between stored azimuths; RotD uses every degree",
     )
 
     @field_validator("dampings")

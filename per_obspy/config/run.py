@@ -14,6 +14,7 @@ from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.config.simulation import SimulatedPairs
+from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.errors import CatalogError
 
 
@@ -76,7 +77,7 @@ class Run(Section):
     @model_validator(mode="after")
     def _comparable_stations(self) -> Self:
         dampings = self.spectra.dampings
-        if not dampings[0] <= 0.05 <= dampings[-1]:
+        if not dampings[0] <= REFERENCE_DAMPING <= dampings[-1]:
             given = ", ".join(f"{damping:g}" for damping in dampings)
             raise ValueError(
                 f"spectra.dampings must reach from 0.05 or below to 0.05 or above, got {given}: "

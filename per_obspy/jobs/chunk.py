@@ -27,8 +27,12 @@ from per_obspy.jobs.parallel import results
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
-from per_obspy.screening.ground_motion.region import Ground
-from per_obspy.screening.ground_motion.site_motion import Source, StationField, prepared_field
+from per_obspy.screening.ground_motion.site_motion import (
+    Hypocentre,
+    RegionalMotion,
+    StationField,
+    prepared_field,
+)
 from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
 from per_obspy.spectra.storage import read_spectra
@@ -38,7 +42,7 @@ from per_obspy.tables.parts import write_part
 CHUNK = 100_000
 
 #: Attributes of a station's Dataset that tell where the earthquake started.
-HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Source._fields)
+HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
 STATIONS_KEPT = 200
@@ -151,7 +155,7 @@ def ground_files(
     shards: Iterable[Path], shakemap: tuple[Path, ...], settings: Interpolation
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """Return what is known of the ground motion, and the stations that have no coordinates."""
-    files, nowhere, source = list[StationFile](), list[Rejection](), list[Source]()
+    files, nowhere, source = list[StationFile](), list[Rejection](), list[Hypocentre]()
     for shard in shards:
         station = read_spectra(shard)
         name, longitude, latitude = (
@@ -164,7 +168,7 @@ def ground_files(
                 )
             )
             source = (
-                [Source(*(station.attrs[one] for one in HYPOCENTRE))]
+                [Hypocentre(*(station.attrs[one] for one in HYPOCENTRE))]
                 if HYPOCENTRE[0] in station.attrs
                 else []
             )
@@ -226,7 +230,7 @@ def _note(job: ChunkJob) -> Path:
 
 
 def _surviving(
-    pairs: pd.DataFrame, ground: Ground, job: ChunkJob
+    pairs: pd.DataFrame, ground: RegionalMotion, job: ChunkJob
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """Return the rows of all pairs but those that cannot be computed, which are found by halving."""
     try:
@@ -246,7 +250,7 @@ def _surviving(
         )
 
 
-def _ground(files: GroundFiles) -> Ground:
+def _ground(files: GroundFiles) -> RegionalMotion:
     longitude, latitude = (
         np.array([(one.longitude, one.latitude) for one in files.stations]).reshape(-1, 2).T
     )
@@ -256,7 +260,7 @@ def _ground(files: GroundFiles) -> Ground:
     )
     shards = [(one.shard, one.hash) for one in files.stations]
     stations = Stations(names, longitude, latitude, ground, lambda index: _station(*shards[index]))
-    return Ground(
+    return RegionalMotion(
         stations, files.field, _shakemap(files.shakemap, files.key) if files.shakemap else None
     )
 

@@ -1,4 +1,4 @@
-"""What a reader of a row must know: its flags."""
+"""Flags of a row: warnings that its reader must know."""
 
 from collections.abc import Mapping
 
@@ -20,19 +20,18 @@ UNRELIABLE_SINGLE_HIT = 0.6
 def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
     """Return which pairs have a period that was derived from height or storeys."""
     derived = np.asarray(pairs["derived"], dtype=object).tolist()
-    told = {
-        names: "period_1" in names or "period_2" in names for names in set(derived)
-    }  # few, of many rows
-    return np.fromiter(map(told.__getitem__, derived), bool, len(derived))
+    # Many rows share few different texts: each text is searched once
+    has_period = {text: "period_1" in text or "period_2" in text for text in set(derived)}
+    return np.fromiter(map(has_period.__getitem__, derived), bool, len(derived))
 
 
 def joined_flags(raised: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]:
-    """Return the names of the flags that rows raise, in the order of ``FLAGS``, separated by a blank."""
+    """Join the names of the flags of each row, in the order of ``FLAGS``, with blanks."""
     return joined_names({name: raised[name] for name in FLAGS if name in raised})
 
 
 def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
-    """Return for every flag that needs no record the rows that raise it."""
+    """Return the rows that raise each flag which needs no record."""
     return {
         "touching": values(table, "gap") == 0.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
@@ -46,23 +45,35 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
 def raised_by_record(
     table: Table, station: xr.Dataset, screening: Screening
 ) -> dict[str, NDArray[np.bool_]]:
-    """Return for every flag of the record the rows that raise it."""
-    periods, per, sd = (np.stack(both(table, name)) for name in ("period", "per", "sd"))
-    shortest, longest = (
-        number(station, "shortest_usable_period"),
-        number(station, "longest_usable_period"),
-    )
-    every = np.ones(periods.shape[1], dtype=bool)
-    crossed = "motion_from_other_site_class"
+    """Return the rows that raise each flag of the record."""
+    every = np.ones(len(table["distance"]), dtype=bool)
+    # Only tables with motion between stations have this column
+    name = "motion_from_other_site_class"
+    other_class = np.asarray(table[name], dtype=bool) if name in table else ~every
     return {
-        "outside_usable_periods": ((periods < shortest) | (periods > longest)).any(axis=0),
-        "per_far_above_sd": (per > screening.per_to_sd * sd).any(axis=0),
+        "outside_usable_periods": _outside_usable_periods(table, station),
+        "per_far_above_sd": _per_far_above_sd(table, screening.per_to_sd),
         "record_from_other_site_class": np.asarray(table["other_site_class"], dtype=bool),
         "far_station": values(table, "distance") > screening.flag_distance,
         "one_horizontal": every & (station.sizes["horizontal"] == 1),
         "linearized_not_converged": ~np.asarray(table["linearized_converged"], dtype=bool),
+        # A measure is missing where none within its range suffices
         "no_damping_suffices": np.isnan(values(table, "supplemental_damping")),
         "no_bumper_suffices": np.isnan(values(table, "bumper_restitution")),
-        crossed: np.asarray(table[crossed], dtype=bool) if crossed in table else ~every,
+        name: other_class,
         "simulated": every & (station.attrs["simulated"] == "true"),
     }
+
+
+def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.bool_]:
+    """Return which pairs have a building whose period the station's record does not support."""
+    periods = np.stack(both(table, "period"))
+    shortest = number(station, "shortest_usable_period")
+    longest = number(station, "longest_usable_period")
+    return np.asarray(((periods < shortest) | (periods > longest)).any(axis=0))
+
+
+def _per_far_above_sd(table: Table, limit: float) -> NDArray[np.bool_]:
+    """Return which pairs have a building with PER / SD above a limit."""
+    per, sd = np.stack(both(table, "per")), np.stack(both(table, "sd"))
+    return np.asarray((per > limit * sd).any(axis=0))

@@ -8,8 +8,7 @@ import xarray as xr
 from per_obspy.config import Building, Screening
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.region import Ground
-from per_obspy.screening.ground_motion.site_motion import prepared_field
+from per_obspy.screening.ground_motion.site_motion import RegionalMotion, prepared_field
 from per_obspy.screening.ranking import worst_first
 from per_obspy.screening.rows import risk_rows
 
@@ -49,7 +48,7 @@ def risk_table(
     located = [stations.read(index) for index in range(stations.names.size)]
     # motion between the stations, for pairs at a distance from theirs
     field = prepared_field(located, screening.interpolation) if located else None
-    rows, unreached = risk_rows(pairs, Ground(stations, field, None), building, screening)
+    rows, unreached = risk_rows(pairs, RegionalMotion(stations, field, None), building, screening)
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *unlocated, *unreached)

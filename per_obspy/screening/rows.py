@@ -35,8 +35,7 @@ from per_obspy.screening.flags import (
     raised_by_record,
 )
 from per_obspy.screening.ground_motion.assignment import assigned
-from per_obspy.screening.ground_motion.region import Ground
-from per_obspy.screening.ground_motion.site_motion import motion_at_pairs
+from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion_at_pairs
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, risk_class
 from per_obspy.screening.uncertainty.probability import pair_probability
@@ -59,7 +58,7 @@ BLOCK = 2000
 
 
 def risk_rows(
-    pairs: pd.DataFrame, ground: Ground, building: Building, screening: Screening
+    pairs: pd.DataFrame, ground: RegionalMotion, building: Building, screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
     Compute one row per pair, in no particular order, and the rejections of pairs out of reach.
@@ -69,7 +68,7 @@ def risk_rows(
     pairs : DataFrame
         From :func:`per_obspy.read_pairs`, or some rows of it; its columns named as results are
         replaced.
-    ground : Ground
+    ground : RegionalMotion
         The ground motion; only stations that serve a pair are read.
     building, screening : Building, Screening
         Assumptions for missing values; thresholds.
@@ -102,7 +101,9 @@ def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:
     return pairs.drop(columns=[name for name in pairs if name in results])
 
 
-def _rows_at_stations(pairs: pd.DataFrame, ground: Ground, screening: Screening) -> pd.DataFrame:
+def _rows_at_stations(
+    pairs: pd.DataFrame, ground: RegionalMotion, screening: Screening
+) -> pd.DataFrame:
     """Return the rows of pairs that have a station."""
     index = pairs["station_index"].to_numpy(np.int64)
     if ground.field is not None:

@@ -11,13 +11,17 @@ from per_obspy.checks import FloatArray
 
 
 class Table(Protocol):
-    """Columns by name: a DataFrame, or a dict of arrays, of which thousands are made where stations are many."""
+    """
+    Columns by name: a DataFrame, or a dict of arrays.
+
+    A dict is faster to make, of which a run with many stations makes thousands.
+    """
 
     def keys(self) -> Iterable[Any]:
         """Return the names of the columns."""
 
     def __iter__(self) -> Iterator[Any]:
-        """Give the names of the columns."""
+        """Yield the names of the columns."""
 
     def __contains__(self, name: object, /) -> bool:
         """Return whether there is a column of this name."""
@@ -26,23 +30,27 @@ class Table(Protocol):
         """Return a column."""
 
 
-#: A table of nothing but arrays.
+#: A table as plain arrays.
 Columns = dict[str, NDArray[Any]]
 
 
 def chosen(table: Table, rows: NDArray[Any]) -> Columns:
-    """Return some rows of a table, by their numbers or a mask."""
+    """Return the rows of a table with these numbers, or of this mask."""
     return {name: np.asarray(table[name])[rows] for name in table}
 
 
 def joined(parts: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Return the rows of all parts in the order of their numbers; all parts have the same columns."""
+    """Join parts, each with its row numbers, in the order of these; all have the same columns."""
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-    return {name: np.concatenate([part[name] for _, part in parts])[order] for name in parts[0][1]}
+    columns = {}
+    for name in parts[0][1]:
+        columns[name] = np.concatenate([part[name] for _, part in parts])[order]
+    return columns
 
 
 def values(table: Table, name: str) -> FloatArray:
-    """Return a column as float64; contiguous, because functions of NumPy may differ in the last bit between strides."""
+    """Return a column as float64."""
+    # Contiguous: functions of NumPy may differ in the last bit between strides
     return np.ascontiguousarray(table[name], dtype=np.float64)
 
 
@@ -53,8 +61,9 @@ def both(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
 
 def at_contact(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     """Return a length of both oscillators at contact height: times the participation."""
-    (first, second), (share_1, share_2) = both(table, name), both(table, "participation")
-    return share_1 * first, share_2 * second
+    length_1, length_2 = both(table, name)
+    participation_1, participation_2 = both(table, "participation")
+    return participation_1 * length_1, participation_2 * length_2
 
 
 def number(station: xr.Dataset, name: str) -> float:
@@ -63,7 +72,11 @@ def number(station: xr.Dataset, name: str) -> float:
 
 
 def components(station: xr.Dataset) -> tuple[FloatArray, FloatArray, float]:
-    """Return north, east (m/s²) and interval (s); a single horizontal counts as north, to be used at azimuth 0."""
+    """
+    Return the acceleration to the north and east (m/s²) and the sampling interval (s).
+
+    A single horizontal counts as north, to be used at azimuth 0.
+    """
     motion = np.ascontiguousarray(station["acceleration"], dtype=np.float64)
     east = motion[1] if len(motion) == 2 else np.zeros_like(motion[0])
     return motion[0], east, number(station, "sampling_interval")

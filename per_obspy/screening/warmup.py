@@ -1,4 +1,4 @@
-"""Compile what screening needs before it is needed: on small pairs, while stations are still at work."""
+"""Compilation of the kernels of screening ahead of use, while stations are still processed."""
 
 import numpy as np
 import pandas as pd
@@ -7,8 +7,8 @@ import xarray as xr
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.screening.risk import risk_table
 
-#: Two oscillators that touch, two whose periods nobody gave, and one that could yield: together
-#: they call every kernel.
+#: Three pairs that together call every kernel: touching ones with given periods, with derived
+#: periods, and with a building that could yield.
 PAIRS = pd.DataFrame(
     {
         "pair_id": ["given", "derived", "yielding"],
@@ -24,26 +24,25 @@ PAIRS = pd.DataFrame(
 )
 
 
-AZIMUTHAL = ("per_azimuthal", "sd_azimuthal")
-
-
 def compile_screening() -> None:
-    """Screen three pairs against a short pulse; the result is of no use."""
+    """Screen three pairs against a short pulse, only to compile the kernels."""
+    risk_table(_station(), checked_pairs(PAIRS, "none"))
+
+
+def _station() -> xr.Dataset:
+    """Return a station with a pulse on both horizontals and constant spectra."""
     pulse = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
     grid = {"period": [0.1, 1.0], "damping": [0.02, 0.05], "azimuth": [0.0, 90.0]}
-    station = xr.Dataset(
-        {
-            "acceleration": (("horizontal", "time"), np.stack([pulse, pulse])),
-            **{
-                name: (tuple(reversed(grid)), np.ones((2, 2, 2), dtype=np.float32))
-                for name in AZIMUTHAL
-            },
-            "per_rotd50": (("damping", "period"), np.ones((2, 2), dtype=np.float32)),
-            "sampling_interval": 0.01,
-            "shortest_usable_period": 0.01,
-            "longest_usable_period": 9.0,
-        },
-        coords={**grid, "station": "none", "latitude": 1.0, "longitude": 1.0},
-        attrs={"simulated": "true"},
-    )
-    risk_table(station, checked_pairs(PAIRS, "none"))
+    spectra = ("azimuth", "damping", "period"), np.ones((2, 2, 2), dtype=np.float32)
+    # The variables of a station that screening reads
+    variables = {
+        "acceleration": (("horizontal", "time"), np.stack([pulse, pulse])),
+        "per_azimuthal": spectra,
+        "sd_azimuthal": spectra,
+        "per_rotd50": (("damping", "period"), np.ones((2, 2), dtype=np.float32)),
+        "sampling_interval": 0.01,
+        "shortest_usable_period": 0.01,
+        "longest_usable_period": 9.0,
+    }
+    place = {"station": "none", "latitude": 1.0, "longitude": 1.0}
+    return xr.Dataset(variables, coords={**grid, **place}, attrs={"simulated": "true"})

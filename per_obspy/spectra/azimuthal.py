@@ -7,16 +7,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import azimuth_steps, blocks
 from per_obspy.kernels.spectra import azimuths as kernels
 from per_obspy.spectra.elastic import grid_of, row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (
-    Ground,
     Oscillators,
+    TiledRecord,
     over_blocks,
-    prepare_ground,
     prepare_oscillators,
     stretches,
+    tiled_record,
 )
 
 #: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times
@@ -26,8 +27,8 @@ LONGEST_PHASE = 0.5
 #: slower.
 MOST_DOUBLINGS = 6
 
-#: Every whole degree of a half turn; the other half repeats it.
-AZIMUTHS = np.arange(0, 180)
+#: Every whole degree of a half turn, degrees; the other half repeats it.
+EVERY_AZIMUTH = np.arange(180.0)
 
 
 def azimuthal_per_spectrum(
@@ -35,11 +36,11 @@ def azimuthal_per_spectrum(
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
-    damping: ArrayLike = 0.05,
-    azimuths: ArrayLike = AZIMUTHS,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    azimuths: ArrayLike = EVERY_AZIMUTH,
 ) -> FloatArray:
     """
-    Pseudo energy radius spectrum along each of many horizontal azimuths.
+    Compute the pseudo energy radius spectrum along each of many horizontal azimuths.
 
     Parameters
     ----------
@@ -71,7 +72,8 @@ def azimuthal_per_spectrum(
 
     Examples
     --------
-    >>> azimuthal_per_spectrum([0.0, 3.0, 0.0], [0.0, 4.0, 0.0], 0.01, [1.0], azimuths=[0, 90]).round(4)
+    >>> north, east = [0.0, 3.0, 0.0], [0.0, 4.0, 0.0]
+    >>> azimuthal_per_spectrum(north, east, 0.01, [1.0], azimuths=[0, 90]).round(4)
     array([[0.0047, 0.0063]])
     """
     return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=True)
@@ -82,10 +84,14 @@ def azimuthal_sd_spectrum(
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
-    damping: ArrayLike = 0.05,
-    azimuths: ArrayLike = AZIMUTHS,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    azimuths: ArrayLike = EVERY_AZIMUTH,
 ) -> FloatArray:
-    """Return the largest displacement along each azimuth, with free vibration, as `azimuthal_per_spectrum`, m."""
+    """
+    Compute the largest displacement along each azimuth, with free vibration, m.
+
+    Arguments and shape of the result are those of `azimuthal_per_spectrum`.
+    """
     return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=True)
 
 
@@ -94,10 +100,14 @@ def sampled_azimuthal_per_spectrum(
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
-    damping: ArrayLike = 0.05,
-    azimuths: ArrayLike = AZIMUTHS,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    azimuths: ArrayLike = EVERY_AZIMUTH,
 ) -> FloatArray:
-    """Return what `azimuthal_per_spectrum` would if only the samples were looked at, m."""
+    """
+    Compute `azimuthal_per_spectrum` from the maxima at the samples alone, m.
+
+    For benchmarks and tests against programs that look at samples only; arguments as there.
+    """
     return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=False)
 
 
@@ -106,10 +116,14 @@ def sampled_azimuthal_sd_spectrum(
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
-    damping: ArrayLike = 0.05,
-    azimuths: ArrayLike = AZIMUTHS,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    azimuths: ArrayLike = EVERY_AZIMUTH,
 ) -> FloatArray:
-    """Return what `azimuthal_sd_spectrum` would if only the samples of the record were looked at, m."""
+    """
+    Compute `azimuthal_sd_spectrum` from the maxima at the samples of the record alone, m.
+
+    For benchmarks and tests against programs that look at samples only; arguments as there.
+    """
     return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=False)
 
 
@@ -127,27 +141,45 @@ def _spectrum(
     components = two_components(north, east)
     dt = checks.number("dt", dt, checks.positive)
     (periods, dampings), shape = grid_of(periods, damping)
-    given = row_of(
-        "azimuths", checks.finite("azimuths", np.atleast_1d(checks.numbers("azimuths", azimuths)))
-    )
-    ascending = np.argsort(given % 180.0)
-    fan = _fan(np.radians(given[ascending] % 180.0))
-    lengths = np.empty((given.size, periods.size))
+    half_turn = _row_of_azimuths(azimuths) % 180.0
+
+    # The kernels take azimuths of a half turn in ascending order
+    ascending = np.argsort(half_turn)
+    fan = _fan(np.radians(half_turn[ascending]))
+
+    # Oscillators whose steps are cut into equally many parts run together
+    lengths = np.empty((half_turn.size, periods.size))
     parts = _parts(2.0 * np.pi * dt / periods) if exact else np.ones(periods.size, dtype=np.int64)
     for count in np.unique(parts).tolist():
-        some = parts == count
-        ground = prepare_ground(*(_with_steps_cut(component, count) for component in components))
-        oscillators = prepare_oscillators(dt / count, periods[some], dampings[some])
-        work = partial(_block_squares, ground, share=share, fan=fan, exact=exact)
-        squares = over_blocks(work, oscillators, ground)
-        lengths[np.ix_(ascending, some)] = (
-            np.sqrt(squares[: given.size]) / oscillators.omegas**2 * ground.scale
-        )
-    return lengths.T.reshape(*shape, given.size)
+        chosen = parts == count
+        oscillators = prepare_oscillators(dt / count, periods[chosen], dampings[chosen])
+        record = tiled_record(*(_with_steps_cut(component, count) for component in components))
+        found = _lengths(record, oscillators, fan, share, exact)
+        lengths[np.ix_(ascending, chosen)] = found[: half_turn.size]
+    return lengths.T.reshape(*shape, half_turn.size)
+
+
+def _row_of_azimuths(azimuths: ArrayLike) -> FloatArray:
+    """Check azimuths and return them as one row, degrees."""
+    row = np.atleast_1d(checks.numbers("azimuths", azimuths))
+    return row_of("azimuths", checks.finite("azimuths", row))
+
+
+def _lengths(
+    record: TiledRecord,
+    oscillators: Oscillators,
+    fan: tuple[FloatArray, FloatArray],
+    share: float,
+    exact: bool,
+) -> FloatArray:
+    """Return the largest lengths of oscillators, (azimuths of the fan, n), m."""
+    work = partial(_block_squares, record, share=share, fan=fan, exact=exact)
+    squares = over_blocks(work, oscillators, record)
+    return np.asarray(np.sqrt(squares) / oscillators.omegas**2 * record.scale)
 
 
 def _parts(phases: FloatArray) -> NDArray[np.int64]:
-    """Return into how many parts a step is cut, so that the bounds between samples stay tight: a power of two."""
+    """Return the number of parts of a step, a power of two: bounds between samples stay tight."""
     doublings = np.ceil(np.log2(np.maximum(phases / LONGEST_PHASE, 1.0)))
     return np.asarray(2 ** np.minimum(doublings, MOST_DOUBLINGS), dtype=np.int64)
 
@@ -157,16 +189,18 @@ def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:
     if count == 1:
         return acceleration
     closed = np.append(acceleration, 0.0)
-    cut: FloatArray = np.interp(
-        np.arange(count * acceleration.size + 1) / count, np.arange(closed.size), closed
-    )
+    steps = np.arange(count * acceleration.size + 1) / count
+    cut: FloatArray = np.interp(steps, np.arange(closed.size), closed)
     return cut
 
 
 def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return directions and edges of groups of the ascending azimuths (rad), the last one repeated, for the kernels."""
+    """Return directions and edges of groups of ascending azimuths (rad) for the kernels."""
+    # The last azimuth fills up the last group
     whole = np.pad(angles, (0, -angles.size % kernels.GROUP), mode="edge")
     directions = np.stack([np.cos(whole), np.sin(whole), np.cos(2.0 * whole), np.sin(2.0 * whole)])
+
+    # Edges of a group: twice the angle of its first and last azimuth, and the rise between them
     firsts = slice(None, None, kernels.GROUP)
     lasts = slice(kernels.GROUP - 1, None, kernels.GROUP)
     rise = 1.0 - np.cos(whole[lasts] - whole[firsts])
@@ -175,39 +209,58 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _block_squares(
-    ground: Ground,
+    record: TiledRecord,
     block: Oscillators,
     *,
     share: float,
     fan: tuple[FloatArray, FloatArray],
     exact: bool,
 ) -> FloatArray:
-    """Return the largest squares of one block, (azimuths, lanes), in units of the scaled acceleration / omega²."""
+    """Return the largest squares of one block, (azimuths, lanes), scaled acceleration / omega²."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
-    kept = np.empty((blocks.TILES, 6, blocks.LANES))
+    tile_states = np.empty((blocks.TILES, 6, blocks.LANES))
     steps = np.empty((blocks.TILES * blocks.TILE, azimuth_steps.COLUMNS))
     largest = np.zeros((blocks.LANES, fan[0].shape[1]))
     kernels.pack_steps(block.phases, block.dampings, packed)
-    for stretch in stretches(ground):
-        kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, kept)
-        for lane in range(block.wanted):
-            oscillator = kernels.Oscillator(
-                lane, float(block.phases[lane]), float(block.dampings[lane]), share
+
+    # All lanes run together, then each is turned into every azimuth
+    for stretch in stretches(record):
+        kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, tile_states)
+        for lane in range(block.size):
+            oscillator = _oscillator(block, lane, share)
+            kernels.raise_azimuths_to_samples(
+                *stretch[:2], tile_states, oscillator, fan[0], largest[lane]
             )
-            kernels.raise_azimuths_to_samples(*stretch[:2], kept, oscillator, fan[0], largest[lane])
             if exact:
-                count = azimuth_steps.list_steps(
-                    *stretch[:4], kept, oscillator, fan[0], largest[lane], steps
-                )
-                azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest[lane])
+                _raise_between_samples(stretch, tile_states, oscillator, fan, steps, largest[lane])
+
+    # In free vibration the radius never grows, the displacement may
     if share == 0.0:
-        kernels.free_displacements(state, block.dampings, block.wanted, fan[0], largest)
+        kernels.free_displacements(state, block.dampings, block.size, fan[0], largest)
     return largest.T
+
+
+def _oscillator(block: Oscillators, lane: int, share: float) -> kernels.Oscillator:
+    """Return one oscillator of a block as the kernels take it."""
+    return kernels.Oscillator(lane, float(block.phases[lane]), float(block.dampings[lane]), share)
+
+
+def _raise_between_samples(
+    stretch: TiledRecord,
+    tile_states: FloatArray,
+    oscillator: kernels.Oscillator,
+    fan: tuple[FloatArray, FloatArray],
+    steps: FloatArray,
+    largest: FloatArray,
+) -> None:
+    """Raise the largest squares of one oscillator along every azimuth by those between samples."""
+    count = azimuth_steps.list_steps(*stretch[:4], tile_states, oscillator, fan[0], largest, steps)
+    azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest)
 
 
 def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:
     """
-    Percentile over the azimuths of a spectrum, its last axis (RotD50 is the median, RotD100 the largest).
+    Compute a percentile over azimuths, the last axis (RotD50: median, RotD100: largest).
 
     Parameters
     ----------

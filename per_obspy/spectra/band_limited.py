@@ -1,4 +1,4 @@
-"""Band-limited interpolation of a record, a step before its spectra where periods are close to the sample interval."""
+"""Band-limited interpolation of a record, before spectra at periods close to its interval."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from per_obspy.checks import FloatArray
 
 
 class Interpolated(NamedTuple):
-    """A record with more samples, and the time between them, s."""
+    """A record with more samples, m/s², and the time between them, s."""
 
     acceleration: FloatArray
     dt: float
@@ -19,7 +19,7 @@ class Interpolated(NamedTuple):
 
 def band_limited(acceleration: ArrayLike, dt: float, factor: int = 8) -> Interpolated:
     """
-    Record sampled more densely, so that straight lines between its samples stay close to the band-limited motion.
+    Interpolate a record so that its straight lines stay close to the band-limited motion.
 
     Parameters
     ----------
@@ -58,12 +58,15 @@ def band_limited(acceleration: ArrayLike, dt: float, factor: int = 8) -> Interpo
     dt = checks.number("dt", dt, checks.positive)
     if checks.number("factor", factor, checks.finite) != int(factor) or factor < 2:
         raise ValueError(f"factor must be a whole number of at least 2, got {factor}")
+
+    # Zeros to twice the length; the Nyquist frequency is shared between both signs
     size = next_fast_len(2 * record.size, real=True)
     size += size % 2
     spectrum = rfft(record, size)
-    spectrum[-1] *= 0.5  # the Nyquist frequency, shared between both signs
+    spectrum[-1] *= 0.5
+
+    # The new straight lines act as sinc²(f dt / factor), which is taken out beforehand
     spectrum /= np.sinc(np.arange(spectrum.size) / (size * factor)) ** 2
     dense = irfft(spectrum, size * int(factor)) * factor
-    return Interpolated(
-        np.ascontiguousarray(dense[: (record.size - 1) * int(factor) + 1]), dt / int(factor)
-    )
+    samples = (record.size - 1) * int(factor) + 1
+    return Interpolated(np.ascontiguousarray(dense[:samples]), dt / int(factor))

@@ -1,4 +1,4 @@
-"""The bilinear oscillator: its history, and inelastic PER spectra of constant strength and of constant ductility."""
+"""Bilinear oscillators: histories, and inelastic PER spectra of given strength or ductility."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,6 @@ from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.kernels.oscillator import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
 
-#: Standard gravity, m/s²: a yield coefficient is the yield force over the weight.
 #: Ratio of neighbouring yield displacements in the search for the largest one that gives a
 #: ductility.
 SCAN_RATIO = 0.97
@@ -94,7 +93,7 @@ def bilinear_response(
     hardening: float,
 ) -> BilinearResponse:
     """
-    Response of a bilinear oscillator with kinematic hardening, exact between the samples and at its events.
+    Compute the response of a bilinear oscillator, exact between samples and at its events.
 
     Parameters
     ----------
@@ -108,7 +107,7 @@ def bilinear_response(
         Fraction of critical of the elastic oscillator; the damping coefficient stays the same while
         yielding.
     yield_displacement : float
-        m; infinity for a linear oscillator.
+        Displacement at which it yields, m; infinity for a linear oscillator.
     hardening : float
         Stiffness after yielding over elastic stiffness, 0 to 1.
 
@@ -125,7 +124,7 @@ def bilinear_response(
     Notes
     -----
     ``u'' + 2 xi omega0 u' + omega0² [alpha u + (1 - alpha) y] = -a`` with ``y`` the elastic part of
-    the displacement, never beyond the yield displacement.
+    the displacement, never beyond the yield displacement; the hardening is kinematic.
 
     Examples
     --------
@@ -136,10 +135,10 @@ def bilinear_response(
     record = checks.record("acceleration", acceleration)
     dt = checks.number("dt", dt, checks.positive)
     omega = 2.0 * np.pi / checks.number("period", period, checks.positive)
+    # An infinite yield displacement is a linear oscillator
     ratio = checks.number("damping", damping, checks.fraction_of_critical)
     limit = checks.number("yield_displacement", yield_displacement, checks.positive_or_infinite)
-    alpha = _hardening(hardening)
-    return _response(record, dt, omega, ratio, limit, alpha)
+    return _response(record, dt, omega, ratio, limit, _hardening(hardening))
 
 
 def constant_yield_spectra(
@@ -151,7 +150,7 @@ def constant_yield_spectra(
     hardening: float,
 ) -> InelasticSpectra:
     """
-    Inelastic spectra of oscillators of given strength.
+    Compute inelastic spectra of oscillators of given strength.
 
     Parameters
     ----------
@@ -192,6 +191,7 @@ def constant_yield_spectra(
     [3.07 2.53 1.02] [0.019 0.063 0.102]
     """
     record, dt, omegas, ratio, alpha = _arguments(acceleration, dt, periods, damping, hardening)
+    # Yield displacement from the yield force over the weight: C g / omega²
     coefficients = np.broadcast_to(
         checks.positive("yield_coefficients", yield_coefficients), omegas.shape
     )
@@ -212,7 +212,7 @@ def constant_ductility_spectra(
     hardening: float,
 ) -> InelasticSpectra:
     """
-    Inelastic spectra of oscillators that are just strong enough not to exceed a ductility.
+    Compute inelastic spectra of oscillators just strong enough not to exceed a ductility.
 
     Parameters
     ----------
@@ -261,6 +261,8 @@ def constant_ductility_spectra(
     if target < 1.0:
         raise ValueError(f"ductility must be at least 1, got {target}")
     limits = np.array([_largest_yield(record, dt, omega, ratio, alpha, target) for omega in omegas])
+
+    # A ductility that is not reached has no response
     empty, nan = np.full(record.size, np.nan), np.nan
     unreached = BilinearResponse(empty, empty, empty, nan, nan, nan, nan, nan, nan)
     rows = [
@@ -271,6 +273,7 @@ def constant_ductility_spectra(
 
 
 def _hardening(hardening: float) -> float:
+    """Check the stiffness after yielding over the elastic one."""
     return checks.number(
         "hardening", hardening, lambda name, value: checks.between(name, value, 0.0, 1.0)
     )
@@ -279,43 +282,39 @@ def _hardening(hardening: float) -> float:
 def _arguments(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: float, hardening: float
 ) -> tuple[FloatArray, float, FloatArray, float, float]:
+    """Return record, interval, omegas in rad/s, damping and hardening."""
     record = checks.record("acceleration", acceleration)
-    row = row_of(
-        "periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods)))
-    )
+    row = np.atleast_1d(checks.numbers("periods", periods))
+    omegas = 2.0 * np.pi / row_of("periods", checks.positive("periods", row))
     ratio = checks.number("damping", damping, checks.fraction_of_critical)
-    return (
-        record,
-        checks.number("dt", dt, checks.positive),
-        2.0 * np.pi / row,
-        ratio,
-        _hardening(hardening),
-    )
+    dt = checks.number("dt", dt, checks.positive)
+    return record, dt, omegas, ratio, _hardening(hardening)
 
 
 def _response(
     record: FloatArray, dt: float, omega: float, damping: float, limit: float, hardening: float
 ) -> BilinearResponse:
-    strength = np.append(record, 0.0) / omega**2
+    """Return the response of one oscillator with a yield displacement ``limit``, m."""
+    # The kernel takes acceleration / omega² with a ramp to zero and gives lengths in m; largest
+    # are displacement, squared radius, squared radius of the energy, and path of yielding
+    static = np.append(record, 0.0) / omega**2
     history, state, largest = np.empty((3, record.size)), np.zeros(4), np.zeros(4)
-    kernels.bilinear_history(
-        strength, omega * dt, damping, limit, hardening, history, state, largest
-    )
+    kernels.bilinear_history(static, omega * dt, damping, limit, hardening, history, state, largest)
     farthest, square, energy, path = largest
-    # an infinite yield displacement is never reached: its path is zero
+
+    # Yielding dissipates the yield force along its path; an infinite yield displacement is never
+    # reached, so that its path is zero
     work = (1.0 - hardening) * omega**2 * limit * path if path > 0.0 else 0.0
-    residual = (1.0 - hardening) * state[2]
-    radii = float(np.sqrt(square)), float(np.sqrt(energy))
-    ductility = float(farthest / limit)
     return BilinearResponse(
-        history[0],
-        history[1] * omega,
-        history[2],
-        ductility,
-        float(work),
-        float(farthest),
-        float(residual),
-        *radii,
+        displacement=history[0],
+        velocity=history[1] * omega,
+        plastic_displacement=history[2],
+        ductility=float(farthest / limit),
+        hysteretic_energy=float(work),
+        displacement_maximum=float(farthest),
+        residual=float((1.0 - hardening) * state[2]),
+        displacement_radius=float(np.sqrt(square)),
+        energy_radius=float(np.sqrt(energy)),
     )
 
 
@@ -327,9 +326,12 @@ def _largest_yield(
     def excess(limit: float) -> float:
         return _response(record, dt, omega, damping, limit, hardening).ductility - ductility
 
+    # Ductility 1 is the elastic displacement itself
     elastic = _response(record, dt, omega, damping, np.inf, hardening).displacement_maximum
     if ductility == 1.0 or elastic == 0.0:
         return elastic if elastic > 0.0 else np.nan
+
+    # Lower the yield displacement step by step until the ductility is exceeded
     stronger = elastic
     while stronger > SMALLEST_YIELD * elastic:
         weaker = stronger * SCAN_RATIO
@@ -340,6 +342,8 @@ def _largest_yield(
 
 
 def _spectra(rows: list[BilinearResponse], coefficients: FloatArray) -> InelasticSpectra:
+    """Return the largest values of one response per period as arrays."""
+    # Histories are left out
     return InelasticSpectra(
         displacement_radius=np.array([row.displacement_radius for row in rows]),
         energy_radius=np.array([row.energy_radius for row in rows]),

@@ -1,4 +1,4 @@
-"""Response spectra of linear oscillators, exact for the record that is linear between its samples."""
+"""Response spectra of linear oscillators, exact for records that are linear between samples."""
 
 from typing import NamedTuple
 
@@ -7,17 +7,18 @@ from numpy.typing import ArrayLike
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
+from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import blocks, radius, response
 from per_obspy.spectra.oscillator_blocks import (
-    Ground,
     Oscillators,
-    choose,
+    TiledRecord,
     over_blocks,
-    prepare_ground,
     prepare_oscillators,
-    raise_between,
+    raise_between_samples,
     raise_to_samples,
+    select_tiles,
     stretches,
+    tiled_record,
 )
 
 
@@ -50,10 +51,10 @@ class ResponseSpectra(NamedTuple):
 
 
 def per_spectrum(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> FloatArray:
     """
-    Pseudo energy radius spectrum of one component of ground acceleration.
+    Compute the pseudo energy radius spectrum of one component of ground acceleration.
 
     Parameters
     ----------
@@ -81,8 +82,12 @@ def per_spectrum(
     -----
     ``u`` and ``v`` are displacement and velocity relative to the ground (Valles-Mattox & Reinhorn
     1996, eq. (11) and (12)). In the free vibration after the record the radius never grows, so that
-    none is added. Bounds of the second derivative of ``r²`` tell in which steps a maximum between
-    samples can lie; there it is found from the roots of ``v`` and of ``2 xi omega v + a``.
+    none is added. Bounds of the second derivative of ``r²`` limit the steps in which a maximum
+    between samples can lie; there it is found from the roots of ``v`` and of
+    ``2 xi omega v + a``.
+
+    Straight lines between samples act on the record as a low-pass. Where periods are close to
+    ``dt``, :func:`per_obspy.spectra.band_limited.band_limited` interpolates the record first.
 
     References
     ----------
@@ -97,14 +102,14 @@ def per_spectrum(
     array([0.49698])
     """
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=True).reshape(shape)
+    return _radii(tiled_record(record), prepare_oscillators(dt, *grid), exact=True).reshape(shape)
 
 
 def response_spectra(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> ResponseSpectra:
     """
-    Response spectra of one component of ground acceleration: PER, SD, SV, SA, PSV and PSA.
+    Compute PER, SD, SV, SA, PSV and PSA spectra of one component of ground acceleration.
 
     Parameters
     ----------
@@ -136,28 +141,32 @@ def response_spectra(
     """
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
     oscillators = prepare_oscillators(dt, *grid)
-    return _spectra(_responses(prepare_ground(record), oscillators, exact=True), oscillators, shape)
+    return _spectra(_responses(tiled_record(record), oscillators, exact=True), oscillators, shape)
 
 
 def sampled_per_spectrum(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> FloatArray:
-    """Return what `per_spectrum` would if only the samples were looked at, for comparison with other programs, m."""
+    """
+    Compute `per_spectrum` from the maxima at the samples alone, m.
+
+    For benchmarks and tests against programs that look at samples only; arguments as there.
+    """
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
-    return _radii(prepare_ground(record), prepare_oscillators(dt, *grid), exact=False).reshape(
-        shape
-    )
+    return _radii(tiled_record(record), prepare_oscillators(dt, *grid), exact=False).reshape(shape)
 
 
 def sampled_response_spectra(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = 0.05
+    acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> ResponseSpectra:
-    """Return what `response_spectra` would if only the samples were looked at, for comparison with official tables."""
+    """
+    Compute `response_spectra` from the maxima at the samples alone.
+
+    For benchmarks and tests against programs that look at samples only; arguments as there.
+    """
     record, dt, grid, shape = _arguments(acceleration, dt, periods, damping)
     oscillators = prepare_oscillators(dt, *grid)
-    return _spectra(
-        _responses(prepare_ground(record), oscillators, exact=False), oscillators, shape
-    )
+    return _spectra(_responses(tiled_record(record), oscillators, exact=False), oscillators, shape)
 
 
 def _arguments(
@@ -172,9 +181,8 @@ def grid_of(
     periods: ArrayLike, damping: ArrayLike
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[int, ...]]:
     """Return every damping with every period as paired rows, and the shape of the grid."""
-    row = row_of(
-        "periods", checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods)))
-    )
+    row = row_of("periods", checks.positive("periods", _at_least_a_row("periods", periods)))
+    # A single damping leaves the result one-dimensional
     dampings = checks.fraction_of_critical("damping", damping)
     if dampings.ndim > 1 or dampings.size == 0:
         raise ValueError(
@@ -184,12 +192,18 @@ def grid_of(
     return (grid[0].ravel(), grid[1].ravel()), (*dampings.shape, row.size)
 
 
+def _at_least_a_row(name: str, values: ArrayLike) -> FloatArray:
+    """Return numbers as an array, a single one as one row."""
+    return np.atleast_1d(checks.numbers(name, values))
+
+
 def two_components(north: ArrayLike, east: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return two components of the same length."""
     components = checks.record("north", north), checks.record("east", east)
     if components[0].size != components[1].size:
         raise ValueError(
-            f"north and east must be equally long, got {components[0].size} and {components[1].size}"
+            "north and east must be equally long, "
+            f"got {components[0].size} and {components[1].size}"
         )
     return components
 
@@ -203,57 +217,64 @@ def row_of(name: str, values: FloatArray) -> FloatArray:
     return values
 
 
-def _radius_block(ground: Ground, block: Oscillators, exact: bool) -> FloatArray:
-    """Return the largest squared radii of one block, (1, lanes), in units of the scaled acceleration / omega²."""
+def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
+    """Return the largest squared radii, (1, lanes), in units of scaled acceleration / omega²."""
     packed, state = np.empty((radius.ROWS, blocks.LANES)), np.empty((2, blocks.LANES))
-    kept, largest = np.empty((blocks.TILES, 3, blocks.LANES)), np.zeros((1, blocks.LANES))
+    tile_states = np.empty((blocks.TILES, 3, blocks.LANES))
+    largest = np.zeros((1, blocks.LANES))
     radius.pack(block.phases, block.dampings, packed)
-    radius.start_at_rest(ground.north[0], packed, state)
-    for stretch in stretches(ground):
-        radius.run_tiles(stretch.north, packed, state, kept)
-        if exact:
-            chosen = choose(stretch, block, kept, largest)
-            states = np.empty(chosen.shape)
-            radius.states_before(stretch.north, packed, kept, chosen, states)
-            raise_between(stretch, block, kept, states, chosen, largest)
-        else:
-            raise_to_samples(stretch, kept, largest)
+    radius.start_at_rest(record.north[0], packed, state)
+
+    for stretch in stretches(record):
+        radius.run_tiles(stretch.north, packed, state, tile_states)
+        if not exact:
+            raise_to_samples(stretch, tile_states, largest)
+            continue
+        # Only the tiles whose bounds allow a larger radius are run again
+        selected = select_tiles(stretch, block, tile_states, largest)
+        states = np.empty(selected.shape)
+        radius.states_before(stretch.north, packed, tile_states, selected, states)
+        raise_between_samples(stretch, block, tile_states, states, selected, largest)
     return largest
 
 
-def _response_block(ground: Ground, block: Oscillators, exact: bool) -> FloatArray:
-    """Return the largest squared radii, displacements, velocities and accelerations of one block, (4, lanes)."""
+def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
+    """Return the largest squared radii, displacements, velocities, accelerations, (4, lanes)."""
     packed = np.empty((response.ROWS, blocks.LANES))
-    kept, largest = np.empty((blocks.TILES, 6, blocks.LANES)), np.zeros((4, blocks.LANES))
+    tile_states = np.empty((blocks.TILES, 6, blocks.LANES))
+    largest = np.zeros((4, blocks.LANES))
     response.pack_response(block.weights, block.phases, block.dampings, packed)
-    for stretch in stretches(ground):
-        response.run_response_tiles(stretch.north, stretch.east, packed, kept)
-        if exact:
-            chosen = choose(stretch, block, kept, largest)
-            states = np.ascontiguousarray(kept[chosen[:, 0], :2, chosen[:, 1]])
-            raise_between(stretch, block, kept, states, chosen, largest)
-        else:
-            raise_to_samples(stretch, kept, largest)
+
+    for stretch in stretches(record):
+        response.run_response_tiles(stretch.north, stretch.east, packed, tile_states)
+        if not exact:
+            raise_to_samples(stretch, tile_states, largest)
+            continue
+        # Only the tiles whose bounds allow a larger value are run again
+        selected = select_tiles(stretch, block, tile_states, largest)
+        states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
+        raise_between_samples(stretch, block, tile_states, states, selected, largest)
     response.free_vibration(packed, block.dampings, largest)
     return largest
 
 
-def _radii(ground: Ground, oscillators: Oscillators, exact: bool) -> FloatArray:
+def _radii(record: TiledRecord, oscillators: Oscillators, exact: bool) -> FloatArray:
     """Return the largest radius of each oscillator, m."""
-    squares = over_blocks(lambda block: _radius_block(ground, block, exact), oscillators, ground)
-    return np.asarray(np.sqrt(squares[0]) / oscillators.omegas**2 * ground.scale)
+    squares = over_blocks(lambda block: _radius_block(record, block, exact), oscillators, record)
+    return np.asarray(np.sqrt(squares[0]) / oscillators.omegas**2 * record.scale)
 
 
-def _responses(ground: Ground, oscillators: Oscillators, exact: bool) -> FloatArray:
-    """Return radius, displacement, velocity / omega and acceleration / omega² of each oscillator, (4, n), m."""
-    largest = over_blocks(lambda block: _response_block(ground, block, exact), oscillators, ground)
+def _responses(record: TiledRecord, oscillators: Oscillators, exact: bool) -> FloatArray:
+    """Return radius, displacement, velocity / omega, acceleration / omega², each (n,), m."""
+    largest = over_blocks(lambda block: _response_block(record, block, exact), oscillators, record)
     largest[0] = np.sqrt(largest[0])
-    return np.asarray(largest / oscillators.omegas**2 * ground.scale)
+    return np.asarray(largest / oscillators.omegas**2 * record.scale)
 
 
 def _spectra(
     lengths: FloatArray, oscillators: Oscillators, shape: tuple[int, ...]
 ) -> ResponseSpectra:
+    """Return the six spectra from the four lengths of :func:`_responses`."""
     omegas = oscillators.omegas
     per, sd, sv, sa = lengths
     spectra = per, sd, sv * omegas, sa * omegas**2, sd * omegas, sd * omegas**2

@@ -1,4 +1,4 @@
-"""Two horizontal sensors, whatever their azimuths, as motion to the north and to the east."""
+"""Motion to the north and east from two horizontal sensors of any azimuths."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from per_obspy.checks import FloatArray
 
 #: Sensors closer than this to the same line do not resolve the plane; degrees. A choice: the error
 #: of the resolved motion grows like 1/sin of the angle between them, here by a factor of 3.
-SMALLEST_ANGLE = 20.0
+SMALLEST_RESOLVED_ANGLE = 20.0
 
 
 def north_and_east(
     first: FloatArray, second: FloatArray, azimuth_1: float, azimuth_2: float
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return north and east components of two horizontal sensors.
+    Resolve the motion of two horizontal sensors into north and east components.
 
     A sensor at azimuth θ records a_N cos θ + a_E sin θ; two of them are solved for a_N and a_E. The
     sensors need not be orthogonal.
@@ -43,10 +43,12 @@ def north_and_east(
     """
     cosine_1, sine_1 = _direction(azimuth_1)
     cosine_2, sine_2 = _direction(azimuth_2)
+    # Two equations for a_N and a_E; the determinant is the sine of the angle between the sensors
     determinant = cosine_1 * sine_2 - cosine_2 * sine_1
-    if abs(determinant) < np.sin(np.radians(SMALLEST_ANGLE)):
+    if abs(determinant) < np.sin(np.radians(SMALLEST_RESOLVED_ANGLE)):
         raise ValueError(
-            f"sensor azimuths {azimuth_1:g} and {azimuth_2:g} degrees are too close to the same line"
+            f"sensor azimuths {azimuth_1:g} and {azimuth_2:g} degrees "
+            "are too close to the same line"
         )
     north = (sine_2 * first - sine_1 * second) / determinant
     east = (cosine_1 * second - cosine_2 * first) / determinant
@@ -54,7 +56,8 @@ def north_and_east(
 
 
 def _direction(azimuth: float) -> tuple[float, float]:
-    """Return cosine and sine, exact at multiples of 90 degrees, so that N and E sensors pass unchanged."""
+    """Return cosine and sine of an azimuth in degrees."""
+    # Exact at multiples of 90 degrees, so that north and east sensors pass unchanged
     quarter, rest = divmod(azimuth % 360.0, 90.0)
     if rest == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter)]

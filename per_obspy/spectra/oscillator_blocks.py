@@ -1,5 +1,5 @@
 """
-Records and oscillators cut for the kernels, and the only threads: one block of oscillators each.
+Records and oscillators cut for the kernels, and threads: one block of oscillators each.
 
 A record is scaled by a power of two to a peak of order one (exactly undone afterwards), closed by
 one ramp to zero, and filled up with zeros to whole tiles. Results do not depend on the number of
@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 STEPS_WORTH_THREADS = 20_000_000
 
 
-class Ground(NamedTuple):
+class TiledRecord(NamedTuple):
     """
     Two components of a record, or of a stretch of it, ready for the kernels.
 
@@ -40,28 +40,36 @@ class Ground(NamedTuple):
 
 
 class Oscillators(NamedTuple):
-    """Phase of one step, damping, weights of north and east (2, n), omega in rad/s; the first ``wanted`` count."""
+    """
+    Oscillators under a record.
+
+    Phase of one step, damping, weights of north and east (2, n), omega in rad/s; only the first
+    ``size`` count, the others fill up a block.
+    """
 
     phases: FloatArray
     dampings: FloatArray
     weights: FloatArray
     omegas: FloatArray
-    wanted: int
+    size: int
 
 
-def prepare_ground(north: FloatArray, east: FloatArray | None = None) -> Ground:
-    """Return one component, felt as it is, or two."""
+def tiled_record(north: FloatArray, east: FloatArray | None = None) -> TiledRecord:
+    """Prepare a record of two components, or of one that every oscillator feels."""
     components = [north] if east is None else [north, east]
+    # A power of two is exactly undone afterwards
     peak = max(float(np.abs(component).max()) for component in components)
     scale = float(2.0 ** np.floor(np.log2(peak))) if peak > 0.0 else 1.0
     scaled = [_closed(component, scale) for component in components]
+
     peaks, jumps = np.zeros((2, 2, (scaled[0].size - 1) // blocks.TILE))
     for number, component in enumerate(scaled):
         blocks.tile_extremes(component, peaks[number], jumps[number])
-    return Ground(scaled[0], scaled[-1], peaks, jumps, scale)
+    return TiledRecord(scaled[0], scaled[-1], peaks, jumps, scale)
 
 
 def _closed(acceleration: FloatArray, scale: float) -> FloatArray:
+    """Return the scaled record, filled up with zeros to whole tiles and one sample."""
     tiles = -(-acceleration.size // blocks.TILE)
     closed = np.zeros(tiles * blocks.TILE + 1)
     np.divide(acceleration, scale, out=closed[: acceleration.size])
@@ -71,67 +79,76 @@ def _closed(acceleration: FloatArray, scale: float) -> FloatArray:
 def prepare_oscillators(
     dt: float, periods: FloatArray, dampings: FloatArray, azimuths: FloatArray | None = None
 ) -> Oscillators:
-    """Return paired oscillators (n,) that feel the first component, or their own azimuths (degrees) of two."""
+    """Return paired oscillators (n,) that feel the first component, or their azimuths (degrees)."""
     omegas = 2.0 * np.pi / periods
     angles = np.zeros(periods.size) if azimuths is None else np.radians(azimuths)
     return Oscillators(
-        omegas * dt,
-        dampings.copy(),
-        np.stack([np.cos(angles), np.sin(angles)]),
-        omegas,
-        periods.size,
+        phases=omegas * dt,
+        dampings=dampings.copy(),
+        weights=np.stack([np.cos(angles), np.sin(angles)]),
+        omegas=omegas,
+        size=periods.size,
     )
 
 
-def stretches(ground: Ground) -> Iterator[Ground]:
-    """Yield consecutive stretches of the record: as many tiles as are kept at a time."""
-    for first in range(0, ground.peaks.shape[1], blocks.TILES):
-        samples = slice(first * blocks.TILE, (first + blocks.TILES) * blocks.TILE + 1)
-        tiles = slice(first, first + blocks.TILES)
-        peaks, jumps = ground.peaks[:, tiles].copy(), ground.jumps[:, tiles].copy()
-        yield Ground(ground.north[samples], ground.east[samples], peaks, jumps, ground.scale)
+def stretches(record: TiledRecord) -> Iterator[TiledRecord]:
+    """Yield consecutive stretches of the record: the tiles whose states are kept at a time."""
+    for first in range(0, record.peaks.shape[1], blocks.TILES):
+        last = first + blocks.TILES
+        # Neighbouring stretches share the sample between them
+        samples = slice(first * blocks.TILE, last * blocks.TILE + 1)
+        peaks = record.peaks[:, first:last].copy()
+        jumps = record.jumps[:, first:last].copy()
+        yield TiledRecord(record.north[samples], record.east[samples], peaks, jumps, record.scale)
 
 
-def choose(
-    stretch: Ground, block: Oscillators, kept: FloatArray, largest: FloatArray
+def select_tiles(
+    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
 ) -> NDArray[np.int64]:
-    """Raise the largest values to the samples of a stretch; return (tile, lane) where more may lie in between."""
+    """
+    Raise the largest values to the samples of a stretch and select tiles for the search between.
+
+    Returns
+    -------
+    selected : (n, 2) ndarray of int
+        Tile and lane wherever the bounds allow a larger value between the samples.
+    """
     tiles = stretch.peaks.shape[1]
-    chosen = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
+    selected = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
     count = blocks.select(
-        kept, stretch.peaks, stretch.jumps, *block[:3], block.wanted, largest, chosen
+        tile_states, stretch.peaks, stretch.jumps, *block[:3], block.size, largest, selected
     )
-    return chosen[:count]
+    return selected[:count]
 
 
-def raise_between(
-    stretch: Ground,
+def raise_between_samples(
+    stretch: TiledRecord,
     block: Oscillators,
-    kept: FloatArray,
+    tile_states: FloatArray,
     states: FloatArray,
-    chosen: NDArray[np.int64],
+    selected: NDArray[np.int64],
     largest: FloatArray,
 ) -> None:
-    """Raise the largest values by what lies between the samples of the chosen tiles, from the states before them."""
-    blocks.repeat(*stretch[:4], *block[:3], kept, states, chosen, largest)
+    """Raise the largest values by the motion between the samples of tiles, from their states."""
+    blocks.repeat(*stretch[:4], *block[:3], tile_states, states, selected, largest)
 
 
-def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> None:
+def raise_to_samples(stretch: TiledRecord, tile_states: FloatArray, largest: FloatArray) -> None:
     """Raise the largest values to those at the samples of a stretch."""
-    blocks.raise_to_tiles(kept, stretch.peaks.shape[1], largest)
+    blocks.raise_to_tiles(tile_states, stretch.peaks.shape[1], largest)
 
 
 def over_blocks(
-    work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, ground: Ground
+    work: Callable[[Oscillators], FloatArray], oscillators: Oscillators, record: TiledRecord
 ) -> FloatArray:
-    """Return the rows that the work gives for each block of oscillators, (rows, n); in threads where that pays."""
-    parts = [_block(oscillators, first) for first in range(0, oscillators.wanted, blocks.LANES)]
-    rows = in_threads(work, parts, oscillators.wanted * ground.north.size)
-    return np.concatenate(rows, axis=1)[:, : oscillators.wanted]
+    """Compute rows for each block of oscillators, (rows, n), in threads where that pays."""
+    parts = [_block(oscillators, first) for first in range(0, oscillators.size, blocks.LANES)]
+    rows = in_threads(work, parts, oscillators.size * record.north.size)
+    return np.concatenate(rows, axis=1)[:, : oscillators.size]
 
 
 def in_threads(work: Callable[[Part], Result], parts: Sequence[Part], steps: int) -> list[Result]:
-    """Return what the work gives for each part, in threads where that many steps of all oscillators are worth them."""
+    """Return the result of each part, in threads if this many steps of oscillators pay for them."""
     if steps < STEPS_WORTH_THREADS:
         return [work(part) for part in parts]
     return map_in_threads(work, parts)
@@ -139,13 +156,12 @@ def in_threads(work: Callable[[Part], Result], parts: Sequence[Part], steps: int
 
 def _block(oscillators: Oscillators, first: int) -> Oscillators:
     """Return one block, filled up with copies of the last oscillator."""
-    count = min(blocks.LANES, oscillators.wanted - first)
-    lanes = first + np.minimum(np.arange(blocks.LANES), count - 1)
-    weights = np.ascontiguousarray(oscillators.weights[:, lanes])
+    size = min(blocks.LANES, oscillators.size - first)
+    lanes = first + np.minimum(np.arange(blocks.LANES), size - 1)
     return Oscillators(
-        oscillators.phases[lanes],
-        oscillators.dampings[lanes],
-        weights,
-        oscillators.omegas[lanes],
-        count,
+        phases=oscillators.phases[lanes],
+        dampings=oscillators.dampings[lanes],
+        weights=np.ascontiguousarray(oscillators.weights[:, lanes]),
+        omegas=oscillators.omegas[lanes],
+        size=size,
     )

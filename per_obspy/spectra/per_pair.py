@@ -1,4 +1,4 @@
-"""Largest radius and displacement of many oscillators under one record, each with its own period and damping."""
+"""Largest radius and displacement of many oscillators, each with its own period and damping."""
 
 from typing import NamedTuple
 
@@ -10,20 +10,19 @@ from per_obspy.checks import FloatArray
 from per_obspy.kernels.maxima.maxima import largest_responses
 from per_obspy.spectra.elastic import row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (
-    Ground,
     Oscillators,
+    TiledRecord,
     in_threads,
-    prepare_ground,
     prepare_oscillators,
+    tiled_record,
 )
 
-#: Longest phase, in radians, after which an undamped oscillator is looked at again, and how damping
-#: shortens it: the radius bends the more. Results do not depend on it but by rounding; fastest in
-#: trials.
+#: Longest phase of a stride, rad, for an undamped oscillator, and by how much damping shortens it,
+#: which bends the radius. Results depend on it by rounding alone; fastest in trials.
 STRIDE_PHASE, SHORTER_BY_DAMPING = 1.1, 8.0
-#: Steps from one look to the next.
+#: Steps in a stride: only the samples at its ends are evaluated at first.
 STRIDES = (1, 2, 4)
-#: Groups of tiles that the window of an oscillator is told in, at most.
+#: Groups of tiles, at most, in which the window of an oscillator is searched for.
 GROUPS = 128
 #: Oscillators that a thread takes at a time.
 PART = 1024
@@ -36,35 +35,6 @@ class OscillatorMaxima(NamedTuple):
     sd: FloatArray
 
 
-def oscillator_maxima(
-    acceleration: ArrayLike, dt: float, periods: ArrayLike, dampings: ArrayLike
-) -> OscillatorMaxima:
-    """
-    Largest radius and displacement of many oscillators, each with its own period and damping.
-
-    Parameters
-    ----------
-    acceleration : (n_samples,) array_like
-        Ground acceleration, m/s², as for `per_spectrum`.
-    dt : float
-        Time between samples, s.
-    periods, dampings : array_like
-        Undamped periods, s, and fractions of critical, broadcast to the shape (n,).
-
-    Returns
-    -------
-    OscillatorMaxima
-        Two arrays (n,), m, exact between samples, with the free vibration after the record.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, out of range or of the wrong shape.
-    """
-    record = checks.record("acceleration", acceleration)
-    return _maxima(prepare_ground(record), _paired(dt, periods, dampings, 0.0))
-
-
 def azimuth_maxima(
     north: ArrayLike,
     east: ArrayLike,
@@ -74,7 +44,7 @@ def azimuth_maxima(
     azimuths: ArrayLike,
 ) -> OscillatorMaxima:
     """
-    Largest radius and displacement of many oscillators, each with its own period, damping and azimuth.
+    Compute largest radius and displacement of oscillators, each along its own azimuth.
 
     Parameters
     ----------
@@ -98,16 +68,16 @@ def azimuth_maxima(
 
     Notes
     -----
-    Bounds of the energy tell which part of the record can hold the largest response of an
-    oscillator: what comes before is left out where less than 1e-12 of it remains by then, what
-    comes after altogether.
+    Bounds of the energy limit the part of the record that can hold the largest response of an
+    oscillator: the motion before is left out where less than 1e-12 of it remains by then, the
+    motion after it altogether.
     """
-    return _maxima(
-        prepare_ground(*two_components(north, east)), _paired(dt, periods, dampings, azimuths)
-    )
+    record = tiled_record(*two_components(north, east))
+    return _maxima(record, _paired(dt, periods, dampings, azimuths))
 
 
 def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayLike) -> Oscillators:
+    """Return checked oscillators, (n,)."""
     dt = checks.number("dt", dt, checks.positive)
     period, damping, azimuth = np.broadcast_arrays(
         checks.positive("periods", np.atleast_1d(checks.numbers("periods", periods))),
@@ -117,36 +87,41 @@ def _paired(dt: float, periods: ArrayLike, dampings: ArrayLike, azimuths: ArrayL
     return prepare_oscillators(dt, row_of("periods", period), damping, azimuth)
 
 
-def _maxima(ground: Ground, oscillators: Oscillators) -> OscillatorMaxima:
-    """Return both lengths of each oscillator; those of a part are looked at equally often."""
-    width = -(-ground.peaks.shape[1] // GROUPS)
-    groups = np.maximum.reduceat(ground.peaks, np.arange(0, ground.peaks.shape[1], width), axis=1)
-    limits = np.concatenate([ground.peaks, ground.jumps])
+def _maxima(record: TiledRecord, oscillators: Oscillators) -> OscillatorMaxima:
+    """Return largest radius and displacement of each oscillator; a part has one stride."""
+    # Peak acceleration of groups of tiles, for the search of an oscillator's window
+    width = -(-record.peaks.shape[1] // GROUPS)
+    firsts = np.arange(0, record.peaks.shape[1], width)
+    groups = np.maximum.reduceat(record.peaks, firsts, axis=1)
+    limits = np.concatenate([record.peaks, record.jumps])
+
     rows = np.stack([oscillators.phases, oscillators.dampings, *oscillators.weights])
-    largest = np.empty((2, oscillators.wanted))
+    largest = np.empty((2, oscillators.size))
 
     def work(part: tuple[int, NDArray[np.int64]]) -> None:
+        stride, members = part
         largest_responses(
-            part[0], ground.north, ground.east, limits, groups, width, rows, part[1], largest
+            stride, record.north, record.east, limits, groups, width, rows, members, largest
         )
 
-    in_threads(work, _parts(oscillators), oscillators.wanted * ground.north.size)
+    # The kernel gives the squared radius and the displacement, scaled acceleration / omega²
+    in_threads(work, _parts(oscillators), oscillators.size * record.north.size)
     largest[0] = np.sqrt(largest[0])
-    return OscillatorMaxima(*(largest / oscillators.omegas**2 * ground.scale))
+    return OscillatorMaxima(*(largest / oscillators.omegas**2 * record.scale))
 
 
 def _parts(oscillators: Oscillators) -> list[tuple[int, NDArray[np.int64]]]:
-    """Return strides and the oscillators that take them, those together that forget equally fast."""
-    longest = np.floor(
-        STRIDE_PHASE / (1.0 + SHORTER_BY_DAMPING * oscillators.dampings) / oscillators.phases
-    )
-    strides = np.array(STRIDES)[
-        np.clip(np.searchsorted(STRIDES, longest, side="right") - 1, 0, None)
-    ]
+    """Return parts of oscillators with their stride; those of equal decay are together."""
+    phase = STRIDE_PHASE / (1.0 + SHORTER_BY_DAMPING * oscillators.dampings)
+    longest = np.floor(phase / oscillators.phases)
+    index = np.clip(np.searchsorted(STRIDES, longest, side="right") - 1, 0, None)
+    strides = np.array(STRIDES)[index]
+
+    # Sorted by decay per step, so that the windows of a part are about equally long
     order = np.argsort(oscillators.phases * oscillators.dampings, kind="stable")
-    taking = [(stride, order[strides[order] == stride]) for stride in STRIDES]
-    return [
-        (stride, some[first : first + PART])
-        for stride, some in taking
-        for first in range(0, some.size, PART)
-    ]
+    parts = []
+    for stride in STRIDES:
+        members = order[strides[order] == stride]
+        firsts = range(0, members.size, PART)
+        parts += [(stride, members[first : first + PART]) for first in firsts]
+    return parts

@@ -1,9 +1,8 @@
 """
-The spectra of one station: from its processed Stream to a Dataset.
+Spectra of one station: from its processed Stream to a Dataset.
 
-The Dataset holds what is stored of a station: the spectra of every component, of the two
-horizontals by azimuth, and the processed horizontal motion itself, from which pairs of buildings
-are computed at their own periods.
+The Dataset contains the spectra of every component, those of the two horizontals by azimuth, and
+the processed horizontal motion, from which pairs of buildings are computed at their own periods.
 """
 
 import json
@@ -18,31 +17,61 @@ from obspy import Stream, Trace
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.constants import VERTICAL_DIP
+from per_obspy.constants import (
+    LONGEST_STORED_PERIOD,
+    SHORTEST_STORED_PERIOD,
+    STORED_AZIMUTH_STEP,
+    STORED_DAMPINGS,
+    STORED_PERIODS,
+    VERTICAL_DIP,
+)
 from per_obspy.errors import RecordRejected
-from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum, rotd
+from per_obspy.spectra.azimuthal import (
+    EVERY_AZIMUTH,
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+    rotd,
+)
 from per_obspy.spectra.elastic import response_spectra
 from per_obspy.spectra.horizontals import north_and_east
 
-#: Every degree, for the percentiles over azimuth.
-EVERY_AZIMUTH = np.arange(180.0)
+#: Attributes of the coordinates of a station, as CF asks for them.
+COORDINATES = {
+    "latitude": {
+        "units": "degrees_north",
+        "standard_name": "latitude",
+        "long_name": "latitude",
+    },
+    "longitude": {
+        "units": "degrees_east",
+        "standard_name": "longitude",
+        "long_name": "longitude",
+    },
+    "elevation": {
+        "units": "m",
+        "standard_name": "surface_altitude",
+        "long_name": "elevation",
+        "positive": "up",
+    },
+}
 
-_RADIUS = {"units": "m"}
+#: Dimensions, values and attributes of a variable of a Dataset.
+Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
 
 
 def station_spectra(
     stream: Stream,
     periods: ArrayLike | None = None,
-    dampings: Sequence[float] = (0.02, 0.05, 0.10, 0.20),
-    azimuth_step: int = 10,
+    dampings: Sequence[float] = STORED_DAMPINGS,
+    azimuth_step: int = STORED_AZIMUTH_STEP,
 ) -> xr.Dataset:
     """
-    Return the spectra of a station, with the processed motion they came from.
+    Compute the spectra of a station, with the processed motion they come from.
 
     Parameters
     ----------
     stream : Stream
-        Processed acceleration of one station, m/s², one trace a component, as
+        Processed acceleration of one station, m/s², one trace per component, as
         :func:`per_obspy.process` returns it. Two horizontals share their start, interval and
         length.
     periods : (n_periods,) array_like, optional
@@ -50,14 +79,13 @@ def station_spectra(
     dampings : sequence of float
         Fractions of critical.
     azimuth_step : int
-        Degrees between the azimuths that are stored; RotD50 and RotD100 always come from every
-        degree.
+        Degrees between the azimuths that are stored; RotD50 and RotD100 always use every degree.
 
     Returns
     -------
     Dataset
-        Dimensions ``component`` (their names, horizontal_1, horizontal_2, vertical, as far as there
-        are, stand in ``component_name``), ``azimuth``, ``damping``, ``period``, ``horizontal`` and
+        Dimensions ``component`` (``component_name`` has the names horizontal_1, horizontal_2,
+        vertical of those that exist), ``azimuth``, ``damping``, ``period``, ``horizontal`` and
         ``time``. Spectra are float32, m; ``acceleration`` is float64, m/s². With one horizontal
         there are no spectra by azimuth: the station serves its own azimuth only.
 
@@ -66,81 +94,95 @@ def station_spectra(
     RecordRejected
         If there is no horizontal, no acceleration in m/s², or the horizontals do not match.
     """
-    grid = (
-        np.geomspace(0.05, 10.0, 100)
-        if periods is None
-        else np.atleast_1d(checks.positive("periods", periods))
-    )
+    grid = _grid(periods)
     damping = np.atleast_1d(checks.fraction_of_critical("dampings", dampings))
     traces = _components(stream)
     horizontals = [trace for name, trace in traces.items() if name != "vertical"]
     motion, azimuths = _horizontal_motion(horizontals)
-    dataset = xr.merge(
-        [
-            _component_spectra(traces, grid, damping),
-            _azimuthal_spectra(motion, horizontals[0].stats.delta, grid, damping, azimuth_step),
-            _motion(motion, azimuths, horizontals[0]),
-            _usable(horizontals, grid),
-        ]
-    )
+
+    # Spectra by component and by azimuth, the motion, and the usable periods
+    parts = [
+        _component_spectra(traces, grid, damping),
+        _azimuthal_spectra(motion, horizontals[0].stats.delta, grid, damping, azimuth_step),
+        _motion(motion, azimuths, horizontals[0]),
+        _usable(horizontals, grid),
+    ]
+    dataset = xr.merge(parts)
     for variable in dataset.data_vars.values():
         variable.attrs["coverage_content_type"] = _content_type(variable)
     return dataset.assign_attrs(_attributes(horizontals))
 
 
+def _grid(periods: ArrayLike | None) -> FloatArray:
+    """Return the periods of the spectra, s."""
+    if periods is None:
+        return np.geomspace(SHORTEST_STORED_PERIOD, LONGEST_STORED_PERIOD, STORED_PERIODS)
+    return np.atleast_1d(checks.positive("periods", periods))
+
+
 def _components(stream: Stream) -> dict[str, Trace]:
     """Return the traces by name: horizontals in ascending azimuth, then the vertical."""
     station = stream[0].id if stream else "an empty stream"
-    horizontals = sorted((trace for trace in stream if not _is_vertical(trace)), key=_azimuth)
+    # Every trace in the same unit
+    reasons = []
+    for trace in stream:
+        units = trace.stats.get("units")
+        if units != "m/s2":
+            reasons.append(f"{trace.id} is in {units!r}, not m/s2")
+
+    # One or two horizontals, and at most one vertical
     verticals = [trace for trace in stream if _is_vertical(trace)]
-    reasons = [
-        f"{t.id} is in {t.stats.get('units')!r}, not m/s2"
-        for t in stream
-        if t.stats.get("units") != "m/s2"
-    ]
+    horizontals = [trace for trace in stream if not _is_vertical(trace)]
+    horizontals.sort(key=_azimuth)
     if not 1 <= len(horizontals) <= 2 or len(verticals) > 1:
         reasons.append(
             f"has {len(horizontals)} horizontal and {len(verticals)} vertical components"
         )
     if reasons:
         raise RecordRejected(station, *reasons)
+
     named = {f"horizontal_{i}": trace for i, trace in enumerate(horizontals, start=1)}
     return named | dict(zip(("vertical",), verticals, strict=False))
 
 
 def _is_vertical(trace: Trace) -> bool:
-    return bool(
-        abs(trace.stats.get("sensor_dip", 0.0)) > VERTICAL_DIP or trace.stats.channel.endswith("Z")
-    )
+    """Return whether the sensor is vertical by its dip or its channel code."""
+    dip = abs(trace.stats.get("sensor_dip", 0.0))
+    return bool(dip > VERTICAL_DIP or trace.stats.channel.endswith("Z"))
 
 
 def _azimuth(trace: Trace) -> float:
-    """Return the sensor's azimuth from its metadata, else from a channel code ending in N or E, else NaN."""
+    """Return the sensor's azimuth from metadata, else from a channel ending in N or E, else NaN."""
     by_code = {"N": 0.0, "E": 90.0}.get(trace.stats.channel[-1:], np.nan)
     return float(trace.stats.get("sensor_azimuth", by_code)) % 360.0
 
 
 def _horizontal_motion(horizontals: list[Trace]) -> tuple[FloatArray, list[float]]:
-    """Return motion to the north and east, or along the only sensor, with the azimuths of its rows."""
-    first, azimuths = horizontals[0], [_azimuth(trace) for trace in horizontals]
+    """Return motion to the north and east, or along the only sensor, with azimuths of its rows."""
+    azimuths = [_azimuth(trace) for trace in horizontals]
     if len(horizontals) == 1:
-        return np.array([first.data], dtype=np.float64), azimuths
-    second = horizontals[1]
+        return np.array([horizontals[0].data], dtype=np.float64), azimuths
+    first, second = horizontals
+    _check_match(first, second, azimuths)
+    # Sensors close to the same line do not resolve the plane
+    try:
+        north, east = north_and_east(first.data, second.data, *azimuths)
+    except ValueError as error:
+        raise RecordRejected(first.id, str(error)) from error
+    return np.array([north, east]), [0.0, 90.0]
+
+
+def _check_match(first: Trace, second: Trace, azimuths: list[float]) -> None:
+    """Reject two horizontals of unknown azimuth or of different start, interval or length."""
     if not np.isfinite(azimuths).all():
         raise RecordRejected(
             first.id, f"sensor azimuths of {first.id} and {second.id} are unknown: {azimuths}"
         )
+    # Both are combined sample by sample
     for field in ("starttime", "delta", "npts"):
-        if first.stats[field] != second.stats[field]:
-            raise RecordRejected(
-                first.id,
-                f"{field} is {first.stats[field]}, but {second.stats[field]} of {second.id}",
-            )
-    try:
-        pair = north_and_east(first.data, second.data, *azimuths)
-    except ValueError as error:
-        raise RecordRejected(first.id, str(error)) from error
-    return np.array(pair), [0.0, 90.0]
+        value, other = first.stats[field], second.stats[field]
+        if value != other:
+            raise RecordRejected(first.id, f"{field} is {value}, but {other} of {second.id}")
 
 
 def _component_spectra(
@@ -151,100 +193,106 @@ def _component_spectra(
         response_spectra(trace.data, trace.stats.delta, periods, dampings)
         for trace in traces.values()
     ]
-    dimensions = ("component", "damping", "period")
+    channels = [trace.stats.channel for trace in traces.values()]
+    processing = [_processing_record(trace) for trace in traces.values()]
 
-    def stacked(name: str) -> np.ndarray[Any, np.dtype[np.float32]]:
-        return np.array([getattr(spectrum, name) for spectrum in spectra], dtype=np.float32)
+    # Each spectrum is an array (component, damping, period)
+    per = [spectrum.per for spectrum in spectra]
+    sd = [spectrum.sd for spectrum in spectra]
+    sa = [spectrum.sa for spectrum in spectra]
+    variables = {
+        "per": _by_component(per, "m", "pseudo energy radius"),
+        "sd": _by_component(sd, "m", "spectral displacement"),
+        "sa": _by_component(sa, "m s-2", "absolute spectral acceleration"),
+        "channel": ("component", channels, {"long_name": "SEED channel code"}),
+        "processing": (
+            "component",
+            processing,
+            {"long_name": "what was done to the record and every number chosen for it, as JSON"},
+        ),
+    }
+    return xr.Dataset(variables, coords=_axes(list(traces), periods, dampings))
 
-    return xr.Dataset(
-        {
-            "per": (dimensions, stacked("per"), _RADIUS | {"long_name": "pseudo energy radius"}),
-            "sd": (dimensions, stacked("sd"), _RADIUS | {"long_name": "spectral displacement"}),
-            "sa": (
-                dimensions,
-                stacked("sa"),
-                {"units": "m s-2", "long_name": "absolute spectral acceleration"},
-            ),
-            "channel": (
-                "component",
-                [t.stats.channel for t in traces.values()],
-                {"long_name": "SEED channel code"},
-            ),
-            "processing": (
-                "component",
-                [_processing_record(trace) for trace in traces.values()],
-                {
-                    "long_name": "what was done to the record and every number chosen for it, as JSON"
-                },
-            ),
-        },
-        coords={
-            "component_name": (
-                "component",
-                list(traces),
-                {"long_name": "horizontal_1, horizontal_2, vertical"},
-            ),
-            "damping": (
-                "damping",
-                dampings,
-                {"units": "1", "long_name": "damping ratio, fraction of critical"},
-            ),
-            "period": ("period", periods, {"units": "s", "long_name": "natural period"}),
-        },
-    )
+
+def _by_component(spectra: list[FloatArray], units: str, title: str) -> Variable:
+    """Return spectra of all components as a float32 variable."""
+    attributes = {"units": units, "long_name": title}
+    return ("component", "damping", "period"), np.array(spectra, dtype=np.float32), attributes
+
+
+def _axes(components: list[str], periods: FloatArray, dampings: FloatArray) -> dict[str, Variable]:
+    """Return the coordinates of spectra of components."""
+    damping = {"units": "1", "long_name": "damping ratio, fraction of critical"}
+    return {
+        "component_name": (
+            "component",
+            components,
+            {"long_name": "horizontal_1, horizontal_2, vertical"},
+        ),
+        "damping": ("damping", dampings, damping),
+        "period": ("period", periods, {"units": "s", "long_name": "natural period"}),
+    }
 
 
 def _processing_record(trace: Trace) -> str:
     """Return the steps and numbers of one trace as JSON."""
     steps = list(trace.stats.get("processing", []))
-    return json.dumps(
-        {"steps": steps, **dict(trace.stats.get("per_obspy", {}))}, default=str, sort_keys=True
-    )
+    numbers = dict(trace.stats.get("per_obspy", {}))
+    return json.dumps({"steps": steps, **numbers}, default=str, sort_keys=True)
 
 
 def _azimuthal_spectra(
     motion: FloatArray, dt: float, periods: FloatArray, dampings: FloatArray, step: int
 ) -> xr.Dataset:
-    """Return PER and SD by azimuth with their percentiles; nothing where there is one horizontal."""
+    """Return PER and SD by azimuth with their percentiles; no variables for one horizontal."""
     if len(motion) == 1:
         return xr.Dataset()
     north, east = motion
-    spectra = {
-        "per": (
-            "pseudo energy radius",
-            azimuthal_per_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH),
-        ),
-        "sd": (
-            "spectral displacement",
-            azimuthal_sd_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH),
-        ),
-    }
-    dimensions = ("damping", "period")
-    variables: dict[str, Any] = {}
-    for name, (title, values) in spectra.items():
-        stored = np.moveaxis(values[..., ::step], -1, 0).astype(np.float32)
-        variables[f"{name}_azimuthal"] = (
-            ("azimuth", *dimensions),
-            stored,
-            _RADIUS | {"long_name": f"{title} of the horizontal motion along the azimuth"},
-        )
-        for percentile in (50, 100):
-            variables[f"{name}_rotd{percentile}"] = (
-                dimensions,
-                rotd(values, percentile).astype(np.float32),
-                _RADIUS | {"long_name": f"{title}, percentile {percentile} over azimuth"},
-            )
-    azimuth = (
-        "azimuth",
-        EVERY_AZIMUTH[::step],
-        {"units": "degree", "long_name": "azimuth, clockwise from north"},
+    # Every degree for the percentiles, of which the stored azimuths are a part
+    per = azimuthal_per_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)
+    sd = azimuthal_sd_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)
+    azimuth = {"units": "degree", "long_name": "azimuth, clockwise from north"}
+    return xr.Dataset(
+        _by_azimuth("per", per, "pseudo energy radius", step)
+        | _by_azimuth("sd", sd, "spectral displacement", step),
+        coords={"azimuth": ("azimuth", EVERY_AZIMUTH[::step], azimuth)},
     )
-    return xr.Dataset(variables, coords={"azimuth": azimuth})
+
+
+def _by_azimuth(name: str, values: FloatArray, title: str, step: int) -> dict[str, Variable]:
+    """Return the stored azimuths and the percentiles of a spectrum (damping, period, azimuth)."""
+    stored = np.moveaxis(values[..., ::step], -1, 0).astype(np.float32)
+    along = {
+        "units": "m",
+        "long_name": f"{title} of the horizontal motion along the azimuth",
+    }
+    variables: dict[str, Variable] = {
+        f"{name}_azimuthal": (("azimuth", "damping", "period"), stored, along)
+    }
+    # Percentiles use every degree, stored or not
+    for percentile in (50, 100):
+        text = {"units": "m", "long_name": f"{title}, percentile {percentile} over azimuth"}
+        spectrum = rotd(values, percentile).astype(np.float32)
+        variables[f"{name}_rotd{percentile}"] = (("damping", "period"), spectrum, text)
+    return variables
 
 
 def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Dataset:
     """Return the processed horizontal acceleration."""
-    start = trace.stats.starttime
+    azimuth = {
+        "units": "degree",
+        "long_name": "azimuth of the motion, clockwise from north; missing if unknown",
+    }
+    interval = {"units": "s", "long_name": "sampling interval"}
+    time = {
+        "units": f"seconds since {trace.stats.starttime}",
+        "standard_name": "time",
+        "long_name": "time",
+        "calendar": "standard",
+        "units_metadata": "leap_seconds: none",
+    }
+    # Time is relative to the start, so that it is exact
+    seconds = np.arange(motion.shape[1]) * trace.stats.delta
     return xr.Dataset(
         {
             "acceleration": (
@@ -252,101 +300,56 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
                 motion,
                 {"units": "m s-2", "long_name": "processed ground acceleration"},
             ),
-            "horizontal_azimuth": (
-                "horizontal",
-                azimuths,
-                {
-                    "units": "degree",
-                    "long_name": "azimuth of the motion, clockwise from north; missing if unknown",
-                },
-            ),
-            "sampling_interval": (
-                (),
-                trace.stats.delta,
-                {"units": "s", "long_name": "sampling interval"},
-            ),
+            "horizontal_azimuth": ("horizontal", azimuths, azimuth),
+            "sampling_interval": ((), trace.stats.delta, interval),
         },
-        coords={
-            "time": (
-                "time",
-                np.arange(motion.shape[1]) * trace.stats.delta,
-                {
-                    "units": f"seconds since {start}",
-                    "standard_name": "time",
-                    "long_name": "time",
-                    "calendar": "standard",
-                    "units_metadata": "leap_seconds: none",
-                },
-            ),
-            **_place(trace),
-        },
+        coords={"time": ("time", seconds, time), **_place(trace)},
     )
 
 
-def _place(trace: Trace) -> dict[str, Any]:
-    """Return name, coordinates and ground of the station; missing (NaN, no text) where they are not known."""
-    known = trace.stats.get("coordinates", {})
-    described = {
-        "latitude": {
-            "units": "degrees_north",
-            "standard_name": "latitude",
-            "long_name": "latitude",
-        },
-        "longitude": {
-            "units": "degrees_east",
-            "standard_name": "longitude",
-            "long_name": "longitude",
-        },
-        "elevation": {
-            "units": "m",
-            "standard_name": "surface_altitude",
-            "long_name": "elevation",
-            "positive": "up",
-        },
-    }
-    station = f"{trace.stats.network}.{trace.stats.station}"
-    names: dict[str, Any] = {
-        "station": ((), station, {"cf_role": "timeseries_id", "long_name": "station"})
-    }
-    names["site_class"] = (
-        (),
-        str(trace.stats.get("site_class", "")),
-        {"long_name": "site class; empty if unknown"},
-    )
+def _place(trace: Trace) -> dict[str, Variable]:
+    """Return name, coordinates and ground of the station; NaN or no text where unknown."""
+    stats = trace.stats
+    name = f"{stats.network}.{stats.station}"
     velocity = {
         "units": "m s-1",
         "long_name": "mean shear-wave velocity of the upper 30 m of ground",
     }
-    names["vs30"] = ((), float(trace.stats.get("vs30", np.nan)), velocity)
-    return names | {
-        name: ((), float(known.get(name, np.nan)), text) for name, text in described.items()
+    place: dict[str, Variable] = {
+        "station": ((), name, {"cf_role": "timeseries_id", "long_name": "station"}),
+        "site_class": (
+            (),
+            str(stats.get("site_class", "")),
+            {"long_name": "site class; empty if unknown"},
+        ),
+        "vs30": ((), float(stats.get("vs30", np.nan)), velocity),
     }
+    # Latitude, longitude and elevation, as far as the metadata have them
+    known = stats.get("coordinates", {})
+    for coordinate, attributes in COORDINATES.items():
+        place[coordinate] = ((), float(known.get(coordinate, np.nan)), dict(attributes))
+    return place
 
 
 def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:
-    """Return which periods every horizontal supports, and the limits."""
+    """Return the limits of the periods that every horizontal supports, and a flag per period."""
     limits = [trace.stats.get("per_obspy", {}) for trace in horizontals]
     shortest = max(float(limit.get("shortest_period", 0.0)) for limit in limits)
     longest = min(float(limit.get("longest_period", np.inf)) for limit in limits)
     usable = ((periods >= shortest) & (periods <= longest)).astype(np.int8)
-    flags = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "not_usable usable"}
+    # Flag variables as CF describes them
+    flags = {
+        "long_name": "whether the processing leaves the period usable",
+        "flag_values": np.array([0, 1], dtype=np.int8),
+        "flag_meanings": "not_usable usable",
+    }
+    lower = {"units": "s", "long_name": "shortest usable period"}
+    upper = {"units": "s", "long_name": "longest usable period"}
     return xr.Dataset(
         {
-            "usable": (
-                "period",
-                usable,
-                {"long_name": "whether the processing leaves the period usable"} | flags,
-            ),
-            "shortest_usable_period": (
-                (),
-                shortest,
-                {"units": "s", "long_name": "shortest usable period"},
-            ),
-            "longest_usable_period": (
-                (),
-                longest,
-                {"units": "s", "long_name": "longest usable period"},
-            ),
+            "usable": ("period", usable, flags),
+            "shortest_usable_period": ((), shortest, lower),
+            "longest_usable_period": ((), longest, upper),
         }
     )
 
@@ -362,19 +365,20 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
     """Return the attributes of CF 1.11 and ACDD 1.3 that are true of one station."""
     first = horizontals[0].stats
     station, software = f"{first.network}.{first.station}", f"per_obspy {version('per_obspy')}"
-    known = first.get("coordinates", {})
-    place = {
-        f"geospatial_{name[:3]}_{end}": known[name]
-        for name in ("latitude", "longitude")
-        for end in ("min", "max")
-        if name in known
-    }
-    return {
+    attributes = {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": f"Pseudo energy radius spectra of station {station}",
-        "summary": "Pseudo energy radius and response spectra of strong-motion records, exact between samples.",
-        "keywords": "earthquake, strong motion, response spectrum, pseudo energy radius, structural pounding",
-        "references": "Valles-Mattox and Reinhorn, An energy approach to pounding of structures, 11WCEE, 1996",
+        "summary": (
+            "Pseudo energy radius and response spectra of strong-motion records, "
+            "exact between samples."
+        ),
+        "keywords": (
+            "earthquake, strong motion, response spectrum, pseudo energy radius, "
+            "structural pounding"
+        ),
+        "references": (
+            "Valles-Mattox and Reinhorn, An energy approach to pounding of structures, 11WCEE, 1996"
+        ),
         "id": station,
         "source": software,
         "history": f"computed from processed acceleration by {software}",
@@ -385,5 +389,11 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
         "time_coverage_end": str(first.endtime),
         "horizontals": len(horizontals),
         "simulated": "false",
-        **place,
     }
+    # The box of ACDD is a point, if the station's place is known
+    known = first.get("coordinates", {})
+    for name in ("latitude", "longitude"):
+        if name in known:
+            attributes[f"geospatial_{name[:3]}_min"] = known[name]
+            attributes[f"geospatial_{name[:3]}_max"] = known[name]
+    return attributes

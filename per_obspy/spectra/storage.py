@@ -1,8 +1,8 @@
 """
-Spectra on disk: one netCDF shard a station, and one file for the region.
+Spectra on disk: one netCDF file per station, and one file for the region.
 
-A shard holds everything of a station, its processed motion included. ``spectra.nc`` of a region
-holds the spectra of all stations along the dimension ``station`` without the motion.
+A station file contains everything of a station, its processed motion included. ``spectra.nc`` of a
+region contains the spectra of all stations along the dimension ``station`` without the motion.
 """
 
 from collections.abc import Hashable, Iterable
@@ -13,7 +13,7 @@ import xarray as xr
 from per_obspy.errors import CatalogError
 from per_obspy.files import written_whole
 
-#: What a region's file leaves in the shards: the motion, sample by sample.
+#: Variables of the motion, sample by sample, which only the station files contain.
 MOTION = ("acceleration", "horizontal_azimuth", "sampling_interval")
 
 
@@ -26,11 +26,12 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     dataset : Dataset
         From :func:`per_obspy.station_spectra` or :func:`region`.
     path : Path
-        Where to; folders are made.
+        File to write; folders are made.
     """
     encoding: dict[Hashable, dict[str, object]] = {
         name: {"_FillValue": None} for name in dataset.coords
     }
+    # Only numbers are compressed, and scalars cannot be
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f":
             encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}
@@ -40,7 +41,12 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
 
 def read_spectra(path: Path) -> xr.Dataset:
     """
-    Read a Dataset that :func:`write_spectra` wrote, identical to what was written.
+    Read a Dataset that :func:`write_spectra` wrote, identical to the one written.
+
+    Parameters
+    ----------
+    path : Path
+        netCDF file.
 
     Raises
     ------
@@ -62,7 +68,7 @@ def read_spectra(path: Path) -> xr.Dataset:
 
 def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     """
-    Return the spectra of several stations along the dimension ``station``, sorted by name, without the motion.
+    Join the spectra of several stations along ``station``, sorted by name, without the motion.
 
     Parameters
     ----------
@@ -79,7 +85,7 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     ValueError
         If the stations' periods, dampings or azimuths differ.
     """
-    ordered = sorted(stations, key=lambda one: str(one["station"].item()))
+    ordered = sorted(stations, key=lambda station: str(station["station"].item()))
     spectra = [_without_motion(station) for station in ordered]
     joined = xr.concat(
         spectra,
@@ -92,9 +98,9 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
         combine_attrs="drop_conflicts",
     )
     for axis in ("period", "damping", "azimuth"):
-        if axis in joined.sizes and joined.sizes[axis] != max(
-            one.sizes.get(axis, 0) for one in spectra
-        ):
+        # An outer join of different axes is longer than each of them
+        longest = max(station.sizes.get(axis, 0) for station in spectra)
+        if axis in joined.sizes and joined.sizes[axis] != longest:
             raise ValueError(
                 f"{axis} differs between the stations: the spectra are not on one grid"
             )
@@ -105,11 +111,11 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
 
 
 def _without_motion(station: xr.Dataset) -> xr.Dataset:
-    """Return the spectra with what has to be told apart by station as variables."""
+    """Return the spectra, with names and numbers that differ by station as variables."""
     spectra = station.drop_vars([*MOTION, "time"]).rename(station="station_name").drop_encoding()
-    spectra = spectra.assign_coords(component=spectra["component_name"].values).drop_vars(
-        "component_name"
-    )
+    # Components are joined by their names
+    spectra = spectra.assign_coords(component=spectra["component_name"].values)
+    spectra = spectra.drop_vars("component_name")
     horizontals = (
         (),
         int(station.attrs["horizontals"]),
@@ -119,7 +125,7 @@ def _without_motion(station: xr.Dataset) -> xr.Dataset:
 
 
 def _unlabelled(joined: xr.Dataset) -> xr.Dataset:
-    """Return the components' names as CF wants them: text beside the dimension, which has no coordinate."""
+    """Return the components' names as CF wants them: text along a dimension without coordinate."""
     names = (
         "component",
         joined["component"].values,
@@ -129,12 +135,13 @@ def _unlabelled(joined: xr.Dataset) -> xr.Dataset:
 
 
 def _box(region: xr.Dataset) -> dict[str, float]:
-    """Return the smallest box of coordinates in the words of ACDD, if any station knows where it is."""
+    """Return the smallest box of coordinates as ACDD names it; empty without coordinates."""
     known = region[["latitude", "longitude"]].dropna("station")
     if not known.sizes["station"]:
         return {}
-    return {
-        f"geospatial_{name[:3]}_{end}": float(getattr(known[name], end)())
-        for name in ("latitude", "longitude")
-        for end in ("min", "max")
-    }
+    # Plain limits, also of a region across the date line
+    box = {}
+    for name in ("latitude", "longitude"):
+        box[f"geospatial_{name[:3]}_min"] = float(known[name].min())
+        box[f"geospatial_{name[:3]}_max"] = float(known[name].max())
+    return box

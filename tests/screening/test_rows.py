@@ -12,8 +12,7 @@ from per_obspy.config import Building, Screening
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.columns import ORDER, RESULTS
 from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.region import Ground
-from per_obspy.screening.ground_motion.site_motion import prepared_field
+from per_obspy.screening.ground_motion.site_motion import RegionalMotion, prepared_field
 from per_obspy.screening.rows import INTERMEDIATE, risk_rows
 
 
@@ -21,7 +20,7 @@ def _rows(pairs, *stations, shakemap=None):
     """Return unranked rows by pair, and the rejections."""
     screening = Screening()
     located, _ = stations_of(stations)
-    ground = Ground(located, prepared_field(stations, screening.interpolation), shakemap)
+    ground = RegionalMotion(located, prepared_field(stations, screening.interpolation), shakemap)
     rows, rejected = risk_rows(pairs, ground, Building(), screening)
     return rows.set_index("pair_id"), rejected
 

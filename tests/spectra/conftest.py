@@ -18,48 +18,82 @@ def noise() -> np.ndarray:
 
 @pytest.fixture(scope="session")
 def reference() -> Reference:
-    """Largest radius, displacement, velocity and absolute acceleration of one oscillator, by matrix exponentials."""
+    """Return the reference, by matrix exponentials, as a function."""
     return largest_responses
 
 
 def largest_responses(
     acceleration: np.ndarray, dt: float, period: float, damping: float
 ) -> np.ndarray:
-    """Dense evaluation, then Brent's method around the highest values; one period of free vibration included."""
+    """
+    Return largest radius, displacement, velocity and absolute acceleration of one oscillator.
+
+    Dense evaluation, then Brent's method around the highest values; one period of free vibration is
+    included.
+    """
     phase = 2.0 * np.pi * dt / period
-    # u, u' dt, a dt², change of a dt² over a step; time in steps
-    system = np.array(
-        [[0, 1, 0, 0], [-(phase**2), -2 * damping * phase, -1, 0], [0, 0, 0, 1], [0, 0, 0, 0.0]]
-    )
-    free = int(np.ceil(period / dt)) + 1
-    ground = np.concatenate([acceleration, np.zeros(1 + free)]) * dt**2
-    states = np.zeros((ground.size, 4))
-    states[:, 2], states[:-1, 3] = ground, np.diff(ground)
-    whole = expm(system)
-    for i in range(1, ground.size):
-        states[i, :2] = (whole @ states[i - 1])[:2]
+    system = _system(phase, damping)
+    states = _states_at_samples(acceleration * dt**2, system, free=int(np.ceil(period / dt)) + 1)
+
+    # Sixty times per period at least, and four times a step
     parts = max(4, int(np.ceil(60 * dt / period)))
     times = np.arange(parts) / parts
     dense = np.stack([states @ expm(system * time).T for time in times], axis=1).reshape(-1, 4)
+    values = _responses(dense, phase, damping)
 
-    def quantities(state: np.ndarray) -> np.ndarray:
-        u, v = state[..., 0], state[..., 1]
-        felt = phase**2 * u + 2 * damping * phase * v
-        return np.stack([np.hypot(u, v / phase), np.abs(u), np.abs(v) / dt, np.abs(felt) / dt**2])
+    # At any time within a step
+    def response(step: int, time: float) -> np.ndarray:
+        return _responses(expm(system * time) @ states[step], phase, damping)
 
-    values = quantities(dense)
-    for row in range(4):
-        for place in np.argsort(values[row])[-3:]:
-            step, part = divmod(place, parts)
-            for begin in {(step, part), divmod(max(place - 1, 0), parts)}:
-                start = states[begin[0]]
+    largest = [_largest(values, row, parts, response) for row in range(4)]
+    return np.array(largest) * [1.0, 1.0, 1.0 / dt, 1.0 / dt**2]
 
-                def lower(time: float, start: np.ndarray = start, row: int = row) -> float:
-                    return -float(quantities(expm(system * time) @ start)[row])
 
-                bounds = (begin[1] / parts, (begin[1] + 1) / parts)
-                peak = minimize_scalar(
-                    lower, bounds=bounds, method="bounded", options={"xatol": 1e-7}
-                )
-                values[row, place] = max(values[row, place], -peak.fun)
-    return values.max(axis=1)
+def _largest(
+    values: np.ndarray, row: int, parts: int, response: Callable[[int, float], np.ndarray]
+) -> float:
+    """Return the largest value of a row, by Brent's method around its three highest."""
+    largest = float(values[row].max())
+    for highest in np.argsort(values[row])[-3:]:
+        # The maximum lies in the interval before or after
+        for begin in {highest, max(highest - 1, 0)}:
+            step, part = divmod(begin, parts)
+            peak = minimize_scalar(
+                lambda time, step=step: -float(response(step, time)[row]),
+                bounds=(part / parts, (part + 1) / parts),
+                method="bounded",
+                options={"xatol": 1e-7},
+            )
+            largest = max(largest, -peak.fun)
+    return largest
+
+
+def _system(phase: float, damping: float) -> np.ndarray:
+    """Return the matrix of u, u' dt, a dt² and the change of a dt² over a step; time in steps."""
+    return np.array(
+        [
+            [0.0, 1.0, 0.0, 0.0],
+            [-(phase**2), -2.0 * damping * phase, -1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 0.0],
+        ]
+    )
+
+
+def _responses(state: np.ndarray, phase: float, damping: float) -> np.ndarray:
+    """Return radius, displacement, velocity times dt and absolute acceleration times dt²."""
+    u, v = state[..., 0], state[..., 1]
+    felt = phase**2 * u + 2.0 * damping * phase * v
+    return np.stack([np.hypot(u, v / phase), np.abs(u), np.abs(v), np.abs(felt)])
+
+
+def _states_at_samples(ground: np.ndarray, system: np.ndarray, free: int) -> np.ndarray:
+    """Return the state at every sample, a ramp to zero and ``free`` steps after it included."""
+    closed = np.concatenate([ground, np.zeros(1 + free)])
+    states = np.zeros((closed.size, 4))
+    states[:, 2], states[:-1, 3] = closed, np.diff(closed)
+    # Exact for straight lines between samples
+    step = expm(system)
+    for i in range(1, closed.size):
+        states[i, :2] = (step @ states[i - 1])[:2]
+    return states

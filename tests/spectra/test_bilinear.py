@@ -1,5 +1,7 @@
 """Bilinear oscillators: energy, limits and symmetries first, then an ODE solver."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -51,16 +53,24 @@ def test_energy_is_conserved(record, limit, hardening):
     # input - damping = kinetic + recoverable + hysteretic: catches a wrong event, offset or path. 8
     # samples between make the trapezoid of input and damping good to 1e-4 of the input; free
     # vibration is left out by comparing at the last sample, with the path up to there
-    fine = np.interp(np.arange((record.size - 1) * 8 + 1) / 8, np.arange(record.size), record)
-    ours = bilinear_response(fine, DT / 8, PERIOD, DAMPING, limit, hardening)
+    fine, dt = _finer(record, 8), DT / 8
+    ours = bilinear_response(fine, dt, PERIOD, DAMPING, limit, hardening)
     u, v, p = ours.displacement, ours.velocity, ours.plastic_displacement
-    given = -np.trapezoid(fine * v, dx=DT / 8)
-    damped = np.trapezoid(2 * DAMPING * OMEGA * v**2, dx=DT / 8)
-    kept = 0.5 * v[-1] ** 2 + 0.5 * OMEGA**2 * (
-        hardening * u[-1] ** 2 + (1 - hardening) * (u[-1] - p[-1]) ** 2
-    )
+    given = -np.trapezoid(fine * v, dx=dt)
+    damped = np.trapezoid(2 * DAMPING * OMEGA * v**2, dx=dt)
+
+    # Per unit mass
+    kinetic = 0.5 * v[-1] ** 2
+    elastic = hardening * u[-1] ** 2 + (1 - hardening) * (u[-1] - p[-1]) ** 2
+    recoverable = 0.5 * OMEGA**2 * elastic
     yielded = (1 - hardening) * OMEGA**2 * limit * np.abs(np.diff(p)).sum()
-    assert_allclose(given - damped, kept + yielded, atol=1e-3 * given)
+    assert_allclose(given - damped, kinetic + recoverable + yielded, atol=1e-3 * given)
+
+
+def _finer(record, count):
+    """Return so many times as many samples on the same straight lines."""
+    steps = np.arange((record.size - 1) * count + 1) / count
+    return np.interp(steps, np.arange(record.size), record)
 
 
 @pytest.mark.parametrize(("limit", "hardening"), CASES)
@@ -91,7 +101,7 @@ def test_mirrored_and_scaled_motion(record, limit, hardening):
 @pytest.mark.parametrize(("limit", "hardening"), CASES)
 def test_more_samples_of_the_same_straight_lines_change_nothing(record, limit, hardening):
     # catches events taken at samples or span ends; events amplify rounding a little
-    fine = np.interp(np.arange((record.size - 1) * 3 + 1) / 3, np.arange(record.size), record)
+    fine = _finer(record, 3)
     once = bilinear_response(record, DT, PERIOD, DAMPING, limit, hardening)
     finer = bilinear_response(fine, DT / 3, PERIOD, DAMPING, limit, hardening)
     scale = once.displacement_maximum
@@ -116,33 +126,40 @@ def test_elastoplastic_block_pushed_by_a_constant_acceleration():
 
 def _by_ode_solver(record, limit, hardening):
     """Displacements at the samples by DOP853 with its own event location, branch by branch."""
+    ground = partial(np.interp, xp=np.arange(record.size) * DT, fp=record)
     state, plastic, branch, found = np.zeros(2), 0.0, 0, [0.0]
     for i in range(record.size - 1):
         time, end = i * DT, (i + 1) * DT
         while time < end:
-
-            def rates(t, x, i=i, plastic=plastic, branch=branch):
-                elastic = branch * limit if branch else x[0] - plastic
-                ground = record[i] + (record[i + 1] - record[i]) * (t / DT - i)
-                force = OMEGA**2 * (hardening * x[0] + (1 - hardening) * elastic)
-                return x[1], -2 * DAMPING * OMEGA * x[1] - force - ground
-
-            def over(_, x, plastic=plastic, branch=branch):
-                return branch * x[1] if branch else limit - abs(x[0] - plastic)
-
-            over.terminal, over.direction = True, -1
-            piece = solve_ivp(
-                rates, (time, end), state, "DOP853", events=over, rtol=1e-11, atol=1e-14
-            )
-            time, state = piece.t[-1], piece.y[:, -1].copy()
+            # The elastic part of the displacement stays at the limit on a yielding branch
+            elastic = (0.0, branch * limit) if branch else (1.0, -plastic)
+            piece = _solve_branch(ground, (time, end), state, elastic, limit, hardening)
+            time, state = piece.t[-1], piece.y[:, -1]
             if branch:
                 plastic = state[0] - branch * limit
+            # An event begins yielding, or ends it at rest
             if piece.status == 1:
                 branch = 0 if branch else int(np.sign(state[0] - plastic))
                 if not branch:
                     state[1] = 0.0
         found.append(state[0])
     return np.array(found)
+
+
+def _solve_branch(ground, span, state, elastic, limit, hardening):
+    """Solve a branch, with the elastic displacement linear in the whole one, until it ends."""
+    slope, offset = elastic
+
+    def rates(t, x):
+        force = OMEGA**2 * (hardening * x[0] + (1 - hardening) * (slope * x[0] + offset))
+        return x[1], -2 * DAMPING * OMEGA * x[1] - force - ground(t)
+
+    # Yielding begins at the yield displacement and ends when the velocity turns
+    def over(_, x):
+        return limit - abs(x[0] + offset) if slope else np.sign(offset) * x[1]
+
+    over.terminal, over.direction = True, -1
+    return solve_ivp(rates, span, state, "DOP853", events=over, rtol=1e-11, atol=1e-14)
 
 
 @pytest.mark.parametrize(("limit", "hardening"), [(0.01, 0.1), (0.01, 0.0), (0.02, 0.5)])

@@ -1,4 +1,4 @@
-"""Spectra that agencies and databases published beside their records."""
+"""Spectra that agencies and databases published with their records."""
 
 from pathlib import Path
 
@@ -54,7 +54,8 @@ def test_radius_lies_between_the_bounds_of_official_spectra(csmip):
         velocity = official.sv * official.periods / (2 * np.pi)
         low, high = np.maximum(official.sd, velocity), np.hypot(official.sd, velocity)
         excess.append(np.maximum(low / ours.per, ours.per / high)[:, usable].ravel() - 1)
-    # 0.5 % for three digits; 14 of 5457 values lie up to 0.91 % outside, in two weak records near their corner
+    # 0.5 % for three digits; 14 of 5457 values lie up to 0.91 % outside, in two weak records near
+    # their corner
     excess = np.concatenate(excess)
     assert np.mean(excess <= 0.005) >= 0.995
     assert excess.max() <= 0.01
@@ -65,13 +66,17 @@ def northridge(real_data):
     """RSN1044 and, per damping in per cent, its table."""
     folder = real_data / "records" / "peer_at2"
     trace = obspy.read(str(folder / "RSN1044_DirRot2.AT2"))[0]
-    tables = {}
-    for damping in (2, 5, 10):
-        lines = (folder / f"RSN1044_Damping{damping}.txt").read_text(errors="replace").splitlines()
-        tables[damping] = np.array(
-            [[float(word) for word in line.split()] for line in lines[6:] if line.strip()]
-        )
+    tables = {
+        damping: _numbers(folder / f"RSN1044_Damping{damping}.txt", header=6)
+        for damping in (2, 5, 10)
+    }
     return trace, tables
+
+
+def _numbers(path, header):
+    """Return the table of numbers in a text file after so many lines of header."""
+    lines = path.read_text(errors="replace").splitlines()[header:]
+    return np.array([np.array(line.split(), dtype=float) for line in lines if line.strip()])
 
 
 @pytest.mark.parametrize("damping", [2, 5, 10])
@@ -125,13 +130,11 @@ def test_official_itaca_spectra(real_data, name):
     # its column called 2 % is not 2 %; from 20 dt on, as peaks are sampled there
     record = real_data / "records" / "itaca2009" / name
     trace = obspy.read(f"{record}.cor.acc")[0]
-    rows = [
-        line.split() for line in Path(f"{record}.rs").read_text().splitlines()[1:] if line.strip()
-    ]
-    table = np.array([[float(word) for word in row] for row in rows])
+    table = _numbers(Path(f"{record}.rs"), header=1)
     table = table[table[:, 0] >= 20 * trace.stats.delta]
     for column, damping in ((2, 0.05), (4, 0.10), (5, 0.20)):
         ours = response_spectra(trace.data, trace.stats.delta, table[:, 0], damping)
+        # Pseudo-acceleration in the unit of the record
         errors = np.abs(ours.psa / table[:, column] - 1)
         assert np.median(errors) <= 0.003, (damping, np.median(errors))
         assert errors.max() <= 0.02, (damping, errors.max())

@@ -1,4 +1,4 @@
-"""Many oscillators, each with its own azimuth: against matrix exponentials, and against the spectra's kernel."""
+"""Many oscillators, each with its own azimuth: matrix exponentials and the spectra's kernel."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.spectra import oscillator_blocks, per_pair
 from per_obspy.spectra.elastic import response_spectra
-from per_obspy.spectra.per_pair import azimuth_maxima, oscillator_maxima
+from per_obspy.spectra.per_pair import azimuth_maxima
 
 DT = 0.01
+
+
+def one_component(record, dt, periods, dampings):
+    """Return the maxima under a single component, as motion to the north alone."""
+    return azimuth_maxima(record, np.zeros(len(record)), dt, periods, dampings, 0.0)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.3, 0.99])
@@ -18,7 +23,7 @@ DT = 0.01
 def test_agrees_with_matrix_exponentials(noise, reference, ratio, damping):
     # mutations: a sample's weight in a stride, a stationary point, the closing ramp or the free
     # vibration left out
-    ours = oscillator_maxima(noise, DT, [ratio * DT], damping)
+    ours = one_component(noise, DT, [ratio * DT], damping)
     # 1e-9 is what the package promises; Brent's method leaves 1e-10 of the reference
     assert_allclose(
         [ours.per[0], ours.sd[0]], reference(noise, DT, ratio * DT, damping)[:2], rtol=1e-9
@@ -26,13 +31,14 @@ def test_agrees_with_matrix_exponentials(noise, reference, ratio, damping):
 
 
 def padded(seed, before, strong, after):
-    """A pulse of smoothed noise between long pads of almost nothing, as acausal filters leave them."""
+    """Return pulses of smoothed noise between long quiet pads, as acausal filters leave them."""
     rng = np.random.default_rng(seed)
-    north, east = rng.normal(size=(2, before + strong + after))
+    components = rng.normal(size=(2, before + strong + after))
+    # Nine to three powers of ten below the pulse, but not zero
     quiet = 10.0 ** rng.uniform(-9, -3)
-    shape = np.full(north.size, quiet)
+    shape = np.full(before + strong + after, quiet)
     shape[before : before + strong] = np.sin(np.linspace(0.0, np.pi, strong)) ** 2 + quiet
-    return [np.convolve(component, np.ones(5) / 5, "same") * shape for component in (north, east)]
+    return [np.convolve(component, np.ones(5) / 5, "same") * shape for component in components]
 
 
 @settings(max_examples=60, deadline=None)
@@ -63,14 +69,14 @@ def test_many_oscillators_have_the_spectra_of_one_component(before):
     periods = DT * np.geomspace(2.0, 300.0, 2000)
     for damping in (0.01, 0.2):
         ours, spectra = (
-            oscillator_maxima(north, DT, periods, damping),
+            one_component(north, DT, periods, damping),
             response_spectra(north, DT, periods, damping),
         )
         assert_allclose([ours.per, ours.sd], [spectra.per, spectra.sd], rtol=2e-11)
 
 
-def company(count, seed):
-    """Oscillators of every stride, some slow enough to be run again, and a long record."""
+def many_oscillators(count, seed):
+    """Return a long record and oscillators of every stride, some slow enough to be run again."""
     rng = np.random.default_rng(seed)
     periods = DT * np.exp(rng.uniform(np.log(0.5), np.log(3000.0), count))
     return (
@@ -82,14 +88,14 @@ def company(count, seed):
     )
 
 
-def test_company_changes_no_bit(monkeypatch):
+def test_other_oscillators_and_threads_change_no_bit(monkeypatch):
     # mutations: largest values of a block's stretch instead of an oscillator's window, lanes mixed
     # up
-    north, east, dt, *oscillators = company(150, 1)
+    north, east, dt, *oscillators = many_oscillators(150, 1)
     together = azimuth_maxima(north, east, dt, *oscillators)
     for part in (slice(0, 1), slice(3, 40), slice(149, None, -1)):
-        some = azimuth_maxima(north, east, dt, *(values[part] for values in oscillators))
-        for alone, among in zip(some, together, strict=True):
+        chosen = [values[part] for values in oscillators]
+        for alone, among in zip(azimuth_maxima(north, east, dt, *chosen), together, strict=True):
             assert_array_equal(alone, among[part])
     monkeypatch.setattr(per_pair, "PART", 5)
     monkeypatch.setattr(oscillator_blocks, "STEPS_WORTH_THREADS", 0)
@@ -104,7 +110,7 @@ def test_company_changes_no_bit(monkeypatch):
 def test_a_late_start_changes_nothing(count):
     # mutations: states lost between stretches of 512 tiles, tiles counted from the stretch instead
     # of the record
-    north, east, dt, *oscillators = company(40, 2)
+    north, east, dt, *oscillators = many_oscillators(40, 2)
     north[0] = east[0] = 0.0  # else the zeros would add a ramp
     once = azimuth_maxima(north, east, dt, *oscillators)
     late = azimuth_maxima(
@@ -116,7 +122,7 @@ def test_a_late_start_changes_nothing(count):
 
 def test_paired_oscillators_are_the_grid(noise):
     periods, dampings = np.array([0.03, 0.1, 0.33, 1.0, 4.0]), np.array([0.02, 0.05, 0.1, 0.0, 0.3])
-    paired = oscillator_maxima(noise, DT, periods, dampings)
+    paired = one_component(noise, DT, periods, dampings)
     spectra = response_spectra(noise, DT, periods, dampings)
     # the same states by another order of operations: rounding alone
     assert_allclose(paired.per, np.diagonal(spectra.per), rtol=1e-12)
@@ -136,7 +142,7 @@ def test_azimuths_superpose_before_the_maximum(noise):
 @pytest.mark.parametrize("factor", [1e-170, -4.0, 1e170])
 def test_lengths_are_proportional_to_the_motion(factor):
     # mutations: absolute floors, squares that overflow or vanish
-    north, east, dt, *oscillators = company(20, 3)
+    north, east, dt, *oscillators = many_oscillators(20, 3)
     once, scaled = (
         azimuth_maxima(size * north, size * east, dt, *oscillators) for size in (1.0, factor)
     )

@@ -1,4 +1,4 @@
-"""The Dataset of a station: what is in it, and what a bad Stream is told."""
+"""The Dataset of a station: its content, and the rejection of unusable Streams."""
 
 import json
 
@@ -17,14 +17,12 @@ MOTION = RANDOM.normal(size=(3, 1200)) * np.hanning(1200)
 
 
 def _stream(azimuths=(0.0, 90.0), vertical=True, **changes):
-    traces = [
-        _trace(
-            f"HN{i}",
-            MOTION[0] * np.cos(np.radians(a)) + MOTION[1] * np.sin(np.radians(a)),
-            sensor_azimuth=a,
-        )
-        for i, a in enumerate(azimuths, start=1)
-    ]
+    traces = []
+    # Sensors along any azimuths of the same horizontal motion
+    for i, azimuth in enumerate(azimuths, start=1):
+        angle = np.radians(azimuth)
+        along = MOTION[0] * np.cos(angle) + MOTION[1] * np.sin(angle)
+        traces.append(_trace(f"HN{i}", along, sensor_azimuth=azimuth))
     traces += [_trace("HNZ", MOTION[2], sensor_dip=-90.0)] if vertical else []
     for trace in traces:
         trace.stats.update(changes)
@@ -56,15 +54,9 @@ def test_dimensions_and_units(station):
     assert station["per"].dims == ("component", "damping", "period")
     assert station["per_azimuthal"].dims == ("azimuth", "damping", "period")
     assert station["component_name"].values.tolist() == ["horizontal_1", "horizontal_2", "vertical"]
-    assert {
-        name: station[name].attrs["units"] for name in ("per", "sd", "sa", "acceleration", "period")
-    } == {
-        "per": "m",
-        "sd": "m",
-        "sa": "m s-2",
-        "acceleration": "m s-2",
-        "period": "s",
-    }
+    units = {"per": "m", "sd": "m", "sa": "m s-2", "acceleration": "m s-2", "period": "s"}
+    # Would catch: pseudo-acceleration in g
+    assert {name: station[name].attrs["units"] for name in units} == units
 
 
 def test_a_component_is_the_spectrum_of_its_trace(station):

@@ -1,4 +1,4 @@
-"""Spectra on disk: the same when read back, and what the conventions ask for."""
+"""Spectra on disk: identical when read back, and what the conventions ask for."""
 
 import numpy as np
 import pytest
@@ -80,16 +80,19 @@ def test_stations_on_different_grids_do_not_make_a_region(stations):
 )  # raised inside the checker by its own dependencies
 @pytest.mark.parametrize("which", ["shard", "region"])
 def test_conventions(stations, tmp_path, which):
-    """All of CF; of ACDD what is highly recommended, but for standard names, which no table has for these spectra."""
     path = tmp_path / f"{which}.nc"
     write_spectra(stations[0] if which == "shard" else region(stations), path)
     suite = CheckSuite()
     suite.load_all_available_checkers()
     dataset = suite.load_dataset(str(path))
     scores = suite.run_all(dataset, ["cf:1.11", "acdd:1.3"], skip_checks=[])
+
+    # All of CF
     cf, errors = scores["cf:1.11"]
     assert not errors, "the checker itself failed"
     assert [result.msgs for result in cf if _failed(result)] == []
+
+    # What ACDD highly recommends, but for standard names, which no table has for these spectra
     high = [
         result
         for result in scores["acdd:1.3"][0]
@@ -100,7 +103,7 @@ def test_conventions(stations, tmp_path, which):
 
 
 def _failed(result):
-    """Tell whether a check lost points; messages alone may be remarks."""
+    """Return whether a check lost points; messages alone may be remarks."""
     reached, possible = (
         result.value if isinstance(result.value, tuple) else (bool(result.value), True)
     )

@@ -14,11 +14,12 @@ from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.screening.by_record.station_motion import StationMotion
 from per_obspy.screening.values import Table, both
-from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
+from per_obspy.spectra.azimuthal import (
+    EVERY_AZIMUTH,
+    azimuthal_per_spectrum,
+    azimuthal_sd_spectrum,
+)
 from per_obspy.spectra.per_pair import azimuth_maxima
-
-#: Every degree of the half circle; radii repeat after 180 degrees.
-EVERY_AZIMUTH = np.arange(180.0)
 
 
 class PairMotion(NamedTuple):

@@ -1,4 +1,4 @@
-"""Which station's record a pair of buildings is given: the nearest on its kind of ground, else the nearest."""
+"""Assignment of a station to each pair: the nearest on its site class, else the nearest."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -14,8 +14,6 @@ from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
 from per_obspy.screening.values import number, values
 
-#: Mean radius of the earth (IUGG), m. On the sphere distances are within 0.6 % of the ellipsoid's.
-
 
 class Stations(NamedTuple):
     """
@@ -28,9 +26,9 @@ class Stations(NamedTuple):
     longitude, latitude : (n_stations,) ndarray
         Degrees east and north.
     site_class : (n_stations,) ndarray of str
-        Of the ground; empty if unknown.
+        Site class of the ground; empty if unknown.
     read : callable
-        Return the Dataset of a station, given its index.
+        Function that returns the Dataset of a station, given its index.
     """
 
     names: NDArray[np.object_]
@@ -41,27 +39,23 @@ class Stations(NamedTuple):
 
 
 def stations_of(datasets: Sequence[xr.Dataset]) -> tuple[Stations, tuple[Rejection, ...]]:
-    """Return the stations that have coordinates, and those that have none."""
-    located = [one for one in datasets if np.isfinite(one["latitude"].item())]
-    nowhere = tuple(
-        Rejection(
-            "station",
-            one["station"].item(),
-            "",
-            None,
-            ("its coordinates are unknown: it serves no pair",),
-        )
-        for one in datasets
-        if not np.isfinite(one["latitude"].item())
+    """Return the stations that have coordinates, and rejections of those that have none."""
+    located = [station for station in datasets if np.isfinite(station["latitude"].item())]
+    stations = Stations(
+        names=np.array([station["station"].item() for station in located], dtype=object),
+        longitude=np.array([number(station, "longitude") for station in located]),
+        latitude=np.array([number(station, "latitude") for station in located]),
+        site_class=np.array([site_class_of(station) for station in located], dtype=object),
+        read=located.__getitem__,
     )
-    names = np.array([one["station"].item() for one in located], dtype=object)
-    longitude, latitude = (
-        [number(one, name) for one in located] for name in ("longitude", "latitude")
+    # Without coordinates a station cannot be the nearest to any pair
+    reasons = ("its coordinates are unknown: it serves no pair",)
+    rejections = tuple(
+        Rejection("station", station["station"].item(), "", None, reasons)
+        for station in datasets
+        if not np.isfinite(station["latitude"].item())
     )
-    ground = np.array([site_class_of(one) for one in located], dtype=object)
-    return Stations(
-        names, np.array(longitude), np.array(latitude), ground, located.__getitem__
-    ), nowhere
+    return stations, rejections
 
 
 def site_class_of(station: xr.Dataset) -> str:
@@ -73,10 +67,10 @@ def assigned(
     pairs: pd.DataFrame, stations: Stations, reach: float
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
-    Return the pairs with their station, its index and its distance, and those that have none in reach.
+    Assign a station to each pair: index, name and distance; reject pairs without one in reach.
 
     The station is the nearest one of the pair's own site class; where none of these is in reach, or
-    the class of the pair is unknown, the nearest of all. ``other_site_class`` tells that both
+    the class of the pair is unknown, the nearest of all. ``other_site_class`` is true where both
     classes are known and differ.
 
     Parameters
@@ -84,88 +78,92 @@ def assigned(
     pairs : DataFrame
         With ``pair_id, longitude, latitude``, and ``site_class`` if it is known.
     stations : Stations
-        Which there are.
+        Stations with coordinates.
     reach : float
         Largest distance, m.
     """
     if not stations.names.size:
-        lost = (
-            Rejection("pair", name, "", None, ("no station has coordinates",))
-            for name in pairs["pair_id"]
-        )
-        return pairs.iloc[:0].assign(
-            station="", station_index=0, distance=0.0, other_site_class=False
-        ), tuple(lost)
-    ground = (
-        pairs["site_class"].to_numpy(object)
-        if "site_class" in pairs
-        else np.full(len(pairs), "", dtype=object)
-    )
-    index, distance = _serving(
-        values(pairs, "longitude"), values(pairs, "latitude"), ground, stations, reach
-    )
-    there = stations.site_class[index]
+        return _without_stations(pairs)
+    if "site_class" in pairs:
+        site_class = pairs["site_class"].to_numpy(object)
+    else:
+        site_class = np.full(len(pairs), "", dtype=object)
+
+    # The station of every pair, and whether its ground is of another class
+    longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
+    index, distance = _serving_station(longitude, latitude, site_class, stations, reach)
+    station_class = stations.site_class[index]
+    known = (site_class != "") & (station_class != "")
     placed = pairs.assign(
         station=stations.names[index],
         station_index=index,
         distance=distance,
-        other_site_class=(ground != "") & (there != "") & (ground != there),
+        other_site_class=known & (site_class != station_class),
     )
-    far = placed[distance > reach]
-    told = zip(
-        far["pair_id"],
-        far["station"],
-        far["distance"],
-        _if_swapped(far, stations, reach),
-        strict=True,
-    )
-    rejected = tuple(
-        Rejection(
-            "pair",
-            name,
-            "",
-            None,
-            (f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m{hint}",),
-        )
-        for name, station, metres, hint in told
-    )
-    return placed[distance <= reach], rejected
+
+    # Pairs beyond the reach are left out
+    return placed[distance <= reach], _out_of_reach(placed[distance > reach], stations, reach)
 
 
-def _if_swapped(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
-    """Return, pair by pair, what to add if exchanged coordinates would bring a station into reach; empty if not."""
+def _without_stations(pairs: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
+    """Return no pairs, and a rejection of each, where there is no station."""
+    none = pairs.iloc[:0].assign(station="", station_index=0, distance=0.0, other_site_class=False)
+    reasons = ("no station has coordinates",)
+    return none, tuple(Rejection("pair", name, "", None, reasons) for name in pairs["pair_id"])
+
+
+def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tuple[Rejection, ...]:
+    """Return rejections of pairs whose station is too far away, with its name and distance."""
+    # Exchanged coordinates are the usual reason of a pair far from every station
+    rejections = []
+    hints = _swap_hints(pairs, stations, reach)
+    rows = zip(pairs["pair_id"], pairs["station"], pairs["distance"], hints, strict=True)
+    for name, station, metres, hint in rows:
+        reason = f"nearest station {station} is {metres:.0f} m away, beyond {reach:.0f} m{hint}"
+        rejections.append(Rejection("pair", name, "", None, (reason,)))
+    return tuple(rejections)
+
+
+def _swap_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
+    """Return a hint per pair that exchanged coordinates would reach a station; empty if not."""
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
-    on_earth = np.abs(longitude) <= 90.0
+    # A longitude beyond 90 degrees cannot be a latitude
+    possible = np.abs(longitude) <= 90.0
     index, distance = nearest_station(
-        latitude, np.where(on_earth, longitude, 0.0), stations.longitude, stations.latitude
+        latitude, np.where(possible, longitude, 0.0), stations.longitude, stations.latitude
     )
-    return [
-        f"; with longitude = {east:g} and latitude = {north:g} exchanged, {stations.names[station]} would be "
-        f"{metres:.0f} m away: are they swapped?"
-        if near
-        else ""
-        for east, north, station, metres, near in zip(
-            longitude, latitude, index, distance, on_earth & (distance <= reach), strict=True
+    hints = []
+    swapped = possible & (distance <= reach)
+    rows = zip(longitude, latitude, index, distance, swapped, strict=True)
+    for east, north, station, metres, near in rows:
+        hint = (
+            f"; with longitude = {east:g} and latitude = {north:g} exchanged, "
+            f"{stations.names[station]} would be {metres:.0f} m away: are they swapped?"
         )
-    ]
+        hints.append(hint if near else "")
+    return hints
 
 
-def _serving(
+def _serving_station(
     longitude: FloatArray,
     latitude: FloatArray,
-    ground: NDArray[np.object_],
+    site_class: NDArray[np.object_],
     stations: Stations,
     reach: float,
 ) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the station of every place and the distance to it."""
+    """Return the index of the station that serves each place, and the distance to it."""
     index, distance = nearest_station(longitude, latitude, stations.longitude, stations.latitude)
-    for name in set(ground.tolist()) & set(stations.site_class.tolist()) - {""}:
-        alike, rows = np.flatnonzero(stations.site_class == name), np.flatnonzero(ground == name)
-        near, metres = nearest_station(
+    # A station of the place's own class goes before a nearer one if it is in reach
+    common = set(site_class.tolist()) & set(stations.site_class.tolist()) - {""}
+    for name in common:
+        alike = np.flatnonzero(stations.site_class == name)
+        rows = np.flatnonzero(site_class == name)
+        nearest, metres = nearest_station(
             longitude[rows], latitude[rows], stations.longitude[alike], stations.latitude[alike]
         )
         within = metres <= reach
-        index[rows[within]], distance[rows[within]] = alike[near[within]], metres[within]
+        index[rows[within]] = alike[nearest[within]]
+        distance[rows[within]] = metres[within]
     return index, distance
 
 
@@ -176,7 +174,7 @@ def nearest_station(
     station_latitude: FloatArray,
 ) -> tuple[NDArray[np.intp], FloatArray]:
     """
-    Return the nearest station of every place and the great-circle distance to it.
+    Find the nearest station of every place and the great-circle distance to it.
 
     Parameters
     ----------
@@ -190,23 +188,23 @@ def nearest_station(
     station : (n_places,) ndarray of int
         Index of the station.
     distance : (n_places,) ndarray
-        On the sphere, m.
+        Distance on the sphere, m, within 0.6 % of that on the ellipsoid.
 
     Examples
     --------
-    >>> nearest_station(np.array([0.1]), np.array([0.0]), np.array([180.0, 0.0]), np.array([0.0, 0.0]))[1].round()
+    >>> stations = np.array([180.0, 0.0]), np.array([0.0, 0.0])
+    >>> nearest_station(np.array([0.1]), np.array([0.0]), *stations)[1].round()
     array([11120.])
     """
     tree = cKDTree(on_sphere(station_longitude, station_latitude))
     chord, station = tree.query(on_sphere(longitude, latitude))
-    return np.asarray(station, dtype=np.intp), 2.0 * EARTH_RADIUS * np.arcsin(
-        np.clip(chord / 2.0, 0.0, 1.0)
-    )
+    angle = 2.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
+    return np.asarray(station, dtype=np.intp), EARTH_RADIUS * angle
 
 
 def on_sphere(longitude: FloatArray, latitude: FloatArray) -> FloatArray:
     """Return points on the unit sphere, (n, 3)."""
     east, north = np.radians(longitude), np.radians(latitude)
-    return np.stack(
-        [np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), np.sin(north)], axis=-1
-    )
+    x = np.cos(north) * np.cos(east)
+    y = np.cos(north) * np.sin(east)
+    return np.stack([x, y, np.sin(north)], axis=-1)

@@ -1,12 +1,12 @@
 """
-Ground motion between stations: an attenuation trend, and how far the motion around a place departs from it.
+Ground motion between stations: an attenuation trend and kriging of the residuals about it.
 
 Within each site class and at each period, ln PER is a trend fitted by generalised least squares
 plus a residual whose spatial correlation is that of Jayaram & Baker (2009), published for spectral
 acceleration and used here for PER. Median and log-standard deviation are those of universal
 kriging: at a station its own value and no deviation, far from every station the trend, the whole
-deviation and what is unknown of the trend. The trend knows every station; the residual of a place
-is told by its nearest ones. Numbers of a place depend on no other place.
+deviation and the uncertainty of the trend. The trend uses every station, the residual of a place
+its nearest ones. Numbers of a place depend on no other place.
 """
 
 from collections.abc import Iterator
@@ -25,15 +25,15 @@ from per_obspy.screening.ground_motion.sites import Sites
 from per_obspy.screening.ground_motion.spatial_correlation import decay_length
 from per_obspy.screening.ground_motion.trend import Group, features_of, fitted_group
 
-#: Stations that tell the residual of a place, the nearest ones: they screen the others. Of 300
+#: Number of nearest stations that decide the residual of a place: they screen the others. Of 300
 #: stations within 60 km whose motion has the assumed correlation, the nearest 20 give deviations
 #: within 0.7 % of those of all of them, and medians within 0.1 deviations at 99 places of 100.
 NEIGHBOURS = 20
 
 
-class Field(NamedTuple):
+class MotionField(NamedTuple):
     """
-    Everything that the motion at any place is told from; small, and the same for every worker.
+    Fitted trend and residuals of a region: small, and the same for every worker.
 
     Attributes
     ----------
@@ -61,8 +61,8 @@ class InterpolatedMotion(NamedTuple):
     log_std : (n_places,) ndarray
         Log-standard deviation; NaN as well.
     fallback : (n_places,) ndarray of bool
-        Whether no station stands on the place's site class, so that stations of other classes were
-        used.
+        Whether the place's site class has no station that supports the period, so that stations of
+        other classes were used.
     """
 
     ln_median: FloatArray
@@ -76,14 +76,14 @@ def fitted_field(
     usable: ArrayLike,
     periods: ArrayLike,
     settings: Interpolation,
-) -> Field:
+) -> MotionField:
     """
-    Fit the trend of each site class, and of all stations for places that no class of its own serves.
+    Fit the trend of each site class, and that of all stations for places of other classes.
 
     Parameters
     ----------
     stations : Sites
-        Where there are records.
+        Places of the records.
     ln_per : (n_stations, n_periods) array_like
         Natural logarithm of PER in m.
     usable : (n_stations, 2) array_like
@@ -91,7 +91,7 @@ def fitted_field(
     periods : (n_periods,) array_like
         s, rising; at least two.
     settings : Interpolation
-        What is assumed of the deviation, and the case of the correlation.
+        Assumed deviation, and the case of the spatial correlation.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def fitted_field(
     Notes
     -----
     The trend is a mean, with a slope in the logarithm of the distance to the source and one in that
-    of Vs30 where enough stations differ enough in it; a place whose value is unknown is given the
+    of Vs30 where enough stations differ enough in it; a place whose value is unknown takes the
     stations' mean. The deviation joins the stations' own with the assumed one ``s0``, which counts
     as ``w`` stations: ``s² = (w s0² + e' C^-1 e) / (w + n - p)``.
 
@@ -110,45 +110,54 @@ def fitted_field(
     Cressie (1993), Statistics for Spatial Data, section 3.4 (universal kriging); Jayaram & Baker
     (2009).
     """
-    values, grid = (
-        checks.finite("ln_per", ln_per),
-        np.atleast_1d(checks.positive("periods", periods)),
-    )
+    values, grid = _checked_grid(stations, ln_per, periods)
+    limits = checks.numbers("usable", usable)
+
+    # One group per known site class; unknown classes are a group only if all classes are unknown
+    names = np.unique(stations.site_class.astype(str)).tolist()
+    groups: dict[str | None, Group] = {}
+    for name in names:
+        if name or len(names) == 1:
+            rows = np.flatnonzero(stations.site_class == name)
+            groups[name] = fitted_group(
+                stations.at(rows), values[rows], limits[rows], grid, settings
+            )
+
+    # All stations together serve the places that no group of their own class serves
+    if len(names) == 1:
+        groups[None] = groups[names[0]]
+    else:
+        groups[None] = fitted_group(stations, values, limits, grid, settings)
+    return MotionField(grid, groups, settings.vs30_clustered)
+
+
+def _checked_grid(
+    stations: Sites, ln_per: ArrayLike, periods: ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Return ln PER of every station and the grid of periods."""
+    # Shapes first, then a grid that can be interpolated
+    values = checks.finite("ln_per", ln_per)
+    grid = np.atleast_1d(checks.positive("periods", periods))
     if values.shape != (stations.longitude.size, grid.size) or not values.size:
         raise ValueError(
-            f"ln_per must be ({stations.longitude.size}, {grid.size}) and not empty, got {values.shape}"
+            f"ln_per must be ({stations.longitude.size}, {grid.size}) and not empty, "
+            f"got {values.shape}"
         )
     if grid.size < 2 or (np.diff(grid) <= 0).any():
         raise ValueError(f"periods must be at least two and rising, got {grid}")
-    limits = checks.numbers("usable", usable)
-    names = np.unique(stations.site_class.astype(str)).tolist()
-    chosen = {
-        name: np.flatnonzero(stations.site_class == name)
-        for name in names
-        if name or len(names) == 1
-    }
-    groups: dict[str | None, Group] = {
-        name: fitted_group(stations.at(some), values[some], limits[some], grid, settings)
-        for name, some in chosen.items()
-    }
-    groups[None] = (
-        groups[names[0]]
-        if len(names) == 1
-        else fitted_group(stations, values, limits, grid, settings)
-    )
-    return Field(grid, groups, settings.vs30_clustered)
+    return values, grid
 
 
-def motion_at(field: Field, places: Sites, period: ArrayLike) -> InterpolatedMotion:
+def motion_at(field: MotionField, places: Sites, period: ArrayLike) -> InterpolatedMotion:
     """
     Estimate the motion at places from the stations around them.
 
     Parameters
     ----------
-    field : Field
+    field : MotionField
         From :func:`fitted_field`.
     places : Sites
-        Where the motion is wanted.
+        Places at which the motion is estimated.
     period : (n_places,) array_like
         One for each place, s. Between the grid's periods ln PER is linear in the logarithm of the
         period.
@@ -157,33 +166,38 @@ def motion_at(field: Field, places: Sites, period: ArrayLike) -> InterpolatedMot
     -----
     Stations of a place's own site class serve it. Where there is none that supports the period, or
     the class of the place is unknown while that of a station is known, all stations do and
-    ``fallback`` says so.
+    ``fallback`` is true.
     """
-    # functions of NumPy may differ in the last bit between strides
-    wanted = np.ascontiguousarray(
+    # Contiguous: functions of NumPy may differ in the last bit between strides
+    target = np.ascontiguousarray(
         np.broadcast_to(checks.positive("period", period), places.longitude.shape)
     )
-    out, fallback = np.full((wanted.size, 2), np.nan), np.zeros(wanted.size, dtype=bool)
-    for rows, group in _served(field, places):
-        out[rows] = _kriged(field, group, places.at(rows), wanted[rows])
-    inside = (wanted >= field.periods[0]) & (wanted <= field.periods[-1])
-    left = np.flatnonzero(np.isnan(out[:, 0]) & inside)
-    out[left] = _kriged(field, field.groups[None], places.at(left), wanted[left])
-    fallback[left] = ~np.isnan(out[left, 0])
-    return InterpolatedMotion(out[:, 0].copy(), out[:, 1].copy(), fallback)
+
+    # Stations of the place's own site class
+    motion = np.full((target.size, 2), np.nan)
+    for rows, group in _places_by_class(field, places):
+        motion[rows] = _kriged(field, group, places.at(rows), target[rows])
+
+    # All stations where that class has no motion at a period of the grid
+    on_the_grid = (target >= field.periods[0]) & (target <= field.periods[-1])
+    rest = np.flatnonzero(np.isnan(motion[:, 0]) & on_the_grid)
+    motion[rest] = _kriged(field, field.groups[None], places.at(rest), target[rest])
+    fallback = np.zeros(target.size, dtype=bool)
+    fallback[rest] = ~np.isnan(motion[rest, 0])
+    return InterpolatedMotion(motion[:, 0].copy(), motion[:, 1].copy(), fallback)
 
 
-def _served(field: Field, places: Sites) -> Iterator[tuple[NDArray[np.intp], Group]]:
-    """Give places with the stations on their site class."""
+def _places_by_class(field: MotionField, places: Sites) -> Iterator[tuple[NDArray[np.intp], Group]]:
+    """Yield the places of each site class with the stations on it."""
     for name in np.unique(places.site_class.astype(str)).tolist():
         if name in field.groups:
             yield np.flatnonzero(places.site_class == name), field.groups[name]
 
 
-def _kriged(field: Field, group: Group, places: Sites, period: FloatArray) -> FloatArray:
-    """Return median and deviation, (n_places, 2), NaN where no station of the group knows."""
-    out = np.full((period.size, 2), np.nan)
+def _kriged(field: MotionField, group: Group, places: Sites, period: FloatArray) -> FloatArray:
+    """Return median and deviation, (n_places, 2), NaN where no station of the group serves."""
     lower, share = on_grid(field.periods, period)
+    # Positions on the unit sphere, so that distances are chords times the Earth's radius
     arrays = (
         on_sphere(places.longitude, places.latitude),
         features_of(places),
@@ -192,13 +206,14 @@ def _kriged(field: Field, group: Group, places: Sites, period: FloatArray) -> Fl
         share,
         decay_length(period, field.vs30_clustered),
     )
-    kriged(*group, arrays, 2.0 * EARTH_RADIUS, NEIGHBOURS, out)
-    out[(period < field.periods[0]) | (period > field.periods[-1])] = np.nan
-    return out
+    motion = np.full((period.size, 2), np.nan)
+    kriged(*group, arrays, 2.0 * EARTH_RADIUS, NEIGHBOURS, motion)
+    motion[(period < field.periods[0]) | (period > field.periods[-1])] = np.nan
+    return motion
 
 
 def on_grid(periods: FloatArray, period: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """Return the lower neighbour on a grid of periods, and the part of the way to the next in ln period; kept on it."""
+    """Return the lower neighbour on a grid of periods and the share of the step above it, ln T."""
     lower = np.clip(np.searchsorted(periods, period, side="right") - 1, 0, periods.size - 2)
     grid = np.log(periods)
     share = (np.log(period) - grid[lower]) / (grid[lower + 1] - grid[lower])

@@ -1,11 +1,11 @@
 """
-The ground motion at a pair of buildings, compared with that of the record which the pair is given.
+The ground motion at a pair of buildings, compared with that of the record assigned to the pair.
 
-The record decides the demand; the columns made here tell how far the motion at the site is expected
-to be from it, and how well that is known. The measure of a station's motion is PER at 5 % damping,
-the median over horizontal azimuths (RotD50) where there are two horizontals, else that of the only
-one; its ratio serves every damping and azimuth. The spatial correlation was published for spectral
-acceleration.
+The record decides the demand; the columns made here state how far the motion at the site is
+expected to be from it, and how well that is known. The measure of a station's motion is PER at 5 %
+damping, the median over horizontal azimuths (RotD50) where there are two horizontals, else that of
+the only one; its ratio serves every damping and azimuth. The spatial correlation was published for
+spectral acceleration.
 """
 
 from collections.abc import Iterable
@@ -19,17 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Interpolation
-from per_obspy.screening.ground_motion.kriging import Field, fitted_field, motion_at, on_grid
+from per_obspy.constants import REFERENCE_DAMPING
+from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
+from per_obspy.screening.ground_motion.kriging import MotionField, fitted_field, motion_at, on_grid
 from per_obspy.screening.ground_motion.sites import Sites, sites
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
 from per_obspy.screening.values import number, values
 
-#: Damping at which stations are compared; where it is not stored, between the stored ones or the
-#: next of them.
-DAMPING = 0.05
+#: Shortest distance from the hypocentre that the trend uses, m.
+SHORTEST_DISTANCE = 1000.0
 
 
-class Source(NamedTuple):
+class Hypocentre(NamedTuple):
     """Where the earthquake started: degrees east and north, depth in m."""
 
     longitude: float
@@ -39,28 +40,47 @@ class Source(NamedTuple):
 
 class StationField(NamedTuple):
     """
-    The motion of all stations of a run: made once, small, and given to every worker.
+    The motion of all stations of a run: made once, small, and passed to every worker.
 
     Attributes
     ----------
-    field : Field
+    field : MotionField
         Trend and residuals.
     ln_per : (n_stations, n_periods) ndarray
-        Of the stations in the order in which they came, PER in m.
-    source : Source or None
+        ln PER of the stations in the order in which they came, PER in m.
+    source : Hypocentre or None
         Where the earthquake started, if that is known.
     """
 
-    field: Field
+    field: MotionField
     ln_per: FloatArray
-    source: Source | None
+    source: Hypocentre | None
+
+
+class RegionalMotion(NamedTuple):
+    """
+    The ground motion of a region: stations, the motion between them, and a map beyond their reach.
+
+    Attributes
+    ----------
+    stations : Stations
+        Stations whose records are assigned to pairs.
+    field : StationField or None
+        The motion between the stations; None if there are no stations.
+    shakemap : Dataset or None
+        ShakeMap for pairs without a station in reach.
+    """
+
+    stations: Stations
+    field: StationField | None
+    shakemap: xr.Dataset | None
 
 
 def prepared_field(
-    stations: Iterable[xr.Dataset], settings: Interpolation, source: Source | None = None
+    stations: Iterable[xr.Dataset], settings: Interpolation, source: Hypocentre | None = None
 ) -> StationField:
     """
-    Prepare what the motion at every site is told from.
+    Fit the field from which the motion at every site is estimated.
 
     Parameters
     ----------
@@ -68,8 +88,8 @@ def prepared_field(
         From :func:`per_obspy.station_spectra`, with coordinates, one after the other;
         ``site_class`` (text) and ``vs30`` (m/s) are used where a station has them.
     settings : Interpolation
-        What is assumed of the deviation, and the case of the correlation.
-    source : Source, optional
+        Assumed deviation, and the case of the spatial correlation.
+    source : Hypocentre, optional
         The hypocentre, from which the trend's distances are measured.
 
     Raises
@@ -77,26 +97,24 @@ def prepared_field(
     ValueError
         If there is no station, or one without coordinates.
     """
-    told = [_told(station) for station in stations]
-    if not told:
+    motions = [_station_motion(station) for station in stations]
+    if not motions:
         raise ValueError("stations must be one at least, got none")
-    periods = told[0].periods
-    ln_per = np.array([np.interp(np.log(periods), np.log(one.periods), one.ln_per) for one in told])
-    usable = np.array([one.usable for one in told])
+
+    # The periods of the first station are the grid of all
+    periods = motions[0].periods
+    ln_per = np.array(
+        [np.interp(np.log(periods), np.log(motion.periods), motion.ln_per) for motion in motions]
+    )
+    usable = np.array([motion.usable for motion in motions])
+
+    # A station that did not move has no ln PER: it supports no period
     still = ~np.isfinite(ln_per).all(axis=1)
-    ln_per[still], usable[still] = (
-        np.nan,
-        (np.inf, -np.inf),
-    )  # a station that did not move knows nothing
-    places = sites(
-        [one.longitude for one in told],
-        [one.latitude for one in told],
-        np.array([one.site_class for one in told], dtype=object),
-        vs30=[one.vs30 for one in told],
-    )
-    field = fitted_field(
-        _seen_from(source, places), np.nan_to_num(ln_per), usable, periods, settings
-    )
+    ln_per[still] = np.nan
+    usable[still] = (np.inf, -np.inf)
+
+    places = _with_source_distance(source, _places_of(motions))
+    field = fitted_field(places, np.nan_to_num(ln_per), usable, periods, settings)
     return StationField(field, ln_per, source)
 
 
@@ -104,7 +122,7 @@ def motion_at_pairs(
     prepared: StationField, pairs: pd.DataFrame, station: ArrayLike
 ) -> dict[str, NDArray[np.generic]]:
     """
-    Return the motion at pairs of buildings relative to their record, as columns of the risk table.
+    Estimate the motion at pairs relative to their records, as columns of the risk table.
 
     Parameters
     ----------
@@ -113,8 +131,8 @@ def motion_at_pairs(
     pairs : DataFrame
         Completed pairs; ``site_class`` and ``vs30`` are used where the table has them.
     station : (n_pairs,) array_like of int
-        Which station's record each pair is given, counted as :func:`prepared_field` was given them;
-        one for all if it is a single number.
+        Index of the station whose record each pair uses, in the order of
+        :func:`prepared_field`; a single number serves all pairs.
 
     Returns
     -------
@@ -122,52 +140,60 @@ def motion_at_pairs(
         ``ln_per_ratio_i``: ln(PER at the site / PER of the record) at the period of building i;
         ``ln_per_std_i``: its log-standard deviation; both 0 at the station's own place where the
         record supports the period, both NaN where no station does.
-        ``motion_from_other_site_class``: whether stations of another site class, or of one nobody
-        knows, had to serve.
+        ``motion_from_other_site_class``: whether stations of another or of an unknown site class
+        had to serve.
 
     Raises
     ------
     ValueError
         If a station's index is out of range.
     """
-    longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
-    count = len(pairs)
-    index = np.broadcast_to(
-        checks.between("station", station, 0, len(prepared.ln_per) - 1), count
+    record = np.broadcast_to(
+        checks.between("station", station, 0, len(prepared.ln_per) - 1), len(pairs)
     ).astype(np.intp)
-    vs30 = values(pairs, "vs30") if "vs30" in pairs else np.nan
-    site_class = pairs["site_class"].to_numpy(dtype=object) if "site_class" in pairs else ""
-    places = _seen_from(prepared.source, sites(longitude, latitude, site_class, np.nan, vs30))
+    places = _with_source_distance(prepared.source, _places_of_pairs(pairs))
+
     columns: dict[str, NDArray[np.generic]] = {}
-    crossed = np.zeros(count, dtype=bool)
+    fallback = np.zeros(len(pairs), dtype=bool)
+    # Both buildings share one place, but each has its own period
     for i in (1, 2):
         period = values(pairs, f"period_{i}")
         motion = motion_at(prepared.field, places, period)
-        columns[f"ln_per_ratio_{i}"] = motion.ln_median - _stored(prepared, index, period)
+        columns[f"ln_per_ratio_{i}"] = motion.ln_median - _stored_ln_per(prepared, record, period)
         columns[f"ln_per_std_{i}"] = motion.log_std
-        crossed |= motion.fallback
-    return columns | {"motion_from_other_site_class": crossed}
+        fallback |= motion.fallback
+    return columns | {"motion_from_other_site_class": fallback}
 
 
-def _stored(prepared: StationField, index: NDArray[np.intp], period: FloatArray) -> FloatArray:
-    """Return ln PER of the pairs' records at their periods."""
+def _places_of_pairs(pairs: pd.DataFrame) -> Sites:
+    """Return the places of pairs, with site class and Vs30 where the table has them."""
+    site_class = pairs["site_class"].to_numpy(dtype=object) if "site_class" in pairs else ""
+    vs30 = values(pairs, "vs30") if "vs30" in pairs else np.nan
+    return sites(values(pairs, "longitude"), values(pairs, "latitude"), site_class, np.nan, vs30)
+
+
+def _stored_ln_per(
+    prepared: StationField, record: NDArray[np.intp], period: FloatArray
+) -> FloatArray:
+    """Interpolate ln PER of the pairs' records at their periods."""
     lower, share = on_grid(prepared.field.periods, period)
-    stored: FloatArray = (1.0 - share) * prepared.ln_per[index, lower] + share * prepared.ln_per[
-        index, lower + 1
-    ]
+    below = prepared.ln_per[record, lower]
+    above = prepared.ln_per[record, lower + 1]
+    stored: FloatArray = (1.0 - share) * below + share * above
     return stored
 
 
-def _seen_from(source: Source | None, places: Sites) -> Sites:
-    """Return the places with their distances from the hypocentre, of which a kilometre is the shortest."""
+def _with_source_distance(source: Hypocentre | None, places: Sites) -> Sites:
+    """Return the places with their distances from the hypocentre."""
     if source is None:
         return places
     along = great_circle(source.longitude, source.latitude, places.longitude, places.latitude)
-    return places._replace(source_distance=np.maximum(np.hypot(along, source.depth), 1000.0))
+    distance = np.maximum(np.hypot(along, source.depth), SHORTEST_DISTANCE)
+    return places._replace(source_distance=distance)
 
 
-class _Told(NamedTuple):
-    """What the field takes of a station."""
+class _StationMotion(NamedTuple):
+    """Place, ground and ln PER of one station; usable periods as shortest and longest, s."""
 
     longitude: float
     latitude: float
@@ -178,23 +204,41 @@ class _Told(NamedTuple):
     ln_per: FloatArray
 
 
-def _told(station: xr.Dataset) -> _Told:
-    return _Told(
-        number(station, "longitude"),
-        number(station, "latitude"),
-        str(station["site_class"].item()) if "site_class" in station else "",
-        number(station, "vs30") if "vs30" in station else np.nan,
-        (number(station, "shortest_usable_period"), number(station, "longest_usable_period")),
-        np.asarray(station["period"], dtype=np.float64),
-        _ln_per(station),
+def _station_motion(station: xr.Dataset) -> _StationMotion:
+    """Extract from a station's Dataset the values that the field uses."""
+    return _StationMotion(
+        longitude=number(station, "longitude"),
+        latitude=number(station, "latitude"),
+        site_class=site_class_of(station),
+        vs30=number(station, "vs30") if "vs30" in station else np.nan,
+        usable=(
+            number(station, "shortest_usable_period"),
+            number(station, "longest_usable_period"),
+        ),
+        periods=np.asarray(station["period"], dtype=np.float64),
+        ln_per=_ln_per(station),
+    )
+
+
+def _places_of(motions: list[_StationMotion]) -> Sites:
+    """Return the places of stations."""
+    return sites(
+        [motion.longitude for motion in motions],
+        [motion.latitude for motion in motions],
+        np.array([motion.site_class for motion in motions], dtype=object),
+        vs30=[motion.vs30 for motion in motions],
     )
 
 
 def _ln_per(station: xr.Dataset) -> FloatArray:
     """Return ln PER at 5 % damping, minus infinity where there was no motion."""
     stored = station["per_rotd50"] if "per_rotd50" in station else station["per"][0]
-    dampings = np.asarray(station["damping"], dtype=np.float64)
     with np.errstate(divide="ignore"):
         radii = np.log(np.asarray(stored, dtype=np.float64))
+
+    # Between the stored dampings if 5 % is not one of them; np.interp needs them ascending
+    dampings = np.asarray(station["damping"], dtype=np.float64)
     order = np.argsort(dampings)
-    return np.array([np.interp(DAMPING, dampings[order], column) for column in radii[order].T])
+    return np.array(
+        [np.interp(REFERENCE_DAMPING, dampings[order], column) for column in radii[order].T]
+    )

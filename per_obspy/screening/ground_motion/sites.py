@@ -1,4 +1,4 @@
-"""Places with what is known of their ground and of their way to the source of the earthquake."""
+"""Places with their site class, Vs30 and distance to the source of the earthquake."""
 
 from typing import NamedTuple
 
@@ -18,11 +18,11 @@ class Sites(NamedTuple):
     longitude, latitude : ndarray
         Degrees east and north.
     site_class : ndarray of str
-        Any words; ``""`` where it is unknown.
+        Name of the site class, free text; ``""`` where it is unknown.
     source_distance : ndarray
-        To the source of the earthquake, m; NaN where it is unknown.
+        Distance to the source of the earthquake, m; NaN where it is unknown.
     vs30 : ndarray
-        m/s; NaN where it is unknown.
+        Mean shear-wave velocity of the upper 30 m, m/s; NaN where it is unknown.
     """
 
     longitude: FloatArray
@@ -49,14 +49,16 @@ def sites(
     source_distance: ArrayLike = np.nan,
     vs30: ArrayLike = np.nan,
 ) -> Sites:
-    """Return places with what is known of them; one value may stand for all (see :class:`Sites`)."""
-    # contiguous: functions of NumPy may differ in the last bit between strides
+    """Return places with their ground; a single value holds for all (see :class:`Sites`)."""
+    # Contiguous: functions of NumPy may differ in the last bit between strides
     east = np.ascontiguousarray(checks.between("longitude", longitude, -180.0, 180.0))
     north = np.ascontiguousarray(checks.between("latitude", latitude, -90.0, 90.0))
-    numbers = (
-        np.ascontiguousarray(np.broadcast_to(np.asarray(values, dtype=np.float64), east.shape))
-        for values in (source_distance, vs30)
-    )
+    distance = np.broadcast_to(np.asarray(source_distance, dtype=np.float64), east.shape)
+    velocity = np.broadcast_to(np.asarray(vs30, dtype=np.float64), east.shape)
     return Sites(
-        east, north, np.broadcast_to(np.asarray(site_class, dtype=object), east.shape), *numbers
+        longitude=east,
+        latitude=north,
+        site_class=np.broadcast_to(np.asarray(site_class, dtype=object), east.shape),
+        source_distance=np.ascontiguousarray(distance),
+        vs30=np.ascontiguousarray(velocity),
     )

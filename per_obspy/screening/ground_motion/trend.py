@@ -1,4 +1,4 @@
-"""The trend of ln PER over the stations that serve places together, period by period, by generalised least squares."""
+"""The trend of ln PER over the stations of a group, per period, by generalised least squares."""
 
 from typing import NamedTuple
 
@@ -12,24 +12,39 @@ from per_obspy.screening.ground_motion.assignment import on_sphere
 from per_obspy.screening.ground_motion.sites import Sites
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle, residual_correlation
 
-#: A slope of the trend (of ln distance, of ln Vs30) is fitted where so many stations differ by so
-#: much; our choice.
+#: Stations per coefficient that a slope of the trend (of ln distance, of ln Vs30) needs, and the
+#: standard deviation that the feature must exceed over them; our choice.
 STATIONS_PER_SLOPE, SPREAD = 6, 0.1
 
-#: Stations whose coordinates agree to so many decimals of a degree (1 m) are one place: their mean
-#: ln PER counts.
+#: Stations whose coordinates agree to this number of decimals of a degree (1 m) are one place:
+#: their mean ln PER counts.
 DECIMALS = 5
 
 
+#: Per period: coefficients (n_periods, 3), their covariance for a deviation of 1 (n_periods, 3, 3),
+#: means of the features (n_periods, 2), deviation (n_periods,).
+Trend = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+
 class Group(NamedTuple):
-    """Stations that serve places together, and their trend: what the kernel takes (see ``kernels/kriging.py``)."""
+    """
+    Stations that serve places together, and their trend, as ``kernels/kriging.py`` takes them.
+
+    Attributes
+    ----------
+    stations : tuple of ndarray
+        Positions on the unit sphere (n, 3), distances between stations (n, n), usable periods
+        (n, 2), features (n, 2), residuals of ln PER (n, n_periods).
+    trend : tuple of ndarray
+        Fit of every period, see ``Trend``.
+    """
 
     stations: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
-    trend: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    trend: Trend
 
 
 def features_of(places: Sites) -> FloatArray:
-    """Return what the trend depends on, NaN where it is not known."""
+    """Return ln source distance and ln Vs30 of places, (n_places, 2), NaN where unknown."""
     return np.log(np.stack([places.source_distance, places.vs30], axis=1))
 
 
@@ -40,93 +55,143 @@ def fitted_group(
     periods: FloatArray,
     settings: Interpolation,
 ) -> Group:
-    """Return stations with their trend at every period."""
-    near, mean, limits = _one_a_place(stations, values, usable)
-    between = great_circle(
-        near.longitude[:, None],
-        near.latitude[:, None],
-        near.longitude[None, :],
-        near.latitude[None, :],
+    """
+    Fit the trend of a group of stations at every period.
+
+    Parameters
+    ----------
+    stations : Sites
+        Places of the stations.
+    values : (n_stations, n_periods) ndarray
+        ln PER.
+    usable : (n_stations, 2) ndarray
+        Shortest and longest period that each record supports, s.
+    periods : (n_periods,) ndarray
+        Grid, s, rising.
+    settings : Interpolation
+        Assumed deviation, and the case of the spatial correlation.
+
+    Returns
+    -------
+    Group
+        The stations, averaged per place, with their trend.
+    """
+    places, mean, limits = _averaged_by_place(stations, values, usable)
+    # Distances from each place to each
+    distance = great_circle(
+        places.longitude[:, None],
+        places.latitude[:, None],
+        places.longitude[None, :],
+        places.latitude[None, :],
     )
-    features = features_of(near)
-    reach = np.concatenate([periods[:1], periods, periods[-1:]])
-    fits = [
-        _fitted(
-            between,
-            features,
-            mean[:, k],
-            (limits[:, 0] <= reach[k + 2]) & (limits[:, 1] >= reach[k]),
-            period,
-            settings,
-        )
-        for k, period in enumerate(periods.tolist())
-    ]
-    coefficients, covariance, middles, deviation = (
-        np.array(part) for part in zip(*fits, strict=True)
-    )
-    about = np.nan_to_num(features[None, :, :] - middles[:, None, :])
-    trend = coefficients[:, :1] + np.einsum("kf,knf->kn", coefficients[:, 1:], about)
-    position = on_sphere(near.longitude, near.latitude)
-    arrays = (position, between, limits, features, np.ascontiguousarray(mean - trend.T))
-    return Group(arrays, (coefficients, covariance, middles, deviation))
+    features = features_of(places)
+    supported = _supported(limits, periods)
+    trend = _trends(distance, features, mean, supported, periods, settings)
+    residual = np.ascontiguousarray(mean - _trend_at(trend, features))
+    position = on_sphere(places.longitude, places.latitude)
+    return Group((position, distance, limits, features, residual), trend)
 
 
-def _one_a_place(
+def _averaged_by_place(
     stations: Sites, values: FloatArray, usable: FloatArray
 ) -> tuple[Sites, FloatArray, FloatArray]:
-    """Return one row for each place that has stations: their mean, and the periods that all of them support."""
+    """Return each place once: its stations' mean, and the periods that all of them support."""
     position = np.round(np.stack([stations.longitude, stations.latitude], axis=1), DECIMALS)
     _, first, place = np.unique(position, axis=0, return_index=True, return_inverse=True)
-    total, limits = np.zeros((first.size, values.shape[1])), usable[first].copy()
+
+    # Sum ln PER and narrow the usable periods, station by station
+    total = np.zeros((first.size, values.shape[1]))
+    limits = usable[first].copy()
     np.add.at(total, place, values)
     np.maximum.at(limits[:, 0], place, usable[:, 0])
     np.minimum.at(limits[:, 1], place, usable[:, 1])
     return stations.at(first), total / np.bincount(place)[:, None], limits
 
 
-def _fitted(
-    between: FloatArray,
+def _supported(limits: FloatArray, periods: FloatArray) -> NDArray[np.bool_]:
+    """Return (n_places, n_periods): whether a record holds within a grid step of the period."""
+    lower = np.concatenate([periods[:1], periods[:-1]])
+    upper = np.concatenate([periods[1:], periods[-1:]])
+    return (limits[:, :1] <= upper) & (limits[:, 1:] >= lower)
+
+
+def _trends(
+    distance: FloatArray,
     features: FloatArray,
     values: FloatArray,
-    known: NDArray[np.bool_],
-    period: float,
+    supported: NDArray[np.bool_],
+    periods: FloatArray,
     settings: Interpolation,
+) -> Trend:
+    """Fit the trend of every period to the places whose records support it."""
+    fits = []
+    for k, period in enumerate(periods.tolist()):
+        # Correlation between the places that serve this period
+        known = supported[:, k]
+        between = distance[np.ix_(known, known)]
+        correlation = residual_correlation(between, period, settings.vs30_clustered)
+        fits.append(_fitted(correlation, features[known], values[known, k], settings))
+    coefficients, covariance, means, deviation = zip(*fits, strict=True)
+    return np.array(coefficients), np.array(covariance), np.array(means), np.array(deviation)
+
+
+def _trend_at(trend: Trend, features: FloatArray) -> FloatArray:
+    """Return the trend at places, (n_places, n_periods); an unknown feature counts as its mean."""
+    coefficients, _, means, _ = trend
+    about = np.nan_to_num(features[None, :, :] - means[:, None, :])
+    slopes = np.einsum("kf,knf->kn", coefficients[:, 1:], about)
+    values: FloatArray = (coefficients[:, :1] + slopes).T
+    return values
+
+
+def _fitted(
+    correlation: FloatArray, features: FloatArray, values: FloatArray, settings: Interpolation
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return coefficients, their covariance for a deviation of 1, middles of the features, and the deviation."""
+    """Fit mean and slopes at one period: coefficients, covariance, means of features, deviation."""
     size = 1 + features.shape[1]
-    coefficients, covariance, middles = (
-        np.zeros(size),
-        np.zeros((size, size)),
-        np.full(size - 1, np.nan),
-    )
-    if not known.any():
-        return coefficients, covariance, middles, np.nan
-    used = _slopes(features[known])
-    middles[used] = features[known][:, used].mean(axis=0)
+    coefficients, covariance = np.zeros(size), np.zeros((size, size))
+    means = np.full(size - 1, np.nan)
+    if not values.size:
+        return coefficients, covariance, means, np.nan
+
+    # Design matrix X: a mean, and the slopes that these stations can resolve, about their means
+    used = _resolved_slopes(features)
+    means[used] = features[:, used].mean(axis=0)
+    design = np.column_stack([np.ones(values.size), features[:, used] - means[used]])
+    fit, uncertainty, deviation = _least_squares(design, correlation, values, settings)
+
+    # Unresolved slopes stay 0, and so does their covariance
     columns = np.concatenate([[0], 1 + used])
-    trend = np.column_stack([np.ones(known.sum()), features[known][:, used] - middles[used]])
-    factor = cho_factor(
-        residual_correlation(between[np.ix_(known, known)], period, settings.vs30_clustered),
-        lower=True,
-    )
-    normal = cho_factor(trend.T @ cho_solve(factor, trend), lower=True)
-    coefficients[columns] = cho_solve(normal, trend.T @ cho_solve(factor, values[known]))
-    covariance[np.ix_(columns, columns)] = cho_solve(normal, np.eye(columns.size))
-    residual = values[known] - trend @ coefficients[columns]
-    freedom = settings.log_std_weight + residual.size - columns.size
-    variance = (
-        settings.log_std_weight * settings.log_std**2 + residual @ cho_solve(factor, residual)
-    ) / freedom
-    return coefficients, covariance, middles, float(np.sqrt(variance))
+    coefficients[columns] = fit
+    covariance[np.ix_(columns, columns)] = uncertainty
+
+    return coefficients, covariance, means, deviation
 
 
-def _slopes(features: FloatArray) -> NDArray[np.intp]:
-    """Return the features whose slope these stations can tell."""
+def _least_squares(
+    design: FloatArray, correlation: FloatArray, values: FloatArray, settings: Interpolation
+) -> tuple[FloatArray, FloatArray, float]:
+    """Solve X' C^-1 X b = X' C^-1 y: b, its covariance for a deviation of 1, and the deviation."""
+    factor = cho_factor(correlation, lower=True)
+    normal = cho_factor(design.T @ cho_solve(factor, design), lower=True)
+    coefficients: FloatArray = cho_solve(normal, design.T @ cho_solve(factor, values))
+    covariance: FloatArray = cho_solve(normal, np.eye(design.shape[1]))
+
+    # The deviation of the residuals e joins the assumed one s0, which counts as w stations:
+    # s^2 = (w s0^2 + e' C^-1 e) / (w + n - p)
+    residual = values - design @ coefficients
+    squares = residual @ cho_solve(factor, residual)
+    weight = settings.log_std_weight
+    freedom = weight + residual.size - design.shape[1]
+    variance = (weight * settings.log_std**2 + squares) / freedom
+    return coefficients, covariance, float(np.sqrt(variance))
+
+
+def _resolved_slopes(features: FloatArray) -> NDArray[np.intp]:
+    """Return the indices of the features whose slope these stations resolve."""
     used: list[int] = []
-    for one, values in enumerate(features.T):
-        enough = values.size >= STATIONS_PER_SLOPE * (1 + len(used)) and bool(
-            np.isfinite(values).all()
-        )
-        if enough and float(values.std()) > SPREAD:
-            used.append(one)
+    for index, values in enumerate(features.T):
+        enough = values.size >= STATIONS_PER_SLOPE * (1 + len(used))
+        if enough and np.isfinite(values).all() and float(values.std()) > SPREAD:
+            used.append(index)
     return np.array(used, dtype=np.intp)

@@ -1,4 +1,4 @@
-"""Several scenarios together: the probability that a pair pounds in any of them, or in a year."""
+"""Probability of pounding of each pair over several scenarios, and within a year."""
 
 from collections.abc import Iterator, Mapping
 
@@ -14,14 +14,14 @@ from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 
 def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> FloatArray:
     """
-    Return the probability given that one of the scenarios happens, ``sum(w P) / sum(w)``.
+    Compute the probability given that one of the scenarios happens, ``sum(w P) / sum(w)``.
 
     Parameters
     ----------
     probability : (n_scenarios, n_pairs) array_like
         Of pounding in each scenario, from 0 to 1.
     weights : (n_scenarios,) array_like
-        How likely each is beside the others; any positive sum.
+        Weight of each scenario relative to the others; any positive sum.
 
     Returns
     -------
@@ -38,25 +38,25 @@ def conditional_probability(probability: ArrayLike, weights: ArrayLike) -> Float
     >>> print(conditional_probability([[1.0, 0.2], [0.0, 0.6]], [3.0, 1.0]))
     [0.75 0.3 ]
     """
-    chance, weight = _scenarios(probability, weights, "weights")
+    pounding, weight = _scenarios(probability, weights, "weights")
     if not weight.sum() > 0:
         raise ValueError(f"weights must have a positive sum, got {weight.sum():g}")
-    joined: FloatArray = np.minimum(_weighted(chance, weight / weight.sum()), 1.0)
+    joined: FloatArray = np.minimum(_weighted_sum(pounding, weight / weight.sum()), 1.0)
     return joined
 
 
 def annual_probability(probability: ArrayLike, rates: ArrayLike) -> FloatArray:
     """
-    Return the probability that a pair pounds within a year, ``1 - exp(-sum(rate P))``.
+    Compute the probability that a pair pounds within a year, ``1 - exp(-sum(rate P))``.
 
-    Scenarios come as a Poisson process, and a pair that has pounded is as it was before.
+    Scenarios come as a Poisson process, and pounding does not change a pair.
 
     Parameters
     ----------
     probability : (n_scenarios, n_pairs) array_like
         Of pounding in each scenario, from 0 to 1.
     rates : (n_scenarios,) array_like
-        Of each scenario, 1/year.
+        Rate of each scenario, 1/year.
 
     Returns
     -------
@@ -73,14 +73,15 @@ def annual_probability(probability: ArrayLike, rates: ArrayLike) -> FloatArray:
     >>> print(annual_probability([[1.0, 0.0]], [0.01]).round(6))
     [0.00995 0.     ]
     """
-    chance, rate = _scenarios(probability, rates, "rates")
-    return np.asarray(-np.expm1(-_weighted(chance, rate)))
+    pounding, rate = _scenarios(probability, rates, "rates")
+    return np.asarray(-np.expm1(-_weighted_sum(pounding, rate)))
 
 
-def _weighted(chance: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the weighted sum of each pair; unlike a matrix product, the same bits whatever pairs stand beside it."""
-    total = np.zeros(chance.shape[1])
-    for row, factor in zip(chance, weight, strict=True):
+def _weighted_sum(probability: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the weighted sum over the scenarios for each pair."""
+    # Unlike a matrix product, this gives a pair the same bits whatever other pairs there are
+    total = np.zeros(probability.shape[1])
+    for row, factor in zip(probability, weight, strict=True):
         total += factor * row
     return total
 
@@ -88,20 +89,32 @@ def _weighted(chance: FloatArray, weight: FloatArray) -> FloatArray:
 def _scenarios(
     probability: ArrayLike, weights: ArrayLike, name: str
 ) -> tuple[FloatArray, FloatArray]:
-    chance = np.atleast_2d(checks.between("probability", probability, 0.0, 1.0))
+    """Check probabilities, (n_scenarios, n_pairs), and one weight or rate per scenario."""
+    pounding = np.atleast_2d(checks.between("probability", probability, 0.0, 1.0))
     weight = np.atleast_1d(checks.not_negative(name, weights))
-    if weight.shape != chance.shape[:1]:
-        raise ValueError(f"{name} must be one a scenario ({chance.shape[0]}), got {weight.size}")
-    return chance, weight
+    if weight.shape != pounding.shape[:1]:
+        raise ValueError(f"{name} must be one a scenario ({pounding.shape[0]}), got {weight.size}")
+    return pounding, weight
 
 
-#: What all scenarios must agree on, else equal names are not the same pair.
+#: Columns, with units, in which all scenarios must agree, else equal names are not the same pair.
 SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
 
 
 def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
-    """Return name, unit and meaning of every column of the table of several scenarios, in their order."""
-    given = [f"{name} ({weight:g}{'/year' if yearly else ''})" for name, weight in weights.items()]
+    """
+    Return the columns of the table of several scenarios, in their order, by name.
+
+    Parameters
+    ----------
+    weights : mapping of str to float
+        Weight or rate of each scenario, by its name.
+    yearly : bool
+        Whether weights are rates, 1/year: ``annual_probability`` is a column then.
+    """
+    unit = "/year" if yearly else ""
+    scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
+    # The scenarios' own columns follow the joined ones
     columns = [
         Column("rank", "int64", "", "1 is the likeliest to pound"),
         Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
@@ -109,7 +122,7 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
             "probability",
             "float64",
             "1",
-            f"of pounding, given that one of these happens: {', '.join(given)}",
+            f"of pounding, given that one of these happens: {scenarios}",
         ),
         Column(
             "annual_probability",
@@ -126,18 +139,20 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
         ),
         *((COLUMNS | COMPLETED)[name] for name in SAME),
     ]
-    return {one.name: one for one in columns if yearly or one.name != "annual_probability"}
+    return {
+        column.name: column for column in columns if yearly or column.name != "annual_probability"
+    }
 
 
 def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> pd.DataFrame:
     """
-    Return the probabilities of pairs whose scenarios were joined.
+    Compute the probabilities of pairs whose scenarios were joined.
 
     Parameters
     ----------
     joined : DataFrame
         ``pair_id``, ``probability_<name>`` of each scenario, and the smallest and largest value in
-        any scenario of what is the same in all: ``gap``, ``gap_largest`` and so on.
+        any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
     weights : mapping of str to float
         Weight of each scenario; see :func:`conditional_probability`.
     yearly : bool
@@ -149,36 +164,43 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
         Columns of :func:`ensemble_columns` without ``rank``, in the order of the rows; without the
         pairs that :func:`ensemble_rejections` names.
     """
-    kept = joined[_faultless(joined, weights)]
-    each = kept[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
-    values = np.array(list(weights.values()))
-    found = {"probability": conditional_probability(each.T, values)}
+    rows = joined[_comparable(joined, weights)]
+    pounding = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
+    weight = np.array(list(weights.values()))
+
+    # Probabilities over all scenarios, and the scenario with the largest of each pair
+    columns = {"probability": conditional_probability(pounding.T, weight)}
     if yearly:
-        found["annual_probability"] = annual_probability(each.T, values)
-    worst = np.array(list(weights), dtype=object)[np.argmax(each, axis=1)]
+        columns["annual_probability"] = annual_probability(pounding.T, weight)
+    worst = np.array(list(weights), dtype=object)[np.argmax(pounding, axis=1)]
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
-    return kept.assign(**found, worst_scenario=worst)[names].reset_index(drop=True)
+    return rows.assign(**columns, worst_scenario=worst)[names].reset_index(drop=True)
 
 
 def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:
-    """Give the pairs that lack a probability in a scenario, or are not the same pair in all of them."""
-    for row in joined[~_faultless(joined, weights)].to_dict("records"):
+    """Yield pairs that lack a probability in a scenario, or differ between the scenarios."""
+    for row in joined[~_comparable(joined, weights)].to_dict("records"):
+        reasons = []
         lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
-        reasons = [
-            f"no probability in {', '.join(lacking)}: not in its inventory, or rejected there"
-        ] * bool(lacking)
-        reasons += [
-            f"{name} = {row[name]:.9g} {unit} in one scenario and {row[f'{name}_largest']:.9g} {unit} in another"
-            for name, unit in SAME.items()
-            if row[name] != row[f"{name}_largest"]
-        ]
+        if lacking:
+            names = ", ".join(lacking)
+            reasons.append(f"no probability in {names}: not in its inventory, or rejected there")
+
+        # Smallest and largest value of what must be the same
+        for name, unit in SAME.items():
+            smallest, largest = row[name], row[f"{name}_largest"]
+            if smallest != largest:
+                reasons.append(
+                    f"{name} = {smallest:.9g} {unit} in one scenario "
+                    f"and {largest:.9g} {unit} in another"
+                )
         yield Rejection("pair", str(row["pair_id"]), "", None, tuple(reasons))
 
 
-def _faultless(joined: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.bool_]:
-    good: NDArray[np.bool_] = (
-        joined[[f"probability_{name}" for name in weights]].notna().all(axis=1).to_numpy()
-    )
+def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.bool_]:
+    """Return which pairs have a probability in every scenario and are the same pair in all."""
+    names = [f"probability_{name}" for name in weights]
+    comparable: NDArray[np.bool_] = joined[names].notna().all(axis=1).to_numpy()
     for name in SAME:
-        good = good & (joined[name] == joined[f"{name}_largest"]).to_numpy()
-    return good
+        comparable = comparable & (joined[name] == joined[f"{name}_largest"]).to_numpy()
+    return comparable

@@ -1,4 +1,4 @@
-"""How a prediction compares with what was seen: hit rate, Brier score, reliability."""
+"""Comparison of a prediction with observations: hit rate, Brier score, reliability."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from per_obspy.checks import FloatArray
 
 class Evaluation(NamedTuple):
     """
-    Prediction against observation, of the pairs that were looked at.
+    Prediction against observation, for the pairs with an observation.
 
     Attributes
     ----------
@@ -21,13 +21,13 @@ class Evaluation(NamedTuple):
     hit_rate : float
         Share of the pounded pairs whose state is yes; NaN if none pounded.
     hit_rate_with_possible : float
-        The same of those whose state is yes or possible.
+        Share of the pounded pairs whose state is yes or possible.
     false_alarm_rate : float
         Share of the other pairs whose state is yes; NaN if all pounded.
     brier_score : float
         Mean squared difference of probability and observation; NaN without probabilities.
     brier_score_of_the_share : float
-        What giving every pair the observed share would have scored: a useful prediction stays below
+        Score of a prediction that gives every pair the observed share: a useful one stays below
         it.
     reliability : DataFrame
         See :func:`reliability`; without rows if there are no probabilities.
@@ -45,40 +45,45 @@ class Evaluation(NamedTuple):
 
 def evaluation(table: pd.DataFrame) -> Evaluation:
     """
-    Compare a risk table with its column ``observed`` (1 pounding was seen, 0 it was not, empty: nobody looked).
+    Compare a risk table with observed pounding.
 
     Parameters
     ----------
     table : DataFrame
-        Risk table with ``state``, and ``probability`` if it has been computed.
+        Risk table with ``state``, ``probability`` if it has been computed, and ``observed``: 1 if
+        pounding was seen, 0 if not, empty without an observation.
 
     Raises
     ------
     ValueError
         If no pair has an observation, or one is neither 0 nor 1.
     """
-    looked_at = table[table["observed"].notna()]
-    observed = _observed(looked_at["observed"])
-    state, share = looked_at["state"].to_numpy(object), float(observed.mean())
-    known = looked_at.get("probability", pd.Series(np.nan, index=looked_at.index)).to_numpy(
-        np.float64
-    )
-    told = ~np.isnan(known)
+    rows = table[table["observed"].notna()]
+    observed = _observed(rows["observed"])
+    state, share = rows["state"].to_numpy(object), float(observed.mean())
+
+    # Probabilities and observations of the pairs that have both
+    missing = pd.Series(np.nan, index=rows.index)
+    probability = rows.get("probability", missing).to_numpy(np.float64)
+    known = ~np.isnan(probability)
+    seen, predicted = observed[known], probability[known]
+
+    # Predicting the share for every pair scores share (1 - share)
     return Evaluation(
         pairs=observed.size,
         pounded=int(observed.sum()),
         hit_rate=_share((state == "yes")[observed == 1]),
         hit_rate_with_possible=_share((state != "no")[observed == 1]),
         false_alarm_rate=_share((state == "yes")[observed == 0]),
-        brier_score=brier_score(observed[told], known[told]) if told.any() else np.nan,
+        brier_score=brier_score(seen, predicted) if known.any() else np.nan,
         brier_score_of_the_share=share * (1.0 - share),
-        reliability=reliability(observed[told], known[told]),
+        reliability=reliability(seen, predicted),
     )
 
 
 def brier_score(observed: ArrayLike, probability: ArrayLike) -> float:
     """
-    Return the mean squared difference of probability and outcome.
+    Compute the mean squared difference of probability and outcome.
 
     Parameters
     ----------
@@ -102,7 +107,7 @@ def brier_score(observed: ArrayLike, probability: ArrayLike) -> float:
 
 def reliability(observed: ArrayLike, probability: ArrayLike, bins: int = 10) -> pd.DataFrame:
     """
-    Compare probabilities with shares, in bins of equal width.
+    Compare probabilities with observed shares, in bins of equal width.
 
     Parameters
     ----------
@@ -116,21 +121,24 @@ def reliability(observed: ArrayLike, probability: ArrayLike, bins: int = 10) -> 
     Returns
     -------
     DataFrame
-        One row a bin that has events: ``low, high, events, mean_probability, observed_share``, and
-        ``share_std``, the standard deviation of the share if the mean probability were true.
+        One row per bin that has events: ``low, high, events, mean_probability, observed_share``
+        and ``share_std``, the standard deviation of the share if the mean probability were true.
 
     Examples
     --------
-    >>> reliability([1, 0, 0, 1], [0.6, 0.1, 0.1, 0.6], bins=2)[["high", "events", "observed_share"]]
+    >>> table = reliability([1, 0, 0, 1], [0.6, 0.1, 0.1, 0.6], bins=2)
+    >>> table[["high", "events", "observed_share"]]
        high  events  observed_share
     0   0.5       2             0.0
     1   1.0       2             1.0
     """
-    given = np.atleast_1d(checks.between("probability", probability, 0.0, 1.0))
-    table = pd.DataFrame({"given": given, "seen": np.asarray(observed, dtype=np.float64)})
-    table["bin"] = np.minimum((given * bins).astype(np.int64), bins - 1)
+    predicted = np.atleast_1d(checks.between("probability", probability, 0.0, 1.0))
+    seen = np.asarray(observed, dtype=np.float64)
+    table = pd.DataFrame({"predicted": predicted, "seen": seen})
+    # A probability of 1 belongs to the last bin
+    table["bin"] = np.minimum((predicted * bins).astype(np.int64), bins - 1)
     groups = table.groupby("bin")
-    events, mean = groups.size(), groups["given"].mean()
+    events, mean = groups.size(), groups["predicted"].mean()
     columns = {
         "low": events.index / bins,
         "high": (events.index + 1) / bins,
@@ -143,15 +151,16 @@ def reliability(observed: ArrayLike, probability: ArrayLike, bins: int = 10) -> 
 
 
 def _observed(observed: ArrayLike) -> FloatArray:
+    """Check observations: at least one, each 0 or 1."""
     values = np.atleast_1d(checks.finite("observed", observed))
     if not values.size:
         raise ValueError("observed must have at least one value, got none")
-    if not np.isin(values, (0.0, 1.0)).all():
-        raise ValueError(
-            f"observed must be 0 or 1, got {values[~np.isin(values, (0.0, 1.0))][0]:g}"
-        )
+    wrong = values[~np.isin(values, (0.0, 1.0))]
+    if wrong.size:
+        raise ValueError(f"observed must be 0 or 1, got {wrong[0]:g}")
     return values
 
 
 def _share(true: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+    """Return the share of true values, NaN if there are no values."""
     return float(true.mean()) if true.size else np.nan

@@ -12,14 +12,14 @@ from per_obspy.checks import FloatArray
 
 def hexagons(longitude: ArrayLike, latitude: ArrayLike, resolution: int) -> NDArray[np.object_]:
     """
-    Return the H3 cell of each place.
+    Find the H3 cell of each place.
 
     Parameters
     ----------
     longitude, latitude : (n_places,) array_like
         Degrees east and north.
     resolution : int
-        From 0 to 15; a cell of resolution 8 has about 0.7 km2, each further step a seventh of that.
+        From 0 to 15; a cell of resolution 8 has about 0.7 km², each further step a seventh of that.
 
     Returns
     -------
@@ -39,13 +39,16 @@ def hexagons(longitude: ArrayLike, latitude: ArrayLike, resolution: int) -> NDAr
 
     east = np.atleast_1d(checks.between("longitude", longitude, -180.0, 180.0)).tolist()
     north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0)).tolist()
-    return np.array(
-        [latlng_to_cell(y, x, resolution) for x, y in zip(east, north, strict=True)], dtype=object
-    )
+    cells = [latlng_to_cell(y, x, resolution) for x, y in zip(east, north, strict=True)]
+    return np.array(cells, dtype=object)
 
 
 def hexagon_outlines(cells: Iterable[str]) -> list[FloatArray]:
-    """Return the corners of H3 cells, each (n_corners, 2), degrees east and north; beyond 180 across the date line."""
+    """
+    Return the corners of H3 cells, each (n_corners, 2), degrees east and north.
+
+    Longitudes of a cell across the date line go on beyond 180.
+    """
     from h3 import cell_to_boundary
 
     return [_unbroken(np.array(cell_to_boundary(cell))[:, ::-1]) for cell in cells]
@@ -60,8 +63,7 @@ def _unbroken(corners: FloatArray) -> FloatArray:
 
 
 def box_outlines(boxes: pd.DataFrame) -> FloatArray:
-    """Return the corners of boxes from ``west, south, east, north``, (n_boxes, 4, 2), degrees east and north."""
+    """Return the corners of boxes ``west, south, east, north``, (n_boxes, 4, 2), degrees."""
     west, south, east, north = boxes[["west", "south", "east", "north"]].to_numpy(np.float64).T
-    return np.stack([(west, south), (east, south), (east, north), (west, north)], axis=0).transpose(
-        2, 0, 1
-    )
+    corners = np.stack([(west, south), (east, south), (east, north), (west, north)], axis=0)
+    return corners.transpose(2, 0, 1)

@@ -12,14 +12,13 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
+from per_obspy.screening.ranking import STATES
 
-STATES = ("yes", "possible", "no")
+#: Factor by which a row of cells is numbered apart from its columns, more than any row has.
+ROW_FACTOR = 1 << 32
 
-#: More than the cells around the earth: a row and a column make one number.
-MANY = 1 << 32
-
-#: Unit and meaning of the columns of a table of totals; every risk class has a column ``class_...``
-#: besides.
+#: Unit and meaning of the columns of a table of totals; each risk class adds a column
+#: ``class_...``.
 TOTALS: dict[str, Column] = {
     column.name: column
     for column in (
@@ -64,16 +63,16 @@ TOTALS: dict[str, Column] = {
 
 class ExpectedCount(NamedTuple):
     """
-    Expected number of events and what its standard deviation may be.
+    Expected number of events and the limits of its standard deviation.
 
     Attributes
     ----------
     mean : float
         Sum of the probabilities.
     std_independent, std_common : float
-        If nothing links the events, and if one cause decides all of them (each happens when the
-        same uniform random number stays below its probability). Pairs that share an earthquake lie
-        in between.
+        Standard deviation if the events are independent, and if one cause decides all of them (each
+        happens when the same uniform random number stays below its probability). Pairs that share
+        an earthquake lie in between.
     """
 
     mean: float
@@ -83,7 +82,7 @@ class ExpectedCount(NamedTuple):
 
 class GridCells(NamedTuple):
     """
-    Cells of a grid.
+    Cells of a grid, with the places in them.
 
     Attributes
     ----------
@@ -99,7 +98,7 @@ class GridCells(NamedTuple):
 
 def expected_count(probability: ArrayLike) -> ExpectedCount:
     """
-    Return the expected number of events of given probabilities, with both limits of its standard deviation.
+    Compute the expected number of events and both limits of its standard deviation.
 
     Parameters
     ----------
@@ -118,11 +117,11 @@ def expected_count(probability: ArrayLike) -> ExpectedCount:
     """
     falling = -np.sort(-np.atleast_1d(checks.between("probability", probability, 0.0, 1.0)))
     mean = float(falling.sum())
-    # all pairs of events: the smaller of two probabilities is the later one, twice for each earlier
-    # one, once itself
-    both = float(falling @ (2.0 * np.arange(falling.size) + 1.0))
+    # Second moment under one cause: two events both happen with the smaller probability, which is
+    # the later of two falling ones; it counts twice for each earlier one and once with itself
+    second = float(falling @ (2.0 * np.arange(falling.size) + 1.0))
     independent = float(np.sqrt((falling * (1.0 - falling)).sum()))
-    return ExpectedCount(mean, independent, float(np.sqrt(max(both - mean**2, 0.0))))
+    return ExpectedCount(mean, independent, float(np.sqrt(max(second - mean**2, 0.0))))
 
 
 def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
@@ -132,7 +131,7 @@ def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
     Parameters
     ----------
     table : DataFrame
-        Risk table; with a column ``probability`` (of pounding) expected numbers are given, of the
+        Risk table; with a column ``probability`` (of pounding) there are expected numbers, of the
         pairs that have one.
     area : (n_pairs,) array_like of str
         Area or cell of each pair.
@@ -140,7 +139,7 @@ def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row an area, in the order of their names: the columns of ``TOTALS`` and ``class_...``
+        One row per area, in the order of their names: the columns of ``TOTALS`` and ``class_...``
         for every risk class.
     """
     return joined_totals([partial_totals(table, area, table["risk_class"].unique())])
@@ -148,66 +147,98 @@ def totals(table: pd.DataFrame, area: ArrayLike) -> pd.DataFrame:
 
 class PartialTotals(NamedTuple):
     """
-    What a piece of a risk table adds to the totals.
+    Contribution of a piece of a risk table to the totals.
 
     Attributes
     ----------
     sums : DataFrame
-        What is summed up, by area.
+        Numbers of pairs, and sums of their positions on the unit sphere, by area.
     worst : DataFrame
         The worst pair of each area with its ``rank``.
-    chance : DataFrame or None
-        Area and probability of each pair; 12 bytes a pair.
+    probability : DataFrame or None
+        Area and probability of each pair; 12 bytes per pair.
     """
 
     sums: pd.DataFrame
     worst: pd.DataFrame
-    chance: pd.DataFrame | None
+    probability: pd.DataFrame | None
 
 
 def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str]) -> PartialTotals:
-    """Count a piece of a risk table, as :func:`totals` does; :func:`joined_totals` joins what pieces add."""
+    """
+    Count a piece of a risk table, as :func:`totals` does.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Piece of a risk table.
+    area : (n_pairs,) array_like of str
+        Area or cell of each pair.
+    classes : iterable of str
+        Names of the risk classes.
+
+    Returns
+    -------
+    PartialTotals
+        Contribution of the piece, to be joined by :func:`joined_totals`.
+    """
+    # Truth values and ones, which are summed up to numbers of pairs
     rows = table.assign(area=np.asarray(area, dtype=object))
+    added: dict[str, object] = {"pairs": 1}
+    for state in STATES:
+        added[state] = rows["state"] == state
+    for name in classes:
+        added[f"class_{name}"] = rows["risk_class"] == name
+
+    # Positions on the unit sphere, of which the mean direction is the middle of the area
     east, north = np.radians(rows["longitude"]), np.radians(rows["latitude"])
-    added = {
-        "pairs": 1,
-        **{state: rows["state"] == state for state in STATES},
-        **{f"class_{name}": rows["risk_class"] == name for name in classes},
-        "x": np.cos(north) * np.cos(east),
-        "y": np.cos(north) * np.sin(east),
-        "z": np.sin(north),
-    }
+    added["x"] = np.cos(north) * np.cos(east)
+    added["y"] = np.cos(north) * np.sin(east)
+    added["z"] = np.sin(north)
     sums = pd.DataFrame(added).groupby(rows["area"]).sum()
-    worst = rows.sort_values("rank").drop_duplicates("area")[
-        ["area", "rank", "pair_id", "state", "demand_ratio"]
-    ]
+    return PartialTotals(sums, _worst_pairs(rows), _probabilities(rows))
+
+
+def _worst_pairs(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the pair of the smallest rank of each area."""
+    worst = rows.sort_values("rank").drop_duplicates("area")
+    return worst[["area", "rank", "pair_id", "state", "demand_ratio"]]
+
+
+def _probabilities(rows: pd.DataFrame) -> pd.DataFrame | None:
+    """Return area and probability of the pairs that have one, if the table has the column."""
     if "probability" not in rows:
-        return PartialTotals(sums, worst, None)
-    return PartialTotals(
-        sums, worst, rows[["area", "probability"]].dropna().astype({"area": "category"})
-    )
+        return None
+    return rows[["area", "probability"]].dropna().astype({"area": "category"})
 
 
 def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
-    """Return the totals of a table from those of its pieces."""
-    sums, worst, chances = zip(*parts, strict=True)
+    """
+    Join the contributions of pieces to the totals of the whole table.
+
+    Parameters
+    ----------
+    parts : iterable of PartialTotals
+        From :func:`partial_totals`, at least one.
+
+    Returns
+    -------
+    DataFrame
+        See :func:`totals`.
+    """
+    sums, worst, probabilities = zip(*parts, strict=True)
     counted = pd.concat(sums).fillna(0.0).groupby(level=0, sort=True).sum()
     x, y, z = (counted.pop(name) for name in "xyz")
     counted = counted.astype(np.int64)
-    known = [one for one in chances if one is not None]
+
+    # Areas without any probability expect no pounding pair
+    known = [piece for piece in probabilities if piece is not None]
     if known:
         counted = counted.join(_expected(known)).fillna(dict.fromkeys(EXPECTED, 0.0))
-    first = (
-        pd.concat(worst)
-        .sort_values("rank")
-        .drop_duplicates("area")
-        .set_index("area")
-        .drop(columns="rank")
-    )
-    counted = counted.join(
-        first.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1)
-    )
-    latitude = np.degrees(np.arctan2(z, np.hypot(x, y)))  # across the date line too
+    counted = counted.join(_worst_of(worst))
+
+    # The middle is the mean direction, which holds across the date line too
+    latitude = np.degrees(np.arctan2(z, np.hypot(x, y)))
     table: pd.DataFrame = counted.assign(longitude=np.degrees(np.arctan2(y, x)), latitude=latitude)
     return table.rename_axis("area").reset_index()
 
@@ -215,29 +246,35 @@ def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:
 EXPECTED = tuple(f"expected_pounding{end}" for end in ("", "_std_independent", "_std_common"))
 
 
-def _expected(chances: Sequence[pd.DataFrame]) -> pd.DataFrame:
+def _worst_of(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return the worst pair of each area from those of all pieces."""
+    first = pd.concat(pieces).sort_values("rank").drop_duplicates("area")
+    named = first.set_index("area").drop(columns="rank")
+    return named.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1)
+
+
+def _expected(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """Return the expected number of pounding pairs of every area that has a probability."""
-    areas = union_categoricals([one["area"] for one in chances])
-    table = pd.DataFrame(
-        {"area": areas, "probability": np.concatenate([one["probability"] for one in chances])}
-    )
+    # Pieces have their own categories of areas
+    area = union_categoricals([piece["area"] for piece in pieces])
+    probability = np.concatenate([piece["probability"] for piece in pieces])
+    table = pd.DataFrame({"area": area, "probability": probability})
     groups = table.groupby("area", observed=True)["probability"]
-    return pd.DataFrame(
-        {area: expected_count(some) for area, some in groups}, index=list(EXPECTED)
-    ).T
+    counts = {name: expected_count(values) for name, values in groups}
+    return pd.DataFrame(counts, index=list(EXPECTED)).T
 
 
 def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCells:
     """
-    Return the cell of each place in a grid of about equal areas over the whole earth.
+    Find the cell of each place in a grid of about equal areas over the whole earth.
 
     Parameters
     ----------
     longitude, latitude : (n_places,) array_like
         Degrees east and north.
     size : float
-        Extent of a cell, m. Rows are exactly that high; cells are as wide as a whole number around
-        the row allows.
+        Extent of a cell, m. Rows are exactly that high; cells are as wide as a whole number of them
+        around the row allows.
 
     Raises
     ------
@@ -252,29 +289,41 @@ def grid_cells(longitude: ArrayLike, latitude: ArrayLike, size: float) -> GridCe
     east = np.atleast_1d(checks.between("longitude", longitude, -180.0, 180.0))
     north = np.atleast_1d(checks.between("latitude", latitude, -90.0, 90.0))
     high = np.degrees(checks.number("size", size, _above_one_metre) / EARTH_RADIUS)
+
+    # Rows of equal height, each cut into a whole number of cells
     row = np.floor(north / high).astype(np.int64)
     around = _cells_around(row, high)
-    column = np.minimum(np.floor((east % 360.0) / 360.0 * around).astype(np.int64), around - 1)
-    _, first, which = np.unique(row * MANY + column, return_index=True, return_inverse=True)
-    row, column, wide = row[first], column[first], 360.0 / around[first]
-    names = np.array(
-        [f"r{one} c{other}" for one, other in zip(row.tolist(), column.tolist(), strict=True)],
-        dtype=object,
-    )
+    column = np.floor((east % 360.0) / 360.0 * around).astype(np.int64)
+    column = np.minimum(column, around - 1)
+
+    # The cells that hold a place, each once
+    number = row * ROW_FACTOR + column
+    _, first, cell = np.unique(number, return_index=True, return_inverse=True)
+    boxes = _boxes(row[first], column[first], around[first], high)
+    return GridCells(boxes.index.to_numpy(object)[cell], boxes)
+
+
+def _boxes(
+    row: NDArray[np.int64], column: NDArray[np.int64], around: NDArray[np.int64], high: float
+) -> pd.DataFrame:
+    """Return names and limits of cells, degrees; ``high`` is the height of a row."""
+    names = [f"r{i} c{k}" for i, k in zip(row.tolist(), column.tolist(), strict=True)]
+    wide = 360.0 / around
+    # West from -180 up to 180; east may lie beyond 180
     west = (column * wide + 180.0) % 360.0 - 180.0
     south = row * high
-    boxes = {"west": west, "south": south, "east": west + wide, "north": south + high}
-    return GridCells(names[which], pd.DataFrame(boxes, index=names))
+    limits = {"west": west, "south": south, "east": west + wide, "north": south + high}
+    return pd.DataFrame(limits, index=np.array(names, dtype=object))
 
 
 def _cells_around(row: NDArray[np.int64], high: float) -> NDArray[np.int64]:
-    """Return how many cells there are around the earth in a row."""
+    """Return the number of cells around the earth in a row."""
     middle = np.radians(np.minimum(np.abs(row + 0.5) * high, 90.0))
-    around: NDArray[np.int64] = np.maximum(
-        np.rint(360.0 * np.cos(middle) / high).astype(np.int64), 1
-    )
+    count = np.rint(360.0 * np.cos(middle) / high).astype(np.int64)
+    around: NDArray[np.int64] = np.maximum(count, 1)
     return around
 
 
 def _above_one_metre(name: str, values: ArrayLike) -> FloatArray:
+    """Check the extent of a cell: from 1 m to more than a quarter of the Earth's circumference."""
     return checks.between(name, values, 1.0, 1e7)

@@ -9,7 +9,11 @@ from numpy.testing import assert_allclose
 from screening_samples import make_station
 
 from per_obspy.config import Interpolation
-from per_obspy.screening.ground_motion.site_motion import Source, motion_at_pairs, prepared_field
+from per_obspy.screening.ground_motion.site_motion import (
+    Hypocentre,
+    motion_at_pairs,
+    prepared_field,
+)
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle, spatial_correlation
 
 SETTINGS = Interpolation()
@@ -149,7 +153,7 @@ def test_one_horizontal_and_a_station_without_motion(stations):
 def test_the_source_tells_an_attenuation():
     # eight stations on a line, PER ~ 1/R from a hypocentre 20 km deep: continued beyond them, and
     # exact between them
-    source = Source(20.0, 9.0, 20_000.0)
+    source = Hypocentre(20.0, 9.0, 20_000.0)
     plain = make_station("ONE")
     latitudes = np.linspace(10.0, 11.0, 8)
     distance = np.hypot(great_circle(20.0, 9.0, 20.0, latitudes), 20_000.0)
@@ -171,7 +175,7 @@ def test_numbers_depend_neither_on_the_block_nor_on_the_process(stations):
     # to the bit, in any order and stride; a field that was sent to another process is the same
     # field
     named = [_on(one, name) for one, name in zip(stations, ("rock", "rock", "hill"), strict=True)]
-    prepared = prepared_field(named, SETTINGS, Source(19.0, 10.0, 1e4))
+    prepared = prepared_field(named, SETTINGS, Hypocentre(19.0, 10.0, 1e4))
     sent = pickle.loads(pickle.dumps(prepared))
     random = np.random.default_rng(3)
     places = _pairs(
