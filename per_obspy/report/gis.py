@@ -43,7 +43,7 @@ def write_pairs_layer(
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
-        What the layer says of all its rows, for example whether the motion is simulated.
+        Facts that hold for all rows, for example whether the motion is simulated.
     """
     with written_whole(path) as part:
         for number, table in enumerate(tables):
@@ -71,7 +71,7 @@ def write_totals_layer(
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
-        What the layer says of all its rows.
+        Facts that hold for all rows.
     """
     if outlines is None:
         shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())

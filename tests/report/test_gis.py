@@ -144,4 +144,4 @@ def test_a_layer_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     with pytest.raises(RuntimeError, match="power cut"):
         write_pairs_layer(broken(), CLASSES, path, FACTS)
     assert path.read_bytes() == before
-    assert [one.name for one in tmp_path.iterdir()] == ["risk.gpkg"]
+    assert [file.name for file in tmp_path.iterdir()] == ["risk.gpkg"]
