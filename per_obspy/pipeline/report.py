@@ -10,7 +10,7 @@ from per_obspy.config import Run
 from per_obspy.errors import require_extra
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
-from per_obspy.report.figures import draw_overview, draw_walk
+from per_obspy.report.figures import draw_overview, draw_record_to_pair
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 from per_obspy.tables.risk import ranked
 from per_obspy.tables.totals import RegionTotals, region_totals, write_totals
@@ -77,7 +77,7 @@ def _figures(settings: Run, risk: Path, shards: Sequence[Path], folder: Path) ->
     if worst is None:
         return [overview]
     (shard,) = (one for one in shards if one.stem == worst["station"].strip("."))
-    draw_walk(read_spectra(shard), worst, walk)
+    draw_record_to_pair(read_spectra(shard), worst, walk)
     return [walk, overview]
 
 

@@ -1,4 +1,4 @@
-"""How the prediction of a region did where somebody looked: a file for machines, and the reliability diagram."""
+"""Prediction against observation of a region: a JSON file and the reliability diagram."""
 
 import json
 import math
@@ -12,37 +12,41 @@ from matplotlib.figure import Figure
 from scipy.stats import binom
 
 from per_obspy.files import written_whole
-from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, save
+from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, MOTION_COLOUR, save
 from per_obspy.screening.region.evaluation import Evaluation, evaluation
 from per_obspy.tables.risk import ranked
 
 
 def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
     """
-    Compare the pairs that somebody looked at with the prediction; without any, files of an earlier run are removed.
+    Compare the observed pairs with the prediction and write the comparison.
+
+    Files of an earlier run are removed, also where no pair has an observation.
 
     Parameters
     ----------
     risk : Path
-        Parquet file of the risk table; only with a column ``observed`` there is something to
-        compare.
+        Parquet file of the risk table; observations are in its column ``observed``, if any.
     folder : Path
-        For ``evaluation.json`` and, where there are probabilities, ``figures/reliability.png``.
+        Folder of ``evaluation.json`` and, where there are probabilities,
+        ``figures/reliability.png``.
     simulated : bool
-        Whether the ground motion was, which the figure says.
+        Whether the ground motion is simulated, which is then written on the figure.
 
     Returns
     -------
     files : list of Path
-        What was written.
+        Files that were written.
     """
     table, figure = folder / "evaluation.json", folder / "figures" / "reliability.png"
-    for old in (table, figure):
-        old.unlink(missing_ok=True)
-    seen = _observed(risk)
-    if seen.empty:
+    for earlier in (table, figure):
+        earlier.unlink(missing_ok=True)
+    observed = _observed(risk)
+    if observed.empty:
         return []
-    found = evaluation(seen)
+
+    # The diagram needs probabilities, the numbers do not
+    found = evaluation(observed)
     with written_whole(table) as part:
         part.write_text(json.dumps(_plain(found), indent=1, allow_nan=False), encoding="utf-8")
     if found.reliability.empty:
@@ -52,7 +56,7 @@ def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
 
 
 def _observed(risk: Path) -> pd.DataFrame:
-    """Return the pairs that somebody looked at."""
+    """Return the pairs with an observation."""
     names = ["observed", "state", "probability"]
     if "observed" not in pq.read_schema(risk).names:
         return pd.DataFrame(columns=names)
@@ -62,26 +66,25 @@ def _observed(risk: Path) -> pd.DataFrame:
 
 
 def _plain(found: Evaluation) -> dict[str, Any]:
-    """Return the numbers as JSON knows them: null for a share of nothing."""
+    """Return the numbers for JSON, which has null instead of NaN."""
     values = found._asdict()
     bins = values.pop("reliability").to_dict("records")
-    return {name: None if math.isnan(value) else value for name, value in values.items()} | {
-        "reliability": bins
-    }
+    plain = {name: None if math.isnan(value) else value for name, value in values.items()}
+    return plain | {"reliability": bins}
 
 
 def draw_reliability(found: Evaluation, path: Path, simulated: bool) -> None:
     """
-    Draw the observed share over the predicted probability, and how many pairs each point stands for.
+    Draw the observed share over the predicted probability, and the number of pairs per point.
 
     Parameters
     ----------
     found : Evaluation
-        With probabilities.
+        Evaluation of pairs with probabilities.
     path : Path
         PNG file.
     simulated : bool
-        Whether the ground motion was.
+        Whether the ground motion is simulated.
     """
     figure = Figure(figsize=(5.5, 6.5), layout="constrained")
     shares, counts = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
@@ -92,39 +95,41 @@ def draw_reliability(found: Evaluation, path: Path, simulated: bool) -> None:
 
 
 def _draw_shares(axes: Axes, found: Evaluation) -> None:
-    """Draw each bin, and the range of 19 shares of 20 if the prediction is true and pairs are independent."""
+    """Draw the observed share of each bin, with the range in which 19 of 20 should lie."""
     bins = found.reliability
     mean, events = bins["mean_probability"].to_numpy(), bins["events"].to_numpy()
-    low, high = binom.interval(0.95, events, mean) / events
     axes.plot([0.0, 1.0], [0.0, 1.0], color=MOTION_COLOUR, linewidth=0.8, label="as predicted")
-    axes.vlines(
-        mean, low, high, color="#BBBBBB", linewidth=6.0, label="19 of 20, if true and independent"
-    )
+
+    # Binomial range of the share, if the prediction is true and pairs are independent
+    low, high = binom.interval(0.95, events, mean) / events
+    label = "19 of 20, if true and independent"
+    axes.vlines(mean, low, high, color=FAINT_COLOUR, linewidth=6.0, label=label)
+
+    # A useful prediction departs from the share of all pairs
     share = found.pounded / found.pairs
-    axes.axhline(
-        share,
-        color=MOTION_COLOUR,
-        linewidth=0.8,
-        linestyle=":",
-        label=f"observed share, {share:.2f}",
-    )
+    label = f"observed share, {share:.2f}"
+    axes.axhline(share, color=MOTION_COLOUR, linewidth=0.8, linestyle=":", label=label)
     axes.plot(mean, bins["observed_share"], "o", color=BUILDING_COLOURS[0], label="observed")
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), ylabel="observed share of pounding")
-    scores = (
-        f"Brier score {found.brier_score:.3f} (share alone {found.brier_score_of_the_share:.3f})"
-    )
-    axes.set_title(f"{found.pairs} pairs looked at, {found.pounded} pounded\n{scores}", fontsize=11)
+    axes.set_title(_title(found), fontsize=11)
+
+
+def _title(found: Evaluation) -> str:
+    """Return number of pairs and Brier score in two lines."""
+    score, of_the_share = found.brier_score, found.brier_score_of_the_share
+    scores = f"Brier score {score:.3f} (share alone {of_the_share:.3f})"
+    return f"{found.pairs} pairs looked at, {found.pounded} pounded\n{scores}"
 
 
 def _draw_counts(axes: Axes, bins: pd.DataFrame) -> None:
+    """Draw the number of pairs of each bin as bars."""
     axes.bar(
         bins["low"],
         bins["events"],
         width=bins["high"] - bins["low"],
         align="edge",
-        color="#BBBBBB",
+        color=FAINT_COLOUR,
         edgecolor="white",
     )
-    axes.set(
-        xlabel="predicted probability of pounding", ylabel="pairs", yscale="log", ylim=(0.5, None)
-    )
+    axes.set(xlabel="predicted probability of pounding", ylabel="pairs", yscale="log")
+    axes.set_ylim(0.5, None)

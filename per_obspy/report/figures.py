@@ -1,4 +1,4 @@
-"""Figures of a run: from one record to one pair at risk, and the region at a glance."""
+"""Figures of a run: from one record to one pair at risk, and an overview of the region."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,13 +11,23 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 from per_obspy.checks import FloatArray
-from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, STATE_COLOURS, save
+from per_obspy.report.spectra import add_circle
+from per_obspy.report.style import (
+    BUILDING_COLOURS,
+    FAINT_COLOUR,
+    MOTION_COLOUR,
+    STATE_COLOURS,
+    save,
+)
 from per_obspy.screening.values import components
 
+#: States in the order in which they are drawn: the worst on top.
+DRAWN_STATES = ("no", "possible", "yes")
 
-def draw_walk(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
+
+def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
     """
-    Draw the way from a record to a pair at risk: motion, PER spectrum, the pair's circles in the state space.
+    Draw a record, its PER spectrum, and the energy circles of a pair in the state space.
 
     Parameters
     ----------
@@ -45,11 +55,13 @@ def motion_along(station: xr.Dataset, azimuth: float) -> FloatArray:
 
 
 def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
+    """Draw the acceleration along an azimuth during the strong motion."""
     motion, time = motion_along(station, azimuth), station["time"].to_numpy()
+    axes.plot(time, motion, color=MOTION_COLOUR, linewidth=0.5)
+    # Pads and quiet ends are left out: 0.1 to 99.9 % of the squared acceleration
     energy = np.cumsum(motion**2)
     start, end = np.interp([0.001, 0.999], energy / energy[-1], time)
-    axes.plot(time, motion, color=MOTION_COLOUR, linewidth=0.5)
-    axes.set_xlim(start - 5.0, end + 5.0)  # pads and quiet ends are left out
+    axes.set_xlim(start - 5.0, end + 5.0)
     along = "" if np.isnan(azimuth) else f", along {azimuth:.0f}°"
     axes.set(xlabel="time (s)", ylabel="ground acceleration (m/s²)")
     axes.set_title(f"1  record {station['station'].item()}{along}", fontsize=11)
@@ -57,14 +69,17 @@ def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
 
 def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
     """Draw the stored spectrum at the damping nearest to the pair's, and the pair's own radii."""
-    name = "per_rotd100" if "per_rotd100" in station else "per"
-    spectrum = station[name].sel(damping=pair["damping_1"], method="nearest")
-    if name == "per":
-        spectrum = spectrum.isel(component=0)
-    usable = station["usable"].to_numpy() == 1
-    axes.loglog(station["period"], spectrum, color="#BBBBBB", linestyle=":")
-    label = "PER, largest over azimuth" if name == "per_rotd100" else "PER"
-    axes.loglog(station["period"][usable], spectrum[usable], color=MOTION_COLOUR, label=label)
+    by_azimuth = "per_rotd100" in station
+    stored = station["per_rotd100"] if by_azimuth else station["per"].isel(component=0)
+    spectrum = stored.sel(damping=pair["damping_1"], method="nearest")
+
+    # Periods outside the usable ones are dotted
+    period, usable = station["period"], station["usable"].to_numpy() == 1
+    label = "PER, largest over azimuth" if by_azimuth else "PER"
+    axes.loglog(period, spectrum, color=FAINT_COLOUR, linestyle=":")
+    axes.loglog(period[usable], spectrum[usable], color=MOTION_COLOUR, label=label)
+
+    # The pair is computed at its own periods and dampings
     for i, colour in enumerate(BUILDING_COLOURS, start=1):
         text = f"building {i}: T = {pair[f'period_{i}']:.2f} s"
         axes.plot(pair[f"period_{i}"], pair[f"per_{i}"], "o", color=colour, label=text)
@@ -74,16 +89,12 @@ def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
 
 
 def _draw_circles(axes: Axes, pair: pd.Series) -> None:
-    """Draw the largest energy circle of each building, their centres separated by the gap (the paper's Fig. 4)."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    drawn = zip(
-        BUILDING_COLOURS, (0.0, pair["gap"]), ("-", "--"), strict=True
-    )  # dashes: equal ones touch all around
-    for i, (colour, centre, line) in enumerate(drawn, start=1):
-        radius = pair[f"participation_{i}"] * pair[f"per_{i}"]
-        x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
-        axes.fill(x, y, color=colour, alpha=0.18)
-        axes.plot(x, y, color=colour, linestyle=line, label=f"building {i}")
+    """Draw the largest energy circle of each building, a gap apart (the paper's Fig. 4)."""
+    # Dashes for the second building, as equal circles touch all around
+    _draw_circle(axes, pair, 1, centre=0.0, line="-")
+    _draw_circle(axes, pair, 2, centre=pair["gap"], line="--")
+
+    # The faces of both buildings at rest
     axes.axvline(0.0, color=BUILDING_COLOURS[0], linewidth=0.8)
     axes.axvline(pair["gap"], color=BUILDING_COLOURS[1], linewidth=0.8)
     axes.set_aspect("equal", adjustable="datalim")
@@ -93,9 +104,20 @@ def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     axes.legend(fontsize=8, loc="upper right")
 
 
+def _draw_circle(axes: Axes, pair: pd.Series, i: int, centre: float, line: str) -> None:
+    """Draw the largest energy circle of building i, filled."""
+    colour = BUILDING_COLOURS[i - 1]
+    radius = pair[f"participation_{i}"] * pair[f"per_{i}"]
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    # The outline is a separate line, so that it is opaque
+    x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
+    axes.fill(x, y, color=colour, alpha=0.18)
+    add_circle(axes, radius, colour, f"building {i}", centre, line)
+
+
 def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Path) -> None:
     """
-    Draw the region: where the pairs and the stations are, and how gaps compare with demands.
+    Draw a map of the pairs and stations of a region, and gaps over demands.
 
     Parameters
     ----------
@@ -117,15 +139,15 @@ def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Pa
 
 
 def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
-    for state in ("no", "possible", "yes"):
+    """Draw pairs in the colours of their states, and stations."""
+    for state in DRAWN_STATES:
         chosen = table[table["state"] == state]
-        label = f"{len(chosen)} pairs: {state}"
-        axes.scatter(
-            chosen["longitude"], chosen["latitude"], s=5, color=STATE_COLOURS[state], label=label
-        )
+        colour, label = STATE_COLOURS[state], f"{len(chosen)} pairs: {state}"
+        axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=colour, label=label)
     axes.scatter(
         spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations"
     )
+    # A degree of longitude is shorter by the cosine of the latitude
     axes.set_aspect(1.0 / np.cos(np.radians(float(table["latitude"].mean()))))
     axes.set(xlabel="longitude (°E)", ylabel="latitude (°N)", title="pounding")
     axes.locator_params(nbins=6)
@@ -134,10 +156,12 @@ def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
 
 
 def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
-    for state in ("no", "possible", "yes"):
+    """Draw gaps over demands, cm, in the colours of the states."""
+    for state in DRAWN_STATES:
         chosen = table[table["state"] == state]
         axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
-    demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
+    # Pairs below the line pound
+    demand, gap = 100 * float(table["demand"].max()), 100 * float(table["gap"].max())
     axes.plot([0.0, demand], [0.0, demand], color="black", linewidth=0.8, label="gap = demand")
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)", title="gap against demand")
     _from_zero(axes.set_xscale, axes.set_xlim, axes.xaxis, demand)
@@ -148,7 +172,7 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
 def _from_zero(
     set_scale: Callable[..., object], set_limits: Callable[..., object], axis: Axis, largest: float
 ) -> None:
-    """Make an axis linear up to 1, or a tenth of what is largest on it if that is less, and logarithmic beyond."""
+    """Make an axis linear up to 1, or to a tenth of a smaller largest value; logarithmic beyond."""
     linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
     set_scale("symlog", linthresh=linear)
     set_limits(-0.1 * linear, 1.5 * max(largest, linear))

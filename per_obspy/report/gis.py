@@ -1,4 +1,4 @@
-"""GeoPackages of a risk table and of its totals; QGIS draws the pairs in the colours of their risk class."""
+"""GeoPackages of a risk table and of its totals, with a QGIS style for the risk classes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -18,12 +18,12 @@ from per_obspy.checks import FloatArray
 from per_obspy.files import written_whole
 from per_obspy.report.style import STATE_COLOURS
 
-#: WGS 84; a GeoPackage keeps longitude before latitude, whatever EPSG says.
+#: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
 CRS = "EPSG:4326"
 GEOMETRY = "geom"
 PAIRS, TOTALS, STYLES = "pairs", "totals", "layer_styles"
 
-#: Diameter of a pair's mark, worst and mildest class, millimetres on the screen.
+#: Diameter of a pair's marker, worst and mildest class, millimetres on the screen.
 LARGEST, SMALLEST = 2.6, 1.2
 
 
@@ -43,7 +43,7 @@ def write_pairs_layer(
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
-        What the layer says of all its rows, for example whether the motion is simulated.
+        Facts that hold for all rows, for example whether the motion is simulated.
     """
     with written_whole(path) as part:
         for number, table in enumerate(tables):
@@ -59,7 +59,7 @@ def write_totals_layer(
     facts: Mapping[str, str],
 ) -> None:
     """
-    Write totals as the polygons of their cells, or as points in the middle of their pairs; whole or not at all.
+    Write totals as polygons of their cells or as points amid their pairs, whole or not at all.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def write_totals_layer(
         From :func:`per_obspy.screening.region.totals.totals`.
     outlines : sequence of ndarray, or None
         Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
-        for areas whose outline nobody gave.
+        for areas without known outlines.
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
-        What the layer says of all its rows.
+        Facts that hold for all rows.
     """
     if outlines is None:
         shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())
@@ -89,7 +89,10 @@ def _write(
     append: bool,
     facts: Mapping[str, str],
 ) -> None:
+    """Write or append a layer: a table with its shapes, and facts as its description."""
+    # Shapes of a layer are all of one type
     polygons = (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any()
+    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     pyogrio.raw.write_arrow(
         _with_shapes(table, shapes),
         path,
@@ -99,41 +102,45 @@ def _write(
         layer=layer,
         append=append,
         driver="GPKG",
-        layer_options={
-            "GEOMETRY_NAME": GEOMETRY,
-            "DESCRIPTION": "; ".join(f"{k}: {v}" for k, v in facts.items()),
-        },
+        layer_options={"GEOMETRY_NAME": GEOMETRY, "DESCRIPTION": description},
     )
 
 
 def _with_shapes(table: pd.DataFrame, shapes: NDArray[np.object_]) -> pa.Table:
-    """Return the table with its geometries as GDAL takes them; a column without any value counts as text."""
+    """Return the table with its geometries as GDAL takes them."""
     plain = table.copy(deep=False)
     plain.attrs = {}
     arrow = pa.Table.from_pandas(plain, preserve_index=False)
-    kinds = [
-        pa.field(one.name, pa.string()) if pa.types.is_null(one.type) else one
-        for one in arrow.schema
-    ]
-    return arrow.cast(pa.schema(kinds)).append_column(
-        GEOMETRY, pa.array(shapely.to_wkb(shapes), pa.binary())
+    # GDAL has no null type: a column without any value counts as text
+    schema = pa.schema(
+        pa.field(field.name, pa.string()) if pa.types.is_null(field.type) else field
+        for field in arrow.schema
     )
+    geometry = pa.array(shapely.to_wkb(shapes), pa.binary())
+    return arrow.cast(schema).append_column(GEOMETRY, geometry)
 
 
 def _write_style(path: Path, layer: str, style: str) -> None:
-    """Add the table in which QGIS keeps styles, with the style that it takes for this layer when it is opened."""
+    """Add the table in which QGIS keeps styles, with the default style of this layer."""
     texts = {
-        "f_table_catalog": "", "f_table_schema": "", "f_table_name": layer, "f_geometry_column": GEOMETRY,
-        "styleName": "risk class", "styleQML": style, "styleSLD": "", "description": "colour by risk class",
-        "owner": "", "ui": "",
-    }  # fmt: skip
+        "f_table_catalog": "",
+        "f_table_schema": "",
+        "f_table_name": layer,
+        "f_geometry_column": GEOMETRY,
+        "styleName": "risk class",
+        "styleQML": style,
+        "styleSLD": "",
+        "description": "colour by risk class",
+        "owner": "",
+        "ui": "",
+    }
     columns: dict[str, NDArray[Any]] = {
         name: np.array([text], dtype=object) for name, text in texts.items()
     }
     columns["useAsDefault"] = np.array([True])
-    columns["update_time"] = np.array(
-        [datetime.now(UTC).replace(tzinfo=None)], dtype="datetime64[ms]"
-    )
+    now = datetime.now(UTC).replace(tzinfo=None)
+    columns["update_time"] = np.array([now], dtype="datetime64[ms]")
+    # A table without geometry
     pyogrio.raw.write(
         path,
         None,
@@ -148,7 +155,19 @@ def _write_style(path: Path, layer: str, style: str) -> None:
 
 
 def class_style(classes: Sequence[str]) -> str:
-    """Return a QGIS style (QML): one mark a risk class, the worst largest, and the worst pairs drawn on top."""
+    """
+    Return a QGIS style (QML): one marker per risk class, the worst pairs drawn on top.
+
+    Parameters
+    ----------
+    classes : sequence of str
+        Names of the risk classes, worst first; its marker is the largest.
+
+    Returns
+    -------
+    style : str
+        XML document.
+    """
     root = ElementTree.Element("qgis", version="3.28.0", styleCategories="Symbology")
     renderer = ElementTree.SubElement(
         root,
@@ -158,34 +177,42 @@ def class_style(classes: Sequence[str]) -> str:
         enableorderby="1",
         symbollevels="0",
     )
-    categories, symbols = (
-        ElementTree.SubElement(renderer, name) for name in ("categories", "symbols")
-    )
+    _add_categories(renderer, classes)
+
+    # Drawn by falling rank: the worst pair, rank 1, last
+    order_by = ElementTree.SubElement(renderer, "orderby")
+    order = ElementTree.SubElement(order_by, "orderByClause", asc="0", nullsFirst="0")
+    order.text = '"rank"'
+    ElementTree.SubElement(root, "layerGeometryType").text = "0"
+    document = ElementTree.tostring(root, encoding="unicode")
+    return "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n" + document
+
+
+def _add_categories(renderer: ElementTree.Element, classes: Sequence[str]) -> None:
+    """Add a category and its marker for each risk class."""
+    categories = ElementTree.SubElement(renderer, "categories")
+    symbols = ElementTree.SubElement(renderer, "symbols")
     colours = LinearSegmentedColormap.from_list("risk", list(STATE_COLOURS.values()))
     for number, name in enumerate(classes):
+        # Colour and size change evenly from the worst to the mildest class
         share = number / max(len(classes) - 1, 1)
+        size = LARGEST + share * (SMALLEST - LARGEST)
         ElementTree.SubElement(
             categories, "category", value=name, label=name, symbol=str(number), render="true"
         )
-        _add_mark(symbols, number, to_hex(colours(share)), LARGEST + share * (SMALLEST - LARGEST))
-    order = ElementTree.SubElement(
-        ElementTree.SubElement(renderer, "orderby"), "orderByClause", asc="0", nullsFirst="0"
-    )
-    order.text = '"rank"'
-    ElementTree.SubElement(root, "layerGeometryType").text = "0"
-    return "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n" + ElementTree.tostring(
-        root, encoding="unicode"
-    )
+        _add_marker(symbols, number, to_hex(colours(share)), size)
 
 
-def _add_mark(symbols: ElementTree.Element, number: int, colour: str, size: float) -> None:
-    red, green, blue = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
+def _add_marker(symbols: ElementTree.Element, number: int, colour: str, size: float) -> None:
+    """Add a circle of a colour (hexadecimal) and a size, mm."""
     symbol = ElementTree.SubElement(
         symbols, "symbol", type="marker", name=str(number), alpha="1", clip_to_extent="1"
     )
     layer = ElementTree.SubElement(
         symbol, "layer", {"class": "SimpleMarker", "enabled": "1", "locked": "0", "pass": "0"}
     )
+    # QGIS takes colours as red, green, blue and opacity, 0 to 255
+    red, green, blue = (int(colour[start : start + 2], 16) for start in (1, 3, 5))
     options = {
         "name": "circle",
         "color": f"{red},{green},{blue},255",

@@ -1,4 +1,4 @@
-"""Figures of one station: its spectra side by side, and the state-space trace of one oscillator."""
+"""Figures of one station: its spectra, and the state-space trace of one oscillator."""
 
 from pathlib import Path
 
@@ -32,15 +32,11 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
     chosen = station.sel(damping=damping, method="nearest")
     figure = Figure(figsize=(13.0, 4.2), layout="constrained")
     radius, velocity, ratio = figure.subplots(1, 3)
-    period = station["period"].to_numpy()
-    usable = np.where(station["usable"] == 1, 1.0, np.nan)
+    # More components than colours begin again
     for index, name in enumerate(station["channel"].to_numpy()):
         colour = COMPONENT_COLOURS[index % len(COMPONENT_COLOURS)]
-        per, sd = chosen["per"][index].to_numpy(), chosen["sd"][index].to_numpy()
-        radius.loglog(period, per * usable, color=colour, label=f"{name} PER")
-        radius.loglog(period, sd * usable, color=colour, linestyle="--", label=f"{name} SD")
-        velocity.loglog(period, 2.0 * np.pi / period * sd * usable, color=colour, label=name)
-        ratio.semilogx(period, per / sd * usable, color=colour, label=name)
+        _draw_component((radius, velocity, ratio), chosen, index, name, colour)
+
     radius.set(ylabel="radius, displacement (m)")
     velocity.set(ylabel="pseudo-velocity (m/s)")
     ratio.set(ylabel="PER / SD (1)")
@@ -48,18 +44,36 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         axes.set_xlabel("natural period (s)")
         axes.grid(which="both", alpha=0.25)
         axes.legend(fontsize=8)
-    title = (
+
+    # The damping is that of the stored spectra
+    figure.suptitle(
         f"{station['station'].item()}, damping {float(chosen['damping']):.0%}, usable periods only"
     )
-    figure.suptitle(title)
     save(figure, path, station.attrs["simulated"] == "true")
+
+
+def _draw_component(
+    panels: tuple[Axes, Axes, Axes], spectra: xr.Dataset, index: int, name: str, colour: str
+) -> None:
+    """Draw PER and SD, pseudo-velocity, and their ratio of one component at usable periods."""
+    radius, velocity, ratio = panels
+    period = spectra["period"].to_numpy()
+    usable = np.where(spectra["usable"] == 1, 1.0, np.nan)
+    per, sd = spectra["per"][index].to_numpy(), spectra["sd"][index].to_numpy()
+    # Unusable periods are NaN, which breaks the lines
+    radius.loglog(period, per * usable, color=colour, label=f"{name} PER")
+    radius.loglog(period, sd * usable, color=colour, linestyle="--", label=f"{name} SD")
+    velocity.loglog(period, 2.0 * np.pi / period * sd * usable, color=colour, label=name)
+    ratio.semilogx(period, per / sd * usable, color=colour, label=name)
 
 
 def draw_state_space(
     acceleration: ArrayLike, dt: float, period: float, damping: float, path: Path
 ) -> None:
     """
-    Draw the motion of one oscillator in the plane of displacement and velocity over frequency, and its PER circle.
+    Draw the motion of one oscillator in its state space, and its PER circle.
+
+    The state space is the plane of displacement and velocity over frequency.
 
     Parameters
     ----------
@@ -68,7 +82,7 @@ def draw_state_space(
     dt : float
         Sampling interval, s.
     period, damping : float
-        Of the oscillator, s; fraction of critical.
+        Undamped period of the oscillator, s, and its damping, fraction of critical.
     path : Path
         PNG file.
 
@@ -76,6 +90,7 @@ def draw_state_space(
     ----------
     Valles-Mattox & Reinhorn (1996), 11WCEE, Fig. 2a.
     """
+    # An infinite yield displacement leaves the oscillator linear
     motion = bilinear_response(acceleration, dt, period, damping, np.inf, 0.0)
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
     axes = figure.subplots()
@@ -94,15 +109,16 @@ def add_state_space(
     Parameters
     ----------
     axes : Axes
-        Where to.
+        Axes to draw on.
     displacement, velocity : (n_time,) ndarray
         Relative to the ground, m and m/s.
     period : float
         Undamped, s.
     """
-    up = velocity * period / (2.0 * np.pi)
-    radius = float(np.max(np.hypot(displacement, up)))
-    axes.plot(displacement, up, color=MOTION_COLOUR, linewidth=0.6)
+    # PER is the largest distance from the origin
+    scaled_velocity = velocity * period / (2.0 * np.pi)
+    radius = float(np.max(np.hypot(displacement, scaled_velocity)))
+    axes.plot(displacement, scaled_velocity, color=MOTION_COLOUR, linewidth=0.6)
     add_circle(axes, radius, COMPONENT_COLOURS[1], f"PER = {radius:.3g} m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="displacement (m)", ylabel="velocity / frequency (m)")
@@ -117,17 +133,12 @@ def add_circle(
     Parameters
     ----------
     axes : Axes
-        Where to.
+        Axes to draw on.
     radius, centre : float
-        Of the circle, the centre along the displacement, m.
+        Radius of the circle and its centre along the displacement, m.
     colour, label, style : str
-        Of its line.
+        Colour, label and style of its line.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    axes.plot(
-        centre + radius * np.cos(angle),
-        radius * np.sin(angle),
-        color=colour,
-        linestyle=style,
-        label=label,
-    )
+    x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
+    axes.plot(x, y, color=colour, linestyle=style, label=label)

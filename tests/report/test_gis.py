@@ -61,8 +61,9 @@ def test_qgis_finds_its_style(tmp_path):
     path = tmp_path / "risk.gpkg"
     write_pairs_layer([TABLE], CLASSES, path, FACTS)
     query = (
-        "SELECT s.styleQML FROM layer_styles s JOIN gpkg_geometry_columns g ON g.table_name = s.f_table_name "
-        "AND g.column_name = s.f_geometry_column WHERE s.useAsDefault = 1"
+        "SELECT s.styleQML FROM layer_styles s JOIN gpkg_geometry_columns g "
+        "ON g.table_name = s.f_table_name AND g.column_name = s.f_geometry_column "
+        "WHERE s.useAsDefault = 1"
     )
     ((style,),) = _rows(path, query)
     assert style == class_style(CLASSES)
@@ -92,24 +93,32 @@ def test_a_class_may_have_any_name_and_be_alone():
     assert next(root.iter("category")).get("value") == '<"grave" & more>'
 
 
-def test_totals_are_cells_or_points(tmp_path):
+def test_totals_of_cells_are_polygons_around_their_pairs(tmp_path):
     cells = grid_cells(TABLE["longitude"], TABLE["latitude"], 1000.0)
     found = totals(TABLE, cells.cell)
     outlines = box_outlines(cells.boxes.loc[found["area"]])
     write_totals_layer(found, outlines, tmp_path / "cells.gpkg", FACTS)
     meta, _, geometry, fields = pyogrio.raw.read(tmp_path / "cells.gpkg")
-    values = dict(zip(meta["fields"], fields, strict=True))
     assert meta["geometry_type"] == "Polygon"
-    pairs = dict(zip(values["area"], values["pairs"], strict=True))
-    assert sorted(pairs.values()) == [1, 2]
+
+    # two pairs share a place
+    values = dict(zip(meta["fields"], fields, strict=True))
+    assert sorted(values["pairs"]) == [1, 2]
     # each place lies in the polygon of its cell
     polygons = dict(zip(values["area"], shapely.from_wkb(geometry), strict=True))
     places = shapely.points(TABLE["longitude"], TABLE["latitude"])
-    assert all(
-        polygons[cell].contains(place) for cell, place in zip(cells.cell, places, strict=True)
-    )
+    for cell, place in zip(cells.cell, places, strict=True):
+        assert polygons[cell].contains(place)
+
+
+def test_totals_of_areas_without_outlines_are_points(tmp_path):
     write_totals_layer(totals(TABLE, "everywhere"), None, tmp_path / "area.gpkg", FACTS)
-    assert pyogrio.read_info(tmp_path / "area.gpkg")["geometry_type"] == "Point"
+    meta, _, geometry, _ = pyogrio.raw.read(tmp_path / "area.gpkg")
+    assert meta["geometry_type"] == "Point"
+    # amid the pairs
+    (point,) = shapely.from_wkb(geometry)
+    assert point.x == pytest.approx(TABLE["longitude"].mean(), abs=1e-3)
+    assert point.y == pytest.approx(TABLE["latitude"].mean(), abs=1e-3)
 
 
 def test_a_table_without_pairs_is_an_empty_layer(tmp_path):
@@ -135,4 +144,4 @@ def test_a_layer_that_cannot_be_finished_leaves_the_old_one(tmp_path):
     with pytest.raises(RuntimeError, match="power cut"):
         write_pairs_layer(broken(), CLASSES, path, FACTS)
     assert path.read_bytes() == before
-    assert [one.name for one in tmp_path.iterdir()] == ["risk.gpkg"]
+    assert [file.name for file in tmp_path.iterdir()] == ["risk.gpkg"]

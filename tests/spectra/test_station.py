@@ -9,6 +9,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
 import per_obspy
+from per_obspy.config import Spectra
 from per_obspy.errors import RecordRejected
 
 PERIODS = [0.2, 0.5, 1.0, 2.0]
@@ -157,3 +158,12 @@ def test_bad_grids_are_named():
         per_obspy.station_spectra(_stream(), [0.0])
     with pytest.raises(ValueError, match=r"dampings must be at least 0 and below 1, got 5\.0"):
         per_obspy.station_spectra(_stream(), PERIODS, (5.0,))
+
+
+def test_periods_default_to_those_of_the_configuration():
+    # would catch a grid that differs between a run and a call
+    settings = Spectra()
+    station = per_obspy.station_spectra(_stream((30.0,), vertical=False))
+    expected = np.geomspace(settings.shortest, settings.longest, settings.count)
+    assert_array_equal(station["period"], expected)
+    assert station["damping"].values.tolist() == list(settings.dampings)

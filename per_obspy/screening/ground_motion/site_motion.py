@@ -31,7 +31,7 @@ SHORTEST_DISTANCE = 1000.0
 
 
 class Hypocentre(NamedTuple):
-    """Where the earthquake started: degrees east and north, depth in m."""
+    """Point at which the earthquake started: degrees east and north, depth in m."""
 
     longitude: float
     latitude: float
@@ -49,7 +49,7 @@ class StationField(NamedTuple):
     ln_per : (n_stations, n_periods) ndarray
         ln PER of the stations in the order in which they came, PER in m.
     source : Hypocentre or None
-        Where the earthquake started, if that is known.
+        Hypocentre of the earthquake, if it is known.
     """
 
     field: MotionField

@@ -14,7 +14,7 @@ from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.ranking import STATES
 
-#: Factor by which a row of cells is numbered apart from its columns, more than any row has.
+#: Numbers of cells per row: more than any row has, so that row and column make one number.
 ROW_FACTOR = 1 << 32
 
 #: Unit and meaning of the columns of a table of totals; each risk class adds a column

@@ -1,13 +1,19 @@
-"""The nearest station, on a sphere."""
+"""Assignment of stations to pairs: the nearest on a sphere, of the pair's own ground first."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from obspy.geodetics import gps2dist_azimuth
+from screening_samples import make_station
 
 from per_obspy.constants import EARTH_RADIUS
-from per_obspy.screening.ground_motion.assignment import Stations, assigned, nearest_station
+from per_obspy.screening.ground_motion.assignment import (
+    Stations,
+    assigned,
+    nearest_station,
+    stations_of,
+)
 
 
 def test_distances_agree_with_the_ellipsoid():
@@ -39,6 +45,27 @@ def test_a_place_at_a_station_is_at_no_distance():
     assert distance[0] < 1e-6  # m
 
 
+def test_stations_without_coordinates_serve_no_pair():
+    # would catch a row of longitudes that is shifted against the names
+    first = make_station("ONE", latitude=10.0)
+    second = make_station("TWO", latitude=11.0).assign_coords(site_class="rock")
+    unlocated = make_station("LOST", latitude=np.nan)
+    stations, rejected = stations_of([first, unlocated, second])
+    assert stations.names.tolist() == ["XX.ONE", "XX.TWO"]
+    assert stations.latitude.tolist() == [10.0, 11.0]
+    assert stations.site_class.tolist() == ["", "rock"]
+    assert stations.read(1) is second
+    assert [(rejection.kind, rejection.name) for rejection in rejected] == [("station", "XX.LOST")]
+
+
+def test_without_any_station_every_pair_is_rejected():
+    none, _ = stations_of([])
+    names, _, rejected = _assigned(["rock", ""], none)
+    assert names == []
+    assert [rejection.name for rejection in rejected] == ["p0", "p1"]
+    assert rejected[0].reasons == ("no station has coordinates",)
+
+
 def _stations(*classes):
     return Stations(
         np.array(["NEAR", "FAR"], dtype=object),
@@ -66,7 +93,7 @@ def test_a_pair_is_given_the_nearest_station_of_its_own_ground():
     assert other == [False, False, False, True]
 
 
-def test_ground_that_nobody_knows_keeps_the_nearest_station():
+def test_unknown_ground_keeps_the_nearest_station():
     assert _assigned(["rock"], _stations("", ""))[:2] == (["NEAR"], [False])
     assert _assigned([""], _stations("lakebed", "rock"))[:2] == (["NEAR"], [False])
 
@@ -96,8 +123,11 @@ def test_coordinates_that_would_reach_a_station_if_exchanged_are_suspected():
     )
     table, rejected = assigned(pairs, turin, 20e3)
     assert table.empty
-    swapped, far, wide = (one.reasons[0] for one in rejected)
-    hint = "with longitude = 45.07 and latitude = 7.68 exchanged, NEAR would be 1112 m away: are they swapped?"
+    swapped, far, wide = (rejection.reasons[0] for rejection in rejected)
+    hint = (
+        "with longitude = 45.07 and latitude = 7.68 exchanged, NEAR would be 1112 m away: "
+        "are they swapped?"
+    )
     assert swapped.endswith(f"beyond 20000 m; {hint}")
     assert far.endswith("beyond 20000 m")
     assert wide.endswith("beyond 20000 m")

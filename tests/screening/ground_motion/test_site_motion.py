@@ -1,4 +1,4 @@
-"""Motion at a site against that of the record: nothing to say at the station, less and less known away from it."""
+"""Motion at a site against that of the record: equal at the station, less known away from it."""
 
 import pickle
 
@@ -21,7 +21,7 @@ SETTINGS = Interpolation()
 
 @pytest.fixture(scope="module")
 def stations():
-    """Three stations, 20 km from each other along a meridian, the middle one shakes three times as much."""
+    """Three stations every 20 km along a meridian, the middle one with 3 x the motion."""
     return [
         make_station("ONE", latitude=10.0, seed=4),
         make_station("TWO", scale=3.0, latitude=10.18, seed=4),
@@ -88,32 +88,40 @@ def _on(station, site_class):
     return station.assign_coords(site_class=site_class)
 
 
-def test_motion_never_crosses_site_classes_but_as_a_fallback_that_says_so(stations):
-    # beside the lakebed station a pair on rock moves as the rock does, whoever's record it is given
-    named = [
-        _on(one, name) for one, name in zip(stations, ("rock", "lakebed", "rock"), strict=True)
-    ]
-    prepared = prepared_field(named, SETTINGS)
+@pytest.fixture
+def lakebed(stations):
+    """The three stations on rock, lakebed and rock; four places near the lakebed's."""
+    classes = ("rock", "lakebed", "rock")
+    named = [_on(station, name) for station, name in zip(stations, classes, strict=True)]
     places = _pairs([20.0] * 4, [10.18] * 4, site_class=["rock", "lakebed", "hill", ""])
-    columns = motion_at_pairs(prepared, places, 1)
+    return named, places
+
+
+def test_motion_crosses_site_classes_as_a_fallback_only(lakebed):
+    named, places = lakebed
+    columns = motion_at_pairs(prepared_field(named, SETTINGS), places, 1)
     assert columns["motion_from_other_site_class"].tolist() == [False, False, True, True]
-    only_rock = motion_at_pairs(prepared_field([named[1], *named[::2]], SETTINGS), places, 0)
-    alone = prepared_field(named[::2], SETTINGS)
-    from_rock = motion_at_pairs(alone, places.iloc[:1], 0)
-    assert_allclose(only_rock["ln_per_ratio_1"], columns["ln_per_ratio_1"], rtol=1e-12)
-    assert_allclose(columns["ln_per_std_1"][0], from_rock["ln_per_std_1"][0], rtol=1e-12)
+    assert_allclose([columns["ln_per_ratio_1"][1], columns["ln_per_std_1"][1]], 0.0, atol=1e-7)
+    # the order of stations does not matter
+    turned = motion_at_pairs(prepared_field([named[1], *named[::2]], SETTINGS), places, 0)
+    assert_allclose(turned["ln_per_ratio_1"], columns["ln_per_ratio_1"], rtol=1e-12)
+
+
+def test_a_pair_on_rock_next_to_the_lakebed_moves_as_the_rock_does(lakebed):
+    named, places = lakebed
+    columns = motion_at_pairs(prepared_field(named, SETTINGS), places, 1)
+    rock = motion_at_pairs(prepared_field(named[::2], SETTINGS), places.iloc[:1], 0)
+    assert_allclose(columns["ln_per_std_1"][0], rock["ln_per_std_1"][0], rtol=1e-12)
     # the rock estimate, seen from the lakebed's record, which is three times that of the first rock
     # station
-    assert_allclose(
-        columns["ln_per_ratio_1"][0], from_rock["ln_per_ratio_1"][0] - np.log(3.0), rtol=1e-6
-    )
-    assert_allclose([columns["ln_per_ratio_1"][1], columns["ln_per_std_1"][1]], 0.0, atol=1e-7)
+    expected = rock["ln_per_ratio_1"][0] - np.log(3.0)
+    assert_allclose(columns["ln_per_ratio_1"][0], expected, rtol=1e-6)
     assert columns["ln_per_std_1"][0] > 0.2
 
 
 def test_louder_earthquakes_change_no_ratio(stations):
     # all records times 5: would catch a ratio to something else than a record
-    louder = [one.assign(per_rotd50=one["per_rotd50"] * 5.0) for one in stations]
+    louder = [station.assign(per_rotd50=station["per_rotd50"] * 5.0) for station in stations]
     places = _pairs(20.05, [9.9, 10.1, 10.2, 10.5])
     once, five = (
         motion_at_pairs(prepared_field(some, SETTINGS), places, 2) for some in (stations, louder)
@@ -131,7 +139,7 @@ def test_periods_that_no_record_supports_have_no_motion(stations):
 
 
 def test_a_record_that_does_not_support_the_period_is_corrected_by_its_neighbours(stations):
-    # the first record ends at 3 s; at 4 s its stored value is compared with what the others tell of
+    # the first record ends at 3 s; at 4 s its stored value is compared with the others' estimate of
     # the place
     short = [make_station("ONE", latitude=10.0, longest=3.0, seed=4), *stations[1:]]
     columns = motion_at_pairs(prepared_field(short, SETTINGS), _pairs(20.0, 10.0, 4.0, 2.0), 0)
@@ -146,11 +154,11 @@ def test_one_horizontal_and_a_station_without_motion(stations):
     prepared = prepared_field([single, still, stations[2]], SETTINGS)
     columns = motion_at_pairs(prepared, _pairs(20.0, [10.0, 10.18]), [0, 1])
     assert_allclose(columns["ln_per_ratio_1"][0], 0.0, atol=1e-12)
-    assert np.isnan(columns["ln_per_ratio_1"][1])  # nothing is any number of times nothing
+    assert np.isnan(columns["ln_per_ratio_1"][1])  # the ratio to a record without motion
     assert np.isfinite(columns["ln_per_std_1"]).all()
 
 
-def test_the_source_tells_an_attenuation():
+def test_the_source_decides_the_attenuation():
     # eight stations on a line, PER ~ 1/R from a hypocentre 20 km deep: continued beyond them, and
     # exact between them
     source = Hypocentre(20.0, 9.0, 20_000.0)
@@ -174,20 +182,11 @@ def test_the_source_tells_an_attenuation():
 def test_numbers_depend_neither_on_the_block_nor_on_the_process(stations):
     # to the bit, in any order and stride; a field that was sent to another process is the same
     # field
-    named = [_on(one, name) for one, name in zip(stations, ("rock", "rock", "hill"), strict=True)]
+    classes = ("rock", "rock", "hill")
+    named = [_on(station, name) for station, name in zip(stations, classes, strict=True)]
     prepared = prepared_field(named, SETTINGS, Hypocentre(19.0, 10.0, 1e4))
     sent = pickle.loads(pickle.dumps(prepared))
-    random = np.random.default_rng(3)
-    places = _pairs(
-        *(
-            random.uniform(*span, 101)
-            for span in ((19.9, 20.1), (9.9, 10.5), (0.06, 8.0), (0.06, 8.0))
-        )
-    )
-    places = places.assign(
-        site_class=random.choice(["rock", "hill", ""], 101), vs30=random.uniform(200, 800, 101)
-    )
-    index = random.integers(0, 3, 101)
+    places, index = _random_pairs(101)
     whole = motion_at_pairs(prepared, places, index)
     for rows in (slice(0, 1), slice(1, 64), slice(100, None, -1)):
         part = motion_at_pairs(sent, places.iloc[rows], index[rows])
@@ -195,11 +194,23 @@ def test_numbers_depend_neither_on_the_block_nor_on_the_process(stations):
             assert np.array_equal(column, whole[name][rows])
 
 
+def _random_pairs(count):
+    """Return pairs around the stations, of any period and ground, and the index of a station."""
+    random = np.random.default_rng(3)
+    longitude, latitude = random.uniform(19.9, 20.1, count), random.uniform(9.9, 10.5, count)
+    period_1, period_2 = random.uniform(0.06, 8.0, (2, count))
+    # on the classes of the stations, and of unknown class
+    site_class = random.choice(["rock", "hill", ""], count)
+    vs30 = random.uniform(200, 800, count)
+    places = _pairs(longitude, latitude, period_1, period_2, site_class=site_class, vs30=vs30)
+    return places, random.integers(0, 3, count)
+
+
 def test_wrong_arguments_are_named(stations):
     with pytest.raises(ValueError, match="stations must be one at least"):
         prepared_field([], SETTINGS)
-    nowhere = stations[0].assign_coords(latitude=np.nan)
+    unlocated = stations[0].assign_coords(latitude=np.nan)
     with pytest.raises(ValueError, match="latitude must be finite, got nan"):
-        prepared_field([nowhere], SETTINGS)
+        prepared_field([unlocated], SETTINGS)
     with pytest.raises(ValueError, match="station must be between 0 and 2, got 3"):
         motion_at_pairs(prepared_field(stations, SETTINGS), _pairs(20.0, 10.0), 3)

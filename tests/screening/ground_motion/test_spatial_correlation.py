@@ -31,5 +31,5 @@ def test_distances_are_those_of_the_nearest_station():
     east, north = np.array([179.99, 0.0, 12.0]), np.array([0.0, 60.0, -45.0])
     for other in ((-179.99, 0.0), (0.5, 60.0), (12.0, 80.0)):
         chord = nearest_station(east, north, *(np.array([x]) for x in other))[1]
-        # arcs of near-opposite places are badly told by chords; these are within 1e-9
+        # chords are ill-conditioned for near-opposite places; these are within 1e-9
         assert_allclose(great_circle(east, north, *other), chord, rtol=1e-9)

@@ -1,4 +1,4 @@
-"""Scenarios together: limits, and a pair that a scenario does not know."""
+"""Scenarios together: limits, and pairs that a scenario lacks."""
 
 import numpy as np
 import pandas as pd
@@ -27,7 +27,7 @@ def test_only_the_proportion_of_weights_counts():
     weights = np.array([1.0, 2.0, 0.0, 5.0])
     got = conditional_probability(chance, weights)
     assert_allclose(conditional_probability(chance, 1e-3 * weights), got, rtol=1e-13)
-    # a scenario of weight 0 says nothing
+    # a scenario of weight 0 changes no probability
     assert_allclose(conditional_probability(chance[[0, 1, 3]], weights[[0, 1, 3]]), got, rtol=1e-13)
     assert ((chance.min(axis=0) <= got) & (got <= chance.max(axis=0))).all()
 
@@ -53,7 +53,7 @@ WEIGHTS = {"near": 3.0, "far": 1.0}
 
 
 def _joined(*rows):
-    """Return pairs whose scenarios were joined: name and the probability in each; all at one place."""
+    """Return pairs at one place whose scenarios were joined, from name and probabilities."""
     table = pd.DataFrame(rows, columns=["pair_id", "probability_near", "probability_far"])
     same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
     return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
@@ -77,7 +77,7 @@ def test_rates_give_a_probability_in_a_year_too():
     assert_allclose(table["probability"], 0.25)
 
 
-def test_a_pair_does_not_depend_on_those_beside_it():
+def test_a_pair_does_not_depend_on_other_pairs():
     # would catch a matrix product, which adds in another order for other sizes
     random = np.random.default_rng(6)
     rows = [(f"p{i}", *random.uniform(0, 1, 2)) for i in range(37)]
@@ -89,10 +89,12 @@ def test_a_pair_does_not_depend_on_those_beside_it():
         )
 
 
-def test_a_pair_that_a_scenario_does_not_know_is_rejected_with_its_name():
+def test_a_pair_that_a_scenario_lacks_is_rejected_with_its_name():
+    # would catch a missing probability that counts as 0
     joined = _joined(("a", 0.2, 0.2), ("b", np.nan, np.nan), ("c", 0.1, np.nan))
     assert ensemble_rows(joined, WEIGHTS, yearly=False)["pair_id"].tolist() == ["a"]
-    reasons = {one.name: one.reasons[0] for one in ensemble_rejections(joined, WEIGHTS)}
+    rejections = ensemble_rejections(joined, WEIGHTS)
+    reasons = {rejection.name: rejection.reasons[0] for rejection in rejections}
     assert reasons["b"].startswith("no probability in near, far: ")
     assert reasons["c"].startswith("no probability in far: ")
     assert set(reasons) == {"b", "c"}

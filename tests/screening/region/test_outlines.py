@@ -21,7 +21,7 @@ def test_places_lie_in_their_hexagon(resolution):
     corners = hexagon_outlines(hexagons(longitude, latitude, resolution))
     for east, north, outline in zip(longitude, latitude, corners, strict=True):
         polygon = shapely.Polygon(outline)
-        # edges are great circles, drawn as straight lines in degrees: a place may lie beside one by
+        # edges are great circles, drawn as straight lines in degrees: a place may be outside by
         # their bulge, which is below 2 % of the width where cells are small and 15 % where they are
         # continents
         near = polygon.buffer((0.15 if resolution == 0 else 0.02) * np.sqrt(polygon.area))
@@ -40,6 +40,7 @@ def test_boxes_are_the_cells_of_the_grid():
     random = np.random.default_rng(8)
     longitude, latitude = random.uniform(-170, 170, 50), random.uniform(-80, 80, 50)
     cells = grid_cells(longitude, latitude, 50e3)
+    # would catch corners in an order that crosses
     outlines = dict(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
     for name, east, north in zip(cells.cell, longitude, latitude, strict=True):
         assert shapely.Polygon(outlines[name]).contains(shapely.Point(east, north))

@@ -1,4 +1,4 @@
-"""Totals: nothing is lost, expected numbers are those of dice, cells are where their places are."""
+"""Totals: every pair counts once, expected numbers are those of dice, cells hold their places."""
 
 import itertools
 
@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from per_obspy.constants import EARTH_RADIUS
-from per_obspy.screening.region.totals import STATES, TOTALS, expected_count, grid_cells, totals
+from per_obspy.screening.ranking import STATES
+from per_obspy.screening.region.totals import (
+    TOTALS,
+    expected_count,
+    grid_cells,
+    joined_totals,
+    partial_totals,
+    totals,
+)
 
 TABLE = pd.DataFrame(
     {
@@ -28,24 +36,15 @@ TABLE = pd.DataFrame(
 
 def test_totals_by_hand():
     north, south = totals(TABLE, ["north", "south", "south", "north"]).to_dict("records")
-    assert (north["area"], north["pairs"], north["yes"], north["possible"], north["no"]) == (
-        "north",
-        2,
-        0,
-        1,
-        1,
-    )
-    assert (south["yes"], south["class_severe"], south["class_high"], south["class_low"]) == (
-        2,
-        1,
-        1,
-        0,
-    )
-    assert (north["worst_pair"], south["worst_pair"], south["worst_demand_ratio"]) == (
-        "c",
-        "a",
-        0.0,
-    )
+    states = ["pairs", "yes", "possible", "no"]
+    assert [north[name] for name in states] == [2, 0, 1, 1]
+    assert [south[name] for name in states] == [2, 2, 0, 0]
+    classes = ["class_severe", "class_high", "class_low"]
+    assert [south[name] for name in classes] == [1, 1, 0]
+
+    # the smallest rank of each area
+    assert (north["area"], north["worst_pair"]) == ("north", "c")
+    assert (south["worst_pair"], south["worst_demand_ratio"]) == ("a", 0.0)
     assert np.isnan(north["worst_demand_ratio"])
     assert south["expected_pounding"] == 1.5
     assert south["expected_pounding_std_independent"] == 0.5
@@ -55,28 +54,48 @@ def test_totals_by_hand():
     assert north["longitude"] == pytest.approx(0.2)
 
 
-def test_every_column_is_described_and_every_pair_counted_once():
-    random = np.random.default_rng(1)
-    count = 500
-    table = pd.DataFrame(
+@pytest.fixture(scope="module")
+def city():
+    """500 random pairs."""
+    random, count = np.random.default_rng(1), 500
+    return pd.DataFrame(
         {
             "rank": random.permutation(count) + 1,
             "pair_id": [f"p{i}" for i in range(count)],
             "state": random.choice(STATES, count),
             "risk_class": random.choice(["severe", "low"], count),
+            # numbers that decide nothing here
             "demand_ratio": random.uniform(0, 2, count),
             "probability": random.uniform(0, 1, count),
             "longitude": random.uniform(-180, 180, count),
             "latitude": random.uniform(-90, 90, count),
         }
     )
-    found = totals(table, random.choice(["a", "b", ""], count))
+
+
+@pytest.fixture(scope="module")
+def areas(city):
+    return np.random.default_rng(2).choice(["a", "b", ""], len(city))
+
+
+def test_every_column_is_described_and_every_pair_counted_once(city, areas):
+    found = totals(city, areas)
     assert set(found) - {"class_severe", "class_low"} == set(TOTALS)
-    assert found["pairs"].sum() == found[list(STATES)].sum().sum() == count
-    assert found[["class_severe", "class_low"]].sum().sum() == count
-    assert_allclose(found["expected_pounding"].sum(), table["probability"].sum())
+    assert found["pairs"].sum() == found[list(STATES)].sum().sum() == len(city)
+    assert found[["class_severe", "class_low"]].sum().sum() == len(city)
+    assert_allclose(found["expected_pounding"].sum(), city["probability"].sum())
     # would catch a first row taken for the worst
-    assert table.set_index("rank").loc[1, "pair_id"] in set(found["worst_pair"])
+    assert city.set_index("rank").loc[1, "pair_id"] in set(found["worst_pair"])
+
+
+def test_pieces_of_a_table_have_its_totals(city, areas):
+    # to the last bit but for sums in another order; would catch an area or a class that a piece
+    # lacks
+    classes = ["severe", "low"]
+    pieces = [slice(0, 1), slice(1, 120), slice(120, None)]
+    parts = [partial_totals(city.iloc[rows], areas[rows], classes) for rows in pieces]
+    joined, whole = joined_totals(parts), totals(city, areas)
+    pd.testing.assert_frame_equal(joined[whole.columns], whole, rtol=1e-12)
 
 
 def test_without_probabilities_there_is_no_expected_number():
@@ -94,37 +113,54 @@ def test_expected_numbers_by_counting_every_outcome(probability):
         count.append(sum(outcome))
         weight.append(np.prod(np.where(outcome, chance, 1 - chance)))
     mean = np.dot(weight, count)
-    got = expected_count(probability)
+    variance = np.dot(weight, np.square(count)) - mean**2
+
     # variances are differences of numbers up to 36: 1e-14, and their root near 0 is 1e-7
+    got = expected_count(probability)
     assert_allclose(got.mean, mean, atol=1e-12)
-    assert_allclose(
-        got.std_independent, np.sqrt(max(np.dot(weight, np.square(count)) - mean**2, 0)), atol=1e-6
-    )
-    # one cause: the count is a step function of a uniform number, integrated between the steps
-    steps = np.unique([0.0, *chance, 1.0])
-    happened = [(chance > (low + high) / 2).sum() for low, high in itertools.pairwise(steps)]
-    second = np.dot(np.diff(steps), np.square(happened))
-    assert_allclose(got.std_common, np.sqrt(max(second - mean**2, 0)), atol=1e-6)
+    assert_allclose(got.std_independent, np.sqrt(max(variance, 0)), atol=1e-6)
     assert got.std_independent <= got.std_common + 1e-6
 
 
-def test_cells_hold_their_places_and_have_about_the_same_area():
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=6))
+def test_one_cause_by_integrating_over_it(probability):
+    # the count is a step function of a uniform number, integrated between the steps
+    steps = np.unique([0.0, *probability, 1.0])
+    middles = (steps[1:] + steps[:-1]) / 2
+    happened = (np.array(probability)[:, None] > middles).sum(axis=0)
+    mean = np.dot(np.diff(steps), happened)
+    variance = np.dot(np.diff(steps), np.square(happened)) - mean**2
+    # differences as above
+    got = expected_count(probability)
+    assert_allclose(got.mean, mean, atol=1e-12)
+    assert_allclose(got.std_common, np.sqrt(max(variance, 0)), atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def places():
+    """2000 places all over the Earth."""
     random = np.random.default_rng(2)
-    longitude, latitude = (
-        random.uniform(-180, 180, 2000),
-        np.degrees(np.arcsin(random.uniform(-1, 1, 2000))),
-    )
-    size = 200e3
-    cell, boxes = grid_cells(longitude, latitude, size)
-    own = boxes.loc[cell]
+    latitude = np.degrees(np.arcsin(random.uniform(-1, 1, 2000)))
+    return random.uniform(-180, 180, 2000), latitude
+
+
+def test_cells_hold_their_places(places):
     # would catch cells that cover their neighbours' places
+    longitude, latitude = places
+    cell, boxes = grid_cells(longitude, latitude, 200e3)
+    own = boxes.loc[cell]
     assert ((longitude - own["west"]) % 360 <= own["east"] - own["west"] + 1e-9).all()
     assert ((own["south"] <= latitude) & (latitude <= own["north"])).all()
+
+
+def test_cells_have_about_the_same_area(places):
+    _, boxes = grid_cells(*places, 200e3)
     inner = boxes[(boxes["north"].abs() < 80) & (boxes["south"].abs() < 80)]
     area = np.radians(inner["east"] - inner["west"]) * EARTH_RADIUS**2
+    # of a zone between two latitudes
     area = area * (np.sin(np.radians(inner["north"])) - np.sin(np.radians(inner["south"])))
     # a whole number of cells around a row: within half a cell of 34 at 80 degrees
-    assert_allclose(area, size**2, rtol=0.02)
+    assert_allclose(area, 200e3**2, rtol=0.02)
 
 
 def test_cells_do_not_depend_on_the_other_places():

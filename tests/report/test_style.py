@@ -1,0 +1,46 @@
+"""Figures are written as PNG, and simulated motion cannot pass for a record."""
+
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from per_obspy.report.style import DOTS_PER_INCH, STATE_COLOURS, save
+
+
+def _figure():
+    figure = Figure(figsize=(5.0, 4.0), layout="constrained")
+    figure.subplots().plot([0.0, 1.0], [0.0, 2.0])
+    return figure
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_simulated_motion_is_written_on_the_figure(tmp_path, simulated):
+    figure = _figure()
+    save(figure, tmp_path / "figure.png", simulated)
+    assert [text.get_text() for text in figure.texts] == ["simulated ground motion"] * simulated
+    assert imread(tmp_path / "figure.png").shape[:2] == (4 * DOTS_PER_INCH, 5 * DOTS_PER_INCH)
+
+
+def test_the_note_lies_below_the_axes(tmp_path):
+    # the lowest figure is 4 inches high; would catch a note over the labels of the axis
+    figure = _figure()
+    save(figure, tmp_path / "figure.png", simulated=True)
+    lowest = figure.axes[0].get_tightbbox().y0
+    assert figure.texts[0].get_window_extent().y1 <= lowest
+
+
+def test_a_figure_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
+    # would catch a file that is written in place
+    path = tmp_path / "figure.png"
+    path.write_bytes(b"old")
+    broken = _figure()
+    broken.savefig = lambda *_, **__: pytest.fail("power cut")
+    with pytest.raises(pytest.fail.Exception, match="power cut"):
+        save(broken, path, simulated=False)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_every_state_has_a_colour_of_its_own():
+    assert list(STATE_COLOURS) == ["yes", "possible", "no"]
+    assert len(set(STATE_COLOURS.values())) == 3

@@ -1,0 +1,125 @@
+"""Flags: raised where their condition is met, and by nothing else."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from per_obspy.config import Screening
+from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.flags import (
+    joined_flags,
+    period_is_derived,
+    raised_by_pairs,
+    raised_by_record,
+)
+
+#: Two pairs that raise no flag.
+PLAIN = {
+    "gap": [0.1, 0.1],
+    "demand": [0.1, 0.1],
+    "demand_ratio": [1.0, 1.0],
+    "derived": ["", ""],
+    "floors_misaligned": [False, False],
+    "distance": [1e3, 1e3],
+    "period_1": [0.5, 0.5],
+    "period_2": [2.0, 2.0],
+    "per_1": [0.1, 0.1],
+    "per_2": [0.2, 0.2],
+    "sd_1": [0.1, 0.1],
+    "sd_2": [0.2, 0.2],
+    "other_site_class": [False, False],
+    "linearized_converged": [True, True],
+    "supplemental_damping": [0.0, 0.0],
+    "bumper_restitution": [1.0, 1.0],
+}
+
+
+def _table(**changes):
+    """Return the plain pairs with other values of the second one."""
+    table = {name: np.array(column) for name, column in PLAIN.items()}
+    for name, value in changes.items():
+        table[name] = np.array([PLAIN[name][0], value])
+    return table
+
+
+def _station(horizontals=2, simulated="false"):
+    """Return a station whose record supports 0.1 to 5 s."""
+    return xr.Dataset(
+        {
+            "acceleration": (("horizontal", "time"), np.zeros((horizontals, 3))),
+            "shortest_usable_period": 0.1,
+            "longest_usable_period": 5.0,
+        },
+        attrs={"simulated": simulated},
+    )
+
+
+def _raised(flags):
+    """Return the flags that the first and the second pair raise."""
+    first = {name for name, rows in flags.items() if rows[0]}
+    second = {name for name, rows in flags.items() if rows[1]}
+    return [first, second]
+
+
+@pytest.mark.parametrize(
+    ("changes", "flags"),
+    [
+        ({"gap": 0.0}, {"touching"}),
+        ({"demand_ratio": 0.59}, {"single_hit_unreliable"}),
+        ({"demand_ratio": 0.6}, set()),
+        ({"demand_ratio": np.nan, "demand": 0.0}, {"no_demand"}),
+        ({"derived": "system_1"}, {"derived_inputs"}),
+        ({"derived": "mass_2 period_2"}, {"derived_inputs", "derived_period"}),
+        ({"floors_misaligned": True}, {"floor_to_column"}),
+    ],
+)
+def test_flags_of_pairs(changes, flags):
+    assert _raised(raised_by_pairs(_table(**changes))) == [set(), flags]
+
+
+@pytest.mark.parametrize(
+    ("changes", "flags"),
+    [
+        # either building counts
+        ({"period_1": 0.09}, {"outside_usable_periods"}),
+        ({"period_2": 5.1}, {"outside_usable_periods"}),
+        ({"period_1": 0.1, "period_2": 5.0}, set()),
+        ({"per_2": 0.31}, {"per_far_above_sd"}),
+        ({"per_1": 0.16}, {"per_far_above_sd"}),
+        ({"distance": 5001.0}, {"far_station"}),
+        ({"other_site_class": True}, {"record_from_other_site_class"}),
+        ({"linearized_converged": False}, {"linearized_not_converged"}),
+        ({"supplemental_damping": np.nan}, {"no_damping_suffices"}),
+        ({"bumper_restitution": np.nan}, {"no_bumper_suffices"}),
+    ],
+)
+def test_flags_of_the_record(changes, flags):
+    raised = raised_by_record(_table(**changes), _station(), Screening())
+    assert _raised(raised) == [set(), flags]
+
+
+def test_flags_of_the_station_hold_for_all_its_pairs():
+    raised = raised_by_record(_table(), _station(1, "true"), Screening())
+    assert _raised(raised) == [{"one_horizontal", "simulated"}] * 2
+
+
+def test_motion_of_other_classes_is_flagged_where_the_column_is_known():
+    table = _table() | {"motion_from_other_site_class": np.array([False, True])}
+    raised = raised_by_record(table, _station(), Screening())
+    assert _raised(raised) == [set(), {"motion_from_other_site_class"}]
+
+
+def test_every_flag_has_a_meaning():
+    # would catch a flag that is raised and then dropped, because its name is not in the table
+    raised = raised_by_pairs(_table()) | raised_by_record(_table(), _station(), Screening())
+    assert set(raised) <= set(FLAGS)
+
+
+def test_names_are_joined_in_one_order():
+    raised = {"simulated": np.array([True, True]), "touching": np.array([False, True])}
+    assert joined_flags(raised).tolist() == ["simulated", "touching simulated"]
+
+
+def test_a_period_is_derived_only_if_it_is_named():
+    derived = np.array(["", "period_1", "damping_1 period_2", "mass_1"], dtype=object)
+    assert period_is_derived({"derived": derived}).tolist() == [False, True, True, False]
