@@ -35,6 +35,7 @@ def simulated_probability(case, count, seed=0):
 def first_order_probability(case):
     """Return the estimate by the elasticities s1, s2 of the critical gap, whose sum is 1."""
     r1, r2, rho, gap, beta_1, beta_2, shared, model, gap_dispersion = case
+    # each elasticity times the dispersion of its radius
     demand = critical_gap(r1, r2, rho)
     part_1 = r1 * (r1 - rho * r2) / demand**2 * beta_1
     part_2 = r2 * (r2 - rho * r1) / demand**2 * beta_2
