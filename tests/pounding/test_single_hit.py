@@ -106,13 +106,13 @@ def test_energies_are_those_of_an_impact_at_its_velocities(pair):
     # mutation: velocities of another branch
     arguments = arguments_of(pair)
     branches = single_hit(*arguments).branches
-    *_, mass_1, mass_2, restitution, _, _ = arguments
+    radius_1, radius_2, period_1, period_2, mass_1, mass_2, restitution, *_ = arguments
     velocities = branches.velocity_1, branches.velocity_2
     expected = transfer_energies(*velocities, mass_1, mass_2, restitution)
     found = branches.transfer_energy_1, branches.transfer_energy_2
-    # rounding of the energies that each structure has before
-    scale = mass_1 * velocities[0] ** 2 + mass_2 * velocities[1] ** 2
-    assert np.all(np.abs(np.subtract(found, expected)) <= EXACT * scale)
+    # rounding of the energies that both structures have
+    scale = mass_1 * (radius_1 / period_1) ** 2 + mass_2 * (radius_2 / period_2) ** 2
+    assert_allclose(found, expected, rtol=0, atol=EXACT * (2 * np.pi) ** 2 * scale)
 
 
 @given(pairs)
