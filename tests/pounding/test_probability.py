@@ -35,6 +35,7 @@ def simulated_probability(case, count, seed=0):
 def first_order_probability(case):
     """Return the estimate by the elasticities s1, s2 of the critical gap, whose sum is 1."""
     r1, r2, rho, gap, beta_1, beta_2, shared, model, gap_dispersion = case
+    # each elasticity times the dispersion of its radius
     demand = critical_gap(r1, r2, rho)
     part_1 = r1 * (r1 - rho * r2) / demand**2 * beta_1
     part_2 = r2 * (r2 - rho * r1) / demand**2 * beta_2
@@ -59,10 +60,9 @@ def test_against_integration_over_both_radii(case):
     rest = np.hypot(model, spread)
 
     def integrand(y, x):
-        first, second = (
-            r1 * np.exp(b1 * x),
-            r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y)),
-        )
+        # x moves both radii, y only what structure 2 does not share
+        first = r1 * np.exp(b1 * x)
+        second = r2 * np.exp(b2 * (shared * x + np.sqrt(1 - shared**2) * y))
         demand = np.sqrt(first**2 + second**2 - 2 * rho * first * second)
         return norm.pdf(x) * norm.pdf(y) * norm.cdf(np.log(demand / gap) / rest)
 
@@ -152,8 +152,9 @@ def test_first_order_is_close_only_for_unlike_radii():
 
 
 @pytest.mark.parametrize(("place", "value", "name"), [
-    (0, -1.0, "per_1"), (1, np.nan, "per_2"), (2, 1.1, "correlation"), (3, -0.1, "gap"), (4, -0.1, "dispersion_1"),
-    (5, np.inf, "dispersion_2"), (6, 1.2, "dispersion_correlation"), (7, -1.0, "model_dispersion"),
+    (0, -1.0, "per_1"), (1, np.nan, "per_2"), (2, 1.1, "correlation"), (3, -0.1, "gap"),
+    (4, -0.1, "dispersion_1"), (5, np.inf, "dispersion_2"), (6, 1.2, "dispersion_correlation"),
+    (7, -1.0, "model_dispersion"),
     (8, -1.0, "gap_dispersion"),
 ])  # fmt: skip
 def test_bad_arguments_are_named(place, value, name):

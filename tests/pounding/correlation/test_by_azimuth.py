@@ -1,12 +1,13 @@
-"""Correlation of two responses to a record: the stationarity formula against the integrals themselves."""
+"""Correlation along any azimuth: the stationarity formula against the integrals themselves."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import cont2discrete, lfilter
 
-from per_obspy.pounding.correlation.by_azimuth import directional_correlation
+from per_obspy.pounding.correlation.by_azimuth import directional_correlation, worst_azimuth
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.history.relative import directional_relative_displacement
 
 DT = 0.01
 RANDOM = np.random.default_rng(5)
@@ -18,10 +19,11 @@ def _displacement(acceleration, period, damping):
     """Return the response on a grid ten times finer, with the free vibration, by SciPy."""
     omega, padded = 2 * np.pi / period, np.append(acceleration, np.zeros(60_000))
     fine = np.arange(10 * (padded.size - 1) + 1) * DT / 10
-    above, below, _ = cont2discrete(
-        ([-1.0], [1.0, 2 * damping * omega, omega**2]), DT / 10, method="foh"
-    )
-    return lfilter(above.ravel(), below, np.interp(fine, np.arange(padded.size) * DT, padded))
+    ground = np.interp(fine, np.arange(padded.size) * DT, padded)
+    # first-order hold: exact for piecewise-linear acceleration
+    system = [-1.0], [1.0, 2 * damping * omega, omega**2]
+    above, below, _ = cont2discrete(system, DT / 10, method="foh")
+    return lfilter(above.ravel(), below, ground)
 
 
 @pytest.mark.parametrize(
@@ -87,16 +89,12 @@ def test_white_noise_tends_to_equation_16():
     )
 
 
-def test_equal_oscillators_move_as_one_and_undamped_ones_only_then():
-    one, other = np.array([1.0, 1.0]), np.array([1.0, 1.2])
-    damped = [0.05, 0.05]
-    assert directional_correlation(NORTH, EAST, DT, one, damped, one, damped, [[0.0]]).tolist() == [
-        [1],
-        [1],
-    ]
-    assert directional_correlation(
-        NORTH, EAST, DT, one, [0, 0], other, [0, 0], [[0.0]]
-    ).tolist() == [[1], [0]]
+@pytest.mark.parametrize(("period", "damping", "expected"), [
+    (1.0, 0.05, 1.0), (1.0, 0.0, 1.0), (1.2, 0.0, 0.0),
+])  # fmt: skip
+def test_equal_oscillators_move_as_one_and_undamped_ones_only_then(period, damping, expected):
+    pair = [1.0], [damping], [period], [damping]
+    assert directional_correlation(NORTH, EAST, DT, *pair, [[0.0]]).tolist() == [[expected]]
 
 
 def test_results_do_not_depend_on_the_company(pairs):
@@ -109,11 +107,44 @@ def test_results_do_not_depend_on_the_company(pairs):
     assert_array_equal(together, alone)
 
 
-def test_bad_arguments_are_named():
-    one = np.ones(1)
-    with pytest.raises(ValueError, match="east must have the 1500 samples of north, got 1499"):
-        directional_correlation(NORTH, EAST[1:], DT, one, one * 0.05, one, one * 0.05, [[0.0]])
-    with pytest.raises(ValueError, match="no motion"):
-        directional_correlation(0 * NORTH, 0 * EAST, DT, one, one * 0.05, one, one * 0.05, [[0.0]])
-    with pytest.raises(ValueError, match="damping_1 must be at least 0 and below 1, got 5"):
-        directional_correlation(NORTH, EAST, DT, one, one * 5, one, one * 0.05, [[0.0]])
+@pytest.mark.parametrize(("east", "damping_1", "message"), [
+    (EAST[1:], 0.05, "east must have the 1500 samples of north, got 1499"),
+    (EAST, 5.0, "damping_1 must be at least 0 and below 1, got 5"),
+])  # fmt: skip
+def test_bad_arguments_are_named(east, damping_1, message):
+    with pytest.raises(ValueError, match=message):
+        directional_correlation(NORTH, east, DT, [1.0], [damping_1], [1.0], [0.05], [[0.0]])
+
+
+def test_an_azimuth_without_motion_has_no_correlation():
+    with pytest.raises(ValueError, match="no motion along an azimuth"):
+        directional_correlation(0 * NORTH, EAST, DT, [1.0], [0.05], [1.2], [0.05], [[0.0]])
+
+
+class TestWorstAzimuth:
+    def test_motion_along_one_line_is_worst_along_it(self):
+        # mutation: cos and sin exchanged, the azimuth of the opposite order
+        towards = _worst(0.6 * NORTH, 0.8 * NORTH)
+        line = np.degrees(np.arctan2(0.8, 0.6))
+        assert min(abs(towards - line), abs(towards - line - 180.0)) < 1e-9
+        # the motion reversed closes the gap from the other side
+        assert abs(_worst(-0.6 * NORTH, -0.8 * NORTH) - towards) == pytest.approx(180.0)
+
+    def test_no_other_azimuth_is_worse(self):
+        # mutation: the largest component in place of the largest length
+        pair = 1.0, 0.05, 0.4, 0.05
+        found = directional_relative_displacement(NORTH, EAST, DT, *pair, _worst(NORTH, EAST))
+        azimuths = np.arange(0.0, 360.0, 5.0)
+        others = directional_relative_displacement(NORTH, EAST, DT, *pair, azimuths)
+        # the vector is looked at at the samples: (omega dt)²/8 at 0.4 s
+        assert found.one_before_two >= others.one_before_two.max() * (1.0 - 4e-3)
+
+    def test_equal_structures_never_part(self):
+        same = [1.0], [0.05], [1.0], [0.05], [1.0], [1.0]
+        assert worst_azimuth(NORTH, EAST, DT, *same).tolist() == [0.0]
+        assert worst_azimuth(NORTH, EAST, DT, [], [], [], [], [], []).size == 0
+
+
+def _worst(north, east):
+    """Return the worst azimuth of one pair."""
+    return worst_azimuth(north, east, DT, [1.0], [0.05], [0.4], [0.05], [1.0], [1.0])[0]

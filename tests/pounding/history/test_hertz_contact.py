@@ -1,3 +1,5 @@
+"""Hertz-damp contact: exact without contact, elastic impacts of stiff ones, loss of energy."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

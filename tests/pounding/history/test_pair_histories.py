@@ -1,3 +1,5 @@
+"""Many pairs at once: the histories of single pairs, limits, and independence of the batch."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -40,12 +42,15 @@ def yielding(count, seed=2):
     return fields
 
 
+YIELDING = ("yield_displacement", "hardening", "participation")
+
+
 def single(acceleration, fields, i, **keywords):
     """Return the history of pair i."""
     structures = [
         Structure(
             fields[f"period_{k}"][i], fields[f"damping_{k}"][i], fields[f"mass_{k}"][i],
-            *(fields[f"{name}_{k}"][i] for name in ("yield_displacement", "hardening", "participation")),
+            *(fields[f"{name}_{k}"][i] for name in YIELDING),
         )
         for k in (1, 2)
     ]  # fmt: skip
@@ -75,27 +80,32 @@ class TestAgainstSingleHistories:
 
     def test_first_impacts(self):
         # catches: an impact counted twice, an approach speed taken after the impact
-        acceleration, count = shaking(), 32
-        fields = pairs(count, seed=5, restitution=np.full(count, 0.65), gap=np.full(count, 0.04))
-        fields.update({key: np.broadcast_to(value, count) for key, value in {
-            "yield_displacement_1": np.inf, "yield_displacement_2": np.inf, "hardening_1": 0.0, "hardening_2": 0.0,
-            "participation_1": 1.0, "participation_2": 1.0}.items()})  # fmt: skip
+        acceleration, fields = shaking(), self.linear_pairs(32)
         checked = 0
-        for i in range(count):
+        for i in range(32):
             impacts = single(acceleration, fields, i, free_vibration=False).impacts
             if len(impacts) < 3:
                 continue
-            end = int(np.ceil(impacts["time"][2] / DT)) + 1  # a record cut after the third impact
+            # a record cut after the third impact
+            end = int(np.ceil(impacts["time"][2] / DT)) + 1
             alone = {name: values[i] for name, values in fields.items()}
             maxima = pounding_histories(acceleration[:end], DT, **alone, free_vibration=False)
             before = impacts[impacts["time"] <= (end - 1) * DT]
             approach = before["velocity_before_1"] - before["velocity_before_2"]
             assert maxima.impacts == len(before)
-            assert_allclose(
-                maxima.impact_velocity, approach.max(), rtol=1e-9
-            )  # three impacts' growth of rounding
+            # three impacts' growth of rounding
+            assert_allclose(maxima.impact_velocity, approach.max(), rtol=1e-9)
             checked += 1
         assert checked > 5
+
+    @staticmethod
+    def linear_pairs(count):
+        """Return pairs of linear structures of one gap and restitution."""
+        fields = pairs(count, seed=5, restitution=np.full(count, 0.65), gap=np.full(count, 0.04))
+        for k in (1, 2):
+            for name, value in zip(YIELDING, (np.inf, 0.0, 1.0), strict=True):
+                fields[f"{name}_{k}"] = np.full(count, value)
+        return fields
 
 
 class TestLimits:
@@ -104,15 +114,12 @@ class TestLimits:
         acceleration, fields = shaking(), pairs(40, gap=10.0)
         maxima = pounding_histories(acceleration, DT, **fields)
         for k in (0, 1):
-            expected = [
-                per_spectrum(np.append(acceleration, 0.0), DT, [period], damping)[0]
-                for period, damping in zip(
-                    fields[f"period_{k + 1}"], fields[f"damping_{k + 1}"], strict=True
-                )
-            ]
-            assert_allclose(
-                maxima.per[k], expected, rtol=1e-9
-            )  # both are exact; the required agreement
+            expected = []
+            for i in range(40):
+                period, damping = fields[f"period_{k + 1}"][i], fields[f"damping_{k + 1}"][i]
+                expected += [*per_spectrum(np.append(acceleration, 0.0), DT, [period], damping)]
+            # both are exact; the required agreement
+            assert_allclose(maxima.per[k], expected, rtol=1e-9)
         assert_array_equal(maxima.impacts, 0)
         assert_array_equal(maxima.impact_velocity, 0.0)
 
@@ -204,7 +211,8 @@ class TestBadInput:
         ("name", "value"),
         [
             ("period_1", 0.0), ("damping_2", 1.0), ("mass_1", -1.0), ("gap", -0.1), ("gap", np.nan),
-            ("restitution", 1.5), ("hardening_1", 1.0), ("yield_displacement_2", 0.0), ("participation_1", -1.0),
+            ("restitution", 1.5), ("hardening_1", 1.0), ("yield_displacement_2", 0.0),
+            ("participation_1", -1.0),
         ],
     )  # fmt: skip
     def test_names_the_argument(self, name, value):

@@ -1,3 +1,5 @@
+"""Pairs that yield: linear limit, single oscillators, sampled differences, scaling."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -22,6 +24,7 @@ def ground():
 def pairs():
     """Random pairs, some so stiff that sampling intervals are cut."""
     random, count = np.random.default_rng(4), 64
+    # undamped ones and every azimuth among them
     return {
         "period_1": random.uniform(0.05, 2.5, count),
         "damping_1": random.uniform(0.0, 0.2, count),
@@ -65,6 +68,14 @@ def test_a_gap_is_closed_exactly_below_the_largest_relative_displacement(ground,
         assert_array_equal(history.impacts > 0, pounds)
 
 
+def oscillator(number, along, pairs, strength, index):
+    """Return the response of structure 1 or 2 of a pair on its own."""
+    arguments = [pairs[f"{name}_{number}"][index] for name in ("period", "damping")]
+    arguments.append(strength[f"yield_displacement_{number}"][index])
+    arguments.append(strength[f"hardening_{number}"][index])
+    return bilinear_response(pairs[f"participation_{number}"][index] * along, DT, *arguments)
+
+
 def test_radii_and_displacements_are_those_of_single_oscillators(ground, pairs, strength):
     # catches: drive or yield displacement without participation. The kernels share no code.
     found = yielding_relative_displacement(ground, DT, **pairs, **strength)
@@ -72,9 +83,7 @@ def test_radii_and_displacements_are_those_of_single_oscillators(ground, pairs, 
     for index in range(8):
         along = np.cos(angle[index]) * ground[0] + np.sin(angle[index]) * ground[1]
         for i in (1, 2):
-            own = [pairs[f"{name}_{i}"][index] for name in ("period", "damping")]
-            own += [strength[f"{name}_{i}"][index] for name in ("yield_displacement", "hardening")]
-            alone = bilinear_response(pairs[f"participation_{i}"][index] * along, DT, *own)
+            alone = oscillator(i, along, pairs, strength, index)
             # events are located to about 1e-12 of a step by either
             assert_allclose(
                 found.displacement_maxima[i - 1, index], alone.displacement_maximum, rtol=1e-8
@@ -87,17 +96,11 @@ def test_against_sampled_differences_of_single_histories(ground, pairs, strength
     found = yielding_relative_displacement(ground, DT, **pairs, **strength)
     angle = np.radians(pairs["azimuth"])
     for index in np.flatnonzero(np.minimum(pairs["period_1"], pairs["period_2"]) > 0.5)[:6]:
-        along = np.append(
-            np.cos(angle[index]) * ground[0] + np.sin(angle[index]) * ground[1], np.zeros(3000)
-        )
-        moved = []
-        for i in (1, 2):
-            own = [pairs[f"{name}_{i}"][index] for name in ("period", "damping")]
-            own += [strength[f"{name}_{i}"][index] for name in ("yield_displacement", "hardening")]
-            moved.append(
-                bilinear_response(pairs[f"participation_{i}"][index] * along, DT, *own).displacement
-            )
-        sampled = np.max(moved[0] - moved[1])
+        along = np.cos(angle[index]) * ground[0] + np.sin(angle[index]) * ground[1]
+        along = np.append(along, np.zeros(3000))
+        first = oscillator(1, along, pairs, strength, index).displacement
+        second = oscillator(2, along, pairs, strength, index).displacement
+        sampled = np.max(first - second)
         # between samples a motion of period T exceeds its samples by at most (pi dt / T)² / 2, here
         # 0.002
         assert sampled * (1.0 - 1e-9) <= found.one_before_two[index] <= 1.01 * sampled

@@ -1,4 +1,4 @@
-"""Bumpers: the target is met and just met, contact models against SciPy's integration of the contact."""
+"""Bumpers: the target is met and just met, contact models against SciPy's integration."""
 
 import numpy as np
 import pytest
@@ -66,6 +66,7 @@ def contact(damping, tension):
     def end(_, state):
         return state[0] if tension else state[0] + 2 * damping * state[1]
 
+    # contact begins at a penetration of 0, which must not end it
     end.terminal, end.direction = True, -1.0
     start = 1e-9 if tension else 0.0
     solution = solve_ivp(motion, (0, 10), [start, 1.0], events=end, rtol=1e-11, atol=1e-12)
@@ -133,8 +134,10 @@ def test_contact_time_decides_whether_the_impact_is_instant():
 @pytest.mark.parametrize(("name", "call"), [
     ("target", lambda: required_restitution(1, 1, 1, 1, 1, 1, 1, 0.5, 0.9)),
     ("gap", lambda: required_restitution(1, 1, 1, 1, 1, 1, 1, -0.5, 1.9)),
-    ("damping", lambda: kelvin_voigt_restitution(1.0)), ("restitution", lambda: kelvin_voigt_damping(1.1)),
-    ("restitution", lambda: jankowski_damping(0.0)), ("restitution", lambda: mahmoud_jankowski_damping(-0.1)),
+    ("damping", lambda: kelvin_voigt_restitution(1.0)),
+    ("restitution", lambda: kelvin_voigt_damping(1.1)),
+    ("restitution", lambda: jankowski_damping(0.0)),
+    ("restitution", lambda: mahmoud_jankowski_damping(-0.1)),
     ("viscosity", lambda: bumper_restitution(1.0, 10.0, 1.0, 1.0, 1.0)),
     ("stiffness", lambda: bumper_restitution(0.0, 10.0, 1.0, 1.0, 1.0)),
     ("shortest_period", lambda: bumper_restitution(1.0, 0.1, 1.0, 1.0, 0.0)),

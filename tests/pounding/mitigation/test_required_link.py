@@ -1,4 +1,4 @@
-"""The least link: on the edge between contact and none, zero where none is needed, NaN where none helps."""
+"""The least link: on the edge of contact, zero where none is needed, NaN where none helps."""
 
 import numpy as np
 import pytest

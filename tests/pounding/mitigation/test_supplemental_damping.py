@@ -1,4 +1,4 @@
-"""Added damping and required gap: the answer is just enough, the scan sees what bisection would miss."""
+"""Added damping and required gap: just enough, and found where bisection would fail."""
 
 import numpy as np
 import pytest
@@ -69,6 +69,7 @@ def test_a_demand_that_rises_again_is_not_robust():
 
 
 def test_the_best_split_needs_no_more_than_half_and_half():
+    # mutation: shares exchanged between the structures, the largest sum in place of the least
     gap = 0.85 * needed_gap(0.05, 0.05)
     half = supplemental_damping(GROUND, DT, 0.9, 0.05, 1.2, 0.05, gap, 0.5, 0.5)
     best = optimal_damping_split(GROUND, DT, 0.9, 0.05, 1.2, 0.05, gap)

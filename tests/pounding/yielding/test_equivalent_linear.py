@@ -53,7 +53,8 @@ def test_secant_stiffness_and_loop_area(ductility, hardening):
 
 @pytest.mark.parametrize(("method", "ductility", "period", "damping"), [
     ("gulkan_sozen", 4.0, 2.0, 0.12), ("kowalsky", 4.0, 2.0, 0.05 + 0.5 / np.pi),
-    ("iwan", 2.0, 1.121, 0.1087), ("fema_440", 3.0, 1.496, 0.05 + 0.108), ("fema_440", 5.0, 1.80, 0.05 + 0.1528),
+    ("iwan", 2.0, 1.121, 0.1087), ("fema_440", 3.0, 1.496, 0.05 + 0.108),
+    ("fema_440", 5.0, 1.80, 0.05 + 0.1528),
 ])  # fmt: skip
 def test_published_formulas_at_round_ductilities(method, ductility, period, damping):
     # worked by hand from the formulas with hardening 0 and 5 % damping
@@ -80,7 +81,8 @@ def test_unverified_coefficients_say_so():
 @pytest.mark.parametrize(("name", "arguments"), [
     ("method", ("jeng", 2.0, 1.0, 0.05, 0.0)), ("ductility", ("iwan", -1.0, 1.0, 0.05, 0.0)),
     ("period", ("iwan", 2.0, 0.0, 0.05, 0.0)), ("damping", ("iwan", 2.0, 1.0, 1.0, 0.0)),
-    ("hardening", ("iwan", 2.0, 1.0, 0.05, 1.0)), ("damping of", ("jeng_unverified", 12.0, 1.0, 0.05, 0.0)),
+    ("hardening", ("iwan", 2.0, 1.0, 0.05, 1.0)),
+    ("damping of", ("jeng_unverified", 12.0, 1.0, 0.05, 0.0)),
 ])  # fmt: skip
 def test_bad_arguments_are_named(name, arguments):
     with pytest.raises(ValueError, match=name):
