@@ -9,7 +9,6 @@ from obspy import Stream, Trace
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
-from per_obspy.formats.text.blocks import is_title, titled_block
 from per_obspy.formats.text.csmip_header import Header, channel_name, known, read_header
 from per_obspy.formats.text.film import pair_lines, read_pairs
 from per_obspy.formats.text.lines import (
@@ -24,6 +23,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
+from per_obspy.formats.text.number_blocks import is_title, titled_block
 from per_obspy.formats.text.vocabulary import trace
 
 _INCH = 0.0254  # m

@@ -6,7 +6,6 @@ from typing import Any
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.constants import GAL, STANDARD_GRAVITY
-from per_obspy.formats.text.blocks import titled_block
 from per_obspy.formats.text.film import pair_lines, read_pairs
 from per_obspy.formats.text.lines import (
     DECIMAL,
@@ -18,6 +17,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
+from per_obspy.formats.text.number_blocks import titled_block
 from per_obspy.formats.text.vocabulary import channel_code, coordinates, orientation, trace, utc
 
 _VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")

@@ -22,6 +22,7 @@ from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import written_whole
 from per_obspy.progress import Progress, silent
 from per_obspy.records.events import fetched_event, read_event
+from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
     Wanted,
@@ -31,7 +32,6 @@ from per_obspy.records.fdsn.request import (
     stations_inside,
     wanted_around,
 )
-from per_obspy.records.fdsn.station import Offer, Outcome, fetch_station
 from per_obspy.records.fdsn.web import answer, host, web_pool
 from per_obspy.records.folder import FolderContents, find_stations
 from per_obspy.records.obspy_readers import foreign_bytes

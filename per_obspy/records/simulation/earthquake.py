@@ -24,7 +24,7 @@ from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.files import written_whole
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation import stochastic
-from per_obspy.records.simulation.metadata import (
+from per_obspy.records.simulation.station_metadata import (
     CHANNELS,
     GAIN,
     NETWORK,

@@ -12,7 +12,7 @@ from scipy import signal
 from per_obspy.config import Scenario
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
-from per_obspy.records.simulation.metadata import GAIN
+from per_obspy.records.simulation.station_metadata import GAIN
 
 GRAVITY = 9.80665
 #: epicentre 33 km west of a city of 12 km radius, half of it on the lakebed
