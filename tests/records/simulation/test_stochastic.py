@@ -72,7 +72,7 @@ def test_kanai_tajimi_does_not_ring_before_it_is_struck():
 @pytest.mark.parametrize("shaking", [2.0, 12.0])
 def test_window_peaks_where_boore_puts_it(shaking):
     dt = 0.001
-    shape = stochastic.window(int(6 * shaking / dt), dt, shaking)
+    shape = stochastic.saragoni_hart_window(int(6 * shaking / dt), dt, shaking)
     assert_allclose(shape.argmax() * dt, 0.2 * 2 * shaking, atol=2 * dt)
     assert_allclose(shape.max(), 1.0, rtol=1e-5)  # a sample beside the peak
     assert_allclose(shape[round(2 * shaking / dt)], 0.05, rtol=1e-9)
