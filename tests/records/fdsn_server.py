@@ -210,7 +210,7 @@ def whole(handler: _Handler, body: bytes) -> None:
 
 
 def status(code: int, **headers: str) -> Fault:
-    """Answer with a status and a page of text; ``_`` in the name of a header stands for ``-``."""
+    """Answer with a status and a page of text; ``_`` in the name of a header becomes ``-``."""
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
     page = b"" if code == 204 else b"the service\nis unwell"
     return lambda handler, _: handler.reply(code, page, headers=sent)
@@ -240,7 +240,7 @@ def dripping(seconds: float, parts: int) -> Fault:
 
 
 def stalled(seconds: float) -> Fault:
-    """Send half of the body and then nothing for a while."""
+    """Send half of the body, then pause."""
 
     def answer(handler: _Handler, body: bytes) -> None:
         handler.reply(200, body[: len(body) // 2], length=len(body))

@@ -65,7 +65,7 @@ def test_an_archive_is_a_folder(tmp_path: Path, name: str):
     assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
     assert [rejection.name for rejection in contents.rejected] == ["readme.txt"]
     assert open_file(archive / "three.AT2").read() == AT2
-    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # nothing is unpacked on disk
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # no file is unpacked on disk
 
 
 @every

@@ -41,7 +41,7 @@ def read_film(text: Text, line: int, samples: int) -> tuple[FloatArray, float]:
         Mean interval, s.
     """
     pairs = fixed_block(text, line, 2 * samples, _WIDTH, 2 * _PAIRS_PER_LINE).reshape(-1, 2)
-    # The mean interval stands for all of them
+    # The mean interval replaces the single ones
     times = pairs[:, 0]
     mean = float(times[-1] - times[0]) / max(samples - 1, 1)
     dt = interval(text, line, "mean interval", mean)

@@ -89,7 +89,7 @@ def quoted(text: Text, line: int, length: int | None = None) -> str:
 
 
 def finite_number(text: Text, line: int, field: str, word: str) -> float:
-    """Return the finite number that a word of a line stands for."""
+    """Return a word of a line as a finite number."""
     try:
         number = float(word)
     except ValueError:

@@ -54,7 +54,7 @@ def web_pool(timeout: float, retries: int, wait: float) -> urllib3.PoolManager:
 
 def answer(pool: urllib3.PoolManager, url: str, parameters: Mapping[str, str]) -> bytes:
     """
-    Return the whole answer of a service; empty if it has nothing (204).
+    Return the whole answer of a service; empty if it has no data (204).
 
     Raises
     ------

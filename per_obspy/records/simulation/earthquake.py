@@ -1,7 +1,7 @@
 """
 A simulated earthquake as a network would deliver it: counts, station metadata and the event.
 
-Everything says that it is simulated: network ``XX``, comments in StationXML and QuakeML. The two
+All files are marked as simulated: network ``XX``, comments in StationXML and QuakeML. The two
 horizontals are correlated with the configured coefficient; the vertical is independent of them.
 Samples are whole counts, as a digitiser of 24 bits gives them (the step, 5e-6 m/s2, lies below the
 background noise), which MiniSEED stores without loss. Each station has random numbers of its own,

@@ -46,9 +46,9 @@ def _soils(simulation):
 
 
 def test_the_same_scenario_gives_the_same_bits(simulation):
-    for one, other in zip(simulation.stream, simulate(SCENARIO).stream, strict=True):
-        assert_array_equal(one.data, other.data)
-        assert one.stats.starttime == other.stats.starttime
+    for trace, repeated in zip(simulation.stream, simulate(SCENARIO).stream, strict=True):
+        assert_array_equal(trace.data, repeated.data)
+        assert trace.stats.starttime == repeated.stats.starttime
 
 
 def test_no_station_depends_on_another(simulation):

@@ -93,13 +93,13 @@ def test_shaped_noise_has_the_spectrum_on_average():
 
 
 def test_larger_events_and_distances_shake_longer():
-    one = stochastic.duration(6.0, 1e4, 10e6, 3500.0)
-    assert_allclose(
-        stochastic.duration(8.0, 1e4, 10e6, 3500.0) - 5e-5 * 1e4,
-        10 * (one - 5e-5 * 1e4),
-        rtol=1e-12,
-    )
-    assert_allclose(stochastic.duration(6.0, 1.1e5, 10e6, 3500.0) - one, 5.0, rtol=1e-12)
+    shaking = stochastic.duration(6.0, 1e4, 10e6, 3500.0)
+    path = 5e-5 * 1e4
+    # Two magnitudes lower the corner frequency by ten; 100 km of path add 5 s
+    larger = stochastic.duration(8.0, 1e4, 10e6, 3500.0)
+    assert_allclose(larger - path, 10 * (shaking - path), rtol=1e-12)
+    farther = stochastic.duration(6.0, 1.1e5, 10e6, 3500.0)
+    assert_allclose(farther - shaking, 5.0, rtol=1e-12)
 
 
 def test_large_faults_are_never_near():
