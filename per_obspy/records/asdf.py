@@ -23,7 +23,7 @@ from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.folder import FolderContents, merged_inventory
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import foreign_bytes
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 #: unit of the samples according to the provenance -> m/s2
 _UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
@@ -115,7 +115,7 @@ def read_asdf_event(path: Path) -> Event:
         content = file["QuakeML"][:].tobytes() if "QuakeML" in file.variables else b""
     # A file without QuakeML holds no event
     try:
-        events = foreign_bytes(obspy.read_events, content, str(path)) if content else []
+        events = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1 or not events[0].origins:
@@ -158,7 +158,11 @@ def _inventories(group: Any, name: str) -> list[Inventory]:
     """Return the StationXML of a station, if there is any."""
     if "StationXML" not in group.variables:
         return []
-    return [foreign_bytes(obspy.read_inventory, group.variables["StationXML"][:].tobytes(), name)]
+    return [
+        read_bytes_with_obspy(
+            obspy.read_inventory, group.variables["StationXML"][:].tobytes(), name
+        )
+    ]
 
 
 def _trace(file: netCDF4.Dataset, waveform: Any) -> Trace:

@@ -18,7 +18,7 @@ from obspy.core.event import Event
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import foreign
+from per_obspy.records.obspy_readers import read_with_obspy
 from per_obspy.records.processed_files import described
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
@@ -164,7 +164,7 @@ def read_event(path: str | Path) -> Event:
         If the file cannot be read or does not hold exactly one event with an origin.
     """
     try:
-        events = foreign(obspy.read_events, Path(path))
+        events = read_with_obspy(obspy.read_events, Path(path))
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1:
@@ -214,11 +214,11 @@ def _read(path: Path, **options: Any) -> Stream:
     with open_file(path) as file:
         if not file.read(1):
             raise RecordRejected(str(path), "the file is empty")
-    return described(foreign(obspy.read, path, **options), path)
+    return described(read_with_obspy(obspy.read, path, **options), path)
 
 
 def _read_inventory(path: Path) -> Inventory:
-    return foreign(obspy.read_inventory, path)
+    return read_with_obspy(obspy.read_inventory, path)
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:

@@ -10,7 +10,7 @@ from per_obspy.errors import PerError, RecordRejected
 from per_obspy.records.archives import open_file
 
 
-def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
+def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
     """
     Call a reader of ObsPy on a file, or on a member of an archive.
 
@@ -34,14 +34,16 @@ def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
         return _called(reader, file, str(path), options)
 
 
-def foreign_bytes(reader: Callable[..., Any], content: bytes, name: str, **options: Any) -> Any:
+def read_bytes_with_obspy(
+    reader: Callable[..., Any], content: bytes, name: str, **options: Any
+) -> Any:
     """
     Call a reader of ObsPy on bytes.
 
     Parameters
     ----------
     reader, **options
-        As for :func:`foreign`.
+        As for :func:`read_with_obspy`.
     content : bytes
         Answer of a service, or a part of a file.
     name : str

@@ -11,7 +11,7 @@ from per_obspy.files import written_whole
 from per_obspy.records.fdsn.request import Wanted, channel_parameters
 from per_obspy.records.fdsn.web import RequestTooLarge, answer, host
 from per_obspy.records.folder import station_name
-from per_obspy.records.obspy_readers import foreign_bytes
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 
 class Offer(NamedTuple):
@@ -99,7 +99,7 @@ def _fetch_records(pool: urllib3.PoolManager, wanted: Wanted, path: Path, offer:
     if not content:
         raise _NoData(f"{host(url)} has no data of the window")
     # A cut answer ends within a MiniSEED record
-    traces = foreign_bytes(obspy.read, content, url, format="MSEED")
+    traces = read_bytes_with_obspy(obspy.read, content, url, format="MSEED")
     record_length = min(trace.stats.mseed.record_length for trace in traces)
     if surplus := len(content) % record_length:
         problem = f"the answer is cut: its last MiniSEED record has {surplus} bytes"
@@ -127,7 +127,7 @@ def _fetch_metadata(pool: urllib3.PoolManager, wanted: Wanted, path: Path, offer
     content = answer(pool, url, _parameters(wanted, path.stem) | {"level": "response"})
     if not content:
         raise _NoData(f"{host(url)} has no metadata of the window")
-    inventory = foreign_bytes(obspy.read_inventory, content, url, format="STATIONXML")
+    inventory = read_bytes_with_obspy(obspy.read_inventory, content, url, format="STATIONXML")
     # An answer for another station must not enter the cache under this name
     found = {f"{network.code}.{station.code}" for network in inventory for station in network}
     _check(url, path.stem, found)
