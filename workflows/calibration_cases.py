@@ -15,7 +15,7 @@ from per_obspy.config import Building, Interpolation, Scenario, Screening, Simul
 from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.records.simulation.earthquake import simulate
-from per_obspy.records.simulation.metadata import GAIN
+from per_obspy.records.simulation.station_metadata import GAIN
 from per_obspy.screening.ground_motion.assignment import nearest_station, stations_of
 from per_obspy.screening.ground_motion.site_motion import (
     Hypocentre,

@@ -1,4 +1,4 @@
-"""AFAD (Türkiye, TADAS): DYNA's header below a few lines of its own, one component a file."""
+"""AFAD (Türkiye, TADAS): DYNA's header below a few other lines, one component per file."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from per_obspy.formats.text.lines import WaveformFile, head, read_text
 
 
 def is_afad(file: WaveformFile) -> bool:
-    """Tell whether a file starts like a record of AFAD."""
+    """Check whether a file starts like a record of AFAD."""
     return head(file, 4) == b"AAD_"
 
 

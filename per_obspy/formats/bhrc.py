@@ -1,4 +1,4 @@
-"""BHRC (Iran): volume 1, uncorrected, g/10, three components a file."""
+"""BHRC (Iran): volume 1, uncorrected, g/10, three components per file."""
 
 import re
 from typing import Any
@@ -6,24 +6,26 @@ from typing import Any
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.formats.text.conversions import metres, signed_degrees, utc_from_words
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
     WaveformFile,
     block_lines,
     count,
+    finite_number,
     fixed_block,
     head,
     interval,
     line_at,
-    number,
+    quoted,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, hemisphere, horizontal, trace, utc
+from per_obspy.formats.text.vocabulary import coordinates, horizontal, sensor_constants, trace
 
 _TITLE = "* VOL1DS FILE:"
-_HEADER_LINES, _RATE_LINE = 27, 21
+_HEADER_LINES, _POINTS_LINE, _UNIT_LINE, _RATE_LINE = 27, 10, 11, 21
 _WIDTH, _PER_LINE = 13, 10
 _STATION = re.compile(
     rf"(.*?)\s+Station\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+Altitude\s*{DECIMAL})?"
@@ -41,7 +43,7 @@ _SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECI
 
 
 def is_bhrc(file: WaveformFile) -> bool:
-    """Tell whether a file starts like volume 1 of BHRC."""
+    """Check whether a file starts like volume 1 of BHRC."""
     return head(file, len(_TITLE)) == _TITLE.encode()
 
 
@@ -56,90 +58,107 @@ def read_bhrc(file: WaveformFile, **_unused: Any) -> Stream:
 
 
 def _component(text: Text, first: int) -> tuple[Trace, int]:
+    """Return a component and the line after it."""
     line_at(text, first + _HEADER_LINES, "samples")
     lines = text.lines[first : first + _HEADER_LINES]
-    if not lines[0].startswith(_TITLE):
-        refuse(text, first, "title", f"{lines[0].strip()[:40]!r} is not that of a component")
-    if not lines[11].upper().strip().endswith("G/10"):
-        refuse(text, first + 11, "unit", f"{lines[11].strip()!r} is not g/10")
+    _check_title_and_unit(text, first)
+    # Samples, in g/10
     samples, dt = _size(text, first)
-    line = first + _HEADER_LINES
-    values = STANDARD_GRAVITY / 10 * fixed_block(text, line, samples, _WIDTH, _PER_LINE)
-    line += block_lines(samples, _PER_LINE)
-    if line_at(text, line, "end of component").strip() != "/&":
-        refuse(
-            text,
-            line,
-            "end of component",
-            f"expected '/&' after the samples, got {text.lines[line].strip()[:40]!r}",
-        )
+    start = first + _HEADER_LINES
+    values = STANDARD_GRAVITY / 10 * fixed_block(text, start, samples, _WIDTH, _PER_LINE)
+    end = start + block_lines(samples, _PER_LINE)
+    _check_end(text, end)
+    # Words of the header
     words = {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
-    return trace(
-        values, dt, words | _station(lines) | {"event": _event(text, first, lines)}
-    ), line + 1
+    words |= _station(lines) | {"event": _event(text, first, lines)}
+    return trace(values, dt, words), end + 1
+
+
+def _check_title_and_unit(text: Text, first: int) -> None:
+    """Refuse a component without its title, or in another unit than g/10."""
+    if not text.lines[first].startswith(_TITLE):
+        refuse(text, first, "title", f"{quoted(text, first, 40)} is not that of a component")
+    unit = first + _UNIT_LINE
+    if not text.lines[unit].upper().strip().endswith("G/10"):
+        refuse(text, unit, "unit", f"{quoted(text, unit)} is not g/10")
+
+
+def _check_end(text: Text, line: int) -> None:
+    """Refuse a component that does not end after its samples."""
+    if line_at(text, line, "end of component").strip() != "/&":
+        problem = f"expected '/&' after the samples, got {quoted(text, line, 40)}"
+        refuse(text, line, "end of component", problem)
 
 
 def _size(text: Text, first: int) -> tuple[int, float]:
-    """Return samples and interval; the rate must fit the duration."""
-    points = _POINTS.match(text.lines[first + 10].strip())
+    """Return the number of samples and their interval, s; the rate must fit the duration."""
+    line = first + _POINTS_LINE
+    points = _POINTS.match(text.lines[line].strip())
     if points is None:
-        refuse(
-            text, first + 10, "number of points", f"{text.lines[first + 10].strip()!r} gives none"
-        )
-    samples = count(text, first + 10, "number of points", points[1])
-    rate = number(
-        text, first + _RATE_LINE, "sampling rate", text.lines[first + _RATE_LINE][:_WIDTH]
-    )
-    if rate <= 0 or abs(samples / rate - float(points[2])) > 0.01 * float(points[2]):
-        refuse(
-            text,
-            first + _RATE_LINE,
-            "sampling rate",
-            f"{rate:g} Hz, but {samples} samples last {points[2]} s",
-        )
-    return samples, 1 / interval(text, first + _RATE_LINE, "sampling rate", rate)
+        refuse(text, line, "number of points", f"{quoted(text, line)} gives none")
+    samples = count(text, line, "number of points", points[1])
+    # The rate has a line of its own among the numbers
+    line = first + _RATE_LINE
+    rate = finite_number(text, line, "sampling rate", text.lines[line][:_WIDTH])
+    duration = float(points[2])
+    if rate <= 0 or abs(samples / rate - duration) > 0.01 * duration:
+        problem = f"{rate:g} Hz, but {samples} samples last {points[2]} s"
+        refuse(text, line, "sampling rate", problem)
+    return samples, 1 / interval(text, line, "sampling rate", rate)
 
 
 def _station(lines: list[str]) -> dict[str, Any]:
-    station, sensor = _STATION.match(lines[7]), _SENSOR.match(lines[9])
-    component = lines[6].removeprefix("COMP").strip()[:1].upper()
-    azimuths = {
-        letter: float(azimuth)
-        for letter, azimuth in _AZIMUTH.findall(lines[7].partition("Azimuth")[2])
+    """Return code, name, coordinates, instrument and direction of a component."""
+    station = _STATION.match(lines[7])
+    name = station[1] if station else None
+    # The model has a line of its own
+    instrument = {
+        "model": lines[1].partition("=")[2].strip() or None,
+        **sensor_constants(_SENSOR.match(lines[9])),
     }
-    direction = {"sensor_dip": -90.0} if component == "V" else {}
-    period = float(sensor[1]) if sensor else 0.0
-    return {
-        "station": re.sub(r"[^A-Z0-9]", "", station[1].upper()) if station else None,
-        "station_name": station[1] if station else None,
+    words = {
+        "station": re.sub(r"[^A-Z0-9]", "", name.upper()) if name is not None else None,
+        "station_name": name,
         "coordinates": _place(station),
-        "instrument": {
-            "model": lines[1].partition("=")[2].strip() or None,
-            "natural_frequency": 1 / period if period > 0 else None,
-            "damping": float(sensor[2]) if sensor else None,
-        },
-    } | (horizontal(azimuths[component]) if component in azimuths else direction)
+        "instrument": instrument,
+    }
+    return words | _direction(lines)
+
+
+def _direction(lines: list[str]) -> dict[str, float]:
+    """Return the direction of a component: L and T have azimuths, V is vertical."""
+    component = lines[6].removeprefix("COMP").strip()[:1].upper()
+    azimuths = dict(_AZIMUTH.findall(lines[7].partition("Azimuth")[2]))
+    if component in azimuths:
+        return horizontal(float(azimuths[component]))
+    return {"sensor_dip": -90.0} if component == "V" else {}
 
 
 def _place(found: re.Match[str] | None) -> dict[str, float | None]:
+    """Return the coordinates of the station, degrees and m."""
     if found is None:
         return {}
     elevation = float(found[6]) if found[6] else None
-    return coordinates(hemisphere(found[2], found[3]), hemisphere(found[4], found[5]), elevation)
+    latitude, longitude = signed_degrees(found, 2)
+    return coordinates(latitude, longitude, elevation)
 
 
 def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
-    place, time = _EPICENTRE.match(lines[8]), _TIME.match(lines[2])
+    """Return origin time, hypocentre and magnitude (moment, or else the first) of the event."""
+    epicentre = _EPICENTRE.match(lines[8])
+    latitude, longitude = signed_degrees(epicentre)
+    depth = float(epicentre[5]) if epicentre and epicentre[5] else None
+    # Kinds of magnitude in the order of the line
     magnitudes = {kind: float(size) for kind, size in _MAGNITUDE.findall(lines[8])}
     return {
-        "time": _origin(text, first + 2, time) if time else None,
-        "latitude": hemisphere(place[1], place[2]) if place else None,
-        "longitude": hemisphere(place[3], place[4]) if place else None,
-        "depth": 1000 * float(place[5]) if place and place[5] else None,
+        "time": _origin(text, first + 2, _TIME.match(lines[2])),
+        "latitude": latitude,
+        "longitude": longitude,
+        "depth": metres(depth),
         "magnitude": magnitudes.get("Mw", next(iter(magnitudes.values()), None)),
     }
 
 
-def _origin(text: Text, line: int, time: re.Match[str]) -> UTCDateTime:
-    year, month, day, hour, minute = (int(part) for part in time.groups()[:5])
-    return utc(text, line, "origin time", (year, month, day), (hour, minute, float(time[6])))
+def _origin(text: Text, line: int, time: re.Match[str] | None) -> UTCDateTime | None:
+    """Return the origin time; None where the header has none."""
+    return utc_from_words(text, line, "origin time", time.groups()) if time else None

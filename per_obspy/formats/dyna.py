@@ -1,4 +1,4 @@
-"""DYNA 1.x of ESM and ITACA (``.ASC``), one component a file."""
+"""DYNA 1.x of ESM and ITACA (``.ASC``), one component per file."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from per_obspy.formats.text.lines import WaveformFile, head, read_text
 
 
 def is_dyna(file: WaveformFile) -> bool:
-    """Tell whether a file starts like DYNA."""
+    """Check whether a file starts like DYNA."""
     start = head(file, 300)
     return start.startswith(b"EVENT_NAME:") and b"\nEVENT_DATE_YYYYMMDD:" in start
 

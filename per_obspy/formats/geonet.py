@@ -1,11 +1,12 @@
-"""GeoNet (New Zealand): V1A (uncorrected) and V2A (corrected), three components a file."""
+"""GeoNet (New Zealand): V1A (uncorrected) and V2A (corrected), three components per file."""
 
 import re
 from typing import Any
 
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
+from per_obspy.formats.text.conversions import metres, sexagesimal, utc
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -16,12 +17,22 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
+    quoted,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import channel_code, coordinates, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import (
+    channel_code,
+    coordinates,
+    corners,
+    orientation,
+    sensor_constants,
+    trace,
+)
 
 _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
+_INTEGERS, _REALS = 40, 60
+_POINTS_LINE, _UNIT_LINE = 9, 10
 _WIDTH, _PER_LINE = 8, 10
 _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w+)\b")
 _ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
@@ -29,6 +40,7 @@ _SITE = re.compile(rf"Site (\S+)\s+{_ANGLE}\s+{_ANGLE}")
 _EPICENTRE = re.compile(
     rf"Epicentre\s+{_ANGLE}\s+{_ANGLE}.*?(?:Depth\s*{DECIMAL}\s*km)?(?:\s+M\w?\s*{DECIMAL})?\s*"
 )
+_POINTS = re.compile(r"Number of points\s+(\S+)")
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")
 _PEAK = re.compile(rf"Acceleration:\s*peak\s*{DECIMAL}\s*mm/s/s", re.IGNORECASE)
 _BANDS = re.compile(rf"bands are {DECIMAL}-{DECIMAL} Hz and {DECIMAL}-{DECIMAL} Hz")
@@ -37,7 +49,7 @@ _MILLIMETRE = 0.001  # m
 
 
 def is_geonet(file: WaveformFile) -> bool:
-    """Tell whether a file starts like GeoNet V1A or V2A."""
+    """Check whether a file starts like GeoNet V1A or V2A."""
     lines = head_lines(file, 300)
     return len(lines) > 2 and bool(_TITLE.match(lines[0])) and lines[1].startswith("Site ")
 
@@ -55,48 +67,45 @@ def read_geonet(file: WaveformFile, **_unused: Any) -> Stream:
 
 
 def _component(text: Text, first: int) -> tuple[Trace, int]:
+    """Return a component and the line after it."""
     line_at(text, first + _HEADER_LINES, "samples")
-    lines = text.lines[first : first + _TEXT_LINES]
-    title = _TITLE.match(lines[0])
-    if title is None:
-        refuse(text, first, "title", f"{lines[0].strip()[:60]!r} is not that of a component")
+    state, instrument = _title(text, first)
+    # Integers and reals of the header
     numbers = first + _TEXT_LINES
-    integers = fixed_block(text, numbers, 10 * _INTEGER_LINES, _WIDTH, _PER_LINE)
-    reals = fixed_block(text, numbers + _INTEGER_LINES, 60, _WIDTH, _PER_LINE)
+    integers = fixed_block(text, numbers, _INTEGERS, _WIDTH, _PER_LINE)
+    reals = fixed_block(text, numbers + _INTEGER_LINES, _REALS, _WIDTH, _PER_LINE)
     dt = interval(text, numbers + _INTEGER_LINES + 2, "interval", float(reals[25]))
     values, line = _samples(text, first, integers)
-    words = (
-        _station(text, first)
-        | _source(lines)
-        | orientation(lines[12].removeprefix("Component").split("  ")[0])
-    )
-    words |= {
-        "starttime": _start(text, numbers, integers),
-        "units": "m/s2",
-        "quantity": "acceleration",
-    }
-    words |= {
-        "processing_level": "raw" if title[1] == "Uncorrected" else "processed",
-        "location": title[3],
-    }
+    # Words of the header
+    words = _station(text, first) | _described(text.lines[first : first + _TEXT_LINES])
+    words["starttime"] = _start(text, numbers, integers)
+    words |= {"units": "m/s2", "quantity": "acceleration"}
+    words["processing_level"] = "raw" if state == "Uncorrected" else "processed"
+    words["location"] = instrument
     words["channel"] = channel_code(1 / dt, words)
-    return trace(_unit(text, first, title[1]) * values, dt, words), line
+    return trace(_unit(text, first, state) * values, dt, words), line
+
+
+def _title(text: Text, line: int) -> tuple[str, str]:
+    """Return state (Uncorrected, ...) and instrument, the last part of the name in the title."""
+    title = _TITLE.match(text.lines[line])
+    if title is None:
+        refuse(text, line, "title", f"{quoted(text, line, 60)} is not that of a component")
+    return title[1], title[3]
 
 
 def _samples(text: Text, first: int, integers: FloatArray) -> tuple[FloatArray, int]:
-    """Read acceleration; velocity and displacement follow in V2A and must be whole."""
-    promised = re.search(r"Number of points\s+(\S+)", text.lines[first + 9])
-    if promised is None:
-        refuse(text, first + 9, "number of points", f"{text.lines[first + 9].strip()!r} gives none")
-    samples = count(text, first + 9, "number of points", promised[1])
+    """
+    Return acceleration and the line after the component.
+
+    Velocity and displacement follow in V2A and must be whole.
+    """
+    samples = _promised_samples(text, first + _POINTS_LINE)
     sizes = [int(size) for size in integers[33:36]]
     if sizes[0] != samples:
-        refuse(
-            text,
-            first + _TEXT_LINES + 3,
-            "number of points",
-            f"{sizes[0]}, but {samples} on line {first + 10}",
-        )
+        problem = f"{sizes[0]}, but {samples} on line {first + _POINTS_LINE + 1}"
+        refuse(text, first + _TEXT_LINES + 3, "number of points", problem)
+    # Blocks of acceleration, velocity and displacement, of which V1A has the first
     line = first + _HEADER_LINES
     blocks = []
     for size in sizes:
@@ -106,76 +115,88 @@ def _samples(text: Text, first: int, integers: FloatArray) -> tuple[FloatArray, 
     return blocks[0], line
 
 
-def _unit(text: Text, first: int, title: str) -> float:
-    if title == "Corrected":
+def _promised_samples(text: Text, line: int) -> int:
+    """Return the number of samples in the text of the header."""
+    promised = _POINTS.search(text.lines[line])
+    if promised is None:
+        refuse(text, line, "number of points", f"{quoted(text, line)} gives none")
+    return count(text, line, "number of points", promised[1])
+
+
+def _unit(text: Text, first: int, state: str) -> float:
+    """Return the unit of the samples, m/s2."""
+    if state == "Corrected":
         return _MILLIMETRE
-    unit = _UNIT.search(text.lines[first + 10])
+    line = first + _UNIT_LINE
+    unit = _UNIT.search(text.lines[line])
     if unit is None:
-        refuse(
-            text,
-            first + 10,
-            "unit",
-            f"{text.lines[first + 10].strip()!r} names no multiple of mm/s/s",
-        )
+        refuse(text, line, "unit", f"{quoted(text, line)} names no multiple of mm/s/s")
     return float(unit[1]) * _MILLIMETRE
 
 
 def _degrees(degrees: str, minutes: str, seconds: str, letter: str) -> float:
     """Return signed degrees; the numeric header has lost the sign of the southern hemisphere."""
-    size = int(degrees) + int(minutes) / 60 + int(seconds) / 3600
+    size = sexagesimal(degrees, minutes, seconds)
     return -size if letter in "SW" else size
 
 
 def _station(text: Text, first: int) -> dict[str, Any]:
-    site = _SITE.match(text.lines[first + 1])
+    """Return codes, name and coordinates of the station."""
+    line = first + 1
+    site = _SITE.match(text.lines[line])
     if site is None:
-        refuse(
-            text,
-            first + 1,
-            "site",
-            f"{text.lines[first + 1].strip()!r} has no code and coordinates",
-        )
-    place = coordinates(_degrees(*site.groups()[1:5]), _degrees(*site.groups()[5:9]))
+        refuse(text, line, "site", f"{quoted(text, line)} has no code and coordinates")
+    # Its groups are the code, then four parts of each angle
+    latitude = _degrees(*site.groups()[1:5])
+    longitude = _degrees(*site.groups()[5:9])
     return {
         "network": "NZ",
         "station": site[1],
-        "coordinates": place,
+        "coordinates": coordinates(latitude, longitude),
         "station_name": text.lines[first + 2].strip() or None,
     }
 
 
-def _source(lines: list[str]) -> dict[str, Any]:
-    """Event, instrument, corners and peak, as far as the text tells them."""
-    epicentre, bands, sensor = (
-        _EPICENTRE.match(lines[8]),
-        _BANDS.search(lines[11]),
-        _SENSOR.search(lines[4]),
-    )
+def _described(lines: list[str]) -> dict[str, Any]:
+    """Return event, instrument, corners, peak and direction, as far as the text has them."""
     peak = _PEAK.match(lines[13])
-    where = epicentre.groups() if epicentre else (None,) * 10
-    period = float(sensor[1]) if sensor else 0.0
-    model, _, serial = lines[3].removeprefix("Instrument").strip().partition("_")
-    return {
-        "event": {
-            "name": lines[6].strip() or None,
-            "latitude": _degrees(*where[:4]) if epicentre else None,
-            "longitude": _degrees(*where[4:8]) if epicentre else None,
-            "depth": float(where[8]) * 1000 if where[8] else None,
-            "magnitude": float(where[9]) if where[9] else None,
-        },
-        "instrument": {
-            "model": model or None,
-            "serial": serial or None,
-            "natural_frequency": 1 / period if period > 0 else None,
-            "damping": float(sensor[2]) if sensor else None,
-        },
-        "corners": {"highpass": float(bands[2]), "lowpass": float(bands[3])} if bands else {},
+    # The corners lie where the transition bands end: inside the pass band
+    words = {
+        "event": _event(lines),
+        "instrument": _instrument(lines),
+        "corners": corners(_BANDS.search(lines[11]), 2),
         "header_peak": abs(float(peak[1])) * _MILLIMETRE if peak else None,
+    }
+    direction = lines[12].removeprefix("Component").split("  ")[0]
+    return words | orientation(direction)
+
+
+def _event(lines: list[str]) -> dict[str, Any]:
+    """Return name, hypocentre and magnitude of the event."""
+    epicentre = _EPICENTRE.match(lines[8])
+    parts = epicentre.groups() if epicentre else (None,) * 10
+    # Groups: four parts of each angle, depth in km, magnitude
+    depth = float(parts[8]) if parts[8] else None
+    return {
+        "name": lines[6].strip() or None,
+        "latitude": _degrees(*parts[:4]) if epicentre else None,
+        "longitude": _degrees(*parts[4:8]) if epicentre else None,
+        "depth": metres(depth),
+        "magnitude": float(parts[9]) if parts[9] else None,
     }
 
 
-def _start(text: Text, line: int, integers: FloatArray) -> Any:
-    year, month, day, hour, minute, milliseconds = (
-        int(integers[index]) for index in (8, 9, 18, 19, 38, 39)
-    )
+def _instrument(lines: list[str]) -> dict[str, Any]:
+    """Return model, serial number and constants of the instrument."""
+    model, _, serial = lines[3].removeprefix("Instrument").strip().partition("_")
+    constants = sensor_constants(_SENSOR.search(lines[4]))
+    return {"model": model or None, "serial": serial or None, **constants}
+
+
+def _start(text: Text, line: int, integers: FloatArray) -> UTCDateTime:
+    """Return the time of the first sample."""
+    # The parts of the time are at three places among the integers
+    year, month = int(integers[8]), int(integers[9])
+    day, hour = int(integers[18]), int(integers[19])
+    minute, milliseconds = int(integers[38]), int(integers[39])
     return utc(text, line, "start", (year, month, day), (hour, minute, milliseconds / 1000))

@@ -1,18 +1,20 @@
-"""ITACA 2009 corrected acceleration (``.cor.acc``), one component a file."""
+"""ITACA 2009 corrected acceleration (``.cor.acc``), one component per file."""
 
 import re
 from typing import Any
 
 from obspy import Stream, UTCDateTime
 
+from per_obspy.checks import FloatArray
+from per_obspy.formats.text.conversions import utc_from_words
 from per_obspy.formats.text.fields import (
     Fields,
     count_field,
-    field,
     interval_field,
     number_field,
     read_fields,
-    word_field,
+    required_field,
+    text_field,
 )
 from per_obspy.formats.text.lines import (
     DECIMAL,
@@ -23,10 +25,11 @@ from per_obspy.formats.text.lines import (
     head,
     line_at,
     no_more,
+    quoted,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import orientation, trace, utc
+from per_obspy.formats.text.vocabulary import corners, orientation, trace
 
 _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5
@@ -36,7 +39,7 @@ _CORNERS = re.compile(rf"{DECIMAL}\s*-\s*{DECIMAL}")
 
 
 def is_itaca(file: WaveformFile) -> bool:
-    """Tell whether a file starts like a corrected record of ITACA 2009."""
+    """Check whether a file starts like a corrected record of ITACA 2009."""
     start = head(file, 120)
     return start.startswith(b"Event Date & Time ") and b"Station Code / Name" in start
 
@@ -45,33 +48,41 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a corrected record of ITACA 2009: acceleration of one component, m/s2."""
     text = read_text(file)
     fields = read_fields(text, _HEADER_LINES - 1)
-    if "m/s/s" not in line_at(text, _HEADER_LINES - 1, "unit"):
-        refuse(
-            text,
-            _HEADER_LINES - 1,
-            "unit",
-            f"{text.lines[_HEADER_LINES - 1].strip()!r} does not say m/s/s",
-        )
-    samples = count_field(text, fields, "Number of Data")
-    values = fixed_block(text, _HEADER_LINES, samples, _WIDTH, _PER_LINE)
-    no_more(text, _HEADER_LINES + block_lines(samples, _PER_LINE), samples)
-    corners = _CORNERS.match(word_field(fields, "Filter Cut-off Frequency (Hz)") or "")
-    words = {
-        "units": "m/s2",
-        "quantity": "acceleration",
-        "processing_level": "processed",
-        "corners": {"highpass": float(corners[1]), "lowpass": float(corners[2])} if corners else {},
-        "header_peak": number_field(text, fields, "PGA (m/s/s)"),
-        "event": {"time": _event_time(text, fields)},
-    }
-    words |= _station(text, fields) | orientation(field(text, fields, "Orientation").value)
+    unit = line_at(text, _HEADER_LINES - 1, "unit")
+    if "m/s/s" not in unit:
+        problem = f"{quoted(text, _HEADER_LINES - 1)} does not say m/s/s"
+        refuse(text, _HEADER_LINES - 1, "unit", problem)
+    values = _samples(text, count_field(text, fields, "Number of Data"))
+    # Words of the header
+    words = _processing(text, fields) | {"event": {"time": _event_time(text, fields)}}
+    words |= _station(text, fields)
+    words |= orientation(required_field(text, fields, "Orientation").value)
     return Stream([trace(values, interval_field(text, fields, "Time Increment (s)"), words)])
 
 
+def _samples(text: Text, samples: int) -> FloatArray:
+    """Return the samples, which end the file."""
+    values = fixed_block(text, _HEADER_LINES, samples, _WIDTH, _PER_LINE)
+    no_more(text, _HEADER_LINES + block_lines(samples, _PER_LINE), samples)
+    return values
+
+
+def _processing(text: Text, fields: Fields) -> dict[str, Any]:
+    """Return quantity, filter and peak."""
+    band = _CORNERS.match(text_field(fields, "Filter Cut-off Frequency (Hz)") or "")
+    return {
+        "units": "m/s2",
+        "quantity": "acceleration",
+        "processing_level": "processed",
+        "corners": corners(band),
+        "header_peak": number_field(text, fields, "PGA (m/s/s)"),
+    }
+
+
 def _station(text: Text, fields: Fields) -> dict[str, Any]:
-    """Code and name; the Italian civil protection (DPC) runs the network with FDSN code IT."""
-    station = _STATION.match(field(text, fields, "Station Code / Name").value)
-    network = word_field(fields, "Network") or ""
+    """Return codes and name; the civil protection (DPC) runs the network with FDSN code IT."""
+    station = _STATION.match(required_field(text, fields, "Station Code / Name").value)
+    network = text_field(fields, "Network") or ""
     return {
         "network": "IT" if network.startswith("DPC") else None,
         "station": station[1] if station else None,
@@ -80,11 +91,8 @@ def _station(text: Text, fields: Fields) -> dict[str, Any]:
 
 
 def _event_time(text: Text, fields: Fields) -> UTCDateTime | None:
-    found = field(text, fields, "Event Date & Time")
-    time = _TIME.match(found.value)
-    if time is None:
-        return None
-    year, month, day, hour, minute = (int(part) for part in time.groups()[:5])
-    return utc(
-        text, found.line, "Event Date & Time", (year, month, day), (hour, minute, float(time[6]))
-    )
+    """Return the origin time, UTC."""
+    name = "Event Date & Time"
+    line, value = required_field(text, fields, name)
+    time = _TIME.match(value)
+    return utc_from_words(text, line, name, time.groups()) if time else None

@@ -1,7 +1,8 @@
-"""K-NET and KiK-net: ObsPy reads them; here their header is said in the words of the vocabulary."""
+"""K-NET and KiK-net: ObsPy reads them; their header is put into the words of the vocabulary."""
 
 from obspy import Trace
 
+from per_obspy.constants import GAL
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.text.vocabulary import coordinates, orientation
 
@@ -11,26 +12,39 @@ _SENSORS = "12"
 
 def with_knet_words(record: Trace) -> Trace:
     """
-    Return a copy of a K-NET trace with the vocabulary's words; counts stay, with the gain in ``calib`` (m/s2).
+    Return a copy of a K-NET trace with the words of the vocabulary.
 
-    ObsPy reads a cut file as a shorter record; here it is refused.
+    Samples stay counts, with the gain in ``calib`` (m/s2 per count).
+
+    Raises
+    ------
+    RecordRejected
+        If the file is shorter than its header promises: ObsPy reads a cut file as a shorter record.
     """
+    _refuse_cut(record)
     header = record.stats.knet
-    seconds = record.stats.npts * record.stats.delta
-    if seconds < header.duration - record.stats.delta:
-        raise RecordRejected(
-            record.id, f"the header promises {header.duration:g} s, the file holds {seconds:g} s"
-        )
-    result = record.copy()
-    result.stats.update({"units": "counts", "quantity": "acceleration", "processing_level": "raw"})
-    result.stats.update(orientation(record.stats.channel.rstrip(_SENSORS)))
-    result.stats.coordinates = coordinates(header.stla, header.stlo, header.stel)
-    result.stats.header_peak = header.accmax * 0.01 / record.stats.calib
-    result.stats.event = {
+    trace = record.copy()
+    stats = trace.stats
+    stats.update({"units": "counts", "quantity": "acceleration", "processing_level": "raw"})
+    stats.update(orientation(record.stats.channel.rstrip(_SENSORS)))
+    stats.coordinates = coordinates(header.stla, header.stlo, header.stel)
+    # The header's peak is in gal, the samples are counts
+    stats.header_peak = header.accmax * GAL / record.stats.calib
+    stats.event = {
         "time": header.evot,
         "latitude": header.evla,
         "longitude": header.evlo,
         "depth": 1000 * header.evdp,
         "magnitude": header.mag,
     }
-    return result
+    return trace
+
+
+def _refuse_cut(record: Trace) -> None:
+    """Refuse a record that is shorter than its header promises by more than a sample."""
+    promised = record.stats.knet.duration
+    seconds = record.stats.npts * record.stats.delta
+    if seconds < promised - record.stats.delta:
+        raise RecordRejected(
+            record.id, f"the header promises {promised:g} s, the file holds {seconds:g} s"
+        )

@@ -7,14 +7,15 @@ import numpy as np
 from obspy import Stream, UTCDateTime
 
 from per_obspy.constants import GAL
+from per_obspy.formats.text.conversions import metres, signed_degrees, utc_from_words
 from per_obspy.formats.text.fields import (
     Fields,
     count_field,
-    field,
     interval_field,
     number_field,
     read_fields,
-    word_field,
+    required_field,
+    text_field,
 )
 from per_obspy.formats.text.lines import (
     DECIMAL,
@@ -26,7 +27,7 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, hemisphere, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import coordinates, orientation, trace
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
@@ -37,7 +38,7 @@ _PEAKS = re.compile(rf"\(([NEU]-[SWD])\)\s*{DECIMAL}")
 
 
 def is_nsmn(file: WaveformFile) -> bool:
-    """Tell whether a file starts like a record of NSMN."""
+    """Check whether a file starts like a record of NSMN."""
     return head(file, len(_TITLE)) == _TITLE
 
 
@@ -45,74 +46,91 @@ def read_nsmn(file: WaveformFile, **_unused: Any) -> Stream:
     """Read a record of NSMN: three components, m/s2."""
     text = read_text(file)
     fields = read_fields(text, _HEADER_LINES - 1)
-    names = line_at(text, _HEADER_LINES - 1, "components").split()
-    if not all(orientation(name) for name in names) or len(names) != 3:
-        refuse(text, _HEADER_LINES - 1, "components", f"expected three directions, got {names}")
+    directions = _directions(text)
+    # One column per component
     samples = count_field(text, fields, "NUMBER OF DATA")
     values = free_block(text, _HEADER_LINES, None, 3 * samples).reshape(-1, 3)
     dt = interval_field(text, fields, "SAMPLING INTERVAL (sec)")
-    peaks = {
-        name: abs(float(peak)) * GAL
-        for name, peak in _PEAKS.findall(word_field(fields, "RAW PGA VALUES (gal)") or "")
-    }
-    common = _station(text, fields) | {
-        "event": _event(text, fields),
-        "starttime": _start(text, fields),
-    }
-    common |= {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
-    return Stream(
-        trace(
-            np.ascontiguousarray(GAL * column),
-            dt,
-            common | orientation(name) | {"header_peak": peaks.get(name)},
-        )
-        for name, column in zip(names, values.T, strict=True)
-    )
+    # Words of the header
+    peaks = _peaks(fields)
+    common = _common_words(text, fields)
+    stream = Stream()
+    for direction, column in zip(directions, values.T, strict=True):
+        words = common | orientation(direction) | {"header_peak": peaks.get(direction)}
+        stream.append(trace(np.ascontiguousarray(GAL * column), dt, words))
+    return stream
 
 
-def _place(fields: Fields, name: str) -> tuple[float | None, float | None]:
-    place = _PLACE.search(word_field(fields, name) or "")
-    return (
-        (hemisphere(place[1], place[2]), hemisphere(place[3], place[4])) if place else (None, None)
-    )
+def _directions(text: Text) -> list[str]:
+    """Return the directions of the three columns."""
+    directions = line_at(text, _HEADER_LINES - 1, "components").split()
+    if not all(orientation(direction) for direction in directions) or len(directions) != 3:
+        problem = f"expected three directions, got {directions}"
+        refuse(text, _HEADER_LINES - 1, "components", problem)
+    return directions
+
+
+def _peaks(fields: Fields) -> dict[str, float]:
+    """Return direction -> absolute peak of the header, m/s2."""
+    peaks = _PEAKS.findall(text_field(fields, "RAW PGA VALUES (gal)") or "")
+    return {direction: abs(float(peak)) * GAL for direction, peak in peaks}
+
+
+def _common_words(text: Text, fields: Fields) -> dict[str, Any]:
+    """Return the words that all components share."""
+    words = _station(text, fields) | {"event": _event(text, fields)}
+    words["starttime"] = _start(text, fields)
+    return words | {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
+
+
+def _place(fields: Fields, name: str) -> tuple[float, float] | tuple[None, None]:
+    """Return latitude and longitude, degrees."""
+    return signed_degrees(_PLACE.search(text_field(fields, name) or ""))
 
 
 def _station(text: Text, fields: Fields) -> dict[str, Any]:
+    """Return codes, name, coordinates and instrument of the station."""
     elevation = number_field(text, fields, "STATION ALTITUDE (m)")
+    latitude, longitude = _place(fields, "STATION COORDINATES")
+    # The recorder, not the sensor, is what the header names
+    recorder = {
+        "model": text_field(fields, "RECORDER TYPE"),
+        "serial": text_field(fields, "RECORDER SERIAL NO"),
+    }
     return {
         "network": "TK",
-        "station": field(text, fields, "STATION ID").value,
-        "station_name": word_field(fields, "PLACE"),
-        "coordinates": coordinates(*_place(fields, "STATION COORDINATES"), elevation),
-        "instrument": {
-            "model": word_field(fields, "RECORDER TYPE"),
-            "serial": word_field(fields, "RECORDER SERIAL NO"),
-        },
+        "station": required_field(text, fields, "STATION ID").value,
+        "station_name": text_field(fields, "PLACE"),
+        "coordinates": coordinates(latitude, longitude, elevation),
+        "instrument": recorder,
     }
 
 
 def _event(text: Text, fields: Fields) -> dict[str, Any]:
+    """Return origin time, hypocentre and magnitude of the event."""
     latitude, longitude = _place(fields, "EPICENTER COORDINATES")
-    time = _EVENT_TIME.match(word_field(fields, "EARTHQUAKE DATE") or "")
+    time = _EVENT_TIME.match(text_field(fields, "EARTHQUAKE DATE") or "")
+    # Depth in km; the kind of the magnitude follows its number
     depth = number_field(text, fields, "EARTHQUAKE DEPTH (km)")
-    magnitude = re.match(DECIMAL, word_field(fields, "EARTHQUAKE MAGNITUDE") or "")
+    magnitude = re.match(DECIMAL, text_field(fields, "EARTHQUAKE MAGNITUDE") or "")
     return {
         "time": _moment(text, fields, "EARTHQUAKE DATE", time.groups()) if time else None,
         "latitude": latitude,
         "longitude": longitude,
-        "depth": None if depth is None else 1000 * depth,
+        "depth": metres(depth),
         "magnitude": float(magnitude[1]) if magnitude else None,
     }
 
 
 def _start(text: Text, fields: Fields) -> UTCDateTime | None:
-    time = _RECORD_TIME.match(word_field(fields, "RECORD TIME") or "")
+    """Return the time of the first sample, whose day comes before month and year."""
+    time = _RECORD_TIME.match(text_field(fields, "RECORD TIME") or "")
     if time is None:
         return None
     day, month, year, *clock = time.groups()
     return _moment(text, fields, "RECORD TIME", (year, month, day, *clock))
 
 
-def _moment(text: Text, fields: Fields, name: str, parts: tuple[str, ...]) -> UTCDateTime:
-    year, month, day, hour, minute = (int(part) for part in parts[:5])
-    return utc(text, fields[name].line, name, (year, month, day), (hour, minute, float(parts[5])))
+def _moment(text: Text, fields: Fields, name: str, words: tuple[str, ...]) -> UTCDateTime:
+    """Return a time in UTC from the words of year, month, ... and second."""
+    return utc_from_words(text, fields[name].line, name, words)

@@ -1,4 +1,8 @@
-"""PEER AT2 (acceleration, g), VT2 (velocity, cm/s) and DT2 (displacement, cm): one component a file."""
+"""
+PEER AT2 (acceleration, g), VT2 (velocity, cm/s) and DT2 (displacement, cm).
+
+A file holds one component.
+"""
 
 import re
 from pathlib import Path
@@ -8,7 +12,9 @@ import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.trace import Stats
 
+from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.formats.text.conversions import full_year, utc
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -17,10 +23,11 @@ from per_obspy.formats.text.lines import (
     head_lines,
     interval,
     line_at,
+    quoted,
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import full_year, orientation, trace, utc
+from per_obspy.formats.text.vocabulary import orientation, trace
 
 _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"
@@ -33,8 +40,8 @@ _TITLE = re.compile(
     r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)"
 )
 _CORNERS = {
-    name: re.compile(rf"\b{word}\s*=\s*(\d*\.?\d+)\s*HZ")
-    for name, word in (("highpass", "HP"), ("lowpass", "LP"))
+    "highpass": re.compile(r"\bHP\s*=\s*(\d*\.?\d+)\s*HZ"),
+    "lowpass": re.compile(r"\bLP\s*=\s*(\d*\.?\d+)\s*HZ"),
 }
 
 #: quantity and unit of the header -> unit of the samples, factor to it
@@ -44,9 +51,12 @@ _UNITS = {
     ("DISPLACEMENT", "CM"): ("m", 0.01),
 }
 
+#: numbers of a full line in a file that is written
+_PER_LINE = 5
+
 
 def is_at2(file: WaveformFile) -> bool:
-    """Tell whether a file starts like a PEER record."""
+    """Check whether a file starts like a PEER record."""
     lines = head_lines(file, 1000)
     return (
         len(lines) > 3
@@ -61,45 +71,56 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
     text = read_text(file)
     units = _QUANTITY.match(line_at(text, 2, "units").strip())
     if units is None or units.groups() not in _UNITS:
-        refuse(text, 2, "units", f"{text.lines[2].strip()!r} is not a PEER quantity and unit")
-    unit, factor = _UNITS[units.group(1), units.group(2)]
+        refuse(text, 2, "units", f"{quoted(text, 2)} is not a PEER quantity and unit")
+    unit, factor = _UNITS[units[1], units[2]]
     samples, dt = _size(text)
     values = factor * free_block(text, 4, None, samples)
-    words = {"units": unit, "quantity": units.group(1).lower(), "processing_level": "processed"}
-    return Stream([trace(values, dt, words | _title(text) | {"corners": _corners(text.lines[2])})])
+    # Words of the header
+    words = {"units": unit, "quantity": units[1].lower(), "processing_level": "processed"}
+    words |= _title(text) | {"corners": _corners(text.lines[2])}
+    return Stream([trace(values, dt, words)])
 
 
 def _size(text: Text) -> tuple[int, float]:
+    """Return the number of samples and their interval, s."""
     line = line_at(text, 3, "NPTS, DT")
     size = _NAMED_SIZE.match(line) or _PLAIN_SIZE.match(line)
     if size is None:
-        refuse(text, 3, "NPTS, DT", f"{line.strip()!r} names no number of samples and no interval")
+        problem = f"{quoted(text, 3)} names no number of samples and no interval"
+        refuse(text, 3, "NPTS, DT", problem)
     return count(text, 3, "NPTS", size[1]), interval(text, 3, "DT", size[2])
 
 
 def _title(text: Text) -> dict[str, Any]:
-    """Event, date, station and orientation of the second line."""
+    """Return event, date, station and orientation of the second line."""
     title = _TITLE.fullmatch(text.lines[1].strip())
     if title is None:
         name = text.lines[1].split(",")[0].strip()
         return {"station": _code(name), "station_name": name}
     event, month, day, year, station, component = title.groups()
     start = utc(text, 1, "date", (full_year(year), int(month), int(day)))
-    named = {
+    # The format has no station codes
+    words = {
         "station": _code(station),
         "station_name": station.strip(),
         "event": {"name": event or None},
+        "starttime": start,
     }
-    return named | {"starttime": start} | orientation(component)
+    return words | orientation(component)
 
 
 def _code(name: str) -> str:
+    """Return a station code made from a name."""
     return re.sub(r"[^A-Z0-9]", "", name.upper())
 
 
 def _corners(line: str) -> dict[str, float]:
-    found = {name: pattern.search(line.upper()) for name, pattern in _CORNERS.items()}
-    return {name: float(match[1]) for name, match in found.items() if match}
+    """Return the corners of PEER's filter that the header has, Hz."""
+    corners = {}
+    for name, pattern in _CORNERS.items():
+        if found := pattern.search(line.upper()):
+            corners[name] = float(found[1])
+    return corners
 
 
 def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -> None:
@@ -122,35 +143,49 @@ def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -
 
 
 def _at2_text(component: Trace) -> str:
+    """Return the content of a file."""
+    _require_acceleration(component)
     stats = component.stats
-    if stats.get("units") != "m/s2":
+    top = [
+        "PEER NGA STRONG MOTION DATABASE RECORD",
+        _title_line(stats),
+        "ACCELERATION TIME SERIES IN UNITS OF G",
+        f"NPTS= {len(component.data):6d}, DT= {stats.delta:.9g} SEC",
+    ]
+    return "\n".join(top + _rows(component.data / STANDARD_GRAVITY)) + "\n"
+
+
+def _require_acceleration(component: Trace) -> None:
+    """Refuse a trace that is not finite acceleration in m/s2."""
+    units = component.stats.get("units")
+    if units != "m/s2":
         raise ValueError(
-            f"an AT2 file holds acceleration, stats.units must be 'm/s2', got {stats.get('units')!r}"
+            f"an AT2 file holds acceleration, stats.units must be 'm/s2', got {units!r}"
         )
     if not np.isfinite(component.data).all():
         raise ValueError(f"{component.id} has samples that are not finite")
+
+
+def _title_line(stats: Stats) -> str:
+    """Return the second line: event and date where they are known, station, orientation."""
     station = stats.get("station_name", stats.station).replace(",", " ")
-    dated = (
-        ""
-        if stats.starttime == UTCDateTime(0)
-        else f"{stats.get('event', {}).get('name', '')}, {_date(stats)}, "
-    )
-    values = [f"{value:15.7E}" for value in component.data / STANDARD_GRAVITY]
-    rows = ["".join(values[first : first + 5]) for first in range(0, len(values), 5)]
-    top = [
-        "PEER NGA STRONG MOTION DATABASE RECORD",
-        f"{dated}{station}, {_component(stats)}",
-        "ACCELERATION TIME SERIES IN UNITS OF G",
-        f"NPTS= {len(values):6d}, DT= {stats.delta:.9g} SEC",
-    ]
-    return "\n".join(top + rows) + "\n"
+    title = f"{station}, {_component(stats)}"
+    # ObsPy's default start is a mark for unknown
+    if stats.starttime == UTCDateTime(0):
+        return title
+    event = stats.get("event", {}).get("name", "")
+    date = f"{stats.starttime.month}/{stats.starttime.day}/{stats.starttime.year}"
+    return f"{event}, {date}, {title}"
+
+
+def _rows(values: FloatArray) -> list[str]:
+    """Return the lines of a block of numbers."""
+    words = [f"{value:15.7E}" for value in values]
+    return ["".join(words[first : first + _PER_LINE]) for first in range(0, len(words), _PER_LINE)]
 
 
 def _component(stats: Stats) -> str:
+    """Return the orientation, or the channel code where it is unknown."""
     if abs(stats.get("sensor_dip", 0.0)) == 90:
         return "UP" if stats.sensor_dip < 0 else "DWN"
     return f"{stats.sensor_azimuth:03.0f}" if "sensor_azimuth" in stats else stats.channel
-
-
-def _date(stats: Stats) -> str:
-    return f"{stats.starttime.month}/{stats.starttime.day}/{stats.starttime.year}"

@@ -1,4 +1,4 @@
-"""RENADIC (Universidad de Chile): volume 1 in CSMIP's layout, mostly with unknown coordinates and unset clocks."""
+"""RENADIC (Universidad de Chile): volume 1 in CSMIP's layout, mostly without place and time."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from per_obspy.formats.text.lines import WaveformFile, head
 
 
 def is_renadic(file: WaveformFile) -> bool:
-    """Tell whether a file starts like a record of RENADIC."""
+    """Check whether a file starts like a record of RENADIC."""
     start = head(file, 1200).upper()
     return (
         start.startswith(b"UNCORRECTED ACCELEROGRAM DATA")

@@ -1,1 +1,1 @@
-"""Where records come from: each source gives Streams in m/s2 with coordinates and sensor azimuths."""
+"""Sources of records: each gives Streams in m/s2 with coordinates and sensor azimuths."""

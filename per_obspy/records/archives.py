@@ -1,4 +1,8 @@
-"""Archives (zip, and tar plain or compressed by gzip, bzip2, xz) as folders, unpacked in memory only."""
+"""
+Archives as folders, unpacked in memory only.
+
+Understood are zip, and tar plain or compressed by gzip, bzip2 or xz.
+"""
 
 import io
 import lzma
@@ -12,7 +16,7 @@ from per_obspy.errors import RecordRejected, reason_of
 
 _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
-#: what the standard library raises for damaged, encrypted or cut archives
+#: errors of the standard library for damaged, encrypted or cut archives
 _DAMAGES = (
     zipfile.BadZipFile,
     tarfile.TarError,
@@ -26,13 +30,13 @@ _DAMAGES = (
 
 
 def is_archive(path: Path) -> bool:
-    """Tell from its name whether a file is an archive."""
+    """Check from its name whether a file is an archive."""
     return path.name.lower().endswith(_ZIP + _TAR)
 
 
 def members(archive: Path) -> list[Path]:
     """
-    Return the files of an archive as paths below the archive's own.
+    List the files of an archive as paths below the path of the archive.
 
     Raises
     ------
@@ -40,15 +44,23 @@ def members(archive: Path) -> list[Path]:
         If the archive is damaged.
     """
     try:
-        if archive.name.lower().endswith(_ZIP):
-            with zipfile.ZipFile(archive) as opened:
-                names = [member.filename for member in opened.infolist() if not member.is_dir()]
-        else:
-            with tarfile.open(archive) as packed:
-                names = [member.name for member in packed if member.isfile()]
+        names = _member_names(archive)
     except _DAMAGES as error:
         raise RecordRejected(str(archive), f"the archive is damaged: {error}") from error
     return [archive / name for name in sorted(names)]
+
+
+def _member_names(archive: Path) -> list[str]:
+    """Return the names of the files of an archive, without those of folders."""
+    if _is_zip(archive):
+        with zipfile.ZipFile(archive) as opened:
+            return [member.filename for member in opened.infolist() if not member.is_dir()]
+    with tarfile.open(archive) as packed:
+        return [member.name for member in packed if member.isfile()]
+
+
+def _is_zip(archive: Path) -> bool:
+    return archive.name.lower().endswith(_ZIP)
 
 
 def open_file(path: Path) -> BinaryIO:
@@ -60,21 +72,26 @@ def open_file(path: Path) -> BinaryIO:
     RecordRejected
         If it cannot be read.
     """
-    archive = next(
-        (parent for parent in path.parents if is_archive(parent) and parent.is_file()), None
-    )
+    archive = _archive_of(path)
     try:
-        return (
-            path.open("rb")
-            if archive is None
-            else _member(archive, path.relative_to(archive).as_posix())
-        )
+        if archive is None:
+            return path.open("rb")
+        return _member(archive, path.relative_to(archive).as_posix())
     except _DAMAGES as error:
         raise RecordRejected(str(path), f"cannot be read: {reason_of(error)}") from error
 
 
+def _archive_of(path: Path) -> Path | None:
+    """Return the archive that holds a path, or None."""
+    for parent in path.parents:
+        if is_archive(parent) and parent.is_file():
+            return parent
+    return None
+
+
 def _member(archive: Path, name: str) -> BinaryIO:
-    if archive.name.lower().endswith(_ZIP):
+    """Unpack a file of an archive in memory."""
+    if _is_zip(archive):
         with zipfile.ZipFile(archive) as opened:
             return io.BytesIO(opened.read(name))
     with tarfile.open(archive) as packed:

@@ -1,17 +1,14 @@
 """
-Workspaces of gmprocess, which are ASDF files (HDF5): raw or processed waveforms, StationXML and the event.
+Workspaces of gmprocess, which are ASDF files (HDF5): waveforms, StationXML and the event.
 
 ASDF keeps a waveform as ``Waveforms/NET.STA/ID__START__END__TAG``, with the sampling rate (Hz) and
-the start (ns since
-1970) as attributes (Krischer and others 2016). gmprocess adds what it did in ``AuxiliaryData`` and ``Provenance``.
-netCDF4, which reads HDF5, is enough for that.
+the start (ns since 1970) as attributes (Krischer and others 2016). gmprocess adds its processing in
+``AuxiliaryData`` and ``Provenance``. netCDF4, which reads HDF5, is enough for that.
 """
 
 import json
 import re
 from fnmatch import fnmatchcase
-from functools import reduce
-from operator import add
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +21,21 @@ from obspy.core.event import Event
 
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
-from per_obspy.records.folder import FolderContents
+from per_obspy.records.folder import FolderContents, merged_inventory
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import foreign_bytes
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
-#: unit that the provenance says the samples have -> m/s2
+#: unit of the samples according to the provenance -> m/s2
 _UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
 
 _OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]*>([^<]+)<")
 
+#: process level of waveforms that are not raw
+_PROCESSED = "corrected physical"
+
 
 def is_asdf(path: Path) -> bool:
-    """Tell from its first bytes whether a file is HDF5; whether it is ASDF is said when it is opened."""
+    """Check from its first bytes whether a file is HDF5; opening it shows whether it is ASDF."""
     with path.open("rb") as file:
         return file.read(8) == b"\x89HDF\r\n\x1a\n"
 
@@ -59,23 +59,28 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> FolderCo
     """
     with _opened(Path(path)) as file:
         groups = file["Waveforms"].groups if "Waveforms" in file.groups else {}
-        stations: dict[str, tuple[Path, ...]] = {
-            name: (Path(path),) for name, group in sorted(groups.items()) if _names(group, tag)
-        }
+        stations: dict[str, tuple[Path, ...]] = {}
+        for name, group in sorted(groups.items()):
+            if _names(group, tag):
+                stations[name] = (Path(path),)
         if not stations:
-            tags = sorted({_tag(name) for group in groups.values() for name in _names(group, "*")})
-            raise CatalogError(
-                str(path), f"has no waveform of tag {tag}, only of {', '.join(tags) or 'none'}"
-            )
+            raise CatalogError(str(path), _no_waveform(groups, tag))
+        # StationXML of every station, which may be damaged
         inventories, rejected = [], []
         for name in stations:
             try:
                 inventories += _inventories(groups[name], f"{path}/{name}")
             except RecordRejected as rejection:
                 rejected.append(Rejection("file", name, str(path), None, rejection.reasons))
-    return FolderContents(
-        stations, reduce(add, inventories) if inventories else None, tuple(rejected)
-    )
+    return FolderContents(stations, merged_inventory(inventories), tuple(rejected))
+
+
+def _no_waveform(groups: dict[str, Any], tag: str) -> str:
+    """Return the reason why no station is found: the tags that there are."""
+    tags: set[str] = set()
+    for group in groups.values():
+        tags.update(_tag(name) for name in _names(group, "*"))
+    return f"has no waveform of tag {tag}, only of {', '.join(sorted(tags)) or 'none'}"
 
 
 def read_asdf_station(
@@ -86,14 +91,14 @@ def read_asdf_station(
     for path in paths:
         with _opened(path) as file:
             group = file["Waveforms"].groups[station]
+            # A waveform that is refused does not stop the others
             for name in _names(group, tag):
                 try:
                     stream += with_metadata(_trace(file, group.variables[name]), inventory)
                     stream[-1].stats.source = str(path)
                 except RecordRejected as rejection:
-                    rejected.append(
-                        Rejection("record", name.split("__")[0], str(path), None, rejection.reasons)
-                    )
+                    record = name.split("__")[0]
+                    rejected.append(Rejection("record", record, str(path), None, rejection.reasons))
     return stream, tuple(rejected)
 
 
@@ -108,8 +113,9 @@ def read_asdf_event(path: Path) -> Event:
     """
     with _opened(path) as file:
         content = file["QuakeML"][:].tobytes() if "QuakeML" in file.variables else b""
+    # A file without QuakeML holds no event
     try:
-        events = foreign_bytes(obspy.read_events, content, str(path)) if content else []
+        events = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1 or not events[0].origins:
@@ -120,12 +126,13 @@ def read_asdf_event(path: Path) -> Event:
 
 
 def has_event(path: Path) -> bool:
-    """Tell whether an ASDF file holds an event."""
+    """Check whether an ASDF file holds an event."""
     with _opened(path) as file:
         return "QuakeML" in file.variables
 
 
 def _opened(path: Path) -> netCDF4.Dataset:
+    """Open an ASDF file."""
     try:
         file = netCDF4.Dataset(path)
     except OSError as error:
@@ -139,9 +146,8 @@ def _opened(path: Path) -> netCDF4.Dataset:
 
 def _names(group: Any, tag: str) -> list[str]:
     """Return the names of the waveforms of a tag, each channel's in the order of time."""
-    return sorted(
-        name for name in group.variables if name != "StationXML" and fnmatchcase(_tag(name), tag)
-    )
+    waveforms = (name for name in group.variables if name != "StationXML")
+    return sorted(name for name in waveforms if fnmatchcase(_tag(name), tag))
 
 
 def _tag(name: str) -> str:
@@ -149,52 +155,63 @@ def _tag(name: str) -> str:
 
 
 def _inventories(group: Any, name: str) -> list[Inventory]:
+    """Return the StationXML of a station, if there is any."""
     if "StationXML" not in group.variables:
         return []
-    return [foreign_bytes(obspy.read_inventory, group.variables["StationXML"][:].tobytes(), name)]
+    return [
+        read_bytes_with_obspy(
+            obspy.read_inventory, group.variables["StationXML"][:].tobytes(), name
+        )
+    ]
 
 
 def _trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
-    """Return a waveform with what gmprocess says of it; one of which it says nothing counts as raw."""
+    """Return a waveform with the words of its processing; without any it counts as raw."""
     identifier, tag = waveform.name.split("__")[0], _tag(waveform.name)
     trace = Trace(np.asarray(waveform[:]))
     trace.id = identifier
     trace.stats.sampling_rate = float(waveform.sampling_rate)
     trace.stats.starttime = UTCDateTime(ns=int(waveform.starttime))
-    stream_name = f"{identifier[:-1]}_{tag}"
-    if "corrected physical" in _said(file, "StreamSupplementalStats", stream_name).get(
-        "standard", {}
-    ).get("process_level", ""):
+    # The level belongs to the stream of all components, whose name lacks their letter
+    level = _auxiliary(file, "StreamSupplementalStats", f"{identifier[:-1]}_{tag}")
+    if _PROCESSED in level.get("standard", {}).get("process_level", ""):
         _describe_processed(file, trace, f"{identifier}_{tag}")
     return trace
 
 
 def _describe_processed(file: netCDF4.Dataset, trace: Trace, name: str) -> None:
-    provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
-    units = _OUTPUT_UNITS.findall(
-        "" if provenance is None else provenance[:].tobytes().decode("utf-8", "replace")
-    )
-    if not units or units[-1] not in _UNITS:
-        raise RecordRejected(
-            trace.id, f"its provenance gives {units[-1] if units else 'no unit'} as output_units"
-        )
-    trace.data = trace.data * _UNITS[units[-1]]
+    """Put a processed waveform into m/s2, with the words of the vocabulary."""
+    trace.data = trace.data * _output_unit(file, trace, name)
     trace.stats.update(
         {"units": "m/s2", "quantity": "acceleration", "processing_level": "processed"}
     )
-    corners = _said(file, "TraceProcessingParameters", name).get("corner_frequencies", {})
-    trace.stats.corners = AttribDict(
-        {key: corners[key] for key in ("highpass", "lowpass") if key in corners}
-    )
+    # Corners of the filter, Hz
+    parameters = _auxiliary(file, "TraceProcessingParameters", name)
+    corners = parameters.get("corner_frequencies", {})
+    known = {key: corners[key] for key in ("highpass", "lowpass") if key in corners}
+    trace.stats.corners = AttribDict(known)
 
 
-def _said(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:
-    """Return what gmprocess says of a stream or trace in its auxiliary data; nothing if it says nothing."""
+def _output_unit(file: netCDF4.Dataset, trace: Trace, name: str) -> float:
+    """Return the unit of the last step of the processing, m/s2."""
+    provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
+    steps = "" if provenance is None else provenance[:].tobytes().decode("utf-8", "replace")
+    units = _OUTPUT_UNITS.findall(steps)
+    # A unit that is missing or unknown must not be guessed
+    if not units or units[-1] not in _UNITS:
+        unit = units[-1] if units else "no unit"
+        raise RecordRejected(trace.id, f"its provenance gives {unit} as output_units")
+    return _UNITS[units[-1]]
+
+
+def _auxiliary(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:
+    """Return gmprocess's auxiliary data of a stream or trace; empty if there is none."""
     station = ".".join(name.split(".")[:2])
     groups = file.groups.get("AuxiliaryData")
     for part in (kind, station):
         groups = groups.groups.get(part) if groups is not None else None
+    # Data of a stream or trace is JSON
     if groups is None or name not in groups.variables:
         return {}
-    said: dict[str, Any] = json.loads(groups.variables[name][:].tobytes())
-    return said
+    content: dict[str, Any] = json.loads(groups.variables[name][:].tobytes())
+    return content

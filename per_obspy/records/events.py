@@ -16,7 +16,7 @@ from per_obspy.records import folder
 from per_obspy.records.asdf import is_asdf, read_asdf_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.web import NotFound, answer, web_pool
-from per_obspy.records.obspy_readers import foreign
+from per_obspy.records.obspy_readers import read_with_obspy
 
 #: how patiently a list of events is asked for: s, retries, s
 _PATIENCE = (60.0, 3, 1.0)
@@ -151,7 +151,7 @@ def _rows_of_file(path: Path) -> list[EventRow]:
     try:
         if content.lstrip()[:1] == b"{":
             return _feed_rows(content)
-        return [_quakeml_row(event) for event in foreign(obspy.read_events, path)]
+        return [_quakeml_row(event) for event in read_with_obspy(obspy.read_events, path)]
     except (RecordRejected, ValueError, KeyError, TypeError, IndexError) as error:
         raise CatalogError(str(path), f"is no list of events: {_said(error)}") from error
 

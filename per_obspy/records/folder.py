@@ -1,4 +1,8 @@
-"""A folder of records: every file that ObsPy and its plugins understand, with StationXML beside them or elsewhere."""
+"""
+A folder of records: every file that ObsPy and its plugins understand.
+
+StationXML may be in the same folder or elsewhere.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -8,16 +12,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import obspy
-from obspy import Inventory, Stream, UTCDateTime
+from obspy import Inventory, Stream, Trace, UTCDateTime
 from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import foreign
+from per_obspy.records.obspy_readers import read_with_obspy
 from per_obspy.records.processed_files import described
 
-#: what StationXML, FDSN station text, QuakeML and descriptions of processed records begin with
+#: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
+#: records -> kind of file
 _MARKS = {
     b"<FDSNStationXML": "inventory",
     b"#Network": "inventory",
@@ -28,7 +33,7 @@ _MARKS = {
 
 class FolderContents(NamedTuple):
     """
-    What a folder holds.
+    Contents of a folder.
 
     Attributes
     ----------
@@ -67,18 +72,15 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
     """
     files, rejected = _files(Path(folder))
     kinds = {path: _kind(path) for path in files}
+    # Headers of the records
     stations: dict[str, list[Path]] = defaultdict(list)
     for path in (path for path in files if kinds[path] == "record"):
         try:
-            for station in sorted(
-                {
-                    f"{trace.stats.network}.{trace.stats.station}"
-                    for trace in _read(path, headonly=True)
-                }
-            ):
+            for station in _station_names(path):
                 stations[station].append(path)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
+    # Metadata from elsewhere, then from the folder
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     for path in (path for path in files if kinds[path] == "inventory"):
         try:
@@ -87,8 +89,21 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
             rejected.append(_rejected_file(path, rejection))
     if not stations:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
-    found = {station: tuple(paths) for station, paths in sorted(stations.items())}
-    return FolderContents(found, merged_inventory(inventories), tuple(rejected))
+    return FolderContents(_sorted(stations), merged_inventory(inventories), tuple(rejected))
+
+
+def _station_names(path: Path) -> list[str]:
+    """Return the stations of a file, sorted."""
+    return sorted({station_name(trace) for trace in _read(path, headonly=True)})
+
+
+def station_name(trace: Trace) -> str:
+    """Return ``"NET.STA"`` of a trace."""
+    return f"{trace.stats.network}.{trace.stats.station}"
+
+
+def _sorted(stations: dict[str, list[Path]]) -> dict[str, tuple[Path, ...]]:
+    return {station: tuple(paths) for station, paths in sorted(stations.items())}
 
 
 def read_station(
@@ -115,7 +130,7 @@ def read_station(
     Returns
     -------
     stream : Stream
-        Traces in the words of ``formats/vocabulary.py``; each remembers its file in
+        Traces in the words of ``formats/text/vocabulary.py``; the path of each one's file is in
         ``stats.source``.
     rejected : tuple of Rejection
         Files that cannot be read and traces whose metadata is insufficient; the rest goes on.
@@ -127,8 +142,9 @@ def read_station(
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
             continue
+        # A trace that is refused does not stop the others of its file
         for trace in traces:
-            if station not in (None, f"{trace.stats.network}.{trace.stats.station}"):
+            if station not in (None, station_name(trace)):
                 continue
             try:
                 stream += with_metadata(trace, inventory)
@@ -148,30 +164,32 @@ def read_event(path: str | Path) -> Event:
         If the file cannot be read or does not hold exactly one event with an origin.
     """
     try:
-        events = foreign(obspy.read_events, Path(path))
+        events = read_with_obspy(obspy.read_events, Path(path))
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
     if len(events) != 1:
         raise CatalogError(str(path), f"must hold one event, holds {len(events)}")
-    if not events[0].origins:
-        raise CatalogError(str(path), f"the event {events[0].resource_id} has no origin")
-    if (events[0].preferred_origin() or events[0].origins[0]).time is None:
-        raise CatalogError(
-            str(path), f"the event {events[0].resource_id} has an origin without time"
-        )
-    return events[0]
+    # Windows and distances need an origin with its time
+    event = events[0]
+    if not event.origins:
+        raise CatalogError(str(path), f"the event {event.resource_id} has no origin")
+    if (event.preferred_origin() or event.origins[0]).time is None:
+        problem = f"the event {event.resource_id} has an origin without time"
+        raise CatalogError(str(path), problem)
+    return event
 
 
 def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
-    """Return all files, those in archives included, and the archives that cannot be read; a file is itself."""
+    """Return all files, those in archives included, and the archives that cannot be read."""
     if not folder.exists():
         raise CatalogError(str(folder), "no such folder or file")
+    # A file counts as the only one of its folder
+    if folder.is_file():
+        paths = [folder]
+    else:
+        paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files, rejected = [], []
-    for path in (
-        [folder]
-        if folder.is_file()
-        else sorted(path for path in folder.rglob("*") if path.is_file())
-    ):
+    for path in paths:
         try:
             files += members(path) if is_archive(path) else [path]
         except RecordRejected as rejection:
@@ -182,23 +200,25 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
 
 
 def _kind(path: Path) -> str:
+    """Return the kind of a file: inventory, event, description, or else record."""
     try:
         with open_file(path) as file:
             start = file.read(1000)
     except RecordRejected:
-        return "record"  # reading it says why it cannot be read
+        return "record"  # reading it gives the reason why it cannot be read
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
 def _read(path: Path, **options: Any) -> Stream:
+    """Read a file of records; one that this package processed gets its description."""
     with open_file(path) as file:
         if not file.read(1):
             raise RecordRejected(str(path), "the file is empty")
-    return described(foreign(obspy.read, path, **options), path)
+    return described(read_with_obspy(obspy.read, path, **options), path)
 
 
 def _read_inventory(path: Path) -> Inventory:
-    return foreign(obspy.read_inventory, path)
+    return read_with_obspy(obspy.read_inventory, path)
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
@@ -207,7 +227,14 @@ def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
 
 
 def read_inventories(stationxml: Path) -> list[Inventory]:
-    """Read a StationXML file, or all of a folder; raise ``CatalogError`` if there is none or one cannot be read."""
+    """
+    Read a StationXML file, or all of a folder.
+
+    Raises
+    ------
+    CatalogError
+        If there is none, or one cannot be read.
+    """
     paths = sorted(stationxml.rglob("*.xml")) if stationxml.is_dir() else [stationxml]
     if not paths:
         raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
@@ -224,6 +251,7 @@ def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
 
 
 def _nothing_found(files: list[Path], rejected: list[Rejection]) -> str:
+    """Return the reason why a folder has no station, with the first fault as an example."""
     problem = f"none of its {len(files)} files is a record"
     if not rejected:
         return f"{problem}: there is only metadata"

@@ -1,6 +1,10 @@
-"""What StationXML knows about a trace, merged by epoch: coordinates, orientation, response, and the ground."""
+"""
+Metadata of a trace from StationXML, merged by epoch.
 
-from collections.abc import Iterator
+They are coordinates, orientation, response, and the ground under the station.
+"""
+
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from itertools import pairwise
 from typing import Any
@@ -15,7 +19,7 @@ from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
 
-#: input unit of a response -> what the samples measure
+#: input unit of a response -> quantity of the samples
 _QUANTITIES = {
     "M/S**2": "acceleration",
     "M/S/S": "acceleration",
@@ -24,10 +28,12 @@ _QUANTITIES = {
     "M": "displacement",
 }
 
+_PLACE = ("latitude", "longitude", "elevation")
+
 
 def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     """
-    Return a copy of a trace in the words of ``formats/vocabulary.py``.
+    Return a copy of a trace in the words of ``formats/text/vocabulary.py``.
 
     Parameters
     ----------
@@ -47,9 +53,9 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     if channel is not None:
         _describe(result, channel)
     elif "units" not in result.stats:
-        raise RecordRejected(
-            trace.id, f"{_missing(trace, inventory)}, so what its samples measure is unknown"
-        )
+        problem = f"{_missing(trace, inventory)}, so what its samples measure is unknown"
+        raise RecordRejected(trace.id, problem)
+    # Place and ground belong to the station, which may be known without the channel
     if not result.stats.get("coordinates"):
         _place_station(result, inventory)
     result.stats.update(_ground(result, inventory))
@@ -58,6 +64,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
 
 
 def _samples(trace: Trace) -> FloatArray:
+    """Return the samples in double precision; all must be finite."""
     samples = np.asarray(trace.data, dtype=np.float64)
     finite = np.isfinite(samples)
     if not finite.all():
@@ -69,80 +76,85 @@ def _samples(trace: Trace) -> FloatArray:
 
 
 def _missing(trace: Trace, inventory: Inventory | None) -> str:
+    """Return the reason why a trace has no channel."""
     if inventory is None:
         return "there is no StationXML"
     return f"StationXML has no channel {trace.id} at {trace.stats.starttime}"
 
 
 def _channel(trace: Trace, inventory: Inventory | None) -> Channel | None:
+    """Return the channel of a trace at its start, or None."""
     stats = trace.stats
     codes = (stats.channel, stats.location)
-    found = [
-        channel
-        for station in _stations(trace, inventory)
-        for channel in station
-        if (channel.code, channel.location_code) == codes and channel.is_active(stats.starttime)
-    ]
-    return _only(trace, "channel", found, _channel_facts)
+    channels = []
+    for station in _stations(trace, inventory):
+        for channel in station:
+            is_same = (channel.code, channel.location_code) == codes
+            if is_same and channel.is_active(stats.starttime):
+                channels.append(channel)
+    return _only(trace, "channel", channels, _channel_facts)
 
 
 def _stations(trace: Trace, inventory: Inventory | None) -> Iterator[Station]:
+    """Yield the descriptions of a trace's station that are valid at its start."""
     stats = trace.stats
     for network in inventory or ():
-        if network.code == stats.network:
-            yield from (
-                station
-                for station in network
-                if station.code == stats.station and station.is_active(stats.starttime)
-            )
+        if network.code != stats.network:
+            continue
+        for station in network:
+            if station.code == stats.station and station.is_active(stats.starttime):
+                yield station
 
 
-def _only(trace: Trace, kind: str, found: list[Any], facts: Any) -> Any:
-    """Return the one description there is, or None; several must say the same."""
-    for one, other in pairwise(found):
+def _only(
+    trace: Trace, kind: str, descriptions: list[Any], facts: Callable[[Any], dict[str, Any]]
+) -> Any:
+    """Return the one description there is, or None; several must have the same facts."""
+    for first, second in pairwise(descriptions):
+        # Name every fact in which two descriptions differ
+        repeated = facts(second)
         differing = [
-            f"{name} {value} and {facts(other)[name]}"
-            for name, value in facts(one).items()
-            if facts(other)[name] != value
+            f"{name} {value} and {repeated[name]}"
+            for name, value in facts(first).items()
+            if repeated[name] != value
         ]
         if differing:
             where = f"StationXML contradicts itself about the {kind} at {trace.stats.starttime}"
             raise RecordRejected(trace.id, f"{where}: {', '.join(differing)}")
-    return found[0] if found else None
+    return descriptions[0] if descriptions else None
 
 
 def _station_facts(station: Station) -> dict[str, Any]:
-    return {name: getattr(station, name) for name in ("latitude", "longitude", "elevation")}
+    return {name: getattr(station, name) for name in _PLACE}
 
 
 def _channel_facts(channel: Channel) -> dict[str, Any]:
-    facts = {
-        name: getattr(channel, name)
-        for name in ("latitude", "longitude", "elevation", "azimuth", "dip")
-    }
+    facts = {name: getattr(channel, name) for name in (*_PLACE, "azimuth", "dip")}
     return facts | {"sensitivity": _sensitivity(channel)}
 
 
 def _sensitivity(channel: Channel) -> float | None:
+    """Return the sensitivity, counts per unit of the ground motion, or None."""
     sensitivity = channel.response.instrument_sensitivity if channel.response else None
     return sensitivity.value if sensitivity else None
 
 
 def _describe(trace: Trace, channel: Channel) -> None:
+    """Fill the gaps of a trace's words from its channel."""
     stats = trace.stats
     if not stats.get("coordinates"):
         stats.coordinates = _place(channel)
     if "sensor_azimuth" not in stats and "sensor_dip" not in stats:
         stats.update(_direction(channel))
+    # Counts need a response, unless the file has their gain and StationXML no sensitivity
     if stats.get("units", "counts") == "counts" and (stats.calib == 1 or _sensitivity(channel)):
         stats.response = _response(trace, channel)
-        unit = stats.response.instrument_sensitivity.input_units
-        stats.update(
-            {"units": "counts", "quantity": _quantity(trace, unit), "processing_level": "raw"}
-        )
+        quantity = _quantity(trace, stats.response.instrument_sensitivity.input_units)
+        stats.update({"units": "counts", "quantity": quantity, "processing_level": "raw"})
 
 
 def _place(site: Channel | Station) -> AttribDict:
+    """Return the coordinates of a channel or station, degrees and m."""
     return AttribDict(
         latitude=float(site.latitude),
         longitude=float(site.longitude),
@@ -151,16 +163,20 @@ def _place(site: Channel | Station) -> AttribDict:
 
 
 def _direction(channel: Channel) -> dict[str, float]:
-    vertical = -90.0 if channel.dip is None and channel.code.endswith("Z") else channel.dip
+    """Return azimuth and dip of a channel as far as they are known; the dip of a vertical alone."""
+    dip = channel.dip
+    # A vertical may be known by its code only
+    vertical = -90.0 if dip is None and channel.code.endswith("Z") else dip
     if vertical is not None and abs(vertical) == 90:
         return {"sensor_dip": float(vertical)}
     if channel.azimuth is None:
         return {}
-    dip = {} if channel.dip is None else {"sensor_dip": float(channel.dip)}
-    return horizontal(float(channel.azimuth)) | dip
+    known_dip = {} if dip is None else {"sensor_dip": float(dip)}
+    return horizontal(float(channel.azimuth)) | known_dip
 
 
 def _response(trace: Trace, channel: Channel) -> Response:
+    """Return the response of a channel, which must have a sensitivity."""
     if not _sensitivity(channel):
         raise RecordRejected(
             trace.id, f"StationXML gives no sensitivity at {trace.stats.starttime}"
@@ -169,6 +185,7 @@ def _response(trace: Trace, channel: Channel) -> Response:
 
 
 def _quantity(trace: Trace, unit: str | None) -> str:
+    """Return the quantity that an instrument measures, from the input unit of its response."""
     if str(unit).upper() not in _QUANTITIES:
         raise RecordRejected(
             trace.id, f"StationXML says that the instrument measures {unit!r}, not ground motion"
@@ -177,7 +194,7 @@ def _quantity(trace: Trace, unit: str | None) -> str:
 
 
 def _place_station(trace: Trace, inventory: Inventory | None) -> None:
-    """Fill the coordinates from StationXML; where nobody knows them they stay absent: spectra need none."""
+    """Fill the coordinates from StationXML; unknown ones stay absent: spectra need none."""
     trace.stats.pop("coordinates", None)
     station = _only(trace, "station", list(_stations(trace, inventory)), _station_facts)
     if station is not None:
@@ -185,31 +202,40 @@ def _place_station(trace: Trace, inventory: Inventory | None) -> None:
 
 
 def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]:
-    """Return what comments of the station say of its ground: ``site_class=`` any word, ``vs30=`` m/s."""
-    comments = (
-        comment.value or ""
-        for station in _stations(trace, inventory)
-        for comment in station.comments
-    )
-    said = {
-        name.strip(): value.strip() for name, _, value in (text.partition("=") for text in comments)
-    }
-    ground: dict[str, str | float] = (
-        {"site_class": said["site_class"]} if said.get("site_class") else {}
-    )
-    if "vs30" not in said:
-        return ground
-    if not said["vs30"].replace(".", "", 1).isdecimal() or not float(said["vs30"]):
-        raise RecordRejected(
-            trace.id, f"StationXML says vs30={said['vs30']}, which is no velocity in m/s"
-        )
-    return ground | {"vs30": float(said["vs30"])}
+    """
+    Return the ground under the station.
+
+    It is in comments: ``site_class=`` any word, ``vs30=`` m/s.
+    """
+    words = _comment_words(trace, inventory)
+    ground: dict[str, str | float] = {}
+    if words.get("site_class"):
+        ground["site_class"] = words["site_class"]
+    # The velocity must be a decimal number above zero
+    if "vs30" in words:
+        vs30 = words["vs30"]
+        if not vs30.replace(".", "", 1).isdecimal() or not float(vs30):
+            raise RecordRejected(
+                trace.id, f"StationXML says vs30={vs30}, which is no velocity in m/s"
+            )
+        ground["vs30"] = float(vs30)
+    return ground
+
+
+def _comment_words(trace: Trace, inventory: Inventory | None) -> dict[str, str]:
+    """Return the ``name=value`` comments of a trace's station."""
+    words = {}
+    for station in _stations(trace, inventory):
+        for comment in station.comments:
+            name, _, value = (comment.value or "").partition("=")
+            words[name.strip()] = value.strip()
+    return words
 
 
 def metadata_text(inventory: Inventory) -> bytes:
     """Return the metadata as StationXML that is the same whenever and wherever it is written."""
     text = BytesIO()
-    Inventory(networks=inventory.networks, source="", created=UTCDateTime(0)).write(
-        text, format="STATIONXML"
-    )
+    # The names of source and time of creation would differ
+    undated = Inventory(networks=inventory.networks, source="", created=UTCDateTime(0))
+    undated.write(text, format="STATIONXML")
     return text.getvalue()

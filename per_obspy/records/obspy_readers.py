@@ -10,7 +10,7 @@ from per_obspy.errors import PerError, RecordRejected
 from per_obspy.records.archives import open_file
 
 
-def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
+def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
     """
     Call a reader of ObsPy on a file, or on a member of an archive.
 
@@ -34,27 +34,46 @@ def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
         return _called(reader, file, str(path), options)
 
 
-def foreign_bytes(reader: Callable[..., Any], content: bytes, name: str, **options: Any) -> Any:
-    """Call a reader of ObsPy on what a service answered, as ``foreign`` does on a file."""
+def read_bytes_with_obspy(
+    reader: Callable[..., Any], content: bytes, name: str, **options: Any
+) -> Any:
+    """
+    Call a reader of ObsPy on bytes.
+
+    Parameters
+    ----------
+    reader, **options
+        As for :func:`read_with_obspy`.
+    content : bytes
+        Answer of a service, or a part of a file.
+    name : str
+        Of its source, for messages.
+
+    Raises
+    ------
+    RecordRejected
+        Whatever the reader raises.
+    """
     return _called(reader, BytesIO(content), name, options)
 
 
 def _called(reader: Callable[..., Any], file: Any, name: str, options: dict[str, Any]) -> Any:
+    """Call a reader; its errors, of ObsPy's bare Exception or of any library below, reject."""
     try:
         return reader(file, **options)
     except PerError:
         raise
-    except (
-        Exception
-    ) as error:  # ObsPy raises bare Exception, and whatever the libraries below it gave
+    except Exception as error:
         raise RecordRejected(name, f"ObsPy cannot read it: {_reason(error)}") from error
 
 
 def _reason(error: Exception) -> str:
-    """Return what ObsPy says on one line; a format that it does not know is the user's file, not an error of types."""
+    """
+    Return the message of an error on one line.
+
+    A format that ObsPy does not know is a fault of the file, not an error of types.
+    """
     reason = " ".join(str(error).split())
-    return (
-        "its format is unknown"
-        if reason.startswith("Unknown format")
-        else f"{type(error).__name__}: {reason}"
-    )
+    if reason.startswith("Unknown format"):
+        return "its format is unknown"
+    return f"{type(error).__name__}: {reason}"

@@ -1,10 +1,11 @@
 """
-Records that this package processed, as files: MiniSEED with the samples, and beside it JSON with what MiniSEED lacks.
+Files of records that this package processed: MiniSEED and a JSON description of the same name.
 
 The samples are float64 as they are in memory, so that spectra of the file are those of the record:
-Steim compression holds whole numbers only, and float32 would round. The JSON holds, trace by trace,
-the words of ``formats/vocabulary.py``, the steps of the processing and every number chosen on the
-way; and the hash of the MiniSEED file, so that neither is ever read with another's partner.
+Steim compression holds whole numbers only, and float32 would round. The JSON has the words that
+MiniSEED lacks: for each trace those of ``formats/text/vocabulary.py``, the steps of the processing
+and every number chosen on the way; and the hash of the MiniSEED file, so that neither is ever read
+with another's partner.
 """
 
 import json
@@ -18,18 +19,33 @@ from obspy.core import AttribDict
 from per_obspy.errors import RecordRejected
 from per_obspy.files import file_hash, written_whole
 
-#: words of ``trace.stats`` that are kept where a trace has them
-WORDS = (
-    "network", "station", "location", "channel", "delta", "units", "quantity", "processing_level", "coordinates",
-    "sensor_azimuth", "sensor_dip", "sensor_location", "station_name", "site_class", "vs30", "corners", "per_obspy",
+#: words of ``trace.stats`` that a description has where the trace has them
+STATS_WORDS = (
+    "network",
+    "station",
+    "location",
+    "channel",
+    "delta",
+    "units",
+    "quantity",
+    "processing_level",
+    "coordinates",
+    "sensor_azimuth",
+    "sensor_dip",
+    "sensor_location",
+    "station_name",
+    "site_class",
+    "vs30",
+    "corners",
+    "per_obspy",
     "processing",
-)  # fmt: skip
+)
 _LENGTHS = {"network": 2, "station": 5, "location": 2, "channel": 3}  # of codes in MiniSEED
 
 
 def write_processed(stream: Stream, path: Path) -> dict[str, Any]:
     """
-    Write traces to one MiniSEED file, whole or not at all, and return what the JSON beside it has to tell.
+    Write traces to one MiniSEED file, whole or not at all, and return their descriptions.
 
     Parameters
     ----------
@@ -41,37 +57,37 @@ def write_processed(stream: Stream, path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``{"traces": [...]}``: one description a trace, in the order of the file.
+        ``{"traces": [...]}``: one description per trace, in the order of the file.
     """
     with written_whole(path) as part:
-        Stream([_with_short_codes(trace) for trace in stream]).write(
-            str(part), format="MSEED", encoding="FLOAT64"
-        )
+        short = Stream([_with_short_codes(trace) for trace in stream])
+        short.write(str(part), format="MSEED", encoding="FLOAT64")
     return {"traces": [_description(trace) for trace in stream]}
 
 
 def write_description(path: Path, facts: dict[str, Any]) -> None:
-    """Write the JSON beside a MiniSEED file of :func:`write_processed`."""
+    """Write the JSON of a MiniSEED file of :func:`write_processed`."""
     with written_whole(path.with_suffix(".json")) as part:
         part.write_text(json.dumps({"shard": file_hash(path), **facts}), encoding="utf-8")
 
 
 def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
     """
-    Return what the JSON beside a MiniSEED file tells of its traces, or None where there is none.
+    Read the descriptions of the traces of a MiniSEED file; None where there is no JSON of its name.
 
     Raises
     ------
     RecordRejected
-        If it tells of another file of this name.
+        If the JSON describes another file of this name.
     """
     try:
         note = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         descriptions: list[dict[str, Any]] = note["traces"]
-        told = note["shard"]
+        described_hash = note["shard"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    if told != file_hash(path):
+    # A file that changed after its description was written
+    if described_hash != file_hash(path):
         raise RecordRejected(
             str(path), f"{path.with_suffix('.json').name} describes another file of this name"
         )
@@ -80,45 +96,55 @@ def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
 
 def described(stream: Stream, path: Path) -> Stream:
     """
-    Return traces just read from a file with what the JSON beside it tells of them; as they are where there is none.
+    Return traces just read from a file with the words of its JSON; unchanged where there is none.
 
     Raises
     ------
     RecordRejected
-        If the JSON tells of another file, or of other traces.
+        If the JSON describes another file, or other traces.
     """
     descriptions = read_descriptions(path)
     if descriptions is None:
         return stream
-    if [one["npts"] for one in descriptions] != [trace.stats.npts for trace in stream]:
-        raise RecordRejected(str(path), f"{path.with_suffix('.json').name} describes other traces")
+    _require_same_lengths(stream, descriptions, path)
+    # Words come back as groups, as the plugins of the formats give them
     out = stream.copy()
     for trace, words in zip(out, descriptions, strict=True):
-        trace.stats.update({name: _group(words[name]) for name in WORDS if name in words})
+        known = {name: _group(words[name]) for name in STATS_WORDS if name in words}
+        trace.stats.update(known)
     return out
 
 
+def _require_same_lengths(stream: Stream, descriptions: list[dict[str, Any]], path: Path) -> None:
+    """Refuse descriptions of other traces."""
+    lengths = [description["npts"] for description in descriptions]
+    if lengths != [trace.stats.npts for trace in stream]:
+        raise RecordRejected(str(path), f"{path.with_suffix('.json').name} describes other traces")
+
+
 def _with_short_codes(trace: Trace) -> Trace:
+    """Return the samples under codes that MiniSEED can hold."""
     codes = {name: trace.stats[name][:length] for name, length in _LENGTHS.items()}
     times = {"starttime": trace.stats.starttime, "delta": trace.stats.delta}
     return Trace(np.asarray(trace.data, dtype=np.float64), codes | times)
 
 
 def _description(trace: Trace) -> dict[str, Any]:
-    known = {name: trace.stats[name] for name in WORDS if name in trace.stats}
-    plain = {
-        name: dict(value) if isinstance(value, AttribDict) else value
-        for name, value in known.items()
-    }
-    source = Path(trace.stats.get("source", "")).name
-    return {
+    """Return the words of a trace, as JSON can hold them."""
+    description = {
         "id": trace.id,
-        "source": source,
+        "source": Path(trace.stats.get("source", "")).name,
         "start": str(trace.stats.starttime),
         "npts": trace.stats.npts,
-        **plain,
     }
+    # Groups become plain dictionaries
+    for name in STATS_WORDS:
+        if name in trace.stats:
+            word = trace.stats[name]
+            description[name] = dict(word) if isinstance(word, AttribDict) else word
+    return description
 
 
-def _group(value: Any) -> Any:
-    return AttribDict(value) if isinstance(value, dict) else value
+def _group(word: Any) -> Any:
+    """Return a dictionary of JSON as a group of words; any other word as it is."""
+    return AttribDict(word) if isinstance(word, dict) else word

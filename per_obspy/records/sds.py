@@ -1,4 +1,4 @@
-"""SDS archives (SeisComP's folders of day files), of which a run wants a few minutes."""
+"""SDS archives (SeisComP's folders of day files), of which a run needs a few minutes."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -21,7 +21,9 @@ def find_sds_stations(
     archive: str | Path, start: UTCDateTime, end: UTCDateTime, stationxml: str | Path | None = None
 ) -> FolderContents:
     """
-    Find the stations of an SDS archive that have day files in a time window, from the names of the files only.
+    Find the stations of an SDS archive that have day files in a time window.
+
+    Only the names of the files are read.
 
     Parameters
     ----------
@@ -45,25 +47,30 @@ def find_sds_stations(
     folder = Path(archive)
     if not folder.is_dir():
         raise CatalogError(str(folder), "no such folder")
-    stations: dict[str, list[Path]] = defaultdict(list)
+    # The first two parts of a name are network and station
+    files: dict[str, list[Path]] = defaultdict(list)
     for path in _day_files(folder, start, end):
         network, station = path.name.split(".")[:2]
-        stations[f"{network}.{station}"].append(path)
-    if not stations:
-        raise CatalogError(
-            str(folder), f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}"
-        )
-    inventory = merged_inventory([] if stationxml is None else read_inventories(Path(stationxml)))
-    return FolderContents(
-        {name: tuple(paths) for name, paths in sorted(stations.items())}, inventory, ()
-    )
+        files[f"{network}.{station}"].append(path)
+    if not files:
+        problem = f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}"
+        raise CatalogError(str(folder), problem)
+    # Metadata are outside the archive
+    inventories = [] if stationxml is None else read_inventories(Path(stationxml))
+    stations = {name: tuple(paths) for name, paths in sorted(files.items())}
+    return FolderContents(stations, merged_inventory(inventories), ())
 
 
 def _day_files(folder: Path, start: UTCDateTime, end: UTCDateTime) -> list[Path]:
+    """Return the files of all days of a window, and of the day before it."""
     midnight = UTCDateTime(start.year, start.month, start.day)
-    days = [midnight + _DAY * day for day in range(-1, int((end - midnight) // _DAY) + 1)]
-    patterns = [f"{day.year}/*/*/*.D/*.D.{day.year}.{day.julday:03d}" for day in days]
-    return [path for pattern in patterns for path in sorted(folder.glob(pattern))]
+    last = int((end - midnight) // _DAY)
+    files = []
+    # Names end with year and day of the year
+    for number in range(-1, last + 1):
+        day = midnight + _DAY * number
+        files += sorted(folder.glob(f"{day.year}/*/*/*.D/*.D.{day.year}.{day.julday:03d}"))
+    return files
 
 
 def read_sds_station(
@@ -80,7 +87,6 @@ def read_sds_station(
     """
     stream, rejected = read_station(paths, inventory, station, start, end)
     if not stream and not rejected:
-        rejected = (
-            Rejection("station", station, "", None, (f"no samples from {start} to {end}",)),
-        )
+        reason = f"no samples from {start} to {end}"
+        rejected = (Rejection("station", station, "", None, (reason,)),)
     return stream, rejected

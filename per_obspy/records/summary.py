@@ -1,11 +1,11 @@
-"""What records a folder, an archive, a file or a workspace holds, one row a trace."""
+"""Summary of a folder, an archive, a file or a workspace of records, one row per trace."""
 
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from obspy import Trace
+from obspy import Stream, Trace
 
 from per_obspy.errors import Rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
@@ -29,9 +29,9 @@ class RecordInfo(NamedTuple):
     start : str
         Time of the first sample, ISO 8601, UTC.
     dt : float
-        s.
+        Sampling interval, s.
     duration : float
-        s.
+        From the first to the last sample, s.
     azimuth : float or None
         Of a horizontal sensor, degrees clockwise from north.
     latitude, longitude : float or None
@@ -39,8 +39,9 @@ class RecordInfo(NamedTuple):
     peak : float
         Largest distance from the mean, in ``unit``; of raw counts by the sensitivity alone.
     unit : str
+        Of the peak.
     file : str
-        Seen from the folder that was named.
+        Path from the folder that was named.
     """
 
     record: str
@@ -61,7 +62,7 @@ def describe_records(
     path: str | Path, stationxml: str | Path | None = None
 ) -> tuple[tuple[RecordInfo, ...], tuple[Rejection, ...]]:
     """
-    Return a row for every record that can be read, and a rejection with its reasons for everything else.
+    Describe every record that can be read, and reject all else with its reasons.
 
     Parameters
     ----------
@@ -69,34 +70,52 @@ def describe_records(
         Folder, archive, waveform file or ASDF workspace (of which waveforms of all tags are
         described).
     stationxml : str or Path, optional
-        A StationXML file or a folder of them, if it is not beside the records.
+        A StationXML file or a folder of them, if it is not in the folder of the records.
+
+    Returns
+    -------
+    records : tuple of RecordInfo
+        One row per record.
+    rejected : tuple of Rejection
+        Files and records that cannot be read.
 
     Raises
     ------
     CatalogError
-        If there is nothing that could be a record.
+        If no file could be a record.
     """
-    given = Path(path)
-    if given.is_file() and is_asdf(given):
-        found, reader = find_asdf_stations(given, "*"), partial(read_asdf_station, tag="*")
+    root = Path(path)
+    if root.is_file() and is_asdf(root):
+        found, reader = find_asdf_stations(root, "*"), partial(read_asdf_station, tag="*")
     else:
-        found, reader = find_stations(given, stationxml), partial(read_station)
+        found, reader = find_stations(root, stationxml), partial(read_station)
+    # Station by station, so that one alone is in memory
     records, rejected = [], list(found.rejected)
     for name, paths in found.stations.items():
         stream, unread = reader(paths, found.inventory, name)
         rejected += unread
-        records += [_described(trace, given) for trace in stream if trace.stats.npts]
-        rejected += [
-            Rejection("record", trace.id, str(trace.stats.source), None, ("it has no samples",))
-            for trace in stream
-            if not trace.stats.npts
-        ]
+        records += [_described(trace, root) for trace in stream if trace.stats.npts]
+        rejected += _empty(stream)
     return tuple(records), tuple(rejected)
 
 
-def _described(trace: Trace, given: Path) -> RecordInfo:
-    stats, place = trace.stats, trace.stats.get("coordinates") or {}
+def _empty(stream: Stream) -> list[Rejection]:
+    """Return a rejection for every trace without samples."""
+    reason = ("it has no samples",)
+    return [
+        Rejection("record", trace.id, str(trace.stats.source), None, reason)
+        for trace in stream
+        if not trace.stats.npts
+    ]
+
+
+def _described(trace: Trace, root: Path) -> RecordInfo:
+    """Return the row of a trace."""
+    stats = trace.stats
+    place = stats.get("coordinates") or {}
     scale, unit = _scale(trace)
+    # Largest distance from the mean: raw records have an offset
+    peak = float(np.abs(trace.data - trace.data.mean()).max()) * scale
     source = Path(stats.source)
     return RecordInfo(
         record=trace.id,
@@ -108,14 +127,14 @@ def _described(trace: Trace, given: Path) -> RecordInfo:
         azimuth=stats.get("sensor_azimuth"),
         latitude=place.get("latitude"),
         longitude=place.get("longitude"),
-        peak=float(np.abs(trace.data - trace.data.mean()).max()) * scale,
+        peak=peak,
         unit=unit,
-        file=source.name if source == given else str(source.relative_to(given)),
+        file=source.name if source == root else str(source.relative_to(root)),
     )
 
 
 def _scale(trace: Trace) -> tuple[float, str]:
-    """Return what a sample counts for, and its unit."""
+    """Return the factor from samples to SI, and the unit it leads to."""
     stats = trace.stats
     if stats.units != "counts":
         return 1.0, stats.units

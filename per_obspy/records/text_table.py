@@ -1,4 +1,4 @@
-"""Plain tables of samples, one row a sample, whose layout the user has to say."""
+"""Plain tables of samples, one row per sample, whose layout the user describes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,17 +13,19 @@ from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
-UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
+TABLE_UNITS = {"m/s2": 1.0, "cm/s2": GAL, "gal": GAL, "g": STANDARD_GRAVITY}
 
 #: last letter of a SEED channel code -> orientation
 _LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90.0}}
 
-#: how far a time may lie from even spacing, as a fraction of the interval (tables round their
-#: times)
+#: largest deviation of a time from even spacing, as a fraction of the interval (tables round times)
 _UNEVENNESS = 0.05
 
+#: number of a line, and its fields
+_Row = tuple[int, list[str]]
 
-def read_columns(  # noqa: PLR0913 - a table without a header leaves all of these to be said
+
+def read_columns(  # noqa: PLR0913 - a table without a header leaves all of these to the user
     path: str | Path,
     *,
     station: str,
@@ -46,7 +48,8 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     Parameters
     ----------
     path : str or Path
-        Text file, one row a sample; empty lines at the end and everything after ``#`` are ignored.
+        Text file, one row per sample; empty lines at the end and everything after ``#`` are
+        ignored.
     station, network : str
         Codes.
     latitude, longitude : float
@@ -73,7 +76,7 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     Returns
     -------
     stream : Stream
-        One trace a channel, in the words of ``formats/vocabulary.py``.
+        One trace per channel, in the words of ``formats/text/vocabulary.py``.
 
     Raises
     ------
@@ -84,21 +87,11 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     RecordRejected
         If a row lacks a column, holds no number or breaks the spacing.
     """
-    if units not in UNITS:
-        raise ValueError(f"units must be one of {', '.join(UNITS)}, got {units!r}")
-    if (time_column is None) == (dt is None):
-        raise ValueError(
-            f"exactly one of time_column and dt must be given, got {time_column} and {dt}"
-        )
-    site = coordinates(
-        checks.number(
-            "latitude", latitude, lambda name, value: checks.between(name, value, -90, 90)
-        ),
-        checks.number(
-            "longitude", longitude, lambda name, value: checks.between(name, value, -180, 180)
-        ),
-    )
+    # Check what does not depend on the file
+    _check_units_and_interval(units, time_column, dt)
+    site = _site(latitude, longitude)
     directions = _directions(channels, azimuths or {})
+    # Read the samples and their interval
     rows = _rows(path, separator, skip)
     if time_column is not None:
         dt = _even_spacing(path, rows, _column(path, rows, time_column, "time"))
@@ -112,19 +105,40 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
         "coordinates": site,
     }
     step = checks.number("dt", 0.0 if dt is None else dt, checks.positive)
-    return Stream(
-        trace(
-            UNITS[units] * _column(path, rows, column, code),
-            step,
-            common | directions[code] | {"channel": code},
+    # One trace per channel, in m/s2
+    stream = Stream()
+    for code, column in channels.items():
+        samples = TABLE_UNITS[units] * _column(path, rows, column, code)
+        stream.append(trace(samples, step, common | directions[code] | {"channel": code}))
+    return stream
+
+
+def _check_units_and_interval(units: str, time_column: int | None, dt: float | None) -> None:
+    """Refuse a unit that is unknown, and an interval that is given twice or not at all."""
+    if units not in TABLE_UNITS:
+        raise ValueError(f"units must be one of {', '.join(TABLE_UNITS)}, got {units!r}")
+    if (time_column is None) == (dt is None):
+        raise ValueError(
+            f"exactly one of time_column and dt must be given, got {time_column} and {dt}"
         )
-        for code, column in channels.items()
+
+
+def _site(latitude: float, longitude: float) -> dict[str, float | None]:
+    """Return the coordinates of a station, checked, degrees."""
+    return coordinates(
+        checks.number(
+            "latitude", latitude, lambda name, value: checks.between(name, value, -90, 90)
+        ),
+        checks.number(
+            "longitude", longitude, lambda name, value: checks.between(name, value, -180, 180)
+        ),
     )
 
 
 def _directions(
     channels: Mapping[str, int], azimuths: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
+    """Return the orientation of every channel, from its azimuth or the last letter of its code."""
     if not channels:
         raise ValueError("channels must name at least one column")
     if unknown := set(azimuths) - set(channels):
@@ -133,21 +147,21 @@ def _directions(
         raise ValueError(
             f"azimuths must tell the direction of {unclear}, whose codes do not end in N, E or Z"
         )
+    # An azimuth comes before the letter
     given = {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}
     return {code: given.get(code) or _LETTERS[code[-1]] for code in channels}
 
 
-def _rows(path: str | Path, separator: str | None, skip: int) -> list[tuple[int, list[str]]]:
+def _rows(path: str | Path, separator: str | None, skip: int) -> list[_Row]:
+    """Return the fields of every line with samples."""
     try:
         content = Path(path).read_text(encoding="latin-1")
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
     lines = [line.split("#")[0] for line in content.rstrip().splitlines()]
-    rows = [
-        (number, line.split(separator))
-        for number, line in enumerate(lines[skip:], skip + 1)
-        if line.strip()
-    ]
+    # Lines are numbered from 1, the skipped ones included
+    numbered = enumerate(lines[skip:], skip + 1)
+    rows = [(number, line.split(separator)) for number, line in numbered if line.strip()]
     if len(rows) < 2:
         raise RecordRejected(
             str(path), f"{len(rows)} rows of samples after {skip} lines, a record needs two"
@@ -155,33 +169,32 @@ def _rows(path: str | Path, separator: str | None, skip: int) -> list[tuple[int,
     return rows
 
 
-def _column(
-    path: str | Path, rows: Sequence[tuple[int, list[str]]], column: int, name: str
-) -> FloatArray:
+def _column(path: str | Path, rows: Sequence[_Row], column: int, name: str) -> FloatArray:
+    """Return the numbers of a column, which must be finite."""
     values = np.empty(len(rows))
     for index, (line, fields) in enumerate(rows):
         if not 0 <= column < len(fields):
-            raise RecordRejected(
-                str(path), f"line {line}, {name}: no column {column}, there are {len(fields)}"
-            )
+            problem = f"no column {column}, there are {len(fields)}"
+            raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
+        # Text is refused as numbers that are not finite are
         try:
             values[index] = float(fields[column])
         except ValueError:
             values[index] = np.nan
         if not np.isfinite(values[index]):
-            raise RecordRejected(
-                str(path), f"line {line}, {name}: {fields[column].strip()!r} is not a finite number"
-            )
+            problem = f"{fields[column].strip()!r} is not a finite number"
+            raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
     return values
 
 
-def _even_spacing(
-    path: str | Path, rows: Sequence[tuple[int, list[str]]], times: FloatArray
-) -> float:
+def _even_spacing(path: str | Path, rows: Sequence[_Row], times: FloatArray) -> float:
+    """Return the mean interval of times that must be evenly spaced, s."""
     dt = float(times[-1] - times[0]) / (len(times) - 1)
     uneven = np.abs(np.diff(times) - dt) > _UNEVENNESS * abs(dt)
     if dt <= 0 or uneven.any():
+        # Name the first time that breaks the spacing
         first = int(np.argmax(uneven))
-        problem = f"{times[first]:g} s is followed by {times[first + 1]:g} s, the mean interval is {dt:g} s"
+        step = f"{times[first]:g} s is followed by {times[first + 1]:g} s"
+        problem = f"{step}, the mean interval is {dt:g} s"
         raise RecordRejected(str(path), f"line {rows[first + 1][0]}, time: {problem}")
     return float(f"{dt:.9g}")  # times are rounded, so more digits would be noise

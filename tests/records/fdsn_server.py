@@ -1,6 +1,11 @@
-"""An FDSN web service on loopback (station, dataselect, event) that answers from memory and fails on demand."""
+"""
+An FDSN web service on loopback: station, dataselect and event.
+
+It answers from memory and fails on demand.
+"""
 
 import copy
+import itertools
 import sys
 import threading
 import time
@@ -13,7 +18,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 from obspy import Inventory, Stream, UTCDateTime
-from obspy.core.event import Catalog
+from obspy.core.event import Catalog, Event
 
 from per_obspy.records.simulation.earthquake import Simulation
 
@@ -28,22 +33,21 @@ class Request(NamedTuple):
 
     @property
     def subject(self) -> str:
-        """What it asked for: a station's name, or what the service lists."""
+        """Return the station of the request, or ``*`` for a list."""
         return self.parameters.get("station", "*")
 
 
 class FdsnServer(ThreadingHTTPServer):
-    """Serves a simulation; ``faults`` are used up one a matching request."""
+    """A service of a simulation; every fault spoils one matching request."""
 
     daemon_threads = True
 
     def __init__(self, simulation: Simulation) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.stream, self.inventory, self.event = (
-            simulation.stream,
-            _begun(simulation.inventory),
-            simulation.event,
-        )
+        self.stream = simulation.stream
+        self.inventory = _begun(simulation.inventory)
+        self.event = simulation.event
+        # Requests in the order of arrival, and faults in the order of their use
         self.requests: list[Request] = []
         self.times: list[float] = []
         self.faults: list[tuple[str, str, Fault]] = []
@@ -55,17 +59,16 @@ class FdsnServer(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_port}"
 
     def fail(self, service: str, subject: str, *faults: Fault) -> None:
-        """Let the next requests to a service about a station (``*`` is the list) fail, once each fault."""
+        """Spoil the next requests to a service for a station (``*`` is the list), one per fault."""
         self.faults += [(service, subject, fault) for fault in faults]
 
     def asked(self, service: str, subject: str | None = None) -> int:
         """Return the number of requests to a service."""
-        return sum(
-            one.service == service and subject in (None, one.subject) for one in self.requests
-        )
+        requests = [request for request in self.requests if request.service == service]
+        return sum(subject in (None, request.subject) for request in requests)
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Say nothing of clients that hung up, as the tests make them do; everything else is still an error."""
+        """Ignore clients that hung up, as the tests make them do; all else is still an error."""
         if not isinstance(sys.exc_info()[1], ConnectionError):
             super().handle_error(request, client_address)
 
@@ -98,6 +101,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         parts = urlsplit(self.path)
         words = parts.path.strip("/").split("/")
+        # Another path is a router or a feed
         service = words[1] if words[0] == "fdsnws" else parts.path
         request = Request(service, dict(parse_qsl(parts.query, keep_blank_values=True)))
         fault = self.server.next_fault(request)
@@ -107,47 +111,38 @@ class _Handler(BaseHTTPRequestHandler):
     def _body(self, request: Request) -> bytes:
         if request.service in self.server.extra:
             return self.server.extra[request.service]
-        return {"station": self._station, "dataselect": self._dataselect, "event": self._event}[
-            request.service
-        ](request.parameters)
+        services = {"station": self._station, "dataselect": self._dataselect, "event": self._event}
+        return services[request.service](request.parameters)
 
-    def _station(self, wanted: dict[str, str]) -> bytes:
-        found = Inventory()
-        for network, station, location, channel in _combinations(wanted):
-            circle = {
-                name: float(wanted[name])
-                for name in ("latitude", "longitude", "maxradius")
-                if name in wanted
-            }
-            found += self.server.inventory.select(network, station, location, channel, **circle)
-        if not found.get_contents()["channels"]:
+    def _station(self, parameters: dict[str, str]) -> bytes:
+        names = ("latitude", "longitude", "maxradius")
+        circle = {name: float(parameters[name]) for name in names if name in parameters}
+        selected = Inventory()
+        for network, station, location, channel in _combinations(parameters):
+            selected += self.server.inventory.select(network, station, location, channel, **circle)
+        if not selected.get_contents()["channels"]:
             return b""
-        if wanted.get("format") == "text":
+        # A list is text, metadata are StationXML
+        if parameters.get("format") == "text":
             text = StringIO()
-            found.write(text, format="STATIONTXT", level=wanted["level"])
+            selected.write(text, format="STATIONTXT", level=parameters["level"])
             return text.getvalue().encode()
         xml = BytesIO()
-        found.write(xml, format="STATIONXML")
+        selected.write(xml, format="STATIONXML")
         return xml.getvalue()
 
-    def _dataselect(self, wanted: dict[str, str]) -> bytes:
-        found = Stream()
-        for network, station, location, channel in _combinations(wanted):
-            found += self.server.stream.select(network, station, location, channel)
-        found = found.slice(UTCDateTime(wanted["starttime"]), UTCDateTime(wanted["endtime"])).copy()
-        return mseed(found)
+    def _dataselect(self, parameters: dict[str, str]) -> bytes:
+        selected = Stream()
+        for network, station, location, channel in _combinations(parameters):
+            selected += self.server.stream.select(network, station, location, channel)
+        start, end = UTCDateTime(parameters["starttime"]), UTCDateTime(parameters["endtime"])
+        return mseed(selected.slice(start, end).copy())
 
-    def _event(self, wanted: dict[str, str]) -> bytes:
+    def _event(self, parameters: dict[str, str]) -> bytes:
         event = self.server.event
-        if wanted.get("format") == "text":
-            origin, magnitude = event.origins[0], event.magnitudes[0]
-            return (
-                "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID|MagType|Magnitude|"
-                "MagAuthor|EventLocationName\n"
-                f"xx1|{origin.time}|{origin.latitude}|{origin.longitude}|{origin.depth / 1000}|A|B|C|xx1|Mw|"
-                f"{magnitude.mag}|A|Nowhere\n"
-            ).encode()
-        if wanted["eventid"] != "xx1":
+        if parameters.get("format") == "text":
+            return _event_text(event).encode()
+        if parameters["eventid"] != "xx1":
             return b""
         content = BytesIO()
         Catalog([event]).write(content, format="QUAKEML")
@@ -171,6 +166,15 @@ class _Handler(BaseHTTPRequestHandler):
         """Stay quiet."""
 
 
+def _event_text(event: Event) -> str:
+    """Return a list of one event, as the text format has it."""
+    origin, magnitude = event.origins[0], event.magnitudes[0]
+    place = f"{origin.latitude}|{origin.longitude}|{origin.depth / 1000}"
+    head = "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID"
+    row = f"xx1|{origin.time}|{place}|A|B|C|xx1|Mw|{magnitude.mag}|A|Nowhere"
+    return f"{head}|MagType|Magnitude|MagAuthor|EventLocationName\n{row}\n"
+
+
 def _begun(inventory: Inventory) -> Inventory:
     """Return the metadata with the start dates that the text format demands."""
     result = copy.deepcopy(inventory)
@@ -180,17 +184,13 @@ def _begun(inventory: Inventory) -> Inventory:
     return result
 
 
-def _combinations(wanted: dict[str, str]) -> list[tuple[str, str, str, str]]:
-    lists = [
-        wanted.get(name, "*").split(",") for name in ("network", "station", "location", "channel")
-    ]
-    return [
-        (n, s, "" if x == "--" else x, c)
-        for n in lists[0]
-        for s in lists[1]
-        for x in lists[2]
-        for c in lists[3]
-    ]
+def _combinations(parameters: dict[str, str]) -> Iterator[tuple[str, ...]]:
+    """Yield every combination of the codes of a request; an empty location is ``--``."""
+    lists = []
+    for name in ("network", "station", "location", "channel"):
+        codes = parameters.get(name, "*").split(",")
+        lists.append(["" if code == "--" else code for code in codes])
+    return itertools.product(*lists)
 
 
 def mseed(stream: Stream) -> bytes:
@@ -210,10 +210,10 @@ def whole(handler: _Handler, body: bytes) -> None:
 
 
 def status(code: int, **headers: str) -> Fault:
-    """Answer with a status and a page of text; ``_`` in the name of a header stands for ``-``."""
+    """Answer with a status and a page of text; ``_`` in the name of a header becomes ``-``."""
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
-    said = b"" if code == 204 else b"the service\nis unwell"
-    return lambda handler, _: handler.reply(code, said, headers=sent)
+    page = b"" if code == 204 else b"the service\nis unwell"
+    return lambda handler, _: handler.reply(code, page, headers=sent)
 
 
 def late(seconds: float) -> Fault:
@@ -240,7 +240,7 @@ def dripping(seconds: float, parts: int) -> Fault:
 
 
 def stalled(seconds: float) -> Fault:
-    """Send half of the body and then nothing for a while."""
+    """Send half of the body, then pause."""
 
     def answer(handler: _Handler, body: bytes) -> None:
         handler.reply(200, body[: len(body) // 2], length=len(body))

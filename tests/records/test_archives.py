@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 from obspy import Stream, Trace
 
 from per_obspy.errors import CatalogError, RecordRejected
@@ -44,7 +43,8 @@ def pack(path: Path) -> Path:
                 archive.writestr(name, content)
         return path
     mode = {".tar": "w", ".gz": "w:gz", ".tgz": "w:gz", ".bz2": "w:bz2", ".xz": "w:xz"}[path.suffix]
-    with tarfile.open(path, mode) as archive:  # type: ignore[call-overload] # the mode is one of the documented
+    # the mode is one of those in tarfile's documentation
+    with tarfile.open(path, mode) as archive:  # type: ignore[call-overload]
         for name, content in CONTENT.items():
             member = tarfile.TarInfo(name)
             member.size = len(content)
@@ -65,11 +65,11 @@ def test_an_archive_is_a_folder(tmp_path: Path, name: str):
     assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
     assert [rejection.name for rejection in contents.rejected] == ["readme.txt"]
     assert open_file(archive / "three.AT2").read() == AT2
-    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # nothing is unpacked on disk
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # no file is unpacked on disk
 
 
 @every
-def test_records_in_archives_are_the_same_as_beside_them(tmp_path: Path, name: str):
+def test_records_in_archives_are_the_same_as_outside(tmp_path: Path, name: str):
     archive = pack(tmp_path / name)
     (tmp_path / "three.AT2").write_bytes(AT2)
     paths = [archive / "three.AT2", tmp_path / "three.AT2"]
@@ -98,14 +98,15 @@ def test_a_folder_of_damaged_archives_is_refused(tmp_path: Path):
         find_stations(tmp_path)
 
 
-def test_missing_members_and_damaged_members_are_refused(tmp_path: Path):
+def test_missing_members_are_refused(tmp_path: Path):
     archive = pack(tmp_path / "a.zip")
     with pytest.raises(RecordRejected, match="cannot be read"):
         open_file(archive / "none.AT2")
-    content = bytearray(archive.read_bytes())
-    place = content.index(b"NPTS")
-    content[place : place + 4] = b"MPTS"
-    archive.write_bytes(content)
-    assert_array_equal(len(members(archive)), len(CONTENT))
+
+
+def test_damaged_members_are_refused(tmp_path: Path):
+    archive = pack(tmp_path / "a.zip")
+    archive.write_bytes(archive.read_bytes().replace(b"NPTS", b"MPTS"))
+    assert len(members(archive)) == len(CONTENT)
     with pytest.raises(RecordRejected, match="Bad CRC-32"):
         open_file(archive / "three.AT2")

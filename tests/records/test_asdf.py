@@ -6,7 +6,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from obspy import UTCDateTime
+from obspy import Inventory, Trace, UTCDateTime
 from obspy.core.event import Catalog
 
 from per_obspy.config import Scenario
@@ -24,6 +24,7 @@ from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 PROCESSED = json.dumps({"standard": {"process_level": "corrected physical units"}})
 CORNERS = json.dumps({"corner_frequencies": {"type": "snr", "highpass": 0.1, "lowpass": 30.0}})
+SECONDS = "%Y-%m-%dT%H:%M:%S"
 PROVENANCE = "<x><seis_prov:output_units a='b'>{}</seis_prov:output_units></x>"
 
 
@@ -40,8 +41,10 @@ def put_text(group, name: str, text: str | bytes) -> None:
 
 
 def put_waveform(group, trace, tag: str, samples: np.ndarray) -> None:
-    times = f"{trace.stats.starttime.strftime('%Y-%m-%dT%H:%M:%S')}__{trace.stats.endtime.strftime('%Y-%m-%dT%H:%M:%S')}"
-    name = f"{trace.id}__{times}__{tag}"
+    """Write samples under the name that ASDF gives them."""
+    start, end = trace.stats.starttime, trace.stats.endtime
+    name = f"{trace.id}__{start.strftime(SECONDS)}__{end.strftime(SECONDS)}__{tag}"
+    # Start in ns and rate in Hz are attributes
     group.createDimension(name, samples.size)
     variable = group.createVariable(name, samples.dtype, (name,))
     variable[:] = samples
@@ -51,40 +54,44 @@ def put_waveform(group, trace, tag: str, samples: np.ndarray) -> None:
 
 @pytest.fixture
 def workspace(simulation: Simulation, tmp_path: Path) -> Path:
-    """A workspace as gmprocess leaves it: raw counts, and cm/s2 of which auxiliary data and provenance tell."""
+    """
+    Return a workspace as gmprocess leaves it.
+
+    It holds raw counts, and cm/s2 with auxiliary data and provenance.
+    """
     path = tmp_path / "workspace.h5"
+    Catalog([simulation.event.copy()]).write(str(tmp_path / "event.xml"), format="QUAKEML")
     with netCDF4.Dataset(path, "w") as file:
+        # The event, metadata of every station, and all waveforms
         file.setncattr("file_format", "ASDF")
-        event = simulation.event.copy()
-        content = tmp_path / "event.xml"
-        Catalog([event]).write(str(content), format="QUAKEML")
-        put_text(file, "QuakeML", content.read_bytes())
+        put_text(file, "QuakeML", (tmp_path / "event.xml").read_bytes())
+        for code in sorted({trace.stats.station for trace in simulation.stream}):
+            put_station(file, simulation.inventory.select(station=code))
         for trace in simulation.stream:
-            station, stream_name = ".".join(trace.id.split(".")[:2]), f"{trace.id[:-1]}_e1_default"
-            group = file.createGroup(f"Waveforms/{station}")
-            if "StationXML" not in group.variables:
-                put_text(
-                    group,
-                    "StationXML",
-                    metadata_text(simulation.inventory.select(station=station[3:])),
-                )
-                put_text(
-                    file.createGroup(f"AuxiliaryData/StreamSupplementalStats/{station}"),
-                    stream_name,
-                    PROCESSED,
-                )
-            put_waveform(group, trace, "e1_unprocessed", trace.data.astype(np.int32))
-            put_waveform(
-                group, trace, "e1_default", trace.data / 2000.0
-            )  # 200 000 counts a m/s2, cm/s2
-            parameters = file.createGroup(f"AuxiliaryData/TraceProcessingParameters/{station}")
-            put_text(parameters, f"{trace.id}_e1_default", CORNERS)
-            put_text(
-                file.createGroup("Provenance"),
-                f"{trace.id}_e1_default",
-                PROVENANCE.format("cm/s^2"),
-            )
+            put_trace(file, trace)
     return path
+
+
+def put_station(file, metadata: Inventory) -> None:
+    """Write the metadata of a station, and the level of its processed stream."""
+    code = metadata[0][0].code
+    group = file.createGroup(f"Waveforms/XX.{code}")
+    put_text(group, "StationXML", metadata_text(metadata))
+    levels = file.createGroup(f"AuxiliaryData/StreamSupplementalStats/XX.{code}")
+    put_text(levels, f"XX.{code}..HN_e1_default", PROCESSED)
+
+
+def put_trace(file, trace: Trace) -> None:
+    """Write a trace raw and processed, with what gmprocess notes of it."""
+    group = file[f"Waveforms/XX.{trace.stats.station}"]
+    put_waveform(group, trace, "e1_unprocessed", trace.data.astype(np.int32))
+    # 200 000 counts per m/s2, 2000 per cm/s2
+    put_waveform(group, trace, "e1_default", trace.data / 2000.0)
+    name = f"{trace.id}_e1_default"
+    station = f"XX.{trace.stats.station}"
+    parameters = file.createGroup(f"AuxiliaryData/TraceProcessingParameters/{station}")
+    put_text(parameters, name, CORNERS)
+    put_text(file.createGroup("Provenance"), name, PROVENANCE.format("cm/s^2"))
 
 
 def test_raw_records_are_counts_with_their_response(workspace: Path, simulation: Simulation):
@@ -93,13 +100,12 @@ def test_raw_records_are_counts_with_their_response(workspace: Path, simulation:
     stream, rejected = read_asdf_station((workspace,), found.inventory, "XX.S002")
     assert rejected == ()
     assert len(stream) == 3
+    # Samples and times are exact
     for trace in stream:
         (sent,) = simulation.stream.select(id=trace.id)
         assert np.array_equal(trace.data, sent.data)
-        assert (trace.stats.starttime.ns, trace.stats.delta) == (
-            sent.stats.starttime.ns,
-            sent.stats.delta,
-        )
+        assert trace.stats.starttime.ns == sent.stats.starttime.ns
+        assert trace.stats.delta == sent.stats.delta
         assert (trace.stats.units, trace.stats.processing_level) == ("counts", "raw")
         assert trace.stats.response.instrument_sensitivity.value == 2e5
         assert trace.stats.coordinates == sent.stats.coordinates
@@ -122,10 +128,10 @@ def test_processed_records_are_si_with_their_corners(workspace: Path, simulation
 )
 def test_an_unknown_unit_is_a_reason(workspace: Path, unit: str, reason: str):
     with netCDF4.Dataset(workspace, "a") as file:
-        said = file["Provenance"].variables["XX.S001..HNE_e1_default"]
-        said[:] = np.frombuffer(PROVENANCE.format(unit).encode().ljust(said.size), np.int8)[
-            : said.size
-        ]
+        provenance = file["Provenance"].variables["XX.S001..HNE_e1_default"]
+        text = PROVENANCE.format(unit).encode().ljust(provenance.size)
+        provenance[:] = np.frombuffer(text, np.int8)[: provenance.size]
+    # One component is rejected, the others are read
     found = find_asdf_stations(workspace, "*_default")
     stream, (rejection,) = read_asdf_station((workspace,), found.inventory, "XX.S001", "*_default")
     assert len(stream) == 2
@@ -150,6 +156,7 @@ def test_other_files_are_refused(tmp_path: Path):
     assert not is_asdf(tmp_path / "text.h5")
     with pytest.raises(CatalogError, match=r"text\.h5: cannot be read as ASDF"):
         find_asdf_stations(tmp_path / "text.h5")
+    # HDF5 of another kind
     with netCDF4.Dataset(tmp_path / "spectra.nc", "w"):
         pass
     with pytest.raises(CatalogError, match="is HDF5, but no ASDF file"):
@@ -177,6 +184,6 @@ def test_our_processing_of_gmprocess_s_raw_records_comes_to_its_results(real_dat
     assert {trace.stats.processing_level for trace in theirs} == {"processed"}
     for trace in theirs:
         (same,) = ours.select(id=trace.id)
-        # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse by
-        # less than 1 %
+        # other windows, tapers and corners (0.037 and 0.041 Hz) change the peak of a 5 Hz pulse
+        # by less than 1 %
         assert np.abs(same.data).max() == pytest.approx(np.abs(trace.data).max(), rel=0.01)

@@ -14,29 +14,30 @@ UNITS = {"LON": "dd", "LAT": "dd", "MMI": "intensity", "PGV": "cms", "SVEL": "ms
 
 def grid_xml(fields, rows, shape, head=""):
     """Return a grid as the USGS writes it, from the names of its fields and its rows."""
-    units = [UNITS.get(name, "ln(pctg)" if name.startswith("STD") else "pctg") for name in fields]
-    named = "\n".join(
-        f'<grid_field index="{i}" name="{name}" units="{unit}" />'
-        for i, (name, unit) in enumerate(zip(fields, units, strict=True), start=1)
-    )
-    table = "\n".join(" ".join(f"{value:g}" for value in row) for row in rows)
-    return f"""<?xml version="1.0" encoding="US-ASCII" standalone="yes"?>{head}
-<shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap" event_id="xx1" shakemap_event_type="ACTUAL">
-<event event_id="xx1" magnitude="6.1" lat="1" lon="2" />
-<grid_specification nlon="{shape[1]}" nlat="{shape[0]}" nominal_lon_spacing="0.5" />
-{named}
-<grid_data>
-{table}
-</grid_data>
-</shakemap_grid>
-"""
+    lines = [f'<?xml version="1.0" encoding="US-ASCII" standalone="yes"?>{head}']
+    # Root element, size and fields, then one row per node
+    lines += ['<shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap"']
+    lines += ['event_id="xx1" shakemap_event_type="ACTUAL">']
+    lines += ['<event event_id="xx1" magnitude="6.1" lat="1" lon="2" />']
+    size = f'nlon="{shape[1]}" nlat="{shape[0]}"'
+    lines += [f'<grid_specification {size} nominal_lon_spacing="0.5" />']
+    for index, name in enumerate(fields, start=1):
+        unit = UNITS.get(name, "ln(pctg)" if name.startswith("STD") else "pctg")
+        lines += [f'<grid_field index="{index}" name="{name}" units="{unit}" />']
+    lines += ["<grid_data>", *table_lines(rows), "</grid_data>", "</shakemap_grid>", ""]
+    return "\n".join(lines)
+
+
+def table_lines(rows):
+    """Return one line per row."""
+    return [" ".join(map("{:g}".format, row)) for row in rows]
 
 
 FIELDS = ("LON", "LAT", "PGA", "PGV", "MMI", "PSA03", "PSA10", "PSA30", "SVEL")
 
 
 def make_rows(longitudes=(10.0, 10.5, 11.0), latitudes=(46.0, 45.5)):
-    """Return rows from north to south and west to east: PSA = 10, 20, 30, ... per cent of gravity at 0.3 s."""
+    """Return rows from north to south and west to east; PSA at 0.3 s is 10, 20, 30, ... % g."""
     nodes = [(east, north) for north in latitudes for east in longitudes]
     return [(*node, 5, 3, 6, 10 * i, 4 * i, i, 300 + i) for i, node in enumerate(nodes, start=1)]
 
@@ -73,33 +74,56 @@ def test_packed_and_in_any_order_it_is_the_same(tmp_path):
     assert packed.equals(plain)
 
 
-def test_uncertainty_of_its_own_file_or_of_the_grid(tmp_path):
-    names = tuple(f"STD{name}" for name in ("PSA03", "PSA10", "PSA30"))
-    rows = make_rows()
-    apart = [(*row[:2], 0.5, 0.6, 0.01 * i) for i, row in enumerate(rows, start=70)]
-    grid = write(tmp_path / "grid.xml", grid_xml(FIELDS, rows, (2, 3)))
-    uncertainty = write(
-        tmp_path / "uncertainty.xml", grid_xml(("LON", "LAT", *names), apart, (2, 3))
-    )
-    both = read_shakemap(grid, uncertainty)
-    assert_allclose(
-        both["psa_log_std"].sel(latitude=45.5, longitude=10.0), [0.5, 0.6, 0.73], rtol=1e-12
-    )
-    joined = [(*row, *other[2:]) for row, other in zip(rows, apart, strict=True)]
-    one = read_shakemap(write(tmp_path / "one.xml", grid_xml((*FIELDS, *names), joined, (2, 3))))
-    assert one.equals(both)
-    elsewhere = [(row[0] + 1, *row[1:]) for row in apart]
-    write(uncertainty, grid_xml(("LON", "LAT", *names), elsewhere, (2, 3)))
+DEVIATIONS = ("STDPSA03", "STDPSA10", "STDPSA30")
+
+
+def make_deviations(shift=0.0):
+    """Return rows of place and deviations at the nodes of ``make_rows``, moved to the east."""
+    rows = enumerate(make_rows(), start=70)
+    return [(east + shift, north, 0.5, 0.6, 0.01 * i) for i, (east, north, *_) in rows]
+
+
+@pytest.fixture
+def grid(tmp_path):
+    return write(tmp_path / "grid.xml", grid_xml(FIELDS, make_rows(), (2, 3)))
+
+
+def write_uncertainty(folder, rows):
+    return write(folder / "uncertainty.xml", grid_xml(("LON", "LAT", *DEVIATIONS), rows, (2, 3)))
+
+
+def test_uncertainty_has_a_file_of_its_own(tmp_path, grid):
+    both = read_shakemap(grid, write_uncertainty(tmp_path, make_deviations()))
+    southwest = both["psa_log_std"].sel(latitude=45.5, longitude=10.0)
+    assert_allclose(southwest, [0.5, 0.6, 0.73], rtol=1e-12)
+
+
+def test_uncertainty_may_be_in_the_grid(tmp_path, grid):
+    both = read_shakemap(grid, write_uncertainty(tmp_path, make_deviations()))
+    pairs = zip(make_rows(), make_deviations(), strict=True)
+    rows = [(*row, *deviations[2:]) for row, deviations in pairs]
+    joined = write(tmp_path / "one.xml", grid_xml((*FIELDS, *DEVIATIONS), rows, (2, 3)))
+    # Paths differ: attributes are not compared
+    assert read_shakemap(joined).equals(both)
+
+
+def test_uncertainty_of_another_grid_is_refused(tmp_path, grid):
+    elsewhere = write_uncertainty(tmp_path, make_deviations(shift=1.0))
     with pytest.raises(CatalogError, match="its longitudes are not those of"):
-        read_shakemap(grid, uncertainty)
+        read_shakemap(grid, elsewhere)
     with pytest.raises(CatalogError, match="has no field STDPSA03"):
         read_shakemap(grid, grid)
 
 
-def test_more_periods_and_the_date_line(tmp_path):
-    rows = [(*row, 7 * i) for i, row in enumerate(make_rows((179.5, 180.0, 180.5)), start=1)]
+def test_more_periods(tmp_path):
+    rows = [(*row, 7 * i) for i, row in enumerate(make_rows(), start=1)]
     grid = read_shakemap(write(tmp_path / "grid.xml", grid_xml((*FIELDS, "PSA06"), rows, (2, 3))))
     assert grid["period"].values.tolist() == [0.3, 0.6, 1.0, 3.0]
+
+
+def test_the_date_line(tmp_path):
+    rows = make_rows((179.5, 180.0, 180.5))
+    grid = read_shakemap(write(tmp_path / "grid.xml", grid_xml(FIELDS, rows, (2, 3))))
     assert grid["longitude"].values.tolist() == [179.5, 180.0, 180.5]
 
 
@@ -113,7 +137,7 @@ def _changed(**changes):
 
 BOMB = '<!DOCTYPE bomb [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]>'
 
-#: what is wrong -> text of the file, what the error says
+#: fault -> text of the file, message of the error
 WRONG = {
     "no XML": ("lon lat 1 2", "cannot be read as XML"),
     "cut": (grid_xml(FIELDS, make_rows(), (2, 3))[:-60], "cannot be read as XML"),
@@ -169,22 +193,25 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("what", WRONG)
-def test_a_wrong_file_is_named_with_its_fault(tmp_path, what):
-    text, said = WRONG[what]
-    with pytest.raises(CatalogError, match=rf"grid.xml: (?s:.)*{said}"):
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_wrong_file_is_named_with_its_fault(tmp_path, fault):
+    text, message = WRONG[fault]
+    with pytest.raises(CatalogError, match=rf"grid.xml: (?s:.)*{message}"):
         read_shakemap(write(tmp_path / "grid.xml", text))
 
 
-def test_files_that_cannot_be_read(tmp_path):
-    with pytest.raises(CatalogError, match="cannot be read"):
+@pytest.mark.parametrize(
+    "content", [gzip.compress(b"<shakemap_grid/>")[:-9], "<shakemap_grid/>".encode("utf-16")]
+)
+def test_files_that_cannot_be_read(tmp_path, content):
+    (tmp_path / "grid.xml").write_bytes(content)
+    with pytest.raises(CatalogError, match=r"grid\.xml: cannot be read"):
+        read_shakemap(tmp_path / "grid.xml")
+
+
+def test_a_missing_file_cannot_be_read(tmp_path):
+    with pytest.raises(CatalogError, match=r"none\.xml: cannot be read"):
         read_shakemap(tmp_path / "none.xml")
-    (tmp_path / "cut.xml.gz").write_bytes(gzip.compress(b"<shakemap_grid/>")[:-9])
-    with pytest.raises(CatalogError, match="cannot be read"):
-        read_shakemap(tmp_path / "cut.xml.gz")
-    (tmp_path / "utf16.xml").write_bytes("<shakemap_grid/>".encode("utf-16"))
-    with pytest.raises(CatalogError, match="cannot be read"):
-        read_shakemap(tmp_path / "utf16.xml")
 
 
 def test_a_bomb_of_zeros_is_not_unpacked(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.records.events import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
-from per_obspy.records.simulation.metadata import scenario_event
+from per_obspy.records.simulation.station_metadata import scenario_event
 from per_obspy.records.sources import find_sources, input_files
 
 CHECKOUT = Path(__file__).parents[2]

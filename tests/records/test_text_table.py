@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.records.text_table import UNITS, read_columns
+from per_obspy.records.text_table import TABLE_UNITS, read_columns
 
 TABLE = """time NS EW V
 0.02 0.1 -0.2 0.3
@@ -44,7 +44,7 @@ def test_columns_become_channels_in_metres_per_second_squared(table: Path):
     assert [trace.stats.sensor_dip for trace in stream] == [0, 0, -90]
 
 
-@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("units", TABLE_UNITS)
 def test_all_units_of_one_motion_agree(tmp_path: Path, units: str):
     in_unit = {"m/s2": 9.80665, "cm/s2": 980.665, "gal": 980.665, "g": 1.0}[units]
     (tmp_path / "one.csv").write_text(f"{in_unit}\n{-2 * in_unit}\n")

@@ -1,1 +1,1 @@
-"""Parse the text files of strong-motion agencies: lines, number fields, blocks and header vocabulary."""
+"""Parsing of agencies' text files: lines, number fields, blocks and header vocabulary."""

@@ -1,46 +1,59 @@
 """The thirteen header lines that CSMIP (CGS, formerly CDMG) began and RENADIC took over."""
 
 import re
+from re import Match
 from typing import Any, NamedTuple
 
 from obspy import UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.formats.text.conversions import MONTHS, full_year, metres, signed_degrees, utc
 from per_obspy.formats.text.lines import DECIMAL, Text, block_lines, fixed_block, line_at, refuse
 from per_obspy.formats.text.vocabulary import (
     channel_code,
     coordinates,
-    full_year,
-    hemisphere,
     orientation,
-    utc,
+    sensor_constants,
 )
 
 _HEADER_LINES = 13
-_INTEGER_LINES = 7  # 100 integers, 16 a line; everything in them is said elsewhere too
+_INTEGER_LINES = 7  # 100 integers, 16 a line; all their values are in the text too
 _RECORD_OF = ("RECORD OF", "RCRD OF")
 _UNKNOWN = (-999.0, 0.0)
 
+# Line 4 (from 0): station number, coordinates, recorder, channels
 _SITE = re.compile(rf"STATION (?:NO|ID)\.\s*(\S*?)\s+{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
 _MODEL = re.compile(r"[NS][,\s]\s*[\d.]+\s*[EW]\s+(\S.*?)\s*S/N\s*(\w*)")
 _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s*CHNS OF\s*(\d{1,3})")
-_CONSTANTS = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC,\s*DAMPING\s*=\s*{DECIMAL}")
-_SENSITIVITY = re.compile(rf"SENSITIVITY\s*=\s*{DECIMAL}\s*V(?:DC)?/G")
+
+# Lines 5, 6, 9: agency; channel and direction; instrument
+_AGENCIES = re.compile(r"\b(CGS|CDMG|CSMIP)\b")
 _CHANNEL = re.compile(
     r"CHAN\s*(\d{1,3}):\s*(.*?)\s*(?:\(STA CHN:\s*(\d{1,3})\)\s*)?(?:LOCATION:\s*(.*))?"
 )
-_SEED = re.compile(r"[^.]*\.([A-Z0-9]{1,2})\.([A-Z0-9]{1,5})\.\S\S\.H")
-_AGENCIES = re.compile(r"\b(CGS|CDMG|CSMIP)\b")
+_CONSTANTS = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC,\s*DAMPING\s*=\s*{DECIMAL}")
+_SENSITIVITY = re.compile(rf"SENSITIVITY\s*=\s*{DECIMAL}\s*V(?:DC)?/G")
 
-_CLOCK = rf"(\d{{1,2}})/\s*(\d{{1,2}})/\s*(\d{{1,4}}),?\s+(\d{{1,2}}):\s*(\d{{1,2}}):\s*{DECIMAL}\s*([A-Z]+)"
+# Line 3: SEED names and start; lines 1 and 2: time of the record and of the origin
+_SEED = re.compile(r"[^.]*\.([A-Z0-9]{1,2})\.([A-Z0-9]{1,5})\.\S\S\.H")
+_CLOCK = (
+    r"(\d{1,2})/\s*(\d{1,2})/\s*(\d{1,4}),?\s+"
+    rf"(\d{{1,2}}):\s*(\d{{1,2}}):\s*{DECIMAL}\s*([A-Z]+)"
+)
 _START = re.compile(rf"(?:START|TRIGGER) TIME:\s*{_CLOCK}")
 _ORIGIN = re.compile(rf"ORIGIN[^:]*:\s*{_CLOCK}")
 _RECORDED = re.compile(
-    rf"\b([A-Z]{{3}})[A-Z]*\s+(\d{{1,2}}),\s+(\d{{4}})\s+(\d{{1,2}}):(\d{{1,2}})(?::{DECIMAL})?\s+([A-Z]+)"
+    r"\b([A-Z]{3})[A-Z]*\s+(\d{1,2}),\s+(\d{4})\s+"
+    rf"(\d{{1,2}}):(\d{{1,2}})(?::{DECIMAL})?\s+([A-Z]+)"
 )
-_MONTHS = ("JAN", "FEB", "MAR", "APR", "MAY", "JUN", "JUL", "AUG", "SEP", "OCT", "NOV", "DEC")
-#: hours ahead of UTC
+
+# Line 8: hypocentre
+_EPICENTRE = re.compile(rf"{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
+_DEPTH = re.compile(rf"\bH=\s*{DECIMAL}\s*KM")
+_MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*{DECIMAL}")
+
+#: time zone -> hours ahead of UTC
 _ZONES = {
     "UTC": 0,
     "GMT": 0,
@@ -53,15 +66,26 @@ _ZONES = {
     "AKDT": -8,
     "HST": -10,
 }
-#: the date that instruments without a clock give
+
+#: date of instruments without a clock
 _NO_CLOCK = (1980, 1, 1)
-_EPICENTRE = re.compile(rf"{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
-_DEPTH = re.compile(rf"\bH=\s*{DECIMAL}\s*KM")
-_MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*{DECIMAL}")
 
 
 class Header(NamedTuple):
-    """One channel's words of the vocabulary, its number, the header's real numbers, and the line after them."""
+    """
+    The header of one channel.
+
+    Attributes
+    ----------
+    words : dict
+        In the vocabulary of ``formats/text/vocabulary.py``.
+    channel : int
+        Number in the file.
+    reals : (n_reals,) ndarray
+        Real numbers of the header.
+    next_line : int
+        Line after the header.
+    """
 
     words: dict[str, Any]
     channel: int
@@ -71,7 +95,7 @@ class Header(NamedTuple):
 
 def read_header(text: Text, first: int, text_lines: int, reals: int) -> Header:
     """
-    Read one channel's header.
+    Read the header of one channel.
 
     Parameters
     ----------
@@ -89,24 +113,29 @@ def read_header(text: Text, first: int, text_lines: int, reals: int) -> Header:
         refuse(text, first + 6, "channel", f"{lines[6].strip()!r} names no channel")
     numbers = first + text_lines + _INTEGER_LINES
     line_at(text, numbers, "header numbers")
-    words = (
-        _station(lines)
-        | _instrument(lines)
-        | orientation(channel[2])
-        | {"sensor_location": channel[4] or None}
-    )
-    words |= {"starttime": _start(text, first, lines), "event": _event(text, first, lines)}
-    words["location"] = _location(lines[4], int(channel[1]), int(channel[3] or channel[1]))
+    # Words of the thirteen lines of text, then the real numbers
+    words = _words(text, first, lines, channel)
     values = fixed_block(text, numbers, reals, 10, 8)
     return Header(words, int(channel[1]), values, numbers + block_lines(reals, 8))
 
 
+def _words(text: Text, first: int, lines: list[str], channel: Match[str]) -> dict[str, Any]:
+    """Return the words of the thirteen lines of text, in capitals."""
+    words = _station(lines) | {"instrument": _instrument(lines)} | orientation(channel[2])
+    # Place of the sensor, times, and the location code that separates instruments
+    words["sensor_location"] = channel[4] or None
+    words["starttime"] = _start(text, first, lines)
+    words["event"] = _event(text, first, lines)
+    words["location"] = _location(lines[4], int(channel[1]), int(channel[3] or channel[1]))
+    return words
+
+
 def _location(site: str, channel: int, station_channel: int) -> str | None:
     """
-    Return a location code that tells instruments of one station apart and keeps the components of each together.
+    Return a location code that separates the instruments of one station.
 
-    A recorder of three channels is named by its first one; a recorder that serves sensors all over
-    a structure gives each its own number.
+    The components of an instrument share it: a recorder of three channels is named by its first
+    one; a recorder that serves sensors all over a structure gives each a number.
     """
     channels = _CHANNELS.search(site)
     recorder, station = (int(channels[1]), int(channels[2])) if channels else (0, 0)
@@ -116,7 +145,7 @@ def _location(site: str, channel: int, station_channel: int) -> str | None:
 
 
 def known(value: float, factor: float = 1.0) -> float | None:
-    """Return a real number of the header, in SI, or None where it stands for unknown."""
+    """Return a real number of the header in SI, or None where it is a mark for unknown."""
     return None if value in _UNKNOWN else float(value) * factor
 
 
@@ -127,51 +156,54 @@ def channel_name(header: Header, dt: float) -> str:
 
 
 def _station(lines: list[str]) -> dict[str, Any]:
+    """Return codes, name and coordinates of the station."""
     site = _SITE.match(lines[4].strip())
-    number = site[1] if site else ""
-    place = (hemisphere(site[2], site[3]), hemisphere(site[4], site[5])) if site else (None, None)
     name, *owner = re.split(r"\s{2,}|\s+S/N", lines[5].strip())
-    seed = _SEED.match(lines[3])
-    network = "CE" if _AGENCIES.search(owner[0] if owner else lines[0]) else ""
+    # SEED names where the header has them, else the agency's number or the name of the place
+    if seed := _SEED.match(lines[3]):
+        network, code = seed[1], seed[2]
+    else:
+        network = "CE" if _AGENCIES.search(owner[0] if owner else lines[0]) else ""
+        number = site[1] if site else ""
+        code = number or re.sub(r"[^A-Z0-9]", "", name)
     return {
-        "network": seed[1] if seed else network,
-        "station": seed[2] if seed else number or re.sub(r"[^A-Z0-9]", "", name),
+        "network": network,
+        "station": code,
         "station_name": name or None,
-        "coordinates": coordinates(*place),
+        "coordinates": coordinates(*signed_degrees(site, 2)),
     }
 
 
 def _instrument(lines: list[str]) -> dict[str, Any]:
-    model, constants, sensitivity = (
-        _MODEL.search(lines[4]),
-        _CONSTANTS.search(lines[9]),
-        _SENSITIVITY.search(lines[9]),
-    )
-    period = float(constants[1]) if constants else 0.0
-    words = {
+    """Return model, serial number and constants of the instrument."""
+    model = _MODEL.search(lines[4])
+    sensitivity = _SENSITIVITY.search(lines[9])
+    return {
         "model": model[1] if model else None,
         "serial": model[2] if model else None,
-        "natural_frequency": 1 / period if period > 0 else None,
-        "damping": float(constants[2]) if constants else None,
+        **sensor_constants(_CONSTANTS.search(lines[9])),
         "sensitivity": float(sensitivity[1]) / STANDARD_GRAVITY if sensitivity else None,
     }
-    return {"instrument": words}
 
 
 def _start(text: Text, first: int, lines: list[str]) -> UTCDateTime | None:
+    """Return the start of the record, or else the time in the title ``RECORD OF``."""
     if start := _START.search(lines[3]):
         return _moment(text, first + 3, start)
     recorded = _RECORDED.search(lines[1])
-    if recorded and lines[1].startswith(_RECORD_OF):
-        month, day, year, hour, minute, second, zone = recorded.groups()
-        if month in _MONTHS and zone in _ZONES:
-            date = (int(year), _MONTHS.index(month) + 1, int(day))
-            clock = (float(hour), float(minute), float(second or 0))
-            return utc(text, first + 1, "time", date, clock, _ZONES[zone])
-    return None
+    if recorded is None or not lines[1].startswith(_RECORD_OF):
+        return None
+    month, day, year, hour, minute, second, zone = recorded.groups()
+    if month not in MONTHS or zone not in _ZONES:
+        return None
+    # Months are names here, and seconds may be missing
+    date = (int(year), MONTHS.index(month) + 1, int(day))
+    clock = (float(hour), float(minute), float(second or 0))
+    return utc(text, first + 1, "time", date, clock, _ZONES[zone])
 
 
-def _moment(text: Text, line: int, found: re.Match[str]) -> UTCDateTime | None:
+def _moment(text: Text, line: int, found: Match[str]) -> UTCDateTime | None:
+    """Return the time of a clock; None where it was not set or its zone is unknown."""
     month, day, year, hour, minute, second, zone = found.groups()
     date = (full_year(year), int(month), int(day))
     if date == _NO_CLOCK or zone not in _ZONES:
@@ -180,23 +212,26 @@ def _moment(text: Text, line: int, found: re.Match[str]) -> UTCDateTime | None:
 
 
 def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
-    origin, place, depth = (
-        _ORIGIN.search(lines[2]),
-        _EPICENTRE.search(lines[8]),
-        _DEPTH.search(lines[8]),
-    )
-    where = (
-        coordinates(hemisphere(place[1], place[2]), hemisphere(place[3], place[4])) if place else {}
-    )
-    magnitudes = {
-        kind: float(value) for kind, value in _MAGNITUDE.findall(lines[8]) if float(value) > 0
-    }
+    """Return name, origin time, hypocentre and magnitude of the event."""
+    origin = _ORIGIN.search(lines[2])
+    epicentre = coordinates(*signed_degrees(_EPICENTRE.search(lines[8])))
+    depth = _DEPTH.search(lines[8])
     named = not lines[1].startswith(_RECORD_OF)
+    # A depth without an epicentre is a mark for unknown
     return {
         "name": lines[1].strip() if named else None,
         "time": _moment(text, first + 2, origin) if origin else None,
-        "latitude": where.get("latitude"),
-        "longitude": where.get("longitude"),
-        "depth": float(depth[1]) * 1000 if depth and where else None,
-        "magnitude": magnitudes.get("MW", next(iter(magnitudes.values()), None)),
+        "latitude": epicentre.get("latitude"),
+        "longitude": epicentre.get("longitude"),
+        "depth": metres(float(depth[1])) if depth and epicentre else None,
+        "magnitude": _magnitude(lines[8]),
     }
+
+
+def _magnitude(hypocentre: str) -> float | None:
+    """Return the moment magnitude, or else the first that is above zero."""
+    magnitudes = {}
+    for kind, value in _MAGNITUDE.findall(hypocentre):
+        if float(value) > 0:
+            magnitudes[kind] = float(value)
+    return magnitudes.get("MW", next(iter(magnitudes.values()), None))

@@ -4,30 +4,34 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from per_obspy.formats.text.lines import Text, count, interval, number, refuse
+from per_obspy.formats.text.lines import Text, count, finite_number, interval, refuse
 
 
-class Field(NamedTuple):
-    """A value and the line it stands on."""
+class HeaderField(NamedTuple):
+    """The value of a header field and its line."""
 
     line: int
     value: str
 
 
-Fields = Mapping[str, Field]
+Fields = Mapping[str, HeaderField]
+
+#: values that stand for an unknown number
+_UNKNOWN = ("", "none", "unknown", "-", "n/a")
 
 
-def read_fields(text: Text, stop: int, separator: str = ":") -> dict[str, Field]:
-    """Return the named values of the lines before ``stop``; of repeated names the first."""
-    fields: dict[str, Field] = {}
+def read_fields(text: Text, stop: int, separator: str = ":") -> dict[str, HeaderField]:
+    """Read the named values of the lines before ``stop``; of repeated names the first counts."""
+    fields: dict[str, HeaderField] = {}
     for line, content in enumerate(text.lines[:stop]):
         name, found, value = content.partition(separator)
         if found:
-            fields.setdefault(re.sub(r"\s+", " ", name.strip(" #")), Field(line, value.strip()))
+            single_spaced = re.sub(r"\s+", " ", name.strip(" #"))
+            fields.setdefault(single_spaced, HeaderField(line, value.strip()))
     return fields
 
 
-def field(text: Text, fields: Fields, name: str) -> Field:
+def required_field(text: Text, fields: Fields, name: str) -> HeaderField:
     """Return a field that must be there and not be empty."""
     if name not in fields:
         refuse(text, 0, name, "the header has no such field")
@@ -38,24 +42,24 @@ def field(text: Text, fields: Fields, name: str) -> Field:
 
 def count_field(text: Text, fields: Fields, name: str) -> int:
     """Return a positive whole number that must be there."""
-    found = field(text, fields, name)
-    return count(text, found.line, name, found.value)
+    line, value = required_field(text, fields, name)
+    return count(text, line, name, value)
 
 
 def interval_field(text: Text, fields: Fields, name: str) -> float:
     """Return a positive number that must be there."""
-    found = field(text, fields, name)
-    return interval(text, found.line, name, found.value)
+    line, value = required_field(text, fields, name)
+    return interval(text, line, name, value)
 
 
 def number_field(text: Text, fields: Fields, name: str) -> float | None:
-    """Return a number, or None where the field is missing, empty or says that it is unknown."""
-    found = fields.get(name)
-    if found is None or found.value.lower() in ("", "none", "unknown", "-", "n/a"):
+    """Return a number, or None where the field is missing, empty or marked as unknown."""
+    field = fields.get(name)
+    if field is None or field.value.lower() in _UNKNOWN:
         return None
-    return number(text, found.line, name, found.value)
+    return finite_number(text, field.line, name, field.value)
 
 
-def word_field(fields: Fields, name: str) -> str | None:
+def text_field(fields: Fields, name: str) -> str | None:
     """Return text, or None where the field is missing or empty."""
     return fields[name].value or None if name in fields else None

@@ -1,4 +1,8 @@
-"""Text files of samples: lines, fields of a header, and blocks of numbers, each fault named by file, line and field."""
+"""
+Text files of samples: lines, header fields and blocks of numbers.
+
+Every fault is reported with its file, line and field.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +16,7 @@ from per_obspy.errors import RecordRejected
 
 WaveformFile = str | Path | BinaryIO
 
-#: what a decimal number is made of; NumPy would also take "nan", "inf" and "1_000"
+#: characters of a decimal number; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
 _LONGEST_LINE = 10_000  # characters; a format that promises more is damaged
@@ -22,7 +26,11 @@ DECIMAL = r"(-?(?:\d+\.?\d*|\.\d+))"
 
 
 class Text(NamedTuple):
-    """A file as lines without their ends; line numbers in the code count from 0, in messages from 1."""
+    """
+    A file as lines without their ends.
+
+    Line numbers count from 0 in the code and from 1 in messages.
+    """
 
     name: str
     lines: list[str]
@@ -47,7 +55,12 @@ def head_lines(file: WaveformFile, size: int) -> list[str]:
 
 
 def read_text(file: WaveformFile) -> Text:
-    """Return a file as lines: any line end, Latin-1 (which every byte is), without padding after the last line."""
+    """
+    Read a file as lines.
+
+    Any line end is understood. The encoding is Latin-1, which every byte is. Padding after the last
+    line is dropped.
+    """
     if hasattr(file, "read"):
         return Text(str(getattr(file, "name", "open file")), _lines(file.read()))
     return Text(str(file), _lines(Path(file).read_bytes()))
@@ -70,36 +83,44 @@ def line_at(text: Text, line: int, field: str) -> str:
     return text.lines[line]
 
 
-def number(text: Text, line: int, field: str, value: str) -> float:
-    """Return a finite number that was found on a line."""
+def quoted(text: Text, line: int, length: int | None = None) -> str:
+    """Return a line in quotes for a message, without blanks around it and cut to a length."""
+    return repr(text.lines[line].strip()[:length])
+
+
+def finite_number(text: Text, line: int, field: str, word: str) -> float:
+    """Return a word of a line as a finite number."""
     try:
-        result = float(value)
+        number = float(word)
     except ValueError:
-        refuse(text, line, field, f"{value.strip()!r} is not a number")
-    if not np.isfinite(result) or "_" in value:
-        refuse(text, line, field, f"{value.strip()!r} is not a finite number")
-    return result
+        refuse(text, line, field, f"{word.strip()!r} is not a number")
+    if not np.isfinite(number) or "_" in word:
+        refuse(text, line, field, f"{word.strip()!r} is not a finite number")
+    return number
 
 
-def count(text: Text, line: int, field: str, value: str) -> int:
+def count(text: Text, line: int, field: str, word: str) -> int:
     """Return a number of samples, lines or channels: a positive integer."""
-    result = number(text, line, field, value)
-    if result < 1 or result != int(result):
-        refuse(text, line, field, f"must be a positive whole number, got {value.strip()!r}")
-    return int(result)
+    number = finite_number(text, line, field, word)
+    if number < 1 or number != int(number):
+        refuse(text, line, field, f"must be a positive whole number, got {word.strip()!r}")
+    return int(number)
 
 
 def interval(text: Text, line: int, field: str, value: str | float) -> float:
     """Return a sampling interval, s, or a sampling rate, Hz: from 1e-5 to 1e5."""
-    result = number(text, line, field, value) if isinstance(value, str) else float(value)
-    if not 1e-5 <= result <= 1e5:
+    if isinstance(value, str):
+        number = finite_number(text, line, field, value)
+    else:
+        number = float(value)
+    if not 1e-5 <= number <= 1e5:
         refuse(text, line, field, f"must be positive and plausible, got {str(value).strip()!r}")
-    return result
+    return number
 
 
 def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int) -> FloatArray:
     """
-    Return numbers that stand in columns, so that neighbours may touch.
+    Read a block of numbers in columns of fixed width, which may touch each other.
 
     Parameters
     ----------
@@ -108,79 +129,100 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
     start : int
         Line of the first number.
     samples : int
-        How many numbers there must be, dimensionless.
+        Numbers of the block, dimensionless.
     width, per_line : int
         Characters of a number, numbers of a full line.
+
+    Returns
+    -------
+    samples : (samples,) ndarray
+        In the unit of the file.
     """
     full = width * per_line
     if full > _LONGEST_LINE:
         refuse(text, start - 1, "format", f"{per_line} numbers of {width} characters a line")
-    rows = _rows(text, start, block_lines(samples, per_line), samples)
-    lengths = np.fromiter(map(len, rows), dtype=np.intp, count=len(rows))
-    if lengths.max() > full:
-        line = int(np.argmax(lengths > full))
-        refuse(text, start + line, "samples", f"{lengths[line]} characters, the format has {full}")
+    rows = _block_rows(text, start, block_lines(samples, per_line), samples)
+    _refuse_long_rows(text, start, rows, full)
+    # Pad every line to its full length, so that number i begins at character i * width
     block = "".join([row.ljust(full) for row in rows]).encode("latin-1")
     values = _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
-    extra = block[samples * width :].strip()
-    if values is None or extra or block.translate(None, _NUMBER_LETTERS):
+    # Only blanks may follow the last number, and only letters of numbers may stand anywhere
+    surplus = block[samples * width :].strip()
+    if values is None or surplus or block.translate(None, _NUMBER_LETTERS):
         _refuse_fixed(text, start, rows, samples, width, per_line)
     return values
 
 
 def block_lines(samples: int, per_line: int) -> int:
-    """Return how many lines a block takes."""
+    """Return the number of lines of a block."""
     return -(-samples // per_line)
 
 
 def no_more(text: Text, line: int, samples: int) -> None:
-    """Refuse what follows the last sample."""
+    """Refuse lines after the last sample."""
     if line < len(text.lines):
-        refuse(
-            text,
-            line,
-            "samples",
-            f"more lines than the {samples} samples that the header promises take",
-        )
+        problem = f"more lines than the {samples} samples that the header promises take"
+        refuse(text, line, "samples", problem)
 
 
 def free_block(text: Text, start: int, stop: int | None, samples: int | None) -> FloatArray:
-    """Return numbers separated by white space on the lines from start to stop; they must be as many as samples."""
+    """
+    Read numbers separated by white space on the lines from ``start`` to ``stop``.
+
+    Parameters
+    ----------
+    text : Text
+        The file.
+    start : int
+        Line of the first number.
+    stop : int or None
+        Line after the last number; None for the end of the file.
+    samples : int or None
+        Numbers that the header promises, dimensionless; None where it promises none.
+
+    Returns
+    -------
+    samples : (n_samples,) ndarray
+        In the unit of the file.
+    """
     rows = text.lines[start:stop]
     content = "\n".join(rows).encode("latin-1")
-    tokens = content.split()
-    values = (
-        _floats(np.array(tokens))
-        if tokens and not content.translate(None, _NUMBER_LETTERS)
-        else None
-    )
+    words = content.split()
+    values = None
+    if words and not content.translate(None, _NUMBER_LETTERS):
+        values = _floats(np.array(words))
+    # Search for the wrong word only when there is one
     if values is None:
         _refuse_free(text, start, rows)
     if samples is not None and len(values) != samples:
-        refuse(
-            text,
-            start + len(rows) - 1,
-            "samples",
-            f"the header promises {samples}, the file holds {len(values)}",
-        )
+        problem = f"the header promises {samples}, the file holds {len(values)}"
+        refuse(text, start + len(rows) - 1, "samples", problem)
     return values
 
 
-def _rows(text: Text, start: int, lines: int, samples: int) -> list[str]:
+def _block_rows(text: Text, start: int, lines: int, samples: int) -> list[str]:
+    """Return the lines of a block without trailing blanks."""
     rows = [row.rstrip() for row in text.lines[start : start + lines]]
     if len(rows) < lines:
-        refuse(
-            text,
-            len(text.lines),
-            "samples",
-            f"the header promises {samples} on {lines} lines, the file ends after {len(rows)} of them",
-        )
+        promise = f"the header promises {samples} on {lines} lines"
+        problem = f"{promise}, the file ends after {len(rows)} of them"
+        refuse(text, len(text.lines), "samples", problem)
     return rows
 
 
-def _floats(fields: NDArray[np.bytes_]) -> FloatArray | None:
+def _refuse_long_rows(text: Text, start: int, rows: list[str], full: int) -> None:
+    """Refuse lines with more characters than a full line of the format."""
+    lengths = np.fromiter(map(len, rows), dtype=np.intp, count=len(rows))
+    if lengths.max() > full:
+        row = int(np.argmax(lengths > full))
+        problem = f"{lengths[row]} characters, the format has {full}"
+        refuse(text, start + row, "samples", problem)
+
+
+def _floats(words: NDArray[np.bytes_]) -> FloatArray | None:
+    """Return words as finite numbers; None if one is not."""
     try:
-        values = fields.astype(np.float64)
+        values = words.astype(np.float64)
     except ValueError:
         return None
     return values if np.isfinite(values).all() else None
@@ -189,39 +231,38 @@ def _floats(fields: NDArray[np.bytes_]) -> FloatArray | None:
 def _refuse_fixed(
     text: Text, start: int, rows: list[str], samples: int, width: int, per_line: int
 ) -> NoReturn:
+    """Refuse the first line of a block in columns that does not hold its share of numbers."""
     for index, row in enumerate(rows):
-        fields = [row[first : first + width] for first in range(0, len(row), width)]
-        wrong = next((field for field in fields if not _is_number(field)), None)
-        if wrong is not None:
-            refuse(
-                text,
-                start + index,
-                f"sample {index * per_line + fields.index(wrong) + 1}",
-                f"{wrong!r} is not a number",
-            )
+        words = [row[first : first + width] for first in range(0, len(row), width)]
+        # Name the first word that is no number by its place in the whole block
+        for column, word in enumerate(words):
+            if not _is_number(word):
+                sample = index * per_line + column + 1
+                refuse(text, start + index, f"sample {sample}", f"{word!r} is not a number")
+        # Every line is full but the last, which holds the rest
         expected = min(per_line, samples - index * per_line)
-        if len(fields) != expected:
-            refuse(
-                text,
-                start + index,
-                "samples",
-                f"{len(fields)} numbers instead of {expected} of the {samples}",
-            )
+        if len(words) != expected:
+            problem = f"{len(words)} numbers instead of {expected} of the {samples}"
+            refuse(text, start + index, "samples", problem)
     refuse(text, start, "samples", "not a block of numbers")
 
 
 def _refuse_free(text: Text, start: int, rows: list[str]) -> NoReturn:
-    for index, token in _tokens(rows):
-        if not _is_number(token):
-            refuse(text, start + index, "samples", f"{token!r} is not a number")
+    """Refuse the first word of a free block that is no number."""
+    for index, word in _words(rows):
+        if not _is_number(word):
+            refuse(text, start + index, "samples", f"{word!r} is not a number")
     refuse(text, start, "samples", "none")
 
 
-def _tokens(rows: list[str]) -> Iterator[tuple[int, str]]:
-    return ((index, token) for index, row in enumerate(rows) for token in row.split())
+def _words(rows: list[str]) -> Iterator[tuple[int, str]]:
+    """Yield every word with the index of its line."""
+    for index, row in enumerate(rows):
+        for word in row.split():
+            yield index, word
 
 
-def _is_number(field: str) -> bool:
-    if field.encode("latin-1").translate(None, _NUMBER_LETTERS):
+def _is_number(word: str) -> bool:
+    if word.encode("latin-1").translate(None, _NUMBER_LETTERS):
         return False
-    return _floats(np.array([field.encode("latin-1")])) is not None
+    return _floats(np.array([word.encode("latin-1")])) is not None

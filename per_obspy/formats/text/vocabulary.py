@@ -1,45 +1,51 @@
 """
-The words that every format plugin puts into ``trace.stats``, and the few conversions that they need.
+The words that every format plugin puts into ``trace.stats``.
 
-==============================
-================================================================================ word
-meaning ==============================
-================================================================================ network, station,
-location     codes of the header; location tells instruments of one station apart channel
-SEED code from sampling rate and orientation, instrument code N (accelerometer) starttime, delta
-UTC; s. Unknown: 1970-01-01, ObsPy's default; a date without a time gives midnight units
-``"m/s2"``, ``"m/s"``, ``"m"``, or ``"counts"`` with the gain in ``calib`` (m/s2 a count) quantity
-``"acceleration"``, ``"velocity"`` or ``"displacement"`` processing_level               ``"raw"`` or
-``"processed"`` coordinates                    latitude, longitude (degrees), elevation (m)
-sensor_location                where in the structure or the ground, as the header has it
-sensor_azimuth, sensor_dip     degrees clockwise from north (horizontals only); degrees down from
-horizontal (0; up
-                               is -90)
-corners                        highpass, lowpass: corners of the filter that was applied, Hz
-instrument                     model, serial, natural_frequency (Hz), damping (fraction of
-critical),
-                               sensitivity (V/(m/s2))
-event                          name, time (UTC), latitude, longitude (degrees), depth (m), magnitude
-station_name                   as the header has it site_class, vs30               of the ground as
-the metadata have it: any word; m/s header_peak                    largest absolute value according
-to the header, in ``units`` ==============================
-================================================================================
+network, station, location
+    Codes of the header; the location separates the instruments of one station.
+channel
+    SEED code from sampling rate and orientation, with instrument code N (accelerometer).
+starttime, delta
+    UTC; s. Unknown: 1970-01-01, ObsPy's default; a date without a time gives midnight.
+units
+    ``"m/s2"``, ``"m/s"``, ``"m"``, or ``"counts"`` with the gain in ``calib`` (m/s2 per count).
+quantity
+    ``"acceleration"``, ``"velocity"`` or ``"displacement"``.
+processing_level
+    ``"raw"`` or ``"processed"``.
+coordinates
+    latitude, longitude (degrees), elevation (m).
+sensor_location
+    Place in the structure or the ground, as the header has it.
+sensor_azimuth, sensor_dip
+    Degrees clockwise from north (horizontals only); degrees down from horizontal (0; up is -90).
+corners
+    highpass, lowpass: corners of the filter that was applied, Hz.
+instrument
+    model, serial, natural_frequency (Hz), damping (fraction of critical), sensitivity (V/(m/s2)).
+event
+    name, time (UTC), latitude, longitude (degrees), depth (m), magnitude.
+station_name
+    As the header has it.
+site_class, vs30
+    Of the ground as the metadata have it: any word; m/s.
+header_peak
+    Largest absolute value according to the header, in ``units``.
 
-What a file does not say is absent: never a guess, never zero. Coordinates 0, 0 are what files write
-for unknown.
+A word that a file does not hold is absent: never a guess, never zero. Coordinates 0, 0 are what
+files write for unknown.
 """
 
 import math
 import re
 from collections.abc import Mapping
-from datetime import UTC, datetime, timedelta
+from re import Match
 from typing import Any
 
-from obspy import Trace, UTCDateTime
+from obspy import Trace
 from obspy.core import AttribDict
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats.text.lines import Text, refuse
 
 #: words for a vertical sensor -> its dip, degrees down from horizontal
 VERTICAL_DIPS = {
@@ -57,33 +63,49 @@ COMPASS_AZIMUTHS = {
     **dict.fromkeys(("W", "WEST"), 270.0),
 }
 
+#: words that can name a file
 _CODES = ("network", "station", "location", "channel")
-_QUADRANT = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])")
+
+#: letters around the angle of a direction as ``N21E`` -> azimuth of the first, turn to the second
 _QUADRANT_AZIMUTHS = {
     "NE": (0.0, 1.0),
     "NW": (360.0, -1.0),
     "SE": (180.0, -1.0),
     "SW": (180.0, 1.0),
 }
+_QUADRANT = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])")
+_DEGREES = re.compile(r"\d{1,3}(\.\d*)?")
+
+#: smallest sampling rate, Hz -> band code of SEED
+_BANDS = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
+
+#: largest angle from north or east at which a channel is called N or E, degrees
+_AXIS_TOLERANCE = 5
 
 
 def orientation(words: str) -> dict[str, float]:
     """
-    Return ``sensor_azimuth`` or ``sensor_dip`` from words such as ``N21E``, ``NS``, ``UP``, else nothing.
+    Return ``sensor_azimuth`` or ``sensor_dip`` from words as ``N21E``, ``NS``, ``UP``.
 
-    >>> orientation("S 16 E"), orientation("Up"), orientation("270 DEG")
-    ({'sensor_azimuth': 164.0, 'sensor_dip': 0.0}, {'sensor_dip': -90.0}, {'sensor_azimuth': 270.0,
-    'sensor_dip': 0.0})
+    Words that name no direction give an empty mapping.
+
+    >>> orientation("S 16 E")
+    {'sensor_azimuth': 164.0, 'sensor_dip': 0.0}
+    >>> orientation("Up"), orientation("270 DEG")
+    ({'sensor_dip': -90.0}, {'sensor_azimuth': 270.0, 'sensor_dip': 0.0})
     """
     word = words.strip().upper().removesuffix("DEG").rstrip(" .")
+    # Vertical sensors and points of the compass
     if word in VERTICAL_DIPS:
         return {"sensor_dip": VERTICAL_DIPS[word]}
     if word in COMPASS_AZIMUTHS:
         return horizontal(COMPASS_AZIMUTHS[word])
+    # An angle from north or south towards east or west
     if quadrant := _QUADRANT.fullmatch(word):
         start, sign = _QUADRANT_AZIMUTHS[quadrant[1] + quadrant[3]]
         return horizontal(start + sign * float(quadrant[2]))
-    if re.fullmatch(r"\d{1,3}(\.\d*)?", word) and float(word) <= 360:
+    # A full azimuth in degrees
+    if _DEGREES.fullmatch(word) and float(word) <= 360:
         return horizontal(float(word))
     return {}
 
@@ -100,70 +122,76 @@ def channel_code(sampling_rate: float, orientation: Mapping[str, float]) -> str:
     North and east within 5 degrees are N and E; otherwise 1 is the horizontal nearer to the
     north-south line. An unknown orientation gives only band and instrument.
 
-    >>> channel_code(200, horizontal(0)), channel_code(50, horizontal(118)), channel_code(100, {"sensor_dip": -90})
-    ('HNN', 'BN2', 'HNZ')
+    >>> channel_code(200, horizontal(0)), channel_code(50, horizontal(118))
+    ('HNN', 'BN2')
+    >>> channel_code(100, {"sensor_dip": -90})
+    'HNZ'
     """
-    bands = ((1000.0, "F"), (250.0, "C"), (80.0, "H"), (10.0, "B"), (0.0, "M"))
-    band = next(code for rate, code in bands if round(sampling_rate, 3) >= rate)
+    band = next(code for rate, code in _BANDS if round(sampling_rate, 3) >= rate)
     if abs(orientation.get("sensor_dip", 0.0)) == 90:
         return f"{band}NZ"
     if "sensor_azimuth" not in orientation:
         return f"{band}N"
-    azimuth = orientation["sensor_azimuth"]
+    return f"{band}N{_horizontal_letter(orientation['sensor_azimuth'])}"
+
+
+def _horizontal_letter(azimuth: float) -> str:
+    """Return the last letter of a horizontal channel's code: N, E, 1 or 2."""
     for letter, axis in (("N", 0.0), ("E", 90.0)):
-        if abs((azimuth - axis + 180) % 360 - 180) <= 5:
-            return f"{band}N{letter}"
-    return f"{band}N{1 if abs(math.cos(math.radians(azimuth))) > math.sqrt(0.5) - 1e-9 else 2}"
-
-
-def full_year(year: str) -> int:
-    """
-    Return a year of which two digits may be given: strong-motion records begin in 1933.
-
-    >>> full_year("52"), full_year("06"), full_year("1985")
-    (1952, 2006, 1985)
-    """
-    if len(year.strip()) > 2:
-        return int(year)
-    return int(year) + (2000 if int(year) < 33 else 1900)
-
-
-def hemisphere(degrees: str, letter: str) -> float:
-    """
-    Return signed degrees.
-
-    >>> hemisphere("117.365", "W")
-    -117.365
-    """
-    return -float(degrees) if letter.upper() in ("S", "W") else float(degrees)
+        # Angle between sensor and axis, from 0 to 180 degrees
+        angle = abs((azimuth - axis + 180) % 360 - 180)
+        if angle <= _AXIS_TOLERANCE:
+            return letter
+    # The tolerance puts 45 degrees on one side, whichever way its cosine is rounded
+    near_north_south = abs(math.cos(math.radians(azimuth))) > math.sqrt(0.5) - 1e-9
+    return "1" if near_north_south else "2"
 
 
 def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
     """
-    Return a trace with the words of the vocabulary; words that are None are left out, and so are empty groups.
+    Return a trace with the words of the vocabulary.
 
-    The channel code is made from rate and orientation where the header has none. Codes keep
-    letters, digits, ``_`` and ``-`` only, so that they can name a file.
+    Words that are None are left out, and so are empty groups. The channel code is made from rate
+    and orientation where the header has none. Codes keep letters, digits, ``_`` and ``-`` only, so
+    that they can name a file.
+
+    Parameters
+    ----------
+    samples : (n_samples,) ndarray
+        In ``words["units"]``.
+    dt : float
+        Sampling interval, s.
+    words : mapping
+        From the header.
     """
-    known = {name: _group(value) for name, value in words.items()}
-    known = {
-        name: value for name, value in known.items() if value is not None and value != AttribDict()
-    }
+    known = {}
+    for name, word in words.items():
+        group = _without_unknowns(word)
+        if group is not None and group != AttribDict():
+            known[name] = group
     known.setdefault("channel", channel_code(1 / dt, known))
-    known |= {name: re.sub(r"[^A-Za-z0-9_-]", "", known[name]) for name in _CODES if name in known}
+    # Strip the characters that a file name cannot hold
+    for name in _CODES:
+        if name in known:
+            known[name] = re.sub(r"[^A-Za-z0-9_-]", "", known[name])
     return Trace(data=samples, header={"delta": dt, **known})
 
 
-def _group(value: Any) -> Any:
-    if not isinstance(value, Mapping):
-        return value
-    return AttribDict({name: part for name, part in value.items() if part is not None})
+def _without_unknowns(word: Any) -> Any:
+    """Return a group of words without those that are None; any other word as it is."""
+    if not isinstance(word, Mapping):
+        return word
+    return AttribDict({name: part for name, part in word.items() if part is not None})
 
 
 def coordinates(
     latitude: float | None, longitude: float | None, elevation: float | None = None
 ) -> dict[str, float | None]:
-    """Return the group of coordinates, degrees and m; empty where they are unknown, 0, 0 or impossible."""
+    """
+    Return the group of coordinates, degrees and m.
+
+    It is empty where they are unknown, 0, 0 or impossible.
+    """
     if latitude is None or longitude is None or (latitude == 0 and longitude == 0):
         return {}
     if abs(latitude) > 90 or abs(longitude) > 180:
@@ -171,23 +199,27 @@ def coordinates(
     return {"latitude": latitude, "longitude": longitude, "elevation": elevation}
 
 
-def utc(
-    text: Text,
-    line: int,
-    field: str,
-    date: tuple[int, ...],
-    clock: tuple[float, ...] = (),
-    hours_ahead: float = 0.0,
-) -> UTCDateTime:
-    """Return a time in UTC from year, month, day and hour, minute, second of a clock that many hours ahead of UTC."""
-    hour, minute, second = (*clock, 0.0, 0.0, 0.0)[:3]
-    if not 1900 <= date[0] < 2100:
-        refuse(text, line, field, f"{date[0]} is not a year of a record")
-    try:
-        year, month, day = date
-        moment = datetime(year, month, day, tzinfo=UTC) + timedelta(
-            hours=hour - hours_ahead, minutes=minute, seconds=second
-        )
-    except (ValueError, OverflowError, TypeError) as error:
-        refuse(text, line, field, f"{date} {clock} is not a time ({error})")
-    return UTCDateTime(moment)
+def corners(found: Match[str] | None, first: int = 1) -> dict[str, float]:
+    """
+    Return the corners of a filter from two groups of a match, Hz; empty where there is none.
+
+    >>> corners(re.match(r"([.0-9]+)-([.0-9]+)", "0.1-30"))
+    {'highpass': 0.1, 'lowpass': 30.0}
+    """
+    if found is None:
+        return {}
+    return {"highpass": float(found[first]), "lowpass": float(found[first + 1])}
+
+
+def sensor_constants(found: Match[str] | None) -> dict[str, float | None]:
+    """
+    Return natural frequency, Hz, and damping from a match of period, s, and damping.
+
+    >>> sensor_constants(re.match(r"(.*) s (.*)", "0.05 s 0.6"))
+    {'natural_frequency': 20.0, 'damping': 0.6}
+    """
+    period = float(found[1]) if found else 0.0
+    return {
+        "natural_frequency": 1 / period if period > 0 else None,
+        "damping": float(found[2]) if found else None,
+    }

@@ -22,6 +22,7 @@ from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import written_whole
 from per_obspy.progress import Progress, silent
 from per_obspy.records.events import fetched_event, read_event
+from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
     Wanted,
@@ -31,10 +32,9 @@ from per_obspy.records.fdsn.request import (
     stations_inside,
     wanted_around,
 )
-from per_obspy.records.fdsn.station import Offer, Outcome, fetch_station
 from per_obspy.records.fdsn.web import answer, host, web_pool
 from per_obspy.records.folder import FolderContents, find_stations
-from per_obspy.records.obspy_readers import foreign_bytes
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 
 class Fetched(NamedTuple):
@@ -154,7 +154,9 @@ def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
         return Inventory()
-    inventory: Inventory = foreign_bytes(obspy.read_inventory, content, url, format="STATIONTXT")
+    inventory: Inventory = read_bytes_with_obspy(
+        obspy.read_inventory, content, url, format="STATIONTXT"
+    )
     return inventory
 
 

@@ -1,4 +1,4 @@
-"""Who offers FDSN web services: names, base URLs, and routers that know who has what."""
+"""Providers of FDSN web services: names, base URLs, and routers that list them."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -9,7 +9,8 @@ from obspy.clients.fdsn.header import URL_MAPPINGS
 from per_obspy.errors import CatalogError, Rejection, ServiceError
 from per_obspy.records.fdsn.web import answer
 
-#: routers -> query URL and what selects an answer of which the base URLs can be read
+#: routers -> query URL, fixed parameters (of an answer with base URLs) and parameters that they
+#: understand
 ROUTERS = {
     "eida-routing": (
         "https://www.orfeus-eu.org/eidaws/routing/1/query",
@@ -59,10 +60,12 @@ def base_url(provider: str) -> str:
 
 
 def base_urls(
-    pool: urllib3.PoolManager, providers: Iterable[str], wanted: Mapping[str, str]
+    pool: urllib3.PoolManager, providers: Iterable[str], selection: Mapping[str, str]
 ) -> tuple[list[str], list[Rejection]]:
     """
-    Return the base URLs of providers in their order, each once; a router gives those that it names.
+    Return the base URLs of providers in their order, each once.
+
+    A router gives the base URLs in its answer.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ def base_urls(
         From :func:`per_obspy.records.fdsn.web.web_pool`.
     providers : iterable of str
         ObsPy's names, base URLs, or the names of ``ROUTERS``.
-    wanted : mapping
+    selection : mapping
         Parameters of the FDSN station service.
 
     Returns
@@ -79,21 +82,23 @@ def base_urls(
     rejected : list of Rejection
         Routers that do not answer.
     """
+    # A dictionary without values is a set that keeps its order
     urls, rejected = dict[str, None](), []
     for provider in providers:
         if provider not in ROUTERS:
             urls[base_url(provider)] = None
             continue
         try:
-            urls |= dict.fromkeys(_routed(pool, provider, wanted))
+            urls |= dict.fromkeys(_routed(pool, provider, selection))
         except ServiceError as error:
-            rejected.append(
-                Rejection("service", provider, ROUTERS[provider][0], None, (str(error),))
-            )
+            url = ROUTERS[provider][0]
+            rejected.append(Rejection("service", provider, url, None, (str(error),)))
     return list(urls), rejected
 
 
-def _routed(pool: urllib3.PoolManager, router: str, wanted: Mapping[str, str]) -> list[str]:
+def _routed(pool: urllib3.PoolManager, router: str, selection: Mapping[str, str]) -> list[str]:
+    """Return the base URLs in the answer of a router."""
     url, fixed, understood = ROUTERS[router]
-    said = answer(pool, url, fixed | {name: wanted[name] for name in understood if name in wanted})
-    return _STATION_SERVICE.findall(said.decode("utf-8", "replace"))
+    parameters = {name: selection[name] for name in understood if name in selection}
+    page = answer(pool, url, fixed | parameters)
+    return _STATION_SERVICE.findall(page.decode("utf-8", "replace"))

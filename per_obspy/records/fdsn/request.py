@@ -1,4 +1,4 @@
-"""Which stations and which time window are wanted of a service."""
+"""Requests to FDSN services: stations, channels and time window."""
 
 import hashlib
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from per_obspy.errors import CatalogError
 
 class Wanted(NamedTuple):
     """
-    A circle on the earth, a time window, and SEED codes with ``*`` and ``?``.
+    A request: a circle on the earth, a time window, and SEED codes with ``*`` and ``?``.
 
     Attributes
     ----------
@@ -42,11 +42,22 @@ class Wanted(NamedTuple):
 
 
 def wanted_around(request: config.Fdsn, event: Event | None) -> Wanted:
-    """Return what a configuration wants; what it leaves open, which needs an event, is seen from the origin."""
+    """
+    Build the request of a configuration.
+
+    Parameters
+    ----------
+    request : config.Fdsn
+        A missing centre or window is that of the event's origin.
+    event : Event or None
+        Needed where the centre or the window is missing.
+    """
     start, end = window(request, event)
+    latitude = _origin(event).latitude if request.latitude is None else request.latitude
+    longitude = _origin(event).longitude if request.longitude is None else request.longitude
     return Wanted(
-        float(_origin(event).latitude if request.latitude is None else request.latitude),
-        float(_origin(event).longitude if request.longitude is None else request.longitude),
+        float(latitude),
+        float(longitude),
         kilometers2degrees(request.radius / 1000),
         start,
         end,
@@ -59,7 +70,7 @@ def wanted_around(request: config.Fdsn, event: Event | None) -> Wanted:
 
 def window(request: config.Window, event: Event | None) -> tuple[UTCDateTime, UTCDateTime]:
     """
-    Return the time window; where its start or end is not given, it is seen from the event's origin time.
+    Return the time window; a missing start or end is counted from the event's origin time.
 
     Raises
     ------
@@ -74,12 +85,13 @@ def window(request: config.Window, event: Event | None) -> tuple[UTCDateTime, UT
 
 
 def _origin(event: Event | None) -> Origin:
+    """Return the preferred origin of an event, or its first."""
     assert event is not None  # config.Records demands an event where place or time is not given
     return event.preferred_origin() or event.origins[0]
 
 
 def station_parameters(wanted: Wanted) -> dict[str, str]:
-    """Return the parameters of an FDSN station service that select what is wanted."""
+    """Return the parameters of a request for an FDSN station service."""
     circle = {
         "latitude": wanted.latitude,
         "longitude": wanted.longitude,
@@ -94,7 +106,7 @@ def station_parameters(wanted: Wanted) -> dict[str, str]:
 
 
 def channel_parameters(wanted: Wanted) -> dict[str, str]:
-    """Return the parameters that select channels and window, the same for every station."""
+    """Return the parameters of channels and window, which all stations share."""
     return {
         "location": ",".join(wanted.locations),
         "channel": ",".join(wanted.channels),
@@ -104,28 +116,31 @@ def channel_parameters(wanted: Wanted) -> dict[str, str]:
 
 
 def folder_name(wanted: Wanted) -> str:
-    """Return the name of the folder for everything of the same window and channels, wherever the stations are."""
+    """Return the name of the folder of all requests with the same window and channels."""
     times = "-".join(time.strftime("%Y%m%dT%H%M%S") for time in (wanted.start, wanted.end))
     return f"{times}-{digest(channel_parameters(wanted))}"
 
 
-def digest(said: object) -> str:
-    """Return eight characters that stand for what was said."""
-    return hashlib.sha256(repr(said).encode()).hexdigest()[:8]
+def digest(content: object) -> str:
+    """Return the first eight characters of a hash of the content."""
+    return hashlib.sha256(repr(content).encode()).hexdigest()[:8]
 
 
 def stations_inside(inventory: Inventory, wanted: Wanted) -> set[str]:
-    """Return the stations of an inventory, ``"NET.STA"``, that are wanted."""
-    return {
-        f"{network.code}.{station.code}"
-        for network in inventory
-        if _matches(network.code, wanted.networks)
-        for station in network
-        if _matches(station.code, wanted.stations) and _distance(wanted, station) <= wanted.radius
-    }
+    """Return the stations of an inventory, ``"NET.STA"``, that a request covers."""
+    inside = set()
+    for network in inventory:
+        if not _matches(network.code, wanted.networks):
+            continue
+        for station in network:
+            matches = _matches(station.code, wanted.stations)
+            if matches and _distance(wanted, station) <= wanted.radius:
+                inside.add(f"{network.code}.{station.code}")
+    return inside
 
 
 def _matches(code: str, patterns: Iterable[str]) -> bool:
+    """Check whether a code fits one of the patterns."""
     return any(fnmatchcase(code, pattern) for pattern in patterns)
 
 

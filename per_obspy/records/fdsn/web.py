@@ -1,4 +1,4 @@
-"""Answers of web services: asked for again when a fault may pass, refused in one line when it does not."""
+"""Answers of web services: requested again when a fault may pass, else refused in one line."""
 
 from collections.abc import Mapping
 from urllib.parse import urlsplit
@@ -7,17 +7,17 @@ import urllib3
 
 from per_obspy.errors import ServiceError
 
-#: faults that may pass: too many requests, and whatever is wrong on the side of the service
+#: faults that may pass: too many requests, and all faults on the side of the service
 PASSING_FAULTS = (429, 500, 502, 503, 504)
 
-#: s; a service that asks for more patience than this is asked again after it all the same
+#: longest pause before the next attempt, s, even if a service demands a longer one
 LONGEST_WAIT = 600
 
 _NO_CONTENT, _NOT_FOUND, _TOO_LARGE, _URI_TOO_LONG = 204, 404, 413, 414
 
 
 class NotFound(ServiceError):
-    """A service does not have what is asked for, or is not there (404)."""
+    """A service does not have the subject of a request, or does not exist (404)."""
 
 
 class RequestTooLarge(ServiceError):
@@ -26,17 +26,17 @@ class RequestTooLarge(ServiceError):
 
 def web_pool(timeout: float, retries: int, wait: float) -> urllib3.PoolManager:
     """
-    Return what keeps the connections.
+    Return a pool of connections.
 
     Parameters
     ----------
     timeout : float
-        s without an answer, or without more of it.
+        Longest wait for an answer, or for more of it, s.
     retries : int
         Number of further attempts after time-outs, cut answers, 429 and 5xx. A ``Retry-After`` of
         the service counts.
     wait : float
-        s; after the n-th failed attempt wait * 2^(n-1), but nothing after the first.
+        Unit of the pauses, s: wait * 2^(n-1) after the n-th failed attempt, none after the first.
     """
     patience = urllib3.Retry(
         retries,
@@ -54,14 +54,14 @@ def web_pool(timeout: float, retries: int, wait: float) -> urllib3.PoolManager:
 
 def answer(pool: urllib3.PoolManager, url: str, parameters: Mapping[str, str]) -> bytes:
     """
-    Return the whole answer of a service; empty if it has nothing (204).
+    Return the whole answer of a service; empty if it has no data (204).
 
     Raises
     ------
     NotFound
-        404, which FDSN services do not use for "no data" unless they are asked to.
+        404, which FDSN services do not use for "no data" unless a request demands it.
     RequestTooLarge
-        If less has to be asked for at once (413, 414).
+        If the request must be divided (413, 414).
     ServiceError
         If there is no answer, or it is another fault.
     """
@@ -70,6 +70,7 @@ def answer(pool: urllib3.PoolManager, url: str, parameters: Mapping[str, str]) -
     except (urllib3.exceptions.HTTPError, ValueError) as error:
         cause = getattr(error, "reason", None) or error
         raise ServiceError(f"{url}: no answer: {_one_line(str(cause))}") from error
+    # 204 is an answer, all else but 200 a fault
     if response.status == _NO_CONTENT:
         return b""
     if response.status == _NOT_FOUND:
@@ -77,9 +78,8 @@ def answer(pool: urllib3.PoolManager, url: str, parameters: Mapping[str, str]) -
     if response.status in (_TOO_LARGE, _URI_TOO_LONG):
         raise RequestTooLarge(f"{url}: refuses to answer so much at once (HTTP {response.status})")
     if response.status != 200:
-        raise ServiceError(
-            f"{url}: HTTP {response.status}: {_one_line(response.data.decode('utf-8', 'replace'))}"
-        )
+        page = response.data.decode("utf-8", "replace")
+        raise ServiceError(f"{url}: HTTP {response.status}: {_one_line(page)}")
     return bytes(response.data)
 
 
@@ -94,4 +94,5 @@ def host(url: str) -> str:
 
 
 def _one_line(text: str) -> str:
+    """Return at most 200 characters of a text on one line."""
     return f"{' '.join(text.split()):.200}"

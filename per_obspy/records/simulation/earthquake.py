@@ -1,7 +1,7 @@
 """
 A simulated earthquake as a network would deliver it: counts, station metadata and the event.
 
-Everything says that it is simulated: network ``XX``, comments in StationXML and QuakeML. The two
+All files are marked as simulated: network ``XX``, comments in StationXML and QuakeML. The two
 horizontals are correlated with the configured coefficient; the vertical is independent of them.
 Samples are whole counts, as a digitiser of 24 bits gives them (the step, 5e-6 m/s2, lies below the
 background noise), which MiniSEED stores without loss. Each station has random numbers of its own,
@@ -24,16 +24,16 @@ from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.files import written_whole
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation import stochastic
-from per_obspy.records.simulation.metadata import (
+from per_obspy.records.simulation.station_metadata import (
     CHANNELS,
     GAIN,
     NETWORK,
-    Place,
+    SimulatedStation,
     scenario_event,
     scenario_inventory,
 )
 
-#: P wave: faster than S by this factor, weaker by that one.
+#: P waves relative to S waves: velocity and amplitude.
 P_VELOCITY, P_AMPLITUDE = np.sqrt(3.0), 0.2
 
 
@@ -44,7 +44,7 @@ class Simulation(NamedTuple):
     Attributes
     ----------
     stream : Stream
-        Raw counts, three components a station.
+        Raw counts, three components per station.
     inventory : Inventory
         Station metadata with response.
     event : Event
@@ -68,21 +68,22 @@ def simulate(scenario: config.Scenario) -> Simulation:
     Returns
     -------
     simulation : Simulation
-        Raw counts (``GAIN`` a m/s2), inventory and event; the same bits for the same scenario.
+        Raw counts (``GAIN`` per m/s2), inventory and event; the same bits for the same scenario.
     """
-    places = [_place(scenario, number) for number in range(scenario.stations)]
-    inventory = scenario_inventory(scenario, places)
-    traces = [
-        trace
-        for number, place in enumerate(places)
-        for trace in _traces(scenario, number, place, inventory)
-    ]
-    return Simulation(Stream(traces), inventory, scenario_event(scenario))
+    stations = [_station(scenario, number) for number in range(scenario.stations)]
+    inventory = scenario_inventory(scenario, stations)
+    stream = Stream()
+    for number, station in enumerate(stations):
+        stream.extend(_records(scenario, number, station, inventory))
+    return Simulation(stream, inventory, scenario_event(scenario))
 
 
 def write_simulation(simulation: Simulation, folder: str | Path) -> None:
     """
-    Write one MiniSEED file a station, ``stations.xml`` (StationXML) and ``event.xml`` (QuakeML) into a folder.
+    Write a simulation into a folder.
+
+    It gets one MiniSEED file per station, ``stations.xml`` (StationXML) and ``event.xml``
+    (QuakeML).
 
     Parameters
     ----------
@@ -92,6 +93,7 @@ def write_simulation(simulation: Simulation, folder: str | Path) -> None:
         Made if it does not exist.
     """
     target = Path(folder)
+    # Whole counts, which Steim compression holds
     for code in sorted({trace.stats.station for trace in simulation.stream}):
         stream = simulation.stream.select(station=code).copy()
         for trace in stream:
@@ -101,9 +103,8 @@ def write_simulation(simulation: Simulation, folder: str | Path) -> None:
     with written_whole(target / "stations.xml") as part:
         simulation.inventory.write(part, format="STATIONXML")
     with written_whole(target / "event.xml") as part:
-        Catalog([simulation.event], resource_id=_catalog_id(simulation.event)).write(
-            part, format="QUAKEML"
-        )
+        catalog = Catalog([simulation.event], resource_id=_catalog_id(simulation.event))
+        catalog.write(part, format="QUAKEML")
 
 
 def _catalog_id(event: Event) -> ResourceIdentifier:
@@ -112,57 +113,73 @@ def _catalog_id(event: Event) -> ResourceIdentifier:
 
 
 def _random(scenario: config.Scenario, *key: int) -> np.random.Generator:
+    """Return the random numbers of a key, which no other key shares."""
     return np.random.default_rng([scenario.seed, *key])
 
 
-def _place(scenario: config.Scenario, number: int) -> Place:
-    """Spread stations evenly over the city by the R2 low-discrepancy sequence, which needs no number of stations."""
+def _station(scenario: config.Scenario, number: int) -> SimulatedStation:
+    """Return a station of the city; its number alone decides its place."""
+    latitude, longitude = _place(scenario, number)
+    from_lake, _, _ = gps2dist_azimuth(
+        latitude, longitude, scenario.lakebed_latitude, scenario.lakebed_longitude
+    )
+    # The frequency of the lakebed scatters from station to station
+    scatter = np.exp(scenario.lakebed_scatter * _random(scenario, number, 0).standard_normal())
+    lakebed = scenario.lakebed_frequency * scatter if from_lake < scenario.lakebed_radius else None
+    return SimulatedStation(f"S{number + 1:03d}", round(latitude, 5), round(longitude, 5), lakebed)
+
+
+def _place(scenario: config.Scenario, number: int) -> tuple[float, float]:
+    """
+    Return latitude and longitude of a station, degrees.
+
+    The R2 low-discrepancy sequence spreads stations evenly over the city, however many they are.
+    """
     plastic = 1.3247179572447458
     radius = scenario.city_radius * np.sqrt((0.5 + number / plastic) % 1.0)
     angle = 2.0 * np.pi * ((0.5 + number / plastic**2) % 1.0)
+    # North and east on the mean Earth
     latitude = scenario.city_latitude + _degrees(radius * np.cos(angle))
     east = _degrees(radius * np.sin(angle)) / np.cos(np.deg2rad(latitude))
     longitude = (scenario.city_longitude + east + 180.0) % 360.0 - 180.0
-    from_lake = gps2dist_azimuth(
-        latitude, longitude, scenario.lakebed_latitude, scenario.lakebed_longitude
-    )[0]
-    scatter = np.exp(scenario.lakebed_scatter * _random(scenario, number, 0).standard_normal())
-    lakebed = scenario.lakebed_frequency * scatter if from_lake < scenario.lakebed_radius else None
-    return Place(f"S{number + 1:03d}", round(latitude, 5), round(longitude, 5), lakebed)
+    return latitude, longitude
 
 
 def _degrees(metres: float) -> float:
     return metres / METRES_PER_DEGREE
 
 
-def _hypocentral(scenario: config.Scenario, place: Place) -> float:
-    epicentral = gps2dist_azimuth(
-        scenario.latitude, scenario.longitude, place.latitude, place.longitude
-    )[0]
+def _hypocentral(scenario: config.Scenario, station: SimulatedStation) -> float:
+    """Return the hypocentral distance of a station, m."""
+    epicentral, _, _ = gps2dist_azimuth(
+        scenario.latitude, scenario.longitude, station.latitude, station.longitude
+    )
     return float(np.hypot(epicentral, scenario.depth))
 
 
-def _traces(
-    scenario: config.Scenario, number: int, place: Place, inventory: Inventory
+def _records(
+    scenario: config.Scenario, number: int, station: SimulatedStation, inventory: Inventory
 ) -> list[Trace]:
-    distance = _hypocentral(scenario, place)
+    """Return the records of a station, counts; they begin before the P waves."""
+    distance = _hypocentral(scenario, station)
     p_wave = UTCDateTime(scenario.origin_time) + distance / (P_VELOCITY * scenario.shear_velocity)
     header = {
         "network": NETWORK,
-        "station": place.code,
+        "station": station.code,
         "delta": scenario.dt,
         "starttime": p_wave - scenario.pre_event,
     }
-    return [
-        with_metadata(Trace(np.rint(GAIN * samples), header | {"channel": channel}), inventory)
-        for channel, samples in zip(
-            CHANNELS, _acceleration(scenario, number, place, distance), strict=True
-        )
-    ]
+    # One trace per component
+    motion = _acceleration(scenario, number, station, distance)
+    traces = []
+    for channel, samples in zip(CHANNELS, motion, strict=True):
+        counts = Trace(np.rint(GAIN * samples), header | {"channel": channel})
+        traces.append(with_metadata(counts, inventory))
+    return traces
 
 
 def _acceleration(
-    scenario: config.Scenario, number: int, place: Place, hypocentral: float
+    scenario: config.Scenario, number: int, station: SimulatedStation, hypocentral: float
 ) -> FloatArray:
     """Return north, east and up in m/s2, (3, n_samples): background, P waves, S waves."""
     distance = stochastic.effective_distance(hypocentral, scenario.magnitude)
@@ -170,31 +187,39 @@ def _acceleration(
         scenario.magnitude, distance, scenario.stress_drop, scenario.shear_velocity
     )
     s_wave = scenario.pre_event + hypocentral / scenario.shear_velocity * (1.0 - 1.0 / P_VELOCITY)
-    ringing = (
-        0.0
-        if place.lakebed is None
-        else 10.0 / (2.0 * np.pi * place.lakebed * scenario.lakebed_damping)
-    )
-    n_samples = int(
-        np.ceil((s_wave + 2.5 * stochastic.WINDOW_STRETCH * shaking + ringing) / scenario.dt)
-    )
-    # as much again in zeros, so that what a filter leaves behind does not come round to the front
+    n_samples = _n_samples(scenario, station, s_wave, shaking)
+    # As many zeros again, so that the end of a filtered motion does not wrap round to its front
     n_padded = fft.next_fast_len(2 * n_samples, real=True)
-    spectra = _spectra(scenario, place, distance, n_padded)
+    spectra = _spectra(scenario, station, distance, n_padded)
+    window = stochastic.saragoni_hart_window(n_padded, scenario.dt, shaking)
+    # Background noise, then the two waves, each from noise of its own
     generator = _random(scenario, number, 1)
     motion = scenario.noise * generator.standard_normal((3, n_samples))
     for arrival, amplitude in ((scenario.pre_event, P_AMPLITUDE), (s_wave, 1.0)):
-        shape = _delayed(
-            stochastic.window(n_padded, scenario.dt, shaking), round(arrival / scenario.dt)
-        )
+        shape = _delayed(window, round(arrival / scenario.dt))
         noise = _correlated(generator.standard_normal((3, n_padded)), scenario.correlation)
-        motion += (
-            amplitude * stochastic.shaped_noise(noise, shape, spectra, scenario.dt)[:, :n_samples]
-        )
+        wave = stochastic.shaped_noise(noise, shape, spectra, scenario.dt)
+        motion += amplitude * wave[:, :n_samples]
     return motion
 
 
+def _n_samples(
+    scenario: config.Scenario, station: SimulatedStation, s_wave: float, shaking: float
+) -> int:
+    """Return the length of a record: S waves until their window ends, then the lakebed rings."""
+    lasts = s_wave + 2.5 * stochastic.WINDOW_STRETCH * shaking + _ringing(scenario, station)
+    return int(np.ceil(lasts / scenario.dt))
+
+
+def _ringing(scenario: config.Scenario, station: SimulatedStation) -> float:
+    """Return the time in which the lakebed under a station comes to rest, s; 0 on rock."""
+    if station.lakebed is None:
+        return 0.0
+    return 10.0 / (2.0 * np.pi * station.lakebed * scenario.lakebed_damping)
+
+
 def _delayed(shape: FloatArray, samples: int) -> FloatArray:
+    """Return a window that begins later, of the same length."""
     return np.concatenate([np.zeros(samples), shape[: shape.size - samples]])
 
 
@@ -205,7 +230,7 @@ def _correlated(noise: FloatArray, correlation: float) -> FloatArray:
 
 
 def _spectra(
-    scenario: config.Scenario, place: Place, distance: float, n_samples: int
+    scenario: config.Scenario, station: SimulatedStation, distance: float, n_samples: int
 ) -> NDArray[np.complex128]:
     """Return the Fourier spectra of north, east and up, m/s, (3, n_frequencies)."""
     frequency = fft.rfftfreq(n_samples, scenario.dt)
@@ -219,8 +244,9 @@ def _spectra(
     path = stochastic.path_spectrum(
         frequency, distance, scenario.shear_velocity, scenario.quality, scenario.quality_exponent
     )
+    # Rock, and for the horizontals of a station on it the lakebed
     rock = source * path * stochastic.rock_response(frequency, scenario.kappa)
     horizontal = rock.astype(np.complex128)
-    if place.lakebed is not None:
-        horizontal *= stochastic.kanai_tajimi(frequency, place.lakebed, scenario.lakebed_damping)
+    if station.lakebed is not None:
+        horizontal *= stochastic.kanai_tajimi(frequency, station.lakebed, scenario.lakebed_damping)
     return np.stack([horizontal, horizontal, scenario.vertical * rock])

@@ -1,8 +1,8 @@
 """
-Ground acceleration by the stochastic method: shaped noise with the spectrum of an omega-squared point source.
+Ground acceleration by the stochastic method.
 
-Every function works on one site; numbers are SI. Reference for all: Boore (2003), Pure Appl.
-Geophys. 160, 635-676.
+It is shaped noise with the spectrum of an omega-squared point source. Every function works on one
+site; numbers are SI. Reference for all: Boore (2003), Pure Appl. Geophys. 160, 635-676.
 """
 
 import numpy as np
@@ -15,8 +15,8 @@ from per_obspy.checks import FloatArray
 #: after eq. 6).
 RADIATION, FREE_SURFACE, PARTITION = 0.55, 2.0, 1.0 / np.sqrt(2.0)
 
-#: Distance at which spreading turns from 1/R (body waves) to 1/sqrt(R) (guided waves), m (Raoof and
-#: others 1999).
+#: Distance at which spreading turns from 1/R (body waves) to 1/sqrt(R) (guided waves), m
+#: (Raoof and others 1999).
 CROSSOVER = 40_000.0
 
 #: Path duration per distance, s/m (Boore 2003, western North America: 0.05 s/km).
@@ -26,28 +26,36 @@ PATH_DURATION = 5e-5
 ROCK_FREQUENCY = (0.01, 0.09, 0.16, 0.51, 0.84, 1.25, 2.26, 3.17, 6.05, 16.6, 61.2)
 ROCK_AMPLIFICATION = (1.00, 1.10, 1.18, 1.42, 1.58, 1.74, 2.06, 2.25, 2.58, 3.13, 4.00)
 
-#: Saragoni-Hart window: the peak at this fraction of its length, this much left at the end (Boore
-#: 2003, eq. 24-26).
+#: Saragoni-Hart window: place of its peak and height of its end, as fractions of its length and
+#: peak, and its length as a multiple of the duration (Boore 2003, eq. 24-26).
 WINDOW_PEAK, WINDOW_END, WINDOW_STRETCH = 0.2, 0.05, 2.0
 
 
 def seismic_moment(magnitude: float) -> float:
-    """Return the seismic moment in N m (Hanks & Kanamori 1979)."""
+    """Compute the seismic moment in N m (Hanks & Kanamori 1979)."""
     return float(10.0 ** (1.5 * magnitude + 9.05))
 
 
 def corner_frequency(magnitude: float, stress_drop: float, shear_velocity: float) -> float:
-    """Return Brune's corner frequency in Hz, ``0.49 beta (stress drop / M0)**(1/3)`` in SI (Boore 2003, eq. 4)."""
+    """
+    Compute Brune's corner frequency in Hz.
+
+    It is ``0.49 beta (stress drop / M0)**(1/3)`` in SI (Boore 2003, eq. 4).
+    """
     return float(0.49 * shear_velocity * (stress_drop / seismic_moment(magnitude)) ** (1.0 / 3.0))
 
 
 def effective_distance(hypocentral: float, magnitude: float) -> float:
-    """Return the distance in m with near-source saturation of an extended fault (Yenier & Atkinson 2015)."""
+    """
+    Compute the distance in m with near-source saturation of an extended fault.
+
+    Reference: Yenier & Atkinson (2015).
+    """
     return float(np.hypot(hypocentral, 1000.0 * 10.0 ** (-0.405 + 0.235 * magnitude)))
 
 
 def spreading(distance: float) -> float:
-    """Return the geometrical spreading, 1/m."""
+    """Compute the geometrical spreading, 1/m."""
     return 1.0 / distance if distance < CROSSOVER else 1.0 / np.sqrt(distance * CROSSOVER)
 
 
@@ -58,7 +66,11 @@ def source_spectrum(
     shear_velocity: float,
     density: float,
 ) -> FloatArray:
-    """Return the acceleration spectrum of the source times distance, m2/s (Boore 2003, eq. 3, 5, 6)."""
+    """
+    Compute the acceleration spectrum of the source times distance, m2/s.
+
+    Reference: Boore (2003), eq. 3, 5 and 6.
+    """
     constant = RADIATION * FREE_SURFACE * PARTITION / (4.0 * np.pi * density * shear_velocity**3)
     corner = corner_frequency(magnitude, stress_drop, shear_velocity)
     displacement = constant * seismic_moment(magnitude) / (1.0 + (frequency / corner) ** 2)
@@ -73,7 +85,11 @@ def path_spectrum(
     quality: float,
     quality_exponent: float,
 ) -> FloatArray:
-    """Return spreading and anelastic attenuation ``exp(-pi f R / (Q beta))``, 1/m (Boore 2003, eq. 8)."""
+    """
+    Compute spreading and anelastic attenuation ``exp(-pi f R / (Q beta))``, 1/m.
+
+    Reference: Boore (2003), eq. 8.
+    """
     factor = np.maximum(frequency, 1e-6) ** (1.0 - quality_exponent)
     path: FloatArray = spreading(distance) * np.exp(
         -np.pi * factor * distance / (quality * shear_velocity)
@@ -82,7 +98,7 @@ def path_spectrum(
 
 
 def rock_response(frequency: FloatArray, kappa: float) -> FloatArray:
-    """Return the amplification of generic rock and its diminution ``exp(-pi kappa f)``."""
+    """Compute the amplification of generic rock and its diminution ``exp(-pi kappa f)``."""
     amplification = np.interp(
         np.log(np.maximum(frequency, 1e-6)), np.log(ROCK_FREQUENCY), ROCK_AMPLIFICATION
     )
@@ -91,18 +107,22 @@ def rock_response(frequency: FloatArray, kappa: float) -> FloatArray:
 
 
 def kanai_tajimi(frequency: FloatArray, natural: float, damping: float) -> NDArray[np.complex128]:
-    """Return the complex, causal transfer function of a soft layer: absolute acceleration of a damped oscillator."""
+    """
+    Compute the complex, causal transfer function of a soft layer.
+
+    It is that of the absolute acceleration of a damped oscillator.
+    """
     ratio = frequency / natural
     return np.asarray((1.0 + 2j * damping * ratio) / (1.0 - ratio**2 + 2j * damping * ratio))
 
 
 def duration(magnitude: float, distance: float, stress_drop: float, shear_velocity: float) -> float:
-    """Return the duration of shaking in s: of the source, one over the corner frequency, and of the path."""
+    """Compute the duration of shaking in s: one over the corner frequency, and that of the path."""
     return 1.0 / corner_frequency(magnitude, stress_drop, shear_velocity) + PATH_DURATION * distance
 
 
-def window(n_samples: int, dt: float, shaking: float) -> FloatArray:
-    """Return the Saragoni-Hart window of a duration in s; its maximum is 1."""
+def saragoni_hart_window(n_samples: int, dt: float, shaking: float) -> FloatArray:
+    """Compute the Saragoni-Hart window of a duration in s; its maximum is 1."""
     power = -WINDOW_PEAK * np.log(WINDOW_END) / (1.0 + WINDOW_PEAK * (np.log(WINDOW_PEAK) - 1.0))
     time = np.arange(n_samples) * dt / (WINDOW_STRETCH * shaking)
     shape: FloatArray = (np.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time)
@@ -113,7 +133,7 @@ def shaped_noise(
     noise: FloatArray, shape: FloatArray, spectrum: NDArray[np.complex128], dt: float
 ) -> FloatArray:
     """
-    Return acceleration in m/s2 with the window's shape and, on average, the spectrum; one row a component.
+    Compute acceleration in m/s2 with the shape of a window and, on average, a spectrum.
 
     Parameters
     ----------
@@ -125,6 +145,11 @@ def shaped_noise(
         Fourier spectrum of the result at the frequencies of ``rfft``, m/s.
     dt : float
         Sampling interval, s.
+
+    Returns
+    -------
+    acceleration : (n_components, n_samples) ndarray
+        m/s2.
     """
     transform = fft.rfft(noise * shape)
     transform /= np.sqrt(np.mean(np.abs(transform) ** 2, axis=-1, keepdims=True))

@@ -4,21 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from obspy import UTCDateTime
 
-from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.lines import Text
 from per_obspy.formats.text.vocabulary import (
     channel_code,
     coordinates,
-    full_year,
     horizontal,
     orientation,
     trace,
-    utc,
 )
 
-TEXT = Text("some.file", ["first", "second"])
 AZIMUTHS = st.floats(0, 360, allow_nan=False)
 
 
@@ -47,9 +41,23 @@ def test_band_codes_of_seed(rate: float, band: str):
 
 @pytest.mark.parametrize(
     ("words", "azimuth"),
-    [("N21E", 21), ("S 16 E", 164), ("S05W", 185), ("N80W", 280), ("S90E", 90), ("N00E", 0), ("N90E", 90), ("360", 0),
-     ("360 Deg", 0), ("118 DEG", 118), ("NS", 0), ("WE", 90), ("West", 270), ("072.5", 72.5)],
-)  # fmt: skip
+    [
+        ("N21E", 21),
+        ("S 16 E", 164),
+        ("S05W", 185),
+        ("N80W", 280),
+        ("S90E", 90),
+        ("N00E", 0),
+        ("N90E", 90),
+        ("360", 0),
+        ("360 Deg", 0),
+        ("118 DEG", 118),
+        ("NS", 0),
+        ("WE", 90),
+        ("West", 270),
+        ("072.5", 72.5),
+    ],
+)
 def test_horizontal_directions(words: str, azimuth: float):
     assert orientation(words) == {"sensor_azimuth": azimuth, "sensor_dip": 0.0}
 
@@ -88,28 +96,3 @@ def test_words_that_are_unknown_are_left_out():
     assert stats.station == "A1"  # a station's code names files
     assert stats.instrument == {"model": "X"}
     assert not {"event", "coordinates", "header_peak"} & set(stats)
-
-
-def test_clocks_of_other_zones():
-    assert utc(TEXT, 0, "time", (2021, 4, 18), (7, 11, 30.5), 8) == UTCDateTime(
-        "2021-04-17T23:11:30.5"
-    )
-    assert utc(TEXT, 0, "time", (2019, 12, 31), (20, 0, 0), -8) == UTCDateTime(
-        "2020-01-01T04:00:00"
-    )
-
-
-@pytest.mark.parametrize(
-    ("year", "full"), [("33", 1933), ("99", 1999), ("00", 2000), ("32", 2032), ("1906", 1906)]
-)
-def test_two_digits_of_a_year(year: str, full: int):
-    assert full_year(year) == full
-
-
-@pytest.mark.parametrize(
-    "date",
-    [(2020, 2, 30), (1899, 1, 1), (2100, 1, 1), (2020, 13, 1), (2020, 0, 1), (2020, 1, 10**12)],
-)
-def test_impossible_dates_are_refused(date: tuple[int, ...]):
-    with pytest.raises(RecordRejected, match=r"some\.file: line 2, time: "):
-        utc(TEXT, 1, "time", date)

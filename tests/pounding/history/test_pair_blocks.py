@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from per_obspy.kernels.pounding_lanes.lanes import LANES
+from per_obspy.kernels.pounding_lanes.lanes import PAIR_LANES
 from per_obspy.pounding.history.pair_blocks import (
     CACHE_LINE,
     CHECKS,
@@ -74,7 +74,7 @@ def test_every_pair_is_in_one_block_with_its_equals(parts):
     blocks = pair_blocks(parts)
     members = [index for block in blocks for index in block]
     assert sorted(members) == list(range(parts.size))
-    assert all(len(block) <= LANES and len(set(parts[block])) == 1 for block in blocks)
+    assert all(len(block) <= PAIR_LANES and len(set(parts[block])) == 1 for block in blocks)
 
 
 def test_the_stiffer_structure_decides_on_steps_the_softer_on_free_vibration():

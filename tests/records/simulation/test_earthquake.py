@@ -12,7 +12,7 @@ from scipy import signal
 from per_obspy.config import Scenario
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
-from per_obspy.records.simulation.metadata import GAIN
+from per_obspy.records.simulation.station_metadata import GAIN
 
 GRAVITY = 9.80665
 #: epicentre 33 km west of a city of 12 km radius, half of it on the lakebed
@@ -31,9 +31,10 @@ def _peak(simulation, station, channel="HNE"):
 def _sa(
     acceleration: np.ndarray, dt: float, periods: np.ndarray, damping: float = 0.05
 ) -> np.ndarray:
-    """Absolute acceleration of oscillators, discretised by SciPy: no code in common with the package."""
+    """Compute absolute acceleration of oscillators with SciPy, independent of the package."""
     peaks = []
     for omega in 2 * np.pi / periods:
+        # (2 xi w s + w^2) / (s^2 + 2 xi w s + w^2), exact for motion linear between samples
         continuous = [2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2]
         numerator, denominator, _ = signal.cont2discrete(continuous, dt, method="foh")
         peaks.append(np.abs(signal.lfilter(numerator.ravel(), denominator, acceleration)).max())
@@ -45,9 +46,9 @@ def _soils(simulation):
 
 
 def test_the_same_scenario_gives_the_same_bits(simulation):
-    for one, other in zip(simulation.stream, simulate(SCENARIO).stream, strict=True):
-        assert_array_equal(one.data, other.data)
-        assert one.stats.starttime == other.stats.starttime
+    for trace, repeated in zip(simulation.stream, simulate(SCENARIO).stream, strict=True):
+        assert_array_equal(trace.data, repeated.data)
+        assert trace.stats.starttime == repeated.stats.starttime
 
 
 def test_no_station_depends_on_another(simulation):
@@ -70,20 +71,26 @@ def test_everything_says_that_it_is_simulated(simulation):
     assert "simulated" in simulation.event.event_descriptions[0].text
 
 
-def test_written_files_are_what_others_read(simulation, tmp_path):
+def test_written_files_are_found(simulation, tmp_path):
     write_simulation(simulation, tmp_path)
     contents = find_stations(tmp_path)
     assert contents.rejected == ()
     assert sorted(contents.stations) == [f"XX.S{number:03d}" for number in range(1, 9)]
+    (event,) = obspy.read_events(tmp_path / "event.xml")
+    assert event.preferred_magnitude().mag == 7.0
+
+
+def test_written_files_are_what_others_read(simulation, tmp_path):
+    write_simulation(simulation, tmp_path)
+    contents = find_stations(tmp_path)
     stream, rejected = read_station(contents.stations["XX.S002"], contents.inventory)
-    assert rejected == ()
+    assert (len(stream), rejected) == (3, ())
+    # Samples without loss, place and unit
     for trace in stream:
         source = simulation.stream.select(id=trace.id)[0]
         assert_array_equal(trace.data, source.data)
         assert trace.stats.coordinates == source.stats.coordinates
         assert trace.stats.units == source.stats.units == "counts"
-    (event,) = obspy.read_events(tmp_path / "event.xml")
-    assert event.preferred_magnitude().mag == 7.0
 
 
 def test_files_are_the_same_in_every_run(simulation, tmp_path):

@@ -1,4 +1,4 @@
-"""The records and the metadata of one station, from the first of several FDSN services that has them."""
+"""Download of one station: records and metadata from the first of several FDSN services."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,12 +10,13 @@ from per_obspy.errors import RecordRejected, ServiceError
 from per_obspy.files import written_whole
 from per_obspy.records.fdsn.request import Wanted, channel_parameters
 from per_obspy.records.fdsn.web import RequestTooLarge, answer, host
-from per_obspy.records.obspy_readers import foreign_bytes
+from per_obspy.records.folder import station_name
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 
 class Offer(NamedTuple):
     """
-    What a service says that it has of a station.
+    The channels of a station that a service lists.
 
     Attributes
     ----------
@@ -31,17 +32,16 @@ class Offer(NamedTuple):
 
 class Outcome(NamedTuple):
     """
-    What became of a station.
+    Outcome of the download of a station.
 
     Attributes
     ----------
     station : str
         ``"NET.STA"``.
     reasons : tuple of str
-        Why it is not in the cache, one of each service; empty if it is.
+        Why it is not in the cache, one per service; empty if it is.
     lasting : bool
-        Whether there is nothing to be gained by asking again: every service said that it has no
-        data.
+        Whether another attempt would be useless: every service answered that it has no data.
     """
 
     station: str
@@ -53,7 +53,9 @@ def fetch_station(
     pool: urllib3.PoolManager, wanted: Wanted, folder: Path, station: str, offers: list[Offer]
 ) -> Outcome:
     """
-    Bring a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``; what is there is not asked for again.
+    Download a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``.
+
+    A file that exists is not requested again.
 
     Parameters
     ----------
@@ -69,6 +71,7 @@ def fetch_station(
         In order of preference.
     """
     reasons, lasting = [], True
+    # The next service is tried only where one fails
     for offer in offers:
         try:
             _fetch_records(pool, wanted, folder / f"{station}.mseed", offer)
@@ -84,55 +87,61 @@ def fetch_station(
 
 
 class _NoData(ServiceError):
-    """A service answered that it has nothing (204)."""
+    """A service answered that it has no data (204)."""
 
 
 def _fetch_records(pool: urllib3.PoolManager, wanted: Wanted, path: Path, offer: Offer) -> None:
+    """Download the records of a station unless they are there."""
     if path.is_file():
         return
     url = f"{offer.base}/fdsnws/dataselect/1/query"
-    parameters = _parameters(wanted, path.stem)
-    try:
-        content = answer(pool, url, parameters)
-    except RequestTooLarge:
-        each = [
-            {"location": location or "--", "channel": channel}
-            for location, channel in offer.channels
-        ]
-        content = b"".join(answer(pool, url, parameters | one) for one in each)
+    content = _records(pool, url, _parameters(wanted, path.stem), offer)
     if not content:
         raise _NoData(f"{host(url)} has no data of the window")
-    traces = foreign_bytes(obspy.read, content, url, format="MSEED")
-    if surplus := len(content) % min(trace.stats.mseed.record_length for trace in traces):
-        raise RecordRejected(
-            url, f"the answer is cut: its last MiniSEED record has {surplus} bytes"
-        )
-    _check(url, path.stem, {f"{trace.stats.network}.{trace.stats.station}" for trace in traces})
+    # A cut answer ends within a MiniSEED record
+    traces = read_bytes_with_obspy(obspy.read, content, url, format="MSEED")
+    record_length = min(trace.stats.mseed.record_length for trace in traces)
+    if surplus := len(content) % record_length:
+        problem = f"the answer is cut: its last MiniSEED record has {surplus} bytes"
+        raise RecordRejected(url, problem)
+    _check(url, path.stem, {station_name(trace) for trace in traces})
     _write(path, content)
 
 
+def _records(
+    pool: urllib3.PoolManager, url: str, parameters: dict[str, str], offer: Offer
+) -> bytes:
+    """Return the records of a station, channel by channel if all at once are too many."""
+    try:
+        return answer(pool, url, parameters)
+    except RequestTooLarge:
+        each = [{"location": code or "--", "channel": channel} for code, channel in offer.channels]
+        return b"".join(answer(pool, url, parameters | codes) for codes in each)
+
+
 def _fetch_metadata(pool: urllib3.PoolManager, wanted: Wanted, path: Path, offer: Offer) -> None:
+    """Download the metadata of a station unless they are there."""
     if path.is_file():
         return
     url = f"{offer.base}/fdsnws/station/1/query"
     content = answer(pool, url, _parameters(wanted, path.stem) | {"level": "response"})
     if not content:
         raise _NoData(f"{host(url)} has no metadata of the window")
-    inventory = foreign_bytes(obspy.read_inventory, content, url, format="STATIONXML")
-    _check(
-        url,
-        path.stem,
-        {f"{network.code}.{station.code}" for network in inventory for station in network},
-    )
+    inventory = read_bytes_with_obspy(obspy.read_inventory, content, url, format="STATIONXML")
+    # An answer for another station must not enter the cache under this name
+    found = {f"{network.code}.{station.code}" for network in inventory for station in network}
+    _check(url, path.stem, found)
     _write(path, content)
 
 
 def _parameters(wanted: Wanted, station: str) -> dict[str, str]:
+    """Return the parameters of a request for one station."""
     network, code = station.split(".", 1)
     return {"network": network, "station": code} | channel_parameters(wanted)
 
 
 def _check(url: str, station: str, found: set[str]) -> None:
+    """Refuse an answer that does not hold exactly the station of the request."""
     if found != {station}:
         raise RecordRejected(
             url, f"answers with {', '.join(sorted(found)) or 'nothing'} instead of {station}"

@@ -1,4 +1,4 @@
-"""Metadata of a simulated event: stations and event, each saying that it is simulated."""
+"""Metadata of a simulated event: stations and event, each marked as simulated."""
 
 from typing import NamedTuple
 
@@ -27,8 +27,19 @@ GAIN = 2.0e5
 CHANNELS = {"HNN": (0.0, 0.0), "HNE": (90.0, 0.0), "HNZ": (0.0, -90.0)}
 
 
-class Place(NamedTuple):
-    """A station of the scenario: code, degrees north and east, Hz of its lakebed filter (None on rock)."""
+class SimulatedStation(NamedTuple):
+    """
+    A station of the scenario.
+
+    Attributes
+    ----------
+    code : str
+        Station code.
+    latitude, longitude : float
+        Degrees.
+    lakebed : float or None
+        Frequency of the lakebed under it, Hz; None on rock.
+    """
 
     code: str
     latitude: float
@@ -36,11 +47,11 @@ class Place(NamedTuple):
     lakebed: float | None
 
 
-def scenario_inventory(scenario: config.Scenario, places: list[Place]) -> Inventory:
-    """Return the stations with a flat response and, in ``geology`` and a comment, what they stand on."""
+def scenario_inventory(scenario: config.Scenario, stations: list[SimulatedStation]) -> Inventory:
+    """Return the stations with a flat response; their ground is in ``geology`` and a comment."""
     network = Network(
         NETWORK,
-        stations=[_station(scenario, place) for place in places],
+        stations=[_station(scenario, station) for station in stations],
         description=NOTICE,
         comments=[StationComment(NOTICE)],
     )
@@ -49,27 +60,37 @@ def scenario_inventory(scenario: config.Scenario, places: list[Place]) -> Invent
     )
 
 
-def _station(scenario: config.Scenario, place: Place) -> Station:
-    soil = "rock" if place.lakebed is None else "lakebed"
-    where = {"latitude": place.latitude, "longitude": place.longitude, "elevation": 0.0}
-    channels = [
-        Channel(
+def _station(scenario: config.Scenario, station: SimulatedStation) -> Station:
+    """Return the metadata of a station."""
+    soil = "rock" if station.lakebed is None else "lakebed"
+    place = {"latitude": station.latitude, "longitude": station.longitude, "elevation": 0.0}
+    # The records module reads the site class from a comment
+    return Station(
+        station.code,
+        **place,
+        channels=_channels(place, 1.0 / scenario.dt),
+        site=Site(f"simulated station {station.code} on {soil}"),
+        geology=soil,
+        comments=[StationComment(NOTICE), StationComment(f"site_class={soil}")],
+    )
+
+
+def _channels(place: dict[str, float], sampling_rate: float) -> list[Channel]:
+    """Return three components at one place."""
+    channels = []
+    for code, (azimuth, dip) in CHANNELS.items():
+        channel = Channel(
             code,
             "",
-            **where,
+            **place,
             depth=0.0,
             azimuth=azimuth,
             dip=dip,
-            sample_rate=1.0 / scenario.dt,
+            sample_rate=sampling_rate,
             response=_response(),
         )
-        for code, (azimuth, dip) in CHANNELS.items()
-    ]
-    site = Site(f"simulated station {place.code} on {soil}")
-    comments = [StationComment(NOTICE), StationComment(f"site_class={soil}")]
-    return Station(
-        place.code, **where, channels=channels, site=site, geology=soil, comments=comments
-    )
+        channels.append(channel)
+    return channels
 
 
 def _response() -> Response:
@@ -78,7 +99,7 @@ def _response() -> Response:
 
 
 def scenario_event(scenario: config.Scenario) -> Event:
-    """Return the event; its identifiers depend on the seed alone, where ObsPy's own would be random."""
+    """Return the event; its identifiers depend on the seed, where ObsPy's own would be random."""
     base = f"smi:local/per_obspy/simulated/{scenario.seed}"
     created = CreationInfo(
         agency_id="per_obspy", author="simulated", creation_time=UTCDateTime(scenario.origin_time)
@@ -98,6 +119,7 @@ def scenario_event(scenario: config.Scenario) -> Event:
         origin_id=origin.resource_id,
         creation_info=created,
     )
+    # The origin and the magnitude, each preferred
     return Event(
         resource_id=ResourceIdentifier(f"{base}/event"),
         event_descriptions=[EventDescription(f"{scenario.name} (simulated)", "earthquake name")],

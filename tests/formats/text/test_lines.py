@@ -1,0 +1,134 @@
+"""
+Lines, number fields and blocks of text files.
+
+Covers ``per_obspy.formats.text.lines`` and the blocks built on it:
+``per_obspy.formats.text.film`` and ``per_obspy.formats.text.number_blocks``.
+"""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from sample_file import MOTION, block, film
+
+from per_obspy.errors import RecordRejected
+from per_obspy.formats.text.film import film_lines, read_film
+from per_obspy.formats.text.lines import (
+    Text,
+    block_lines,
+    count,
+    fixed_block,
+    free_block,
+    head,
+    interval,
+    line_at,
+    read_text,
+)
+from per_obspy.formats.text.number_blocks import is_title, titled_block
+
+THOUSANDTHS = st.integers(-99_999, 999_999)
+
+
+def text_of(content: str) -> Text:
+    return Text("some.file", content.split("\n"))
+
+
+@given(st.lists(THOUSANDTHS, min_size=1, max_size=30), st.integers(1, 8))
+def test_blocks_in_columns_are_read_as_written(thousandths: list[int], per_line: int):
+    # numbers of seven characters touch: would catch splitting at blanks
+    values = np.array(thousandths) / 1000
+    text = text_of(block(values, "%7.3f", per_line))
+    assert len(text.lines) == block_lines(len(values), per_line)
+    assert_array_equal(fixed_block(text, 0, len(values), 7, per_line), values)
+
+
+@given(st.lists(THOUSANDTHS, min_size=1, max_size=30), st.integers(1, 8))
+def test_free_blocks_do_not_depend_on_their_lines(thousandths: list[int], per_line: int):
+    values = np.array(thousandths) / 1000
+    text = text_of(block(values, " %.3f", per_line))
+    assert_array_equal(free_block(text, 0, None, len(values)), values)
+
+
+@pytest.mark.parametrize(
+    ("content", "samples", "message"),
+    [
+        (
+            "  1.0  2.0\n  3.0",
+            5,
+            "line 3, samples: the header promises 5 on 3 lines, the file ends",
+        ),
+        ("  1.0  2.0\n  x.0", 3, r"line 2, sample 3: '  x\.0' is not a number"),
+        ("  1.0\n  3.0", 3, "line 1, samples: 1 numbers instead of 2 of the 3"),
+        ("  1.0  2.0  3.0\n  3.0", 3, "line 1, samples: 15 characters, the format has 10"),
+        ("  1.0  2.0\n  3.0  4.0", 3, "line 2, samples: 2 numbers instead of 1 of the 3"),
+    ],
+)
+def test_faults_of_a_block_are_named(content: str, samples: int, message: str):
+    with pytest.raises(RecordRejected, match=f"some.file: {message}"):
+        fixed_block(text_of(content), 0, samples, 5, 2)
+
+
+def test_a_free_block_must_hold_what_is_promised():
+    with pytest.raises(RecordRejected, match="line 2, samples: the header promises 4, the file"):
+        free_block(text_of("1 2\n3"), 0, None, 4)
+    with pytest.raises(RecordRejected, match="line 1, samples: none"):
+        free_block(text_of(""), 0, None, 4)
+
+
+@pytest.mark.parametrize("word", ["0", "-3", "2.5", "nan", "1_000", "", "1e400"])
+def test_what_counts_nothing_is_refused(word: str):
+    with pytest.raises(RecordRejected, match=r"some\.file: line 3, points: "):
+        count(text_of(""), 2, "points", word)
+
+
+@pytest.mark.parametrize("value", ["0", "-0.01", "1e6", "1e-6", 0.0, float("nan")])
+def test_implausible_intervals_are_refused(value: str | float):
+    with pytest.raises(RecordRejected, match="must be positive and plausible"):
+        interval(text_of(""), 0, "interval", value)
+
+
+def test_missing_lines_are_named():
+    with pytest.raises(RecordRejected, match="line 3, unit: missing, the file ends after 2 lines"):
+        line_at(text_of("a\nb"), 2, "unit")
+
+
+def test_any_line_end_and_any_byte_can_be_read():
+    assert read_text(io.BytesIO(b"a\r\nb\rc\nd\r\r\n\xff\x1a")).lines == [
+        "a",
+        "b",
+        "c",
+        "d",
+        "\xff",
+    ]
+    assert head(io.BytesIO(b"abc"), 2) == b"ab"
+    assert head("no such file", 2) == b""
+
+
+def test_film_gives_values_and_their_mean_interval():
+    text = text_of(film(MOTION, 0.02))
+    values, dt = read_film(text, 0, len(MOTION))
+    assert film_lines(len(MOTION)) == len(text.lines)
+    # times and values are written to three decimals
+    assert_allclose(values, np.round(MOTION, 3), rtol=1e-15)
+    assert dt == pytest.approx(0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [1.0, 0.0, -0.5])
+def test_film_that_runs_back_or_away_is_refused(wrong: float):
+    # would catch a check of single steps only, or of the drift only
+    text = text_of(film(MOTION, 0.02).replace("  0.100", f"{wrong:7.3f}"))
+    with pytest.raises(RecordRejected, match=r"line 2, time [67]: .* breaks the mean interval"):
+        read_film(text, 0, len(MOTION))
+
+
+@pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
+def test_a_title_announces_interval_or_rate(spacing: str):
+    title = f" {len(MOTION)} points of accel data {spacing}, in cm/sec2. (8f10.6)"
+    text = text_of(f"{title}\n{block(MOTION, '%10.6f', 8)}\nnext")
+    assert is_title(title)
+    values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
+    assert_array_equal(values, MOTION)
+    assert (dt, text.lines[line]) == (0.01, "next")

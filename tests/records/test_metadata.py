@@ -1,0 +1,200 @@
+"""Metadata of records from StationXML and station text."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from obspy import UTCDateTime
+from obspy.core.inventory import Comment, Inventory, Response
+from station_files import (
+    THREE,
+    inventory,
+    read_all,
+    record,
+    response,
+    write_inventory,
+    write_records,
+)
+
+from per_obspy.records.folder import find_stations, read_station
+from per_obspy.records.metadata import metadata_text
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_records(tmp_path)
+    return tmp_path
+
+
+def commented(*comments: str) -> Inventory:
+    """Return the metadata of a station with comments."""
+    metadata = inventory(THREE)
+    metadata[0][0].comments = [Comment(comment) for comment in comments]
+    return metadata
+
+
+def test_records_get_orientation_coordinates_and_response(folder: Path):
+    traces, reasons = read_all(folder)
+    assert reasons == ()
+    assert [trace.stats.get("sensor_azimuth") for trace in traces] == [30, 120, None]
+    assert [trace.stats.sensor_dip for trace in traces] == [0, 0, -90]
+    # The words of each of them
+    for trace in traces:
+        words = (trace.stats.units, trace.stats.quantity, trace.stats.processing_level)
+        assert words == ("counts", "acceleration", "raw")
+        assert trace.stats.coordinates == {"latitude": 35, "longitude": -117, "elevation": 700}
+        assert trace.stats.response.instrument_sensitivity.value == 2e5
+        assert trace.data.dtype == np.float64
+
+
+def test_comments_of_the_station_hold_its_ground(folder: Path):
+    write_inventory(commented("a park", "site_class = lakebed", "vs30=180.5"), folder)
+    traces, _ = read_all(folder)
+    assert {(trace.stats.site_class, trace.stats.vs30) for trace in traces} == {("lakebed", 180.5)}
+    write_inventory(commented("site_class="), folder)
+    for trace in read_all(folder)[0]:
+        assert not {"site_class", "vs30"} & set(trace.stats)
+
+
+@pytest.mark.parametrize("velocity", ["soft", "-200", "0", "nan", "inf", "1e5"])
+def test_a_vs30_that_is_no_velocity_is_a_reason(folder: Path, velocity: str):
+    write_inventory(commented(f"vs30={velocity}"), folder)
+    traces, reasons = read_all(folder)
+    assert not traces
+    assert set(reasons) == {f"StationXML says vs30={velocity}, which is no velocity in m/s"}
+
+
+def test_without_stationxml_raw_records_are_rejected_with_a_reason(folder: Path):
+    (folder / "station.xml").unlink()
+    traces, reasons = read_all(folder)
+    assert not traces
+    assert set(reasons) == {"there is no StationXML, so what its samples measure is unknown"}
+
+
+def test_a_channel_that_stationxml_lacks_is_one_rejection(folder: Path):
+    write_inventory(inventory({code: THREE[code] for code in ("HN1", "HNZ")}), folder)
+    traces, reasons = read_all(folder)
+    assert [trace.stats.channel for trace in traces] == ["HN1", "HNZ"]
+    assert len(reasons) == 1
+    assert reasons[0].startswith("StationXML has no channel CI.CLC..HN2 at 2020-01-02T03:04:05")
+
+
+def test_the_epoch_of_the_record_decides(folder: Path):
+    begin, change = UTCDateTime(2000, 1, 1), UTCDateTime(2010, 1, 1)
+    old = inventory(THREE, latitude=10.0, start_date=begin, end_date=change)
+    new = inventory(THREE, latitude=36.0, start_date=change)
+    write_inventory(old + new, folder)
+    assert {trace.stats.coordinates.latitude for trace in read_all(folder)[0]} == {36}
+
+
+def test_stationxml_that_contradicts_itself_is_a_reason(folder: Path):
+    write_inventory(inventory(THREE, latitude=36.0), folder, "other.xml")
+    traces, reasons = read_all(folder)
+    assert not traces
+    assert "contradicts itself about the channel" in reasons[0]
+    assert "latitude 36.0 and 35.0" in reasons[0]
+
+
+def test_the_same_stationxml_twice_is_no_contradiction(folder: Path):
+    write_inventory(inventory(THREE), folder, "other.xml")
+    assert len(read_all(folder)[0]) == 3
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (response("PA"), "StationXML says that the instrument measures 'PA', not ground motion"),
+        (Response(), "StationXML gives no sensitivity at 2020"),
+    ],
+)
+def test_a_response_that_gives_no_motion_is_a_reason(folder: Path, answer: Response, reason: str):
+    write_inventory(inventory(THREE, answer=answer), folder)
+    traces, reasons = read_all(folder)
+    assert not traces
+    assert len(reasons) == 3
+    assert all(found.startswith(reason) for found in reasons)
+
+
+def test_samples_that_are_not_numbers_are_a_reason(folder: Path):
+    samples = np.ones(300)
+    samples[[16, 20]] = np.nan, np.inf
+    record("HN1", samples).write(str(folder / "deep" / "er" / "HN1.mseed"), format="MSEED")
+    traces, reasons = read_all(folder)
+    assert len(traces) == 2
+    assert reasons == ("2 samples are not finite, the first is sample 17",)
+
+
+def test_a_vertical_channel_without_dip_points_up(folder: Path):
+    metadata = inventory(THREE)
+    for channel in metadata[0][0]:
+        channel.dip = None
+    write_inventory(metadata, folder)
+    traces, reasons = read_all(folder)
+    assert reasons == ()
+    assert [trace.stats.get("sensor_azimuth") for trace in traces] == [30, 120, None]
+    assert [trace.stats.sensor_dip for trace in traces] == [0, 0, -90]  # SEED: Z is vertical
+
+
+def test_the_text_of_metadata_does_not_depend_on_time_or_source():
+    metadata = inventory(THREE)
+    text = metadata_text(metadata)
+    metadata.created, metadata.source = UTCDateTime(1999, 1, 1), "elsewhere"
+    assert metadata_text(metadata) == text
+    # but on the metadata themselves
+    assert metadata_text(inventory(THREE, latitude=36.0)) != text
+
+
+@pytest.mark.real_data
+def test_knet_counts_keep_their_gain(real_data: Path):
+    contents = find_stations(real_data / "records" / "aomori2018_knet")
+    assert len(contents.stations) == 9
+    for paths in contents.stations.values():
+        stream, rejected = read_station(paths, None)
+        assert (len(stream), rejected) == (3, ())
+        assert {trace.stats.get("sensor_azimuth") for trace in stream} == {0, 90, None}
+        # Counts, whose header has the peak about the mean, to 0.001 gal
+        for trace in stream:
+            assert trace.stats.units == "counts"
+            assert trace.stats.coordinates.latitude == pytest.approx(41, abs=1)
+            peak = np.abs(trace.data - trace.data.mean()).max() * trace.stats.calib
+            header_peak = trace.stats.header_peak * trace.stats.calib
+            assert peak == pytest.approx(header_peak, abs=2e-5)
+
+
+STATION_TEXT = """#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime
+|ANGOL|-37.79|-72.71|100.0|Angol Hospital|1970-01-01T00:00:00|
+"""
+
+
+@pytest.fixture
+def angol(real_data: Path, tmp_path: Path) -> Path:
+    """Return a folder with a real record whose coordinates are 0, 0: a mark for unknown."""
+    folder = tmp_path / "records"
+    folder.mkdir()
+    source = real_data / "records" / "maule2010_renadic" / "angol1002271parte1.v1"
+    (folder / "angol.v1").write_bytes(source.read_bytes())
+    return folder
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("same_folder", [True, False])
+def test_station_text_gives_the_coordinates_that_renadic_leaves_out(
+    angol: Path, tmp_path: Path, same_folder: bool
+):
+    text = (angol if same_folder else tmp_path) / "stations.txt"
+    text.write_text(STATION_TEXT)
+    contents = find_stations(angol, None if same_folder else text)
+    assert contents.rejected == ()
+    stream, rejected = read_station(contents.stations[".ANGOL"], contents.inventory, ".ANGOL")
+    # The station's place, and the file's own directions
+    assert rejected == ()
+    assert [trace.stats.coordinates.latitude for trace in stream] == [-37.79] * 3
+    assert [trace.stats.get("sensor_azimuth") for trace in stream] == [90, 0, None]
+
+
+@pytest.mark.real_data
+def test_unknown_coordinates_stay_absent(angol: Path):
+    paths = find_stations(angol).stations[".ANGOL"]
+    stream, rejected = read_station(paths, None, ".ANGOL")
+    assert (len(stream), rejected) == (3, ())
+    assert not any("coordinates" in trace.stats for trace in stream)
