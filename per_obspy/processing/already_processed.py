@@ -9,12 +9,12 @@ from per_obspy.processing.filter.corners import (
     Corner,
     clean_corner,
     lowest_highpass,
+    usable_periods_noted,
 )
 from per_obspy.processing.notes import noted, remembered
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import judged
 from per_obspy.processing.quality.raw_checks import header_findings
-from per_obspy.processing.usable_periods import usable_periods_noted
 
 
 def passed_through(stream: Stream, settings: Processing) -> Stream:

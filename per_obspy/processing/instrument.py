@@ -9,9 +9,9 @@ from obspy.core import AttribDict
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
 from per_obspy.processing.already_processed import passed_through
-from per_obspy.processing.filter.automatic import corners_noted, offset_kept
+from per_obspy.processing.filter.baseline_and_corners import corners_noted, offset_kept
 from per_obspy.processing.filter.butterworth import filtered, padded
-from per_obspy.processing.filter.corners import corners_shared
+from per_obspy.processing.filter.corners import corners_shared, usable_periods_noted
 from per_obspy.processing.instrument_response import in_acceleration
 from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
 from per_obspy.processing.notes import is_processed
@@ -19,7 +19,6 @@ from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import Finding, judged, surviving
 from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
 from per_obspy.processing.station.components import is_horizontal, paired
-from per_obspy.processing.usable_periods import usable_periods_noted
 
 Step = Callable[[Stream], Stream]
 

@@ -11,8 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.copying import copied
-from per_obspy.processing.notes import noted
+from per_obspy.processing.notes import copied, noted
 
 ACCELERATION_UNITS = ("M/S**2", "M/S^2", "M/S/S", "M/SEC**2", "M/(S**2)")
 VELOCITY_UNITS = ("M/S", "M/SEC")

@@ -8,8 +8,7 @@ from obspy import Stream, Trace
 
 from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import Rejection
-from per_obspy.processing.copying import copied
-from per_obspy.processing.notes import is_processed, rejection, remembered
+from per_obspy.processing.notes import copied, is_processed, rejection, remembered
 
 PREFERENCE = ("HN", "BN", "HH", "BH")  # accelerometers before velocity sensors, fast before slow
 

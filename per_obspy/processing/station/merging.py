@@ -7,8 +7,7 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.copying import copied
-from per_obspy.processing.notes import is_processed
+from per_obspy.processing.notes import copied, is_processed
 from per_obspy.processing.quality.findings import surviving
 from per_obspy.processing.station.splicing import spliced
 

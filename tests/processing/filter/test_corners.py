@@ -10,6 +10,7 @@ from per_obspy.processing.filter.corners import (
     fallback_highpass,
     highest_corner,
     lowest_highpass,
+    usable_periods_noted,
 )
 
 TABLE = Processing().fallback_highpass
@@ -53,3 +54,12 @@ def test_limits_from_length_and_sampling():
 def test_the_reason_says_what_decided():
     clean = clean_corner(trace(), lowest_highpass(trace()), 0.5, 0.02, 5)
     assert clean.reason == "one cycle in the record"
+
+
+@pytest.mark.parametrize(("lowpass", "dt", "shortest"), [(25.0, 0.001, 0.05), (25.0, 0.02, 0.1)])
+def test_usable_periods_stay_inside_corners_and_sampling(lowpass, dt, shortest):
+    trace = Trace(header={"delta": dt, "per_obspy": AttribDict(highpass=0.1, lowpass=lowpass)})
+    out = usable_periods_noted(Stream([trace]), usable=0.8)[0].stats.per_obspy
+    assert out.longest_period == pytest.approx(8.0)
+    assert out.shortest_period == pytest.approx(shortest)
+    assert "longest_period" not in trace.stats.per_obspy

@@ -5,7 +5,7 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Check, Checks, Processing
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.filter.automatic import corners_noted
+from per_obspy.processing.filter.baseline_and_corners import corners_noted
 
 RATE = 100.0
 SETTINGS = Processing()

@@ -3,7 +3,7 @@ from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Response
 
-from per_obspy.processing.copying import copied
+from per_obspy.processing.notes import copied
 
 
 def test_a_copy_is_equal_and_shares_nothing_but_the_response():
