@@ -72,7 +72,7 @@ def find_pairs(
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.pairs import pairs_from_footprints
+    from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
     from per_obspy.tables.writing import write_rejected
 
     table = pairs_from_footprints(footprints, distance, layer, gap_std)
@@ -108,7 +108,7 @@ def check_pairs(
     Example: per-obspy pairs check pairs.csv
     """
     from per_obspy.inventory.files.reading import read_pairs
-    from per_obspy.inventory.profile import (
+    from per_obspy.inventory.table_checks import (
         derived_counts,
         inventory_profile,
         suspicions,
@@ -137,7 +137,7 @@ def check_pairs(
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
     """Print the first rejected rows, and where there are more, how many were rejected for what."""
-    from per_obspy.inventory.profile import faults_by_column
+    from per_obspy.inventory.table_checks import faults_by_column
 
     for one in rejected[:SHOWN]:
         print(f"  line {one.row}, {one.name}: {'; '.join(one.reasons)}")

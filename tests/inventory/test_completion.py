@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from per_obspy import asce7_period, ec8_period
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.inventory.contact import contact_participation
+from per_obspy.inventory.contact_height import contact_participation
 from per_obspy.inventory.schema import COLUMNS, COMPLETED
 
 PLACE = {

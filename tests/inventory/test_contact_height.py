@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.inventory.contact import (
+from per_obspy.inventory.contact_height import (
     contact_mass,
     contact_participation,
     floor_offset,

@@ -5,7 +5,7 @@ import pandas as pd
 
 from per_obspy.errors import Rejection
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.inventory.profile import (
+from per_obspy.inventory.table_checks import (
     derived_counts,
     faults_by_column,
     inventory_profile,

@@ -10,13 +10,13 @@ import shapely
 
 from per_obspy import checks
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.checking import Rejections, checked_pairs
-from per_obspy.inventory.contact import floor_offset
+from per_obspy.inventory.contact_height import floor_offset
 from per_obspy.inventory.footprints.importers import imported
 from per_obspy.inventory.footprints.layers import Geometries, Layer, read_layer
 from per_obspy.inventory.footprints.neighbours import Neighbours, neighbours
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
+from per_obspy.inventory.table_columns import numbers_in
 
 #: Share of the smaller footprint that may be covered by both: digitised party walls cross by
 #: centimetres.
