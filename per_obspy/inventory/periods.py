@@ -16,7 +16,7 @@ from per_obspy.inventory.schema import SYSTEMS
 
 #: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);
 #: ASCE 7, table 12.8-2, metric. The two ratios are those of Goel & Chopra (1997). No best fit is
-#: known to us for the other two systems: their lower bound stands in for a median, unverified.
+#: known for the other two systems: their lower bound is used as a median, unverified.
 ASCE7 = {
     "steel_mrf": (1.25, 0.0724, 0.80),
     "concrete_mrf": (1.13, 0.0466, 0.90),

@@ -129,8 +129,8 @@ def equivalent_sdof(masses: ArrayLike, stiffnesses: ArrayLike, level: int) -> Eq
 
     Examples
     --------
-    >>> one = equivalent_sdof([2e5], [8e6], 0)
-    >>> round(one.period, 4), one.participation, one.mass
+    >>> oscillator = equivalent_sdof([2e5], [8e6], 0)
+    >>> round(oscillator.period, 4), oscillator.participation, oscillator.mass
     (0.9935, 1.0, 200000.0)
     """
     mass, stiffness = _floors(masses, stiffnesses)

@@ -78,7 +78,7 @@ class PairInventory:
     Parameters
     ----------
     paths : sequence of Path
-        CSV or Parquet. Apart from a chunk, memory holds 8 bytes per row to find repeated
+        CSV or Parquet. Besides a chunk, memory holds 8 bytes per row to find repeated
         identifiers.
 
     Attributes
