@@ -58,8 +58,8 @@ def simulated_pairs(
     latitudes: ArrayLike,
     count: int,
     seed: int,
-    radius: float = 2000.0,
-    touching: float = 0.5,
+    radius: float,
+    touching: float,
 ) -> pd.DataFrame:
     """
     Simulate pairs of neighbouring buildings around stations.
@@ -72,9 +72,9 @@ def simulated_pairs(
         Number of pairs.
     seed : int
         Of every random number; the same seed gives the same table.
-    radius : float, optional
+    radius : float
         Largest distance of a pair from its station, m.
-    touching : float, optional
+    touching : float
         Share of pairs without a gap.
 
     Returns
@@ -90,7 +90,8 @@ def simulated_pairs(
 
     Examples
     --------
-    >>> list(simulated_pairs([-67.95], [-20.35], 3, seed=20)["pair_id"])
+    >>> table = simulated_pairs([-67.95], [-20.35], 3, seed=20, radius=2000.0, touching=0.5)
+    >>> list(table["pair_id"])
     ['P0000001', 'P0000002', 'P0000003']
     """
     stations = _checked_stations(longitudes, latitudes)
