@@ -13,11 +13,13 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.checks import FloatArray
+from per_obspy.config import Processing
 from per_obspy.files import written_whole
 from per_obspy.processing.noise.signal_to_noise import noise_spectra
 from per_obspy.report.style import BUILDING_COLOURS, DOTS_PER_INCH, MOTION_COLOUR, STATE_COLOURS
 from per_obspy.tables.processed import COLUMNS
 
+SMOOTHING = Processing().smoothing  # b of the Konno-Ohmachi window
 BEFORE_COLOUR = "#BBBBBB"
 PAGE = (11.7, 8.3)  # inches: A4, landscape
 ROOM = 1.3  # of a vertical axis over the largest processed value: what drifts beyond is cut
@@ -121,7 +123,7 @@ def _draw_amplitudes(axes: Axes, processed: Any, before: Any) -> None:
         rasterized=True,
     )
     if before is not None and chosen.get("noise"):
-        spectra = noise_spectra(before.data, dt, float(chosen.noise))
+        spectra = noise_spectra(before.data, dt, float(chosen.noise), SMOOTHING)
         known = spectra.frequencies >= 1 / (record.size * dt)
         frequencies = spectra.frequencies[known]
         axes.loglog(

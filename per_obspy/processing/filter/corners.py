@@ -2,7 +2,7 @@
 Corners of the filter and the usable periods that follow from them.
 
 A corner comes from noise, displacement, sampling or the fallback table; the two horizontals of an
-instrument share theirs.
+instrument share the narrower band.
 """
 
 from typing import NamedTuple

@@ -38,11 +38,10 @@ def test_a_magnitude_below_the_table_gets_the_constant():
 
 def test_both_horizontals_get_the_narrower_band():
     out = corners_shared(Stream([trace(0.1, 20.0), trace(0.3, 30.0)]))
-    assert [(one.stats.per_obspy.highpass, one.stats.per_obspy.lowpass) for one in out] == [
-        (0.3, 20.0)
-    ] * 2
-    assert out[0].stats.per_obspy.own_highpass == 0.1
-    assert [one.stats.per_obspy.highpass_source for one in out] == ["shared", "noise"]
+    first, second = (trace.stats.per_obspy for trace in out)
+    assert (first.highpass, first.lowpass) == (second.highpass, second.lowpass) == (0.3, 20.0)
+    assert first.own_highpass == 0.1
+    assert (first.highpass_source, second.highpass_source) == ("shared", "noise")
 
 
 def test_limits_from_length_and_sampling():
@@ -51,7 +50,7 @@ def test_limits_from_length_and_sampling():
     assert highest_corner(trace(), 20.0).frequency == 20.0
 
 
-def test_the_reason_says_what_decided():
+def test_the_reason_names_the_limit():
     clean = clean_corner(trace(), lowest_highpass(trace()), 0.5, 0.02, 5)
     assert clean.reason == "one cycle in the record"
 
