@@ -2,7 +2,7 @@
 __version__: str
 
 from .inventory.files.reading import read_pairs as read_pairs
-from .inventory.footprints.pairs import pairs_from_footprints as pairs_from_footprints
+from .inventory.footprints.footprint_pairs import pairs_from_footprints as pairs_from_footprints
 from .inventory.periods import asce7_period as asce7_period
 from .inventory.periods import ec8_period as ec8_period
 from .inventory.shear_building import equivalent_sdof as equivalent_sdof

@@ -73,7 +73,7 @@ def find_pairs(
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.pairs import pairs_from_footprints
+    from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
     from per_obspy.tables.writing import write_rejected
 
     # Find the pairs and write them with their rejections
@@ -107,7 +107,7 @@ def check_pairs(
     Example: per-obspy pairs check pairs.csv
     """
     from per_obspy.inventory.files.reading import read_pairs
-    from per_obspy.inventory.profile import (
+    from per_obspy.inventory.table_checks import (
         derived_counts,
         inventory_profile,
         suspicions,
@@ -138,7 +138,7 @@ def check_pairs(
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
     """Print the first rejected rows; count the others by column and fault."""
-    from per_obspy.inventory.profile import faults_by_column
+    from per_obspy.inventory.table_checks import faults_by_column
 
     for row in rejected[:SHOWN]:
         print(f"  line {row.row}, {row.name}: {'; '.join(row.reasons)}")

@@ -1,1 +1,1 @@
-"""Buildings and pairs: schema, reading and checking, periods, masses, participation, simulated inventories."""
+"""Buildings and pairs: schema, readers, checks, periods, masses, participation, simulation."""

@@ -1,8 +1,8 @@
 """
-The index of stored pair inventories: a TOML file beside them that says what each holds and whether it is unchanged.
+Index of stored pair inventories: a TOML file with the contents, origin and hash of each.
 
 A file is used only after its hash was compared (:func:`verified_file`), so that a changed or
-damaged inventory is noticed before any number is made of it. Positions are longitude and latitude
+damaged inventory is noticed before it is screened. Positions are longitude and latitude
 (WGS 84), as in every pair table.
 """
 
@@ -17,21 +17,35 @@ import pandas as pd
 from pydantic import Field
 
 from per_obspy import config
+from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, written_whole
 from per_obspy.inventory.files.reading import read_pairs
 
+#: Longitude and latitude, WGS 84.
 CRS = "OGC:CRS84"
 
-HEADER = """\
-# Index of stored inventories of building pairs. `per-obspy catalog add` writes it, `per-obspy catalog check` compares
-# every file with its hash. Bounding boxes are west, south, east, north in degrees.
-"""
+#: Comment at the head of an index.
+HEADER = (
+    "# Index of stored inventories of building pairs. `per-obspy catalog add` writes it, "
+    "`per-obspy catalog check` compares\n"
+    "# every file with its hash. Bounding boxes are west, south, east, north in degrees.\n"
+)
+
+#: Every longitude and latitude, in the order of a box.
+DEGREES = (180.0, 90.0, 180.0, 90.0)
+
+#: Smallest cosine of a latitude that widens longitudes: near a pole a box spans the whole Earth.
+SMALLEST_COSINE = 1e-6
 
 
 class Box(NamedTuple):
-    """A range of longitudes and latitudes in degrees; it crosses the date line if west is larger than east."""
+    """
+    Bounding box in degrees of longitude and latitude.
+
+    It crosses the date line if west is larger than east.
+    """
 
     west: float
     south: float
@@ -66,7 +80,7 @@ class Catalogue(config.Section):
 
 
 class Origin(NamedTuple):
-    """What only a person can say of an inventory: its name, source, licence and the date of entry."""
+    """Origin of an inventory, given by the user: name, source, licence and date of entry."""
 
     name: str
     source: str
@@ -99,7 +113,7 @@ def stored_inventories(index: str | Path) -> tuple[StoredInventory, ...]:
 
 def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> StoredInventory:
     """
-    Check an inventory and enter it into the index, which is made if it does not exist.
+    Check an inventory and add it to the index, which is created if it does not exist.
 
     Parameters
     ----------
@@ -113,7 +127,7 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
     Returns
     -------
     entry : StoredInventory
-        As it now stands in the index.
+        The new entry of the index.
 
     Raises
     ------
@@ -122,16 +136,13 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
     """
     target = Path(index)
     entries = stored_inventories(target) if target.exists() else ()
-    if origin.name in [entry.name for entry in entries]:
-        raise CatalogError(str(target), f"name = {origin.name!r} is taken")
-    empty = [field for field in ("name", "source", "licence") if not getattr(origin, field).strip()]
-    if empty:
-        raise CatalogError(str(target), f"{empty[0]} of the inventory {str(file)!r} is empty")
+    _check_origin(target, entries, file, origin)
+    # An inventory needs at least one usable pair
     pairs = read_pairs(file)
     if pairs.empty:
-        raise CatalogError(
-            str(file), f"no usable row: {'; '.join(pairs.attrs['rejected'][0].reasons)}"
-        )
+        reasons = "; ".join(pairs.attrs["rejected"][0].reasons)
+        raise CatalogError(str(file), f"no usable row: {reasons}")
+    # Contents and hash of the file
     entry = StoredInventory(
         name=origin.name,
         file=Path(file).resolve(),
@@ -146,47 +157,67 @@ def add_inventory(index: str | Path, file: str | Path, origin: Origin) -> Stored
     return entry
 
 
+def _check_origin(
+    index: Path, entries: tuple[StoredInventory, ...], file: str | Path, origin: Origin
+) -> None:
+    """Raise CatalogError if the name of a new inventory is taken, or a text of it is empty."""
+    if origin.name in [entry.name for entry in entries]:
+        raise CatalogError(str(index), f"name = {origin.name!r} is taken")
+    for field in ("name", "source", "licence"):
+        if not getattr(origin, field).strip():
+            raise CatalogError(str(index), f"{field} of the inventory {str(file)!r} is empty")
+
+
 def bounding_box(pairs: pd.DataFrame) -> Box:
-    """Return the smallest box around all buildings of a pair table; across the date line if that is smaller."""
+    """Return the smallest box around all buildings of a pair table, across the date line or not."""
     latitude = pairs[["latitude_1", "latitude_2"]].to_numpy()
-    longitude = np.unique(pairs[["longitude_1", "longitude_2"]].to_numpy())
-    empty = np.diff(longitude, append=longitude[0] + 360.0)
+    longitude = pairs[["longitude_1", "longitude_2"]].to_numpy()
+    return _box_around(longitude, latitude)
+
+
+def _box_around(longitude: FloatArray, latitude: FloatArray) -> Box:
+    """Return the smallest box around positions in degrees."""
+    # The box begins after the widest range of longitudes without a position
+    sorted_longitude = np.unique(longitude)
+    empty = np.diff(sorted_longitude, append=sorted_longitude[0] + 360.0)
     widest = int(empty.argmax())
     return Box(
-        float(longitude[(widest + 1) % longitude.size]), float(latitude.min()),
-        float(longitude[widest]), float(latitude.max()),
-    )  # fmt: skip
+        west=float(sorted_longitude[(widest + 1) % sorted_longitude.size]),
+        south=float(latitude.min()),
+        east=float(sorted_longitude[widest]),
+        north=float(latitude.max()),
+    )
 
 
 def region_around(longitudes: Sequence[float], latitudes: Sequence[float], reach: float) -> Box:
-    """Return the box around some places, widened by a distance in m; the whole earth's width near a pole."""
-    places = pd.DataFrame(
-        {
-            f"{name}_{i}": column
-            for name, column in (("longitude", longitudes), ("latitude", latitudes))
-            for i in (1, 2)
-        }
-    )
-    box, degrees = bounding_box(places), reach / METRES_PER_DEGREE
+    """
+    Return the box around positions in degrees, widened by a distance in m on every side.
+
+    Near a pole it has the width of the whole Earth.
+    """
+    box = _box_around(np.array(longitudes), np.array(latitudes))
+    degrees = reach / METRES_PER_DEGREE
     south, north = max(box.south - degrees, -90.0), min(box.north + degrees, 90.0)
-    widened = degrees / max(float(np.cos(np.radians(max(abs(south), abs(north))))), 1e-6)
+    # Degrees of longitude are shortest at the latitude farthest from the equator
+    cosine = float(np.cos(np.radians(max(abs(south), abs(north)))))
+    widened = degrees / max(cosine, SMALLEST_COSINE)
     if _width(box) + 2.0 * widened >= 360.0:
         return Box(-180.0, south, 180.0, north)
-    west, east = (
-        (edge + 540.0) % 360.0 - 180.0 for edge in (box.west - widened, box.east + widened)
-    )
+    # Longitudes between -180 and 180 degrees
+    west = (box.west - widened + 540.0) % 360.0 - 180.0
+    east = (box.east + widened + 540.0) % 360.0 - 180.0
     return Box(west, south, east, north)
 
 
-def touch(one: Box, other: Box) -> bool:
+def touch(first: Box, second: Box) -> bool:
     """Return whether two boxes have a point in common."""
-    east, west = (other.west - one.west) % 360.0, (one.west - other.west) % 360.0
-    side_by_side = east <= _width(one) or west <= _width(other)
-    return side_by_side and one.south <= other.north and other.south <= one.north
+    east, west = (second.west - first.west) % 360.0, (first.west - second.west) % 360.0
+    longitudes_overlap = east <= _width(first) or west <= _width(second)
+    return longitudes_overlap and first.south <= second.north and second.south <= first.north
 
 
 def _width(box: Box) -> float:
-    """Return the extent in degrees; 360 for the whole earth, which a remainder would make 0."""
+    """Return the range of longitudes in degrees: 360 for the whole Earth, not its remainder 0."""
     return box.east - box.west + (360.0 if box.west > box.east else 0.0)
 
 
@@ -208,21 +239,21 @@ def find_inventories(index: str | Path, region: Box) -> tuple[StoredInventory, .
     ValueError
         If the region is no box in degrees.
     """
-    _check(region)
+    _check_region(region)
     return tuple(entry for entry in stored_inventories(index) if touch(entry.bounding_box, region))
 
 
-def _check(region: Box) -> None:
+def _check_region(region: Box) -> None:
+    """Raise ValueError if a region is no box in degrees."""
     values = np.abs(np.array(region, dtype=np.float64))
-    if not (values <= [180.0, 90.0, 180.0, 90.0]).all() or region.south > region.north:
-        raise ValueError(
-            f"region must be west, south, east, north in degrees, got {', '.join(map(str, region))}"
-        )
+    if not (values <= DEGREES).all() or region.south > region.north:
+        edges = ", ".join(map(str, region))
+        raise ValueError(f"region must be west, south, east, north in degrees, got {edges}")
 
 
 def verified_file(entry: StoredInventory) -> Path:
     """
-    Return the file of an entry once it is known to be unchanged.
+    Return the file of an entry after comparing its hash.
 
     Raises
     ------
@@ -231,15 +262,17 @@ def verified_file(entry: StoredInventory) -> Path:
     """
     if not entry.file.is_file():
         raise CatalogError(str(entry.file), f"the stored inventory {entry.name!r} is missing")
+    # Any other byte gives another hash
     found = file_hash(entry.file)
     if found != entry.sha256:
-        problem = f"changed or damaged since it was stored as {entry.name!r} (sha256 {found}, expected {entry.sha256})"
-        raise CatalogError(str(entry.file), problem)
+        problem = f"changed or damaged since it was stored as {entry.name!r}"
+        hashes = f"sha256 {found}, expected {entry.sha256}"
+        raise CatalogError(str(entry.file), f"{problem} ({hashes})")
     return entry.file
 
 
 def check_inventories(index: str | Path) -> tuple[Rejection, ...]:
-    """Return every stored inventory that cannot be used, with its reason; none if all are as they were stored."""
+    """Return a rejection for each stored inventory that is missing, changed or damaged."""
     faults = []
     for entry in stored_inventories(index):
         try:
@@ -250,16 +283,17 @@ def check_inventories(index: str | Path) -> tuple[Rejection, ...]:
 
 
 def _write(index: Path, entries: tuple[StoredInventory, ...]) -> None:
+    """Write the whole index."""
     folder = index.resolve().parent
+    blocks = [HEADER, *(_toml(entry, folder) for entry in entries)]
     with written_whole(index) as part:
-        part.write_text(
-            "\n".join([HEADER, *(_toml(entry, folder) for entry in entries)]), encoding="utf-8"
-        )
+        part.write_text("\n".join(blocks), encoding="utf-8")
 
 
 def _toml(entry: StoredInventory, folder: Path) -> str:
-    """Return one entry as TOML, its file relative to the folder; JSON's strings and lists are TOML's as well."""
+    """Return one entry as TOML with its file relative to the folder."""
     values = entry.model_dump(context={"folder": folder})
     day = values.pop("date")
+    # Strings and lists of JSON are valid TOML
     lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
     return "\n".join(["[[inventory]]", *lines, f"date = {day.isoformat()}", ""])

@@ -1,7 +1,8 @@
 """
-Row-by-row checks of a pair table against the schema: whole columns at a time, every reason of a row kept.
+Row-by-row checks of a pair table against the schema, with every reason of a rejected row.
 
-A row with a fault becomes a :class:`~per_obspy.errors.Rejection`; the others go on.
+Each check works on whole columns. A row with a fault becomes a
+:class:`~per_obspy.errors.Rejection`; the other rows are accepted.
 """
 
 from collections import defaultdict
@@ -15,16 +16,18 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.errors import CatalogError, Rejection, did_you_mean
-from per_obspy.inventory.cells import numbers_in
 from per_obspy.inventory.schema import COLUMNS, EMPTY, ONE_OF, Column
+from per_obspy.inventory.table_columns import numbers_in
 
-#: Height of one storey, m: a hall may have 12 m, but a floor of 28 m is a mistake in height or
-#: storeys.
+#: Height of one storey, m: a hall may have 12 m, but 28 m is a mistake in height or storeys.
 STOREY_HEIGHTS = (2.0, 12.0)
 
 #: Largest distance between the two positions of a pair, m; neighbours' centres lie closer.
 LARGEST_SEPARATION = 1000.0
 
+#: A contact height may exceed the lower building by this much, m: heights are often rounded,
+#: contact heights computed.
+CONTACT_TOLERANCE = 1e-3
 
 #: Position of a row in the table, and what is wrong with it.
 Fault = tuple[int, str]
@@ -32,10 +35,10 @@ Fault = tuple[int, str]
 
 class Rejections(tuple[Rejection, ...]):
     """
-    Rejected rows as ``attrs`` of a table carry them.
+    Rejected rows in the ``attrs`` of a table.
 
-    pandas deep-copies ``attrs`` in every operation: half a second each for 1e5 rejections. Nothing
-    in here can change, so that copies may share it.
+    pandas deep-copies ``attrs`` in every operation: half a second each for 1e5 rejections. The
+    rows are immutable, so that copies may share them.
     """
 
     __slots__ = ()
@@ -62,8 +65,8 @@ def checked_pairs(
     lines : (n_rows,) ndarray of int, optional
         Line of each row in its file; if not given, rows follow a header in line 1.
     repeated : (n_rows,) ndarray of bool, optional
-        Whether the row's ``pair_id`` stands in an earlier row of the inventory; if not given, the
-        table is all of it.
+        Whether an earlier row of the inventory has the row's ``pair_id``; if not given, the table
+        is the whole inventory.
 
     Returns
     -------
@@ -74,22 +77,24 @@ def checked_pairs(
     Raises
     ------
     CatalogError
-        If a required column is missing, a column stands twice, or there is no row.
+        If a required column is missing, a column occurs twice, or there is no row.
     """
     check_columns([str(name) for name in table.columns], source)
     if table.empty and lines is None:
         raise CatalogError(source, "the table has no rows")
     if lines is None:
         lines = np.arange(2, len(table) + 2)
+    # Convert every cell and collect every fault of every row
     pairs, faults = _converted(table)
-    faults += _duplicates(
-        pairs["pair_id"], pairs["pair_id"].duplicated() if repeated is None else repeated
-    )
-    faults += [fault for check in _CHECKS for fault in check(pairs)]
-    rejected = _rejections(pairs["pair_id"], faults, source, lines)
-    bad = np.zeros(len(pairs), dtype=bool)
-    bad[[position for position, _ in faults]] = True
-    accepted = pairs[~bad].reset_index(drop=True)
+    identifiers = pairs["pair_id"]
+    faults += _duplicates(identifiers, identifiers.duplicated() if repeated is None else repeated)
+    for check in _CHECKS:
+        faults += check(pairs)
+    # Separate the rows without a fault from the rejected ones
+    rejected = _rejections(identifiers, faults, source, lines)
+    is_faulty = np.zeros(len(pairs), dtype=bool)
+    is_faulty[[position for position, _ in faults]] = True
+    accepted = pairs[~is_faulty].reset_index(drop=True)
     accepted.attrs["rejected"] = Rejections(rejected)
     return accepted
 
@@ -101,85 +106,101 @@ def check_columns(names: Sequence[str], source: str) -> None:
     Raises
     ------
     CatalogError
-        If a required column is missing or a column stands twice.
+        If a required column is missing or a column occurs twice.
     """
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise CatalogError(source, f"column {twice[0]} stands more than once")
-    missing = [
-        column.name for column in COLUMNS.values() if column.required and column.name not in names
-    ]
+    # Required columns, and groups of which one column is enough
+    required = [column.name for column in COLUMNS.values() if column.required]
+    missing = [name for name in required if name not in names]
     missing += [" or ".join(group) for group in ONE_OF if not set(group) & set(names)]
     if missing:
         found = ", ".join(names)
-        asked = "".join(did_you_mean(name, set(names) - set(COLUMNS)) for name in missing[:1])
+        suggestion = did_you_mean(missing[0], set(names) - set(COLUMNS))
+        absent = ", ".join(missing)
         raise CatalogError(
-            source, f"missing column {', '.join(missing)} (columns found: {found:.200}){asked}"
+            source, f"missing column {absent} (columns found: {found:.200}){suggestion}"
         )
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
-    """Return the table in schema order with numbers as float64 and text stripped, and what could not be read."""
+    """
+    Convert the cells of a table and collect the faults of those that cannot be converted.
+
+    Columns come in the order of the schema, numbers as float64 and text stripped; unknown columns
+    follow unchanged.
+    """
     known = [name for name in COLUMNS if name in table.columns]
     data: dict[str, pd.Series | FloatArray] = {}
     faults: list[Fault] = []
+    # Known columns as the schema has them
     for name in known:
         read = _texts if COLUMNS[name].dtype == "str" else _numbers
         data[name], found = read(COLUMNS[name], table[name])
         faults += found
+    # Unknown columns as they are
     for name in table.columns.difference(known, sort=False):
         data[name] = table[name].reset_index(drop=True)
     return pd.DataFrame(data), faults
 
 
 def _rows(mask: ArrayLike) -> list[int]:
+    """Return the positions of the rows in which a mask is true."""
     rows: list[int] = np.flatnonzero(mask).tolist()
     return rows
 
 
 def _is_empty(values: pd.Series) -> NDArray[np.bool_]:
-    return np.asarray(
-        values.isna() | values.astype(str).str.strip().str.lower().isin(EMPTY), dtype=bool
-    )
+    """Return where cells are missing or contain a word for an empty cell."""
+    text = values.astype(str).str.strip().str.lower()
+    return np.asarray(values.isna() | text.isin(EMPTY), dtype=bool)
 
 
 def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
+    """Return stripped text, "" in empty cells, and the faults of missing or unknown texts."""
     empty = _is_empty(values)
     text = values.astype(str).str.strip().mask(empty, "").reset_index(drop=True)
     faults = _missing(column, empty)
     if column.choices:
-        wrong = _rows(~text.isin([*column.choices, ""]))
+        # Texts that are not among the choices of the schema
         allowed = ", ".join(column.choices)
-        faults += [
-            (i, f"{column.name} = {text.iloc[i]!r} is unknown, expected {allowed}") for i in wrong
-        ]
+        for i in _rows(~text.isin([*column.choices, ""])):
+            reason = f"{column.name} = {text.iloc[i]!r} is unknown, expected {allowed}"
+            faults.append((i, reason))
     return text, faults
 
 
 def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]]:
+    """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
+    # Cells that were read as numbers
     if pd.api.types.is_numeric_dtype(values.dtype):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
+    # Cells that are still text
     empty = _is_empty(values)
-    number = pd.to_numeric(values.astype(str).mask(empty), errors="coerce").to_numpy(
-        dtype=np.float64, na_value=np.nan
-    )
+    converted = pd.to_numeric(values.astype(str).mask(empty), errors="coerce")
+    number = converted.to_numpy(dtype=np.float64, na_value=np.nan)
     wrong = _rows(np.isnan(number) & ~empty)
     faults = [(i, f"{column.name} = {str(values.iloc[i])!r:.40} is not a number") for i in wrong]
     return number, faults + _missing(column, empty) + _out_of_range(column, number)
 
 
 def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:
-    return [(i, f"{column.name} is empty") for i in _rows(empty)] if column.required else []
+    """Return a fault for each empty cell of a required column."""
+    if not column.required:
+        return []
+    return [(i, f"{column.name} is empty") for i in _rows(empty)]
 
 
 def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
+    """Return a fault for each number outside the closed range of the schema."""
+    # Range and unit as the message gives them
     unit = "" if column.unit == "1" else f" {column.unit}"
-    allowed = (
-        f"{column.low:.6g} to {column.high:.6g}{unit}"
-        if column.high < np.inf
-        else f"{column.low:g}{unit} or more"
-    )
+    if column.high < np.inf:
+        allowed = f"{column.low:.6g} to {column.high:.6g}{unit}"
+    else:
+        allowed = f"{column.low:g}{unit} or more"
     faults = []
     for i in _rows((number < column.low) | (number > column.high)):
         hint = f" ({column.hint})" if column.hint and abs(number[i]) > column.high else ""
@@ -188,6 +209,7 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
 
 
 def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
+    """Yield rows whose ``pair_id`` an earlier row has."""
     for i in _rows(np.asarray(repeated) & (identifiers != "").to_numpy()):
         yield i, f"pair_id = {identifiers.iloc[i]!r} stands in an earlier row already"
 
@@ -201,81 +223,97 @@ def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
 
 
 def _storey_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows in which height over number of storeys is no height of a storey."""
     low, high = STOREY_HEIGHTS
     for index in (1, 2):
-        height, storeys = (
-            numbers_in(pairs, f"height_{index}"),
-            numbers_in(pairs, f"storeys_{index}"),
-        )
+        height = numbers_in(pairs, f"height_{index}")
+        storeys = numbers_in(pairs, f"storeys_{index}")
+        # Mean height of a storey where both are known
         with np.errstate(divide="ignore", invalid="ignore"):
             storey = height / storeys
-        for i in _rows((height > 0) & (storeys > 0) & ((storey < low) | (storey > high))):
+        is_outside = (storey < low) | (storey > high)
+        for i in _rows((height > 0) & (storeys > 0) & is_outside):
             yield (
                 i,
-                f"height_{index} = {height[i]:g} m with storeys_{index} = {storeys[i]:g} makes floors of "
-                f"{storey[i]:.3g} m, outside {low:g} to {high:g} m",
+                f"height_{index} = {height[i]:g} m with storeys_{index} = {storeys[i]:g} "
+                f"makes floors of {storey[i]:.3g} m, outside {low:g} to {high:g} m",
             )
 
 
 def _contact_heights(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows whose contact height is above the lower building."""
     contact = numbers_in(pairs, "contact_height")
     lower = np.fmin(numbers_in(pairs, "height_1"), numbers_in(pairs, "height_2"))
-    # heights are often rounded, contact heights computed: a millimetre does not matter
-    for i in _rows(contact > lower + 1e-3):
+    for i in _rows(contact > lower + CONTACT_TOLERANCE):
         yield i, f"contact_height = {contact[i]:g} m is above the lower building, {lower[i]:g} m"
 
 
-def _positions(pairs: pd.DataFrame) -> Iterator[Fault]:
-    """Yield rows whose buildings are no neighbours, or stand where a missing position is written as 0, 0."""
-    place = {
-        name: numbers_in(pairs, name)
-        for name in ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
-    }
+def _placeholders(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows with a building at 0, 0, which many programs write for a missing position."""
     for index in (1, 2):
-        nowhere = (place[f"longitude_{index}"] == 0.0) & (place[f"latitude_{index}"] == 0.0)
-        for i in _rows(nowhere):
+        longitude = numbers_in(pairs, f"longitude_{index}")
+        latitude = numbers_in(pairs, f"latitude_{index}")
+        for i in _rows((longitude == 0.0) & (latitude == 0.0)):
             yield i, f"longitude_{index} = latitude_{index} = 0 is a placeholder, not a position"
-    north = place["latitude_2"] - place["latitude_1"]
-    east = (place["longitude_2"] - place["longitude_1"] + 180.0) % 360.0 - 180.0
-    distance = METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(place["latitude_1"])))
-    on_earth = np.all([np.abs(place[name]) <= COLUMNS[name].high for name in place], axis=0)
-    for i in _rows(on_earth & (distance > LARGEST_SEPARATION)):
-        yield (
-            i,
-            f"the positions (longitude_1 = {place['longitude_1'][i]:g}, latitude_1 = {place['latitude_1'][i]:g}) and "
-            f"(longitude_2 = {place['longitude_2'][i]:g}, latitude_2 = {place['latitude_2'][i]:g}) are "
-            f"{distance[i] / 1000:.3g} km apart",
-        )
+
+
+def _separations(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows whose buildings lie too far from each other for neighbours."""
+    names = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
+    longitude_1, latitude_1, longitude_2, latitude_2 = (numbers_in(pairs, name) for name in names)
+    # Distance on a sphere taken as flat, across the date line too
+    north = latitude_2 - latitude_1
+    east = (longitude_2 - longitude_1 + 180.0) % 360.0 - 180.0
+    distance = METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1)))
+    # Positions outside the range of the schema have a fault of their own
+    in_range = [np.abs(numbers_in(pairs, name)) <= COLUMNS[name].high for name in names]
+    is_far = np.all(in_range, axis=0) & (distance > LARGEST_SEPARATION)
+    for i in _rows(is_far):
+        first = f"(longitude_1 = {longitude_1[i]:g}, latitude_1 = {latitude_1[i]:g})"
+        second = f"(longitude_2 = {longitude_2[i]:g}, latitude_2 = {latitude_2[i]:g})"
+        yield i, f"the positions {first} and {second} are {distance[i] / 1000:.3g} km apart"
 
 
 def _same_building(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows that name the same building twice."""
     if {"building_id_1", "building_id_2"} <= set(pairs.columns):
-        same = (pairs["building_id_1"] == pairs["building_id_2"]) & (pairs["building_id_1"] != "")
-        for i in _rows(same):
+        first, second = pairs["building_id_1"], pairs["building_id_2"]
+        for i in _rows((first == second) & (first != "")):
             yield (
                 i,
-                f"building_id_1 = building_id_2 = {pairs['building_id_1'].iloc[i]!r}: a building has no gap to itself",
+                f"building_id_1 = building_id_2 = {first.iloc[i]!r}: "
+                "a building has no gap to itself",
             )
 
 
 def _observations(pairs: pd.DataFrame) -> Iterator[Fault]:
+    """Yield rows whose observation is between 0 and 1."""
     observed = numbers_in(pairs, "observed")
     for i in _rows((observed > 0.0) & (observed < 1.0)):
         yield i, f"observed = {observed[i]:g} is neither 0 nor 1"
 
 
-_CHECKS = (_sizes, _storey_heights, _contact_heights, _positions, _same_building, _observations)
+_CHECKS = (
+    _sizes,
+    _storey_heights,
+    _contact_heights,
+    _placeholders,
+    _separations,
+    _same_building,
+    _observations,
+)
 
 
 def _rejections(
-    names: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]
+    identifiers: pd.Series, faults: list[Fault], source: str, lines: NDArray[np.int64]
 ) -> tuple[Rejection, ...]:
+    """Return one rejection per faulty row, with its reasons in the order of the checks."""
     reasons: dict[int, list[str]] = defaultdict(list)
     for position, reason in faults:
         reasons[int(position)].append(reason)
-    return tuple(
-        Rejection(
-            "pair", names.iloc[position], source, int(lines[position]), tuple(reasons[position])
-        )
-        for position in sorted(reasons)
-    )
+    # Rows in the order of the table
+    rejected = []
+    for i in sorted(reasons):
+        line = int(lines[i])
+        rejected.append(Rejection("pair", identifiers.iloc[i], source, line, tuple(reasons[i])))
+    return tuple(rejected)

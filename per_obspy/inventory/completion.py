@@ -1,8 +1,8 @@
 """
-Complete a pair table: what a row does not give is derived or assumed, and the column ``derived`` says which.
+Completion of a pair table by derived or assumed values, named row by row in the column ``derived``.
 
-Nothing given is changed. The order matters: storeys and heights first, then periods and masses,
-which need them, and contact quantities last.
+Given values are never changed. The order matters: storeys and heights first, then periods, which
+need them, then contact quantities, and masses last.
 """
 
 from collections.abc import Callable
@@ -14,24 +14,22 @@ from numpy.typing import NDArray
 from per_obspy import config
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.inventory.cells import numbers_in
-from per_obspy.inventory.contact import (
+from per_obspy.inventory.contact_height import (
     contact_mass,
     contact_participation,
     floor_offset,
     floors_misaligned,
 )
-from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.periods import asce7_period, ec8_period, period_log_std
+from per_obspy.inventory.table_columns import joined_names, numbers_in
 
-#: Standard acceleration of gravity, m/s2.
-
+#: Periods from heights in m and structural systems, by the name of the formula.
 _FORMULAS: dict[str, Callable[[FloatArray, NDArray[np.str_]], FloatArray]] = {
     "asce7": asce7_period,
     "ec8": ec8_period,
 }
 
-#: Columns of the table under work, and for each derived one the rows in which it was.
+#: Completed columns by name, and for each column that may be derived a mask of the derived rows.
 Columns = dict[str, FloatArray]
 Derived = dict[str, NDArray[np.bool_]]
 
@@ -43,9 +41,9 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     Parameters
     ----------
     pairs : DataFrame
-        As :func:`~per_obspy.inventory.files.reading.read_pairs` gives them.
+        From :func:`~per_obspy.inventory.files.reading.read_pairs`.
     building : config.Building
-        What to assume where the table is silent.
+        Values to assume where the table has none.
 
     Returns
     -------
@@ -58,42 +56,54 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
 
     Notes
     -----
-    * Height from storeys and storeys from height by the storey height. Where neither is known both stay NaN, the
-      participation is 1 (a plain oscillator) and the building weighs as much as its neighbour.
+    * Height from storeys and storeys from height by the storey height. Where neither is known both
+      stay NaN, the participation is 1 (a plain oscillator) and the building weighs as much as its
+      neighbour.
     * The contact is at the top of the lower building of those whose height is known.
-    * A building without yield displacement and yield coefficient stays linear (infinite yield displacement); a pair
-      without azimuth keeps NaN, which means every direction. Neither counts as derived.
+    * A building without yield displacement and yield coefficient stays linear (infinite yield
+      displacement); a pair without azimuth keeps NaN, which means every direction. Neither counts
+      as derived.
     * Log-standard deviations of given periods and dampings are 0 unless the table gives them.
     """
     columns: Columns = {}
     derived: Derived = {}
     system = {i: _system(pairs, i, derived) for i in (1, 2)}
+    # Each building's oscillator
     for i in (1, 2):
         _add_size(columns, derived, pairs, i, building)
         _add_period(columns, derived, pairs, i, system[i].to_numpy(dtype=str), building)
         _add_strength(columns, derived, pairs, i)
+    # Quantities that need both buildings
     _add_contact(columns, derived, pairs, building)
     _add_masses(columns, derived, pairs, building)
     _add_place(columns, pairs)
-    texts = {f"system_{i}": system[i] for i in (1, 2)} | {"derived": joined_names(derived)}
-    flags = {
-        "floors_misaligned": floors_misaligned(
-            np.nan_to_num(columns["floor_offset"]), building.floor_tolerance
-        )
-    }
-    return pairs.assign(**columns, **texts, **flags)
+    # Texts and flags
+    offset = np.nan_to_num(columns["floor_offset"])
+    return pairs.assign(
+        **columns,
+        system_1=system[1],
+        system_2=system[2],
+        derived=joined_names(derived),
+        floors_misaligned=floors_misaligned(offset, building.floor_tolerance),
+    )
 
 
-def _fill(
+def _add_column(
     columns: Columns, derived: Derived, name: str, given: FloatArray, values: FloatArray | float
 ) -> None:
-    """Add a column: the given values, elsewhere the others; those that are numbers count as derived."""
+    """Add a column of given values, filled up by others; the filled rows count as derived."""
     empty = np.isnan(given)
     columns[name] = np.where(empty, values, given)
     derived[name] = empty & ~np.isnan(columns[name])
 
 
+def _given_or(given: FloatArray, values: FloatArray | float) -> FloatArray:
+    """Return the given values, and other values where they are NaN."""
+    return np.where(np.isnan(given), values, given)
+
+
 def _system(pairs: pd.DataFrame, i: int, derived: Derived) -> pd.Series:
+    """Return the structural systems of building i, ``other`` where the table has none."""
     name = f"system_{i}"
     given = pairs[name] if name in pairs.columns else pd.Series("", index=pairs.index)
     derived[name] = (given == "").to_numpy(dtype=bool)
@@ -103,15 +113,11 @@ def _system(pairs: pd.DataFrame, i: int, derived: Derived) -> pd.Series:
 def _add_size(
     columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int, building: config.Building
 ) -> None:
+    """Add height, m, and storeys of building i, each from the other by the storey height."""
     height, storeys = numbers_in(pairs, f"height_{i}"), numbers_in(pairs, f"storeys_{i}")
-    _fill(columns, derived, f"height_{i}", height, storeys * building.storey_height)
-    _fill(
-        columns,
-        derived,
-        f"storeys_{i}",
-        storeys,
-        np.maximum(np.rint(height / building.storey_height), 1.0),
-    )
+    _add_column(columns, derived, f"height_{i}", height, storeys * building.storey_height)
+    counted = np.maximum(np.rint(height / building.storey_height), 1.0)
+    _add_column(columns, derived, f"storeys_{i}", storeys, counted)
 
 
 def _add_period(
@@ -122,103 +128,118 @@ def _add_period(
     system: NDArray[np.str_],
     building: config.Building,
 ) -> None:
+    """Add period, s, and damping of building i with their logarithmic standard deviations."""
     height, period = columns[f"height_{i}"], numbers_in(pairs, f"period_{i}")
-    # a row without height has a period, or it would have been rejected; 1 m stands in where nothing
-    # is derived
-    formula = _FORMULAS[building.period_formula](np.where(np.isnan(height), 1.0, height), system)
-    _fill(columns, derived, f"period_{i}", period, np.where(np.isnan(height), np.nan, formula))
+    # A row without height has a period, or it would have been rejected: 1 m is a placeholder
+    unknown = np.isnan(height)
+    formula = _FORMULAS[building.period_formula](np.where(unknown, 1.0, height), system)
+    _add_column(columns, derived, f"period_{i}", period, np.where(unknown, np.nan, formula))
     spread = np.where(np.isnan(period), period_log_std(system), 0.0)
-    columns[f"period_log_std_{i}"] = _first(numbers_in(pairs, f"period_log_std_{i}"), spread)
+    columns[f"period_log_std_{i}"] = _given_or(numbers_in(pairs, f"period_log_std_{i}"), spread)
+    # Damping as a fraction of critical
     damping = numbers_in(pairs, f"damping_{i}")
-    _fill(columns, derived, f"damping_{i}", damping, building.damping)
+    _add_column(columns, derived, f"damping_{i}", damping, building.damping)
     spread = np.where(np.isnan(damping), building.damping_log_std, 0.0)
-    columns[f"damping_log_std_{i}"] = _first(numbers_in(pairs, f"damping_log_std_{i}"), spread)
-
-
-def _first(given: FloatArray, values: FloatArray | float) -> FloatArray:
-    return np.where(np.isnan(given), values, given)
+    columns[f"damping_log_std_{i}"] = _given_or(numbers_in(pairs, f"damping_log_std_{i}"), spread)
 
 
 def _add_strength(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:
-    """Yield displacement ``C_y g (T / 2 pi)**2`` from the yield coefficient; infinite where neither is given."""
+    """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
     name = f"yield_displacement_{i}"
+    # C_y g (T / 2 pi)**2 from the yield coefficient C_y
     coefficient = numbers_in(pairs, f"yield_coefficient_{i}")
-    _fill(
-        columns,
-        derived,
-        name,
-        numbers_in(pairs, name),
-        coefficient * STANDARD_GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2,
-    )
-    columns[name] = _first(columns[name], np.inf)
-    columns[f"hardening_{i}"] = _first(numbers_in(pairs, f"hardening_{i}"), 0.0)
+    from_coefficient = coefficient * STANDARD_GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2
+    _add_column(columns, derived, name, numbers_in(pairs, name), from_coefficient)
+    columns[name] = _given_or(columns[name], np.inf)
+    columns[f"hardening_{i}"] = _given_or(numbers_in(pairs, f"hardening_{i}"), 0.0)
 
 
 def _add_contact(
     columns: Columns, derived: Derived, pairs: pd.DataFrame, building: config.Building
 ) -> None:
+    """Add the contact, the participations of the buildings, restitution and the gap's deviation."""
+    # Contact at the top of the lower building whose height is known
     lower = np.fmin(columns["height_1"], columns["height_2"])
-    _fill(columns, derived, "contact_height", numbers_in(pairs, "contact_height"), lower)
+    _add_column(columns, derived, "contact_height", numbers_in(pairs, "contact_height"), lower)
     for i in (1, 2):
-        storeys, height, known = _sized(columns, i)
-        contact = np.where(known, np.fmin(columns["contact_height"], height), 1.0)
-        participation = np.where(known, contact_participation(storeys, height, contact), 1.0)
-        _fill(
-            columns,
-            derived,
-            f"participation_{i}",
-            numbers_in(pairs, f"participation_{i}"),
-            participation,
-        )
-    offset = np.where(
-        _measured(pairs),
-        floor_offset(*_sized(columns, 1)[1::-1], *_sized(columns, 2)[1::-1]),
-        np.nan,
-    )
-    _fill(columns, derived, "floor_offset", numbers_in(pairs, "floor_offset"), offset)
-    _fill(columns, derived, "restitution", numbers_in(pairs, "restitution"), building.restitution)
-    columns["gap_std"] = _first(numbers_in(pairs, "gap_std"), 0.0)
+        _add_participation(columns, derived, pairs, i)
+    _add_floor_offset(columns, derived, pairs)
+    # Impact and gap
+    given = numbers_in(pairs, "restitution")
+    _add_column(columns, derived, "restitution", given, building.restitution)
+    columns["gap_std"] = _given_or(numbers_in(pairs, "gap_std"), 0.0)
 
 
-def _sized(columns: Columns, i: int) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return storeys and height, 1 where they are unknown, and where they are known."""
+def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:
+    """Add the participation of building i at the contact, 1 where its height is unknown."""
+    storeys, height, known = _size(columns, i)
+    contact = _contact_on(columns, height, known)
+    participation = np.where(known, contact_participation(storeys, height, contact), 1.0)
+    name = f"participation_{i}"
+    _add_column(columns, derived, name, numbers_in(pairs, name), participation)
+
+
+def _add_floor_offset(columns: Columns, derived: Derived, pairs: pd.DataFrame) -> None:
+    """Add the floor offset, m, NaN unless heights and storeys of both buildings are given."""
+    storeys_1, height_1, _ = _size(columns, 1)
+    storeys_2, height_2, _ = _size(columns, 2)
+    offset = floor_offset(height_1, storeys_1, height_2, storeys_2)
+    located = np.where(_floors_given(pairs), offset, np.nan)
+    _add_column(columns, derived, "floor_offset", numbers_in(pairs, "floor_offset"), located)
+
+
+def _size(columns: Columns, i: int) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return storeys and height of building i, 1 where unknown, and the mask of the known ones."""
     known = ~np.isnan(columns[f"height_{i}"])
-    return (
-        np.where(known, columns[f"storeys_{i}"], 1.0),
-        np.where(known, columns[f"height_{i}"], 1.0),
-        known,
-    )
+    storeys = np.where(known, columns[f"storeys_{i}"], 1.0)
+    height = np.where(known, columns[f"height_{i}"], 1.0)
+    return storeys, height, known
 
 
-def _measured(pairs: pd.DataFrame) -> NDArray[np.bool_]:
-    """Return where heights and storeys of both buildings are given: only then do floors say where they are."""
-    names = [f"{name}_{i}" for name in ("height", "storeys") for i in (1, 2)]
+def _contact_on(columns: Columns, height: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+    """Return the contact height on a building, at most its own height, m; 1 where unknown."""
+    return np.where(known, np.fmin(columns["contact_height"], height), 1.0)
+
+
+def _floors_given(pairs: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return the rows that give heights and storeys of both buildings, hence heights of floors."""
+    names = ("height_1", "height_2", "storeys_1", "storeys_2")
     return np.asarray(~np.any([np.isnan(numbers_in(pairs, name)) for name in names], axis=0))
 
 
 def _add_masses(
     columns: Columns, derived: Derived, pairs: pd.DataFrame, building: config.Building
 ) -> None:
-    masses = []
-    for i in (1, 2):
-        area = _first(numbers_in(pairs, f"area_{i}"), building.area)
-        derived_mass = area * columns[f"storeys_{i}"] * building.mass_per_area
-        masses.append(_first(numbers_in(pairs, f"mass_{i}"), derived_mass))
-    nothing_known = building.area * building.mass_per_area
-    for i, mass, neighbour in zip((1, 2), masses, masses[::-1], strict=True):
-        assumed = _first(_first(mass, neighbour), nothing_known)
-        _fill(columns, derived, f"mass_{i}", numbers_in(pairs, f"mass_{i}"), assumed)
-        storeys, height, known = _sized(columns, i)
-        contact = np.where(known, np.fmin(columns["contact_height"], height), 1.0)
+    """Add total masses and generalised masses at the contact, kg."""
+    mass_1 = _mass_by_area(columns, pairs, 1, building)
+    mass_2 = _mass_by_area(columns, pairs, 2, building)
+    # A mass that is not known is the neighbour's; where neither is, that of one storey
+    one_storey = building.area * building.mass_per_area
+    for i, mass, neighbour in ((1, mass_1, mass_2), (2, mass_2, mass_1)):
+        assumed = _given_or(_given_or(mass, neighbour), one_storey)
+        _add_column(columns, derived, f"mass_{i}", numbers_in(pairs, f"mass_{i}"), assumed)
+        # The whole mass where the height of the contact is unknown
+        storeys, height, known = _size(columns, i)
+        contact = _contact_on(columns, height, known)
         at_contact = contact_mass(columns[f"mass_{i}"], storeys, height, contact)
         columns[f"contact_mass_{i}"] = np.where(known, at_contact, columns[f"mass_{i}"])
 
 
+def _mass_by_area(
+    columns: Columns, pairs: pd.DataFrame, i: int, building: config.Building
+) -> FloatArray:
+    """Return masses of building i, kg: given, or from floor area and storeys; NaN if unknown."""
+    area = _given_or(numbers_in(pairs, f"area_{i}"), building.area)
+    derived_mass = area * columns[f"storeys_{i}"] * building.mass_per_area
+    return _given_or(numbers_in(pairs, f"mass_{i}"), derived_mass)
+
+
 def _add_place(columns: Columns, pairs: pd.DataFrame) -> None:
     """Add the middle of the pair, across the date line too, and the azimuth."""
-    east = (
-        numbers_in(pairs, "longitude_2") - numbers_in(pairs, "longitude_1") + 180.0
-    ) % 360.0 - 180.0
-    columns["longitude"] = (numbers_in(pairs, "longitude_1") + east / 2.0 + 180.0) % 360.0 - 180.0
-    columns["latitude"] = (numbers_in(pairs, "latitude_1") + numbers_in(pairs, "latitude_2")) / 2.0
+    # Longitude of the middle on the shorter way around the Earth
+    longitude_1, longitude_2 = numbers_in(pairs, "longitude_1"), numbers_in(pairs, "longitude_2")
+    latitude_1, latitude_2 = numbers_in(pairs, "latitude_1"), numbers_in(pairs, "latitude_2")
+    east = (longitude_2 - longitude_1 + 180.0) % 360.0 - 180.0
+    columns["longitude"] = (longitude_1 + east / 2.0 + 180.0) % 360.0 - 180.0
+    columns["latitude"] = (latitude_1 + latitude_2) / 2.0
     columns["azimuth"] = numbers_in(pairs, "azimuth")

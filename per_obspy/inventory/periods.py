@@ -1,5 +1,5 @@
 """
-First natural periods from height and structural system, where nothing better is known.
+First natural periods from height and structural system, for buildings without a measured period.
 
 A code's period formula is calibrated as a *lower bound*, because a short period gives a large
 design force. For pounding that is the unsafe side: displacements grow with the period. The
@@ -16,7 +16,7 @@ from per_obspy.inventory.schema import SYSTEMS
 
 #: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);
 #: ASCE 7, table 12.8-2, metric. The two ratios are those of Goel & Chopra (1997). No best fit is
-#: known to us for the other two systems: their lower bound stands in for a median, unverified.
+#: known for the other two systems: their lower bound is used as a median, unverified.
 ASCE7 = {
     "steel_mrf": (1.25, 0.0724, 0.80),
     "concrete_mrf": (1.13, 0.0466, 0.90),
@@ -33,7 +33,8 @@ EC8_HEIGHT = 40.0
 LOG_STD = {"steel_mrf": 0.3, "concrete_mrf": 0.3, "ebf_brbf": 0.3, "other": 0.4}
 
 
-def _known(system: ArrayLike) -> NDArray[np.str_]:
+def _checked_systems(system: ArrayLike) -> NDArray[np.str_]:
+    """Return structural systems as an array; raise ValueError if one is unknown."""
     names = np.asarray(system, dtype=str)
     unknown = sorted(set(np.unique(names).tolist()) - set(SYSTEMS))
     if unknown:
@@ -42,15 +43,16 @@ def _known(system: ArrayLike) -> NDArray[np.str_]:
 
 
 def _by_system(names: NDArray[np.str_], values: dict[str, float]) -> FloatArray:
-    found = np.empty(names.shape)
+    """Return the value of each building's structural system."""
+    chosen = np.empty(names.shape)
     for name, value in values.items():
-        found[names == name] = value
-    return found
+        chosen[names == name] = value
+    return chosen
 
 
 def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     """
-    Median period ``ratio * C h**x`` with the coefficients of ASCE 7.
+    Compute the median period ``ratio * C h**x`` with the coefficients of ASCE 7.
 
     For moment frames this is the best fit of Goel & Chopra (1.25 and 1.13 times the code's lower
     bound). For ``ebf_brbf`` and ``other`` it is the code's own value, which is a lower bound
@@ -82,21 +84,20 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     >>> asce7_period([10.0, 30.0], "concrete_mrf").round(2)
     array([0.42, 1.12])
     """
-    names, tall = np.broadcast_arrays(_known(system), checks.positive("height", height))
-    factor = _by_system(
-        names, {name: ratio * coefficient for name, (ratio, coefficient, _) in ASCE7.items()}
-    )
-    exponent = _by_system(names, {name: exponent for name, (_, _, exponent) in ASCE7.items()})
-    period: FloatArray = factor * tall**exponent
+    names, metres = np.broadcast_arrays(_checked_systems(system), checks.positive("height", height))
+    # Median = best fit over lower bound, times the code's lower bound
+    factors = {name: ratio * coefficient for name, (ratio, coefficient, _) in ASCE7.items()}
+    exponents = {name: exponent for name, (_, _, exponent) in ASCE7.items()}
+    period: FloatArray = _by_system(names, factors) * metres ** _by_system(names, exponents)
     return period
 
 
 def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     """
-    Period ``C_t h**0.75`` of Eurocode 8 up to 40 m; above, the form of :func:`asce7_period`.
+    Compute the period ``C_t h**0.75`` of Eurocode 8; above 40 m that of :func:`asce7_period`.
 
-    The code gives one approximate value and does not say whether it is a bound; it is used as the
-    median. The two forms do not meet at 40 m.
+    The code gives one approximate value, not marked as a bound; it is used as the median. The two
+    forms do not meet at 40 m.
 
     Parameters
     ----------
@@ -124,13 +125,12 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     >>> float(ec8_period(16.0, "concrete_mrf").round(2))
     0.6
     """
-    names, tall = np.broadcast_arrays(_known(system), checks.positive("height", height))
-    period: FloatArray = np.where(
-        tall <= EC8_HEIGHT, _by_system(names, EC8) * tall**0.75, asce7_period(tall, names)
-    )
+    names, metres = np.broadcast_arrays(_checked_systems(system), checks.positive("height", height))
+    low = _by_system(names, EC8) * metres**0.75
+    period: FloatArray = np.where(metres <= EC8_HEIGHT, low, asce7_period(metres, names))
     return period
 
 
 def period_log_std(system: ArrayLike) -> FloatArray:
     """Return the logarithmic standard deviation of a derived period: 0.3, or 0.4 for ``other``."""
-    return _by_system(_known(system), LOG_STD)
+    return _by_system(_checked_systems(system), LOG_STD)

@@ -1,9 +1,9 @@
 """
-The one schema of the pair table: every column with its kind, unit, meaning and allowed range.
+The one schema of the pair table: every column with its type, unit, meaning and allowed range.
 
 Readers check against it, writers order by it, simulated inventories obey it and the documentation
-prints it. One row is one pair of neighbouring buildings; ``_1`` and ``_2`` are the two, and the
-axis points from 1 to 2.
+prints it. One row is one pair of neighbouring buildings; ``_1`` and ``_2`` mark the two buildings,
+and the axis points from 1 to 2.
 """
 
 from math import inf
@@ -12,10 +12,10 @@ from typing import NamedTuple
 #: Structural systems for which period formulas exist; masonry and anything unknown is ``other``.
 SYSTEMS = ("steel_mrf", "concrete_mrf", "ebf_brbf", "other")
 
-#: What people write into an empty cell.
+#: Words for an empty cell, in lower case.
 EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 
-#: Where in its row of houses the pair stands: ``end`` if either building has no further neighbour.
+#: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 
 
@@ -32,7 +32,7 @@ class Column(NamedTuple):
     unit : str
         SI unit, ``"1"`` if dimensionless, empty for text.
     meaning : str
-        One line for people.
+        One line for the user.
     required : bool
         Whether every file must have the column and every row a value in it.
     low, high : float
@@ -40,7 +40,7 @@ class Column(NamedTuple):
     choices : tuple of str
         The texts allowed; empty if any text is.
     hint : str
-        What is usually behind a value out of range.
+        Usual mistake behind a value out of range.
     """
 
     name: str
@@ -59,20 +59,31 @@ TINY = 1e-4
 
 _PAIR = (
     Column("pair_id", "str", "", "identifier of the pair, unique in its file", required=True),
-    Column("gap", "float64", "m", "clear distance between the buildings at the contact height, 0 if they touch",
-           required=True, low=0.0, high=10.0, hint="given in millimetres or centimetres by mistake?"),
-    Column("gap_std", "float64", "m", "standard deviation of the gap", low=0.0, high=1.0, hint="in millimetres?"),
-    Column("azimuth", "float64", "degrees", "direction from building 1 to building 2, clockwise from north",
-           low=0.0, high=360.0),
-    Column("contact_height", "float64", "m", "height at which the buildings meet first", low=TINY, high=1000.0),
-    Column("floor_offset", "float64", "m", "height between a floor of one building and the nearest floor of the other",
+    Column("gap", "float64", "m",
+           "clear distance between the buildings at the contact height, 0 if they touch",
+           required=True, low=0.0, high=10.0,
+           hint="given in millimetres or centimetres by mistake?"),
+    Column("gap_std", "float64", "m", "standard deviation of the gap",
+           low=0.0, high=1.0, hint="in millimetres?"),
+    Column("azimuth", "float64", "degrees",
+           "direction from building 1 to building 2, clockwise from north", low=0.0, high=360.0),
+    Column("contact_height", "float64", "m", "height at which the buildings meet first",
+           low=TINY, high=1000.0),
+    Column("floor_offset", "float64", "m",
+           "height between a floor of one building and the nearest floor of the other",
            low=-20.0, high=20.0),
-    Column("facing_length", "float64", "m", "length over which the walls face each other", low=0.0, high=1000.0),
-    Column("position", "str", "", "whether the pair stands at the end of its row of buildings", choices=POSITIONS),
-    Column("restitution", "float64", "1", "coefficient of restitution of impact", low=0.0, high=1.0),
-    Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground", low=30.0, high=4000.0),
-    Column("site_class", "str", "", "site class of the ground, compared with that of the station"),
-    Column("observed", "float64", "1", "1 if pounding was seen in the event, 0 if looked for and not seen",
+    Column("facing_length", "float64", "m", "length over which the walls face each other",
+           low=0.0, high=1000.0),
+    Column("position", "str", "", "whether the pair stands at the end of its row of buildings",
+           choices=POSITIONS),
+    Column("restitution", "float64", "1", "coefficient of restitution of impact",
+           low=0.0, high=1.0),
+    Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground",
+           low=30.0, high=4000.0),
+    Column("site_class", "str", "",
+           "site class of the ground, compared with that of the station"),
+    Column("observed", "float64", "1",
+           "1 if pounding was seen in the event, 0 if looked for and not seen",
            low=0.0, high=1.0),
 )  # fmt: skip
 
@@ -82,35 +93,40 @@ _BUILDING = (
            hint="metres of a projection?"),
     Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
            hint="longitude and latitude swapped, or metres of a projection?"),
-    Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0, hint="metres above ground expected"),
+    Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
+           hint="metres above ground expected"),
     Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
     Column("system", "str", "", "structural system", choices=SYSTEMS),
-    Column("period", "float64", "s", "first natural period in the direction of the axis", low=0.01, high=20.0,
-           hint="in milliseconds?"),
-    Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period", low=0.0, high=2.0),
+    Column("period", "float64", "s", "first natural period in the direction of the axis",
+           low=0.01, high=20.0, hint="in milliseconds?"),
+    Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period",
+           low=0.0, high=2.0),
     Column("damping", "float64", "1", "fraction of critical damping", low=0.0, high=1.0 - 1e-9,
            hint="a fraction is expected, not per cent"),
-    Column("damping_log_std", "float64", "1", "logarithmic standard deviation of the damping", low=0.0, high=2.0),
+    Column("damping_log_std", "float64", "1", "logarithmic standard deviation of the damping",
+           low=0.0, high=2.0),
     Column("mass", "float64", "kg", "total mass", low=1.0, high=1e12),
     Column("area", "float64", "m2", "floor area of one storey", low=1.0, high=1e6),
-    Column("participation", "float64", "1", "displacement at contact height / displacement of the oscillator",
+    Column("participation", "float64", "1",
+           "displacement at contact height / displacement of the oscillator",
            low=TINY, high=3.0),
-    Column("yield_displacement", "float64", "m", "of the equivalent oscillator; infinite if it stays linear", low=TINY),
+    Column("yield_displacement", "float64", "m",
+           "of the equivalent oscillator; infinite if it stays linear", low=TINY),
     Column("yield_coefficient", "float64", "1", "yield strength / weight", low=TINY, high=10.0),
-    Column("hardening", "float64", "1", "stiffness after yield / stiffness before", low=0.0, high=1.0 - 1e-9),
+    Column("hardening", "float64", "1", "stiffness after yield / stiffness before",
+           low=0.0, high=1.0 - 1e-9),
     Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),
     Column("importance", "float64", "1", "importance factor", low=0.0, high=10.0),
 )  # fmt: skip
 
 
 def _of_building(column: Column, index: int) -> Column:
-    return column._replace(
-        name=f"{column.name}_{index}", meaning=f"building {index}: {column.meaning}"
-    )
+    """Return the column for building 1 or 2."""
+    name, meaning = f"{column.name}_{index}", f"building {index}: {column.meaning}"
+    return column._replace(name=name, meaning=meaning)
 
 
-#: Every column that a pair table may have with a meaning of ours, by name; others are carried
-#: through.
+#: Every column of a pair table with a meaning in the package, by name; others are carried through.
 COLUMNS: dict[str, Column] = {
     column.name: column
     for column in (
@@ -120,10 +136,10 @@ COLUMNS: dict[str, Column] = {
     )
 }
 
-#: Of each of these groups a file must have at least one column, and each row at least one value.
+#: Groups of which a file must have at least one column, and each row at least one value.
 ONE_OF = tuple((f"height_{i}", f"storeys_{i}", f"period_{i}") for i in (1, 2))
 
-#: What ``completed_pairs`` adds beyond the columns above.
+#: Columns that ``completed_pairs`` adds to those above.
 COMPLETED: dict[str, Column] = {
     column.name: column
     for column in (

@@ -1,4 +1,4 @@
-"""Shear buildings with a model of their own: modes, and the oscillator that stands for one at a floor."""
+"""Modes of a shear building, and its equivalent oscillator at the floor of contact."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class ShearBuilding(NamedTuple):
     periods : (n_modes,) ndarray
         Natural periods, s.
     shapes : (n_floors, n_modes) ndarray
-        Mode shapes, one column a mode, 1 at the roof; dimensionless.
+        Mode shapes, one column per mode, 1 at the roof; dimensionless.
     """
 
     periods: FloatArray
@@ -28,7 +28,7 @@ class ShearBuilding(NamedTuple):
 
 class EquivalentSDOF(NamedTuple):
     """
-    The oscillator that stands for the first mode of a building at one floor.
+    Equivalent oscillator of the first mode of a building at one floor.
 
     Attributes
     ----------
@@ -46,17 +46,19 @@ class EquivalentSDOF(NamedTuple):
 
 
 def _floors(masses: ArrayLike, stiffnesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return checked masses, kg, and stiffnesses, N/m, of the floors."""
     mass, stiffness = checks.positive("masses", masses), checks.positive("stiffnesses", stiffnesses)
     if mass.ndim != 1 or mass.size == 0 or mass.shape != stiffness.shape:
         raise ValueError(
-            f"masses and stiffnesses must be rows of equal length, got {mass.shape} and {stiffness.shape}"
+            "masses and stiffnesses must be rows of equal length, "
+            f"got {mass.shape} and {stiffness.shape}"
         )
     return mass, stiffness
 
 
 def shear_building(masses: ArrayLike, stiffnesses: ArrayLike) -> ShearBuilding:
     """
-    Natural periods and mode shapes of a shear building.
+    Compute the natural periods and mode shapes of a shear building.
 
     Parameters
     ----------
@@ -90,17 +92,19 @@ def shear_building(masses: ArrayLike, stiffnesses: ArrayLike) -> ShearBuilding:
     array([10.166,  3.883])
     """
     mass, stiffness = _floors(masses, stiffnesses)
+    # Diagonals of M**-1/2 K M**-1/2
     above = np.append(stiffness[1:], 0.0)
-    eigenvalues, vectors = eigh_tridiagonal(
-        (stiffness + above) / mass, -stiffness[1:] / np.sqrt(mass[:-1] * mass[1:])
-    )
+    diagonal = (stiffness + above) / mass
+    neighbouring = -stiffness[1:] / np.sqrt(mass[:-1] * mass[1:])
+    eigenvalues, vectors = eigh_tridiagonal(diagonal, neighbouring)
+    # Back from sqrt(m) u to displacements, 1 at the roof
     shapes = vectors / np.sqrt(mass)[:, None]
     return ShearBuilding(2.0 * np.pi / np.sqrt(eigenvalues), shapes / shapes[-1])
 
 
 def equivalent_sdof(masses: ArrayLike, stiffnesses: ArrayLike, level: int) -> EquivalentSDOF:
     """
-    Period, participation and generalised mass of the first mode, seen from one floor.
+    Compute period, participation and generalised mass of the first mode at one floor.
 
     Parameters
     ----------
@@ -125,14 +129,15 @@ def equivalent_sdof(masses: ArrayLike, stiffnesses: ArrayLike, level: int) -> Eq
 
     Examples
     --------
-    >>> one = equivalent_sdof([2e5], [8e6], 0)
-    >>> round(one.period, 4), one.participation, one.mass
+    >>> oscillator = equivalent_sdof([2e5], [8e6], 0)
+    >>> round(oscillator.period, 4), oscillator.participation, oscillator.mass
     (0.9935, 1.0, 200000.0)
     """
     mass, stiffness = _floors(masses, stiffnesses)
     if not -mass.size <= level < mass.size:
         raise ValueError(f"level must be below the number of floors, {mass.size}, got {level}")
     periods, shapes = shear_building(mass, stiffness)
+    # First mode, 1 at the floor of contact
     shape = shapes[:, 0] / shapes[level, 0]
     generalised = float(mass @ shape**2)
     return EquivalentSDOF(float(periods[0]), float(mass @ shape) / generalised, generalised)

@@ -1,1 +1,1 @@
-"""Stream to Stream: every step returns a new Stream and leaves its input as it was; ``chain`` puts them in order."""
+"""Processing steps from Stream to new Stream; ``chain`` applies them in order."""

@@ -1,4 +1,4 @@
-"""Records that others have processed: they pass as they are, with what can be said about their limits."""
+"""Records processed by others: their samples pass unchanged, with corners and usable periods."""
 
 from obspy import Stream, Trace
 
@@ -9,22 +9,22 @@ from per_obspy.processing.filter.corners import (
     Corner,
     clean_corner,
     lowest_highpass,
+    usable_periods_noted,
 )
 from per_obspy.processing.notes import noted, remembered
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import judged
 from per_obspy.processing.quality.raw_checks import header_findings
-from per_obspy.processing.usable_periods import usable_periods_noted
 
 
 def passed_through(stream: Stream, settings: Processing) -> Stream:
     """
-    Return a copy of records that others have processed, with their corners and usable periods.
+    Return a copy of records processed by others, with their corners and usable periods.
 
-    Where the header is silent about the high-pass corner, the corner that would clean the
-    displacement limits the usable periods (nothing is filtered); about the low-pass, 0.75 of the
-    Nyquist frequency. Velocity or displacement that does not come to rest, and a peak that is not
-    the header's, are warnings: the samples are not ours to change.
+    Without a high-pass corner in the header, the corner that would clean the displacement limits
+    the usable periods (no filter is applied); without a low-pass corner, 0.75 of the Nyquist
+    frequency. Velocity or displacement that does not come to rest, and a peak that is not the
+    header's, are warnings: the samples are final.
 
     Parameters
     ----------
@@ -39,32 +39,33 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
     """
     out = Stream()
     for trace in stream:
-        known = _with_corners(trace, settings)
+        limited = _with_corners(trace, settings)
         found = (*header_findings(trace, settings.checks), *final_findings(trace, settings.checks))
-        out += judged(known, [one._replace(level="warn") for one in found])
+        out += judged(limited, [finding._replace(level="warn") for finding in found])
     return usable_periods_noted(out, settings.usable)
 
 
 def _with_corners(trace: Trace, settings: Processing) -> Trace:
+    """Return a copy with the corners of the header, or else with limits in their place."""
     out = trace.copy()
     noted(out, "processed already, passed through")
-    told = trace.stats.get("corners", {})
-    highpass = (
-        Corner(told["highpass"], "header")
-        if told.get("highpass")
-        else _silent_highpass(trace, settings)
-    )
+    header = trace.stats.get("corners", {})
+    if header.get("highpass"):
+        highpass = Corner(header["highpass"], "header")
+    else:
+        highpass = _limiting_highpass(trace, settings)
+    # Corners like 999 Hz mean none
     nyquist = trace.stats.sampling_rate / 2
-    silent = Corner(LOWPASS_OF_NYQUIST * nyquist, "0.75 Nyquist, the header is silent")
-    known = 0 < told.get("lowpass", 0) < nyquist  # 999 Hz and the like stand for none
-    lowpass = Corner(told["lowpass"], "header") if known else silent
+    lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, "0.75 Nyquist, the header is silent")
+    if 0 < header.get("lowpass", 0) < nyquist:
+        lowpass = Corner(header["lowpass"], "header")
     remembered(out, highpass=float(highpass.frequency), highpass_source=highpass.reason)
     remembered(out, lowpass=float(lowpass.frequency), lowpass_source=lowpass.reason)
     return out
 
 
-def _silent_highpass(trace: Trace, settings: Processing) -> Corner:
-    """Return the corner below which the displacement is not clean, as a limit, not to be applied."""
+def _limiting_highpass(trace: Trace, settings: Processing) -> Corner:
+    """Return the corner below which the displacement is not clean, as a limit of usable periods."""
     shape = tapered(Stream([trace]), settings.taper)[0]
     highest = settings.highpass_range[1]
     clean = clean_corner(shape, lowest_highpass(trace), highest, settings.drift, settings.order)

@@ -1,4 +1,4 @@
-"""The chain, station by station, every reason kept."""
+"""The processing chain, station by station, with a reason for every rejected trace."""
 
 import logging
 from collections import defaultdict
@@ -15,13 +15,15 @@ from per_obspy.processing.station.components import instruments, is_horizontal, 
 from per_obspy.processing.station.merging import merged
 from per_obspy.processing.station.structures import kept_apart
 
+#: Settings of an empty configuration.
 DEFAULTS = Processing()
+
 log = logging.getLogger(__name__)
 
 
 def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None = None) -> Stream:
     """
-    Return the records of a stream, ready for spectra.
+    Process the records of a stream so that spectra can be computed from them.
 
     Parameters
     ----------
@@ -30,33 +32,34 @@ def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None
     settings : Processing
         Every number of the chain, with its unit.
     event : obspy Event, optional
-        Helps to find the first wave; no event is fine.
+        Its origin helps to find the first wave.
 
     Returns
     -------
     obspy Stream
-        Acceleration, m/s2, of one instrument a station: at most two horizontals, with equal times,
-        and a vertical. Filtered records keep the zero pads that hold the transients of the filter.
+        Acceleration, m/s2, of one instrument per station: at most two horizontals, with equal
+        times, and a vertical. Filtered records keep the zero pads with the filter's transients.
         ``stats.processing`` lists the steps, ``stats.per_obspy`` the numbers chosen: corners,
         usable periods and so on.
 
     Raises
     ------
     RecordRejected
-        If nothing is left, with every reason of every trace.
+        If no trace is left, with every reason of every trace.
     """
     stations: dict[tuple[str, str], Stream] = defaultdict(Stream)
     for trace in stream:
         stations[trace.stats.network, trace.stats.station] += trace
+    # Every station by itself
     out, reasons = Stream(), []
     for station in stations.values():
-        kept, rejected = process_station(station, settings, event)
-        out += kept
-        reasons += [f"{row.name}: {reason}" for row in rejected for reason in row.reasons]
+        accepted, rejected = process_station(station, settings, event)
+        out += accepted
+        for row in rejected:
+            reasons += [f"{row.name}: {reason}" for reason in row.reasons]
     if not out:
-        raise RecordRejected(
-            ", ".join(map(".".join, stations)) or "empty stream", *(reasons or ["no traces"])
-        )
+        names = ", ".join(map(".".join, stations)) or "empty stream"
+        raise RecordRejected(names, *(reasons or ["no traces"]))
     for reason in reasons:
         log.warning("left out: %s", reason)
     return out
@@ -66,7 +69,7 @@ def process_station(
     stream: Stream, settings: Processing, event: Event | None = None
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Return the processed traces of the best instrument of a station, and a row for everything left out.
+    Process a station and return the best instrument with a row for each other trace.
 
     Parameters
     ----------
@@ -75,39 +78,42 @@ def process_station(
     settings : Processing
         Every number of the chain.
     event : obspy Event, optional
-        Helps to find the first wave, and a corner where there is no noise.
+        Its origin helps to find the first wave, its magnitude gives a corner without noise.
 
     Returns
     -------
-    kept : obspy Stream
-        Empty if no horizontal survived.
+    best : obspy Stream
+        Empty if no horizontal is usable.
     rejected : tuple of Rejection
-        One row a trace; one bad trace never loses the others. Sensors in structures are among them:
-        they recorded the structure, not the ground; `process_instruments` processes them.
+        One row per trace; a bad trace is rejected alone. Sensors in structures are among them: they
+        recorded the structure, not the ground; `process_instruments` processes them.
     """
     ground, structure = kept_apart(stream)
-    candidates, rejected = process_instruments(ground, settings, event)
+    candidates, unusable = process_instruments(ground, settings, event)
     best = max(candidates, key=lambda traces: sum(map(is_horizontal, traces)), default=Stream())
-    others = (trace for traces in candidates if traces is not best for trace in traces)
-    beside = [
-        rejection(trace, f"the instrument of {best[0].id} at the same station goes first")
-        for trace in others
-    ]
+    rejected = list(unusable)
+    # Other instruments at the same place
+    for traces in candidates:
+        if traces is not best:
+            reason = f"the instrument of {best[0].id} at the same station goes first"
+            rejected += [rejection(trace, reason) for trace in traces]
+    # Verticals alone
     if not any(map(is_horizontal, best)):
-        beside += [rejection(trace, "no horizontal of its instrument is usable") for trace in best]
+        reason = "no horizontal of its instrument is usable"
+        rejected += [rejection(trace, reason) for trace in best]
         best = Stream()
-    beside += [
-        rejection(trace, f"in a structure ({trace.stats.sensor_location}): kept apart")
-        for trace in structure
-    ]
-    return best, (*rejected, *beside)
+    # Sensors in structures
+    for trace in structure:
+        reason = f"in a structure ({trace.stats.sensor_location}): kept apart"
+        rejected.append(rejection(trace, reason))
+    return best, tuple(rejected)
 
 
 def process_instruments(
     stream: Stream, settings: Processing, event: Event | None = None
 ) -> tuple[list[Stream], tuple[Rejection, ...]]:
     """
-    Return the processed traces of every instrument of a station apart, the preferred instrument first.
+    Process every instrument of a station by itself, the preferred instrument first.
 
     For arrays in structures, boreholes and co-located sensors, whose instruments see different
     motion.
@@ -120,14 +126,15 @@ def process_instruments(
     Returns
     -------
     instruments : list of Stream
-        Empty ones left out.
+        Without those that have no usable trace.
     rejected : tuple of Rejection
     """
-    whole, lost = merged(stream)
+    whole, broken = merged(stream)
     source = source_of(event) if event is not None and event.origins else None
-    processed, rejected = [], list(lost)
+    processed, rejected = [], list(broken)
+    # Each instrument by itself
     for instrument in instruments(oriented(whole)):
-        traces, lost = process_instrument(instrument, settings, source)
+        traces, unusable = process_instrument(instrument, settings, source)
         processed += [traces] if traces else []
-        rejected += lost
+        rejected += unusable
     return processed, tuple(rejected)

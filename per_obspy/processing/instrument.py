@@ -1,4 +1,8 @@
-"""The steps of one instrument in their order: checks, m/s2, noise, baseline, corners, filter, usable periods."""
+"""
+Steps of one instrument in their order.
+
+Checks, m/s2, noise, baseline, corners, filter, usable periods.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial, reduce
@@ -9,9 +13,9 @@ from obspy.core import AttribDict
 from per_obspy.config import Processing
 from per_obspy.errors import Rejection
 from per_obspy.processing.already_processed import passed_through
-from per_obspy.processing.filter.automatic import corners_noted, offset_kept
+from per_obspy.processing.filter.baseline_and_corners import corners_noted, offset_kept
 from per_obspy.processing.filter.butterworth import filtered, padded
-from per_obspy.processing.filter.corners import corners_shared
+from per_obspy.processing.filter.corners import corners_shared, usable_periods_noted
 from per_obspy.processing.instrument_response import in_acceleration
 from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
 from per_obspy.processing.notes import is_processed
@@ -19,8 +23,8 @@ from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import Finding, judged, surviving
 from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
 from per_obspy.processing.station.components import is_horizontal, paired
-from per_obspy.processing.usable_periods import usable_periods_noted
 
+#: A step takes a Stream and returns a new one.
 Step = Callable[[Stream], Stream]
 
 
@@ -28,7 +32,7 @@ def process_instrument(
     instrument: Stream, settings: Processing, source: Source | None
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Return the processed components of one instrument, and a row for each that was left out.
+    Process the components of one instrument and return a row for each that is left out.
 
     Parameters
     ----------
@@ -47,57 +51,70 @@ def process_instrument(
     if instrument and is_processed(instrument[0]):
         pair, rejected = paired(instrument, settings.overlap)
         return passed_through(pair, settings), rejected
-    physical, unfit = _in_turn(instrument, _before(settings))
+    # Each component in m/s2, then the horizontals over their common time
+    physical, unfit = _in_turn(instrument, _conversion_steps(settings))
     pair, unpaired = paired(physical, settings.overlap)
+    # Baseline and corners of each component; the horizontals share the narrower band
     windowed = _windowed(pair, settings, source)
-    ready, undecided = _in_turn(windowed, _between(windowed, settings, source))
+    ready, undecided = _in_turn(windowed, _baseline_steps(windowed, settings, source))
     horizontals = corners_shared(Stream([trace for trace in ready if is_horizontal(trace)]))
     verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
-    done, restless = _in_turn(horizontals + verticals, _after(settings))
+    done, restless = _in_turn(horizontals + verticals, _filter_steps(settings))
     return done, (*unfit, *unpaired, *undecided, *restless)
 
 
-def _windowed(stream: Stream, settings: Processing, source: Source | None) -> Stream:
-    margin, shortest, tolerance = (
-        settings.onset_margin,
-        settings.shortest_noise,
-        settings.pick_tolerance,
-    )
-    noted_windows = noise_window_noted(
-        stream, margin, shortest, tolerance, source, settings.pre_event
-    )
-    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal)
-
-
-def _between(stream: Stream, settings: Processing, source: Source | None) -> tuple[Step, ...]:
-    outliers = outlier_findings(stream, settings.checks)
-    magnitude = source.magnitude if source else _told_magnitude(stream)
-    automatic = partial(corners_noted, settings=settings, magnitude=magnitude)
-    kept = partial(offset_kept, settings=settings)
-    return (
-        lambda one: judged(one[0], outliers.get(one[0].id, [])),
-        kept if settings.permanent_offset else automatic,
-    )
-
-
-def _told_magnitude(stream: Stream) -> float | None:
-    """Return the magnitude that a header tells, if one does."""
-    told = (trace.stats.get("event", {}).get("magnitude") for trace in stream)
-    return next((float(magnitude) for magnitude in told if magnitude), None)
-
-
 def _in_turn(stream: Stream, steps: Iterable[Step]) -> tuple[Stream, tuple[Rejection, ...]]:
-    return surviving(lambda one: reduce(lambda record, step: step(record), steps, one), stream)
+    """Apply steps in turn to each trace by itself."""
+
+    def apply(single: Stream) -> Stream:
+        return reduce(lambda record, step: step(record), steps, single)
+
+    return surviving(apply, stream)
 
 
-def _before(settings: Processing) -> tuple[Step, ...]:
+def _conversion_steps(settings: Processing) -> tuple[Step, ...]:
+    """Return the checks of raw samples and the conversion to m/s2."""
     return (
         lambda stream: judged(stream[0], raw_findings(stream[0], settings.checks)),
         partial(in_acceleration, gain_tolerance=settings.gain_tolerance),
     )
 
 
-def _after(settings: Processing) -> tuple[Step, ...]:
+def _windowed(stream: Stream, settings: Processing, source: Source | None) -> Stream:
+    """Return the components with their noise windows, cut to the time around the shaking."""
+    noted_windows = noise_window_noted(
+        stream,
+        settings.onset_margin,
+        settings.shortest_noise,
+        settings.pick_tolerance,
+        source,
+        settings.pre_event,
+    )
+    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal)
+
+
+def _baseline_steps(
+    stream: Stream, settings: Processing, source: Source | None
+) -> tuple[Step, ...]:
+    """Return the check for outliers among the components and the choice of baseline and corners."""
+    outliers = outlier_findings(stream, settings.checks)
+    magnitude = source.magnitude if source else _header_magnitude(stream)
+    # The permanent offset is kept on request only
+    if settings.permanent_offset:
+        chosen: Step = partial(offset_kept, settings=settings)
+    else:
+        chosen = partial(corners_noted, settings=settings, magnitude=magnitude)
+    return lambda single: judged(single[0], outliers.get(single[0].id, [])), chosen
+
+
+def _header_magnitude(stream: Stream) -> float | None:
+    """Return the first magnitude in the headers, if there is one."""
+    magnitudes = (trace.stats.get("event", {}).get("magnitude") for trace in stream)
+    return next((float(magnitude) for magnitude in magnitudes if magnitude), None)
+
+
+def _filter_steps(settings: Processing) -> tuple[Step, ...]:
+    """Return the filter, the usable periods, the last checks and the mark of a processed trace."""
     return (
         partial(
             _low_passed if settings.permanent_offset else _padded_and_filtered, order=settings.order
@@ -109,25 +126,25 @@ def _after(settings: Processing) -> tuple[Step, ...]:
 
 
 def _padded_and_filtered(stream: Stream, order: int) -> Stream:
-    corners = stream[0].stats.per_obspy
-    return filtered(
-        padded(stream, corners.highpass, order), corners.highpass, corners.lowpass, order
-    )
+    """Return the padded and filtered record, by its own corners."""
+    highpass, lowpass = stream[0].stats.per_obspy.highpass, stream[0].stats.per_obspy.lowpass
+    return filtered(padded(stream, highpass, order), highpass, lowpass, order)
 
 
 def _low_passed(stream: Stream, order: int) -> Stream:
+    """Return the record low-passed at its own corner."""
     return filtered(stream, 0.0, stream[0].stats.per_obspy.lowpass, order)
 
 
 def _final_findings(trace: Trace, settings: Processing) -> Iterator[Finding]:
-    """Give what does not come to rest; a permanent offset that was asked for may stay."""
+    """Yield the findings of motion that does not come to rest, but for a permanent offset."""
     for finding in final_findings(trace, settings.checks):
         if not (settings.permanent_offset and finding.check == "final_displacement"):
             yield finding
 
 
 def _marked(stream: Stream) -> Stream:
-    """Return a copy that says it is processed, with its corners, so that a second pass leaves it alone."""
+    """Return a copy marked as processed, with its corners, so that a second pass keeps it."""
     out = stream.copy()
     for trace in out:
         corners = trace.stats.per_obspy

@@ -1,4 +1,4 @@
-"""From counts to m/s2 by the full response, the overall sensitivity, or the reader's own factor."""
+"""Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +11,34 @@ from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.copying import copied
-from per_obspy.processing.notes import noted
+from per_obspy.processing.notes import copied, noted
 
+#: Units of the ground motion in a response.
 ACCELERATION_UNITS = ("M/S**2", "M/S^2", "M/S/S", "M/SEC**2", "M/(S**2)")
 VELOCITY_UNITS = ("M/S", "M/SEC")
 
+#: The pre-filter of velocity sensors rises from 0 to 1 in this band, Hz; that of accelerometers
+#: leaves low frequencies unchanged.
+VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 
-def in_acceleration(
-    stream: Stream,
-    velocity_band: tuple[float, float] = (0.005, 0.01),
-    nyquist_band: tuple[float, float] = (0.8, 0.9),
-    gain_tolerance: float = 0.1,
-) -> Stream:
+#: The pre-filter falls from 1 to 0 in this band, fractions of the Nyquist frequency: above it
+#: recorders record no motion, and dividing by a response near zero makes noise.
+NYQUIST_BAND = (0.8, 0.9)
+
+
+def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
     """
     Return a copy in m/s2.
 
     Physical records pass through. Counts are deconvolved with the full response where the metadata
-    hold one, without a water level, which would distort accelerometers; the pre-filter leaves
-    accelerometers alone at low frequency, where their response is flat. Without stages the overall
-    sensitivity divides; without any response the factor ``calib`` of a reader that vouches for
-    ``quantity = "acceleration"`` multiplies.
+    have one, without a water level, which would distort accelerometers; the pre-filter does not
+    change accelerometers at low frequency, where their response is flat. Without stages the overall
+    sensitivity divides; without any response the factor ``calib`` multiplies, if the reader gives
+    ``quantity = "acceleration"``.
 
     Parameters
     ----------
     stream : obspy Stream
-    velocity_band : (2,) float
-        Where the pre-filter of velocity sensors rises from 0 to 1, Hz.
-    nyquist_band : (2,) float
-        Where the pre-filter falls from 1 to 0, fractions of the Nyquist frequency; above it
-        recorders record nothing, and dividing by nothing makes noise.
     gain_tolerance : float
         Largest relative difference between the product of the stage gains and the overall
         sensitivity.
@@ -64,46 +62,44 @@ def in_acceleration(
         if units not in ("m/s2", "counts"):
             raise RecordRejected(trace.id, f"units {units!r}, needs m/s2 or counts with a response")
         if units == "counts":
-            _convert(trace, velocity_band, nyquist_band, gain_tolerance)
+            _convert(trace, gain_tolerance)
     return out
 
 
-def _convert(
-    trace: Trace,
-    velocity_band: tuple[float, float],
-    nyquist_band: tuple[float, float],
-    tolerance: float,
-) -> None:
+def _convert(trace: Trace, tolerance: float) -> None:
+    """Convert a step's own copy from counts to m/s2."""
     response = trace.stats.get("response")
     if response is None or response.instrument_sensitivity is None:
         _multiply_calibration(trace)
     else:
-        accelerometer = _is_accelerometer(trace, response)
+        is_accelerometer = _is_accelerometer(trace, response)
         _require_consistent(trace, response, tolerance)
         if any(type(stage) is not ResponseStage for stage in response.response_stages):
-            _deconvolve(trace, (-2.0, -1.0) if accelerometer else velocity_band, nyquist_band)
-        elif accelerometer:
+            _deconvolve(trace, ACCELERATION_BAND if is_accelerometer else VELOCITY_BAND)
+        elif is_accelerometer:
             _divide_sensitivity(trace, response)
         else:
             raise RecordRejected(
                 trace.id, "a velocity sensor with an overall sensitivity but no response stages"
             )
-    trace.stats.pop("response", None)  # it describes counts, which these samples no longer are
+    # The response describes counts, which these samples no longer are
+    trace.stats.pop("response", None)
     trace.stats.calib = 1.0
     trace.stats.units, trace.stats.quantity = "m/s2", "acceleration"
 
 
 def _multiply_calibration(trace: Trace) -> None:
-    vouched = (
-        trace.stats.get("quantity") == "acceleration" or "knet" in trace.stats
-    )  # ObsPy's K-NET reader: m/s2
-    if not vouched or trace.stats.calib == 1.0:
+    """Multiply by the reader's factor, if it is one to acceleration."""
+    # ObsPy's K-NET reader gives m/s2 without naming the quantity
+    is_known = trace.stats.get("quantity") == "acceleration" or "knet" in trace.stats
+    if not is_known or trace.stats.calib == 1.0:
         raise RecordRejected(trace.id, "counts without a response or a calibration factor")
     trace.data = trace.data * trace.stats.calib
     noted(trace, f"multiplied by calib {trace.stats.calib:g} m/s2", conversion="calibration factor")
 
 
 def _is_accelerometer(trace: Trace, response: Response) -> bool:
+    """Return whether a response is one to acceleration; reject other units than velocity."""
     units = str(response.instrument_sensitivity.input_units).upper()
     if units not in ACCELERATION_UNITS + VELOCITY_UNITS:
         raise RecordRejected(trace.id, f"response from {units!r}, needs M/S**2 or M/S")
@@ -111,55 +107,59 @@ def _is_accelerometer(trace: Trace, response: Response) -> bool:
 
 
 def _require_consistent(trace: Trace, response: Response, tolerance: float) -> None:
+    """Reject a trace whose stage gains contradict the overall sensitivity."""
     overall = response.instrument_sensitivity.value
     gains = [stage.stage_gain for stage in response.response_stages if stage.stage_gain is not None]
     product = float(np.prod(gains)) if gains else overall
+    # A sensitivity of 0 or None contradicts every gain
     if not overall or not abs(product / overall - 1) <= tolerance:
         raise RecordRejected(
             trace.id,
-            f"product of stage gains {product:g}, overall sensitivity {overall!r}: more than {tolerance:.0%} apart",
+            f"product of stage gains {product:g}, overall sensitivity {overall!r}: "
+            f"more than {tolerance:.0%} apart",
         )
 
 
 def _divide_sensitivity(trace: Trace, response: Response) -> None:
+    """Divide by the overall sensitivity."""
     sensitivity = response.instrument_sensitivity.value
     trace.data = trace.data / sensitivity
     noted(trace, f"divided by sensitivity {sensitivity:g} counts/(m/s2)", conversion="sensitivity")
 
 
-def _deconvolve(trace: Trace, low: tuple[float, float], nyquist_band: tuple[float, float]) -> None:
+def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
+    """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
     nyquist = trace.stats.sampling_rate / 2
-    band = (*low, nyquist_band[0] * nyquist, nyquist_band[1] * nyquist)
+    band = (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
+    # Zeros behind the record take up what the filter moves around
     length = next_fast_len(2 * trace.stats.npts, real=True)
     frequencies = rfftfreq(length, trace.stats.delta)
     try:
         response = _interpolated(trace.stats.response, frequencies)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    spectrum = (
-        rfft(trace.data - trace.data.mean(), length)
-        * cosine_sac_taper(frequencies, flimit=band)
-        / response
-    )
+    amplitudes = rfft(trace.data - trace.data.mean(), length)
+    spectrum = amplitudes * cosine_sac_taper(frequencies, flimit=band) / response
     trace.data = irfft(spectrum, length)[: trace.stats.npts]
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
 
 
 def _interpolated(response: Response, frequencies: FloatArray) -> NDArray[np.complex128]:
     """
-    Return the response to acceleration, counts/(m/s2), evaluated on a thousand frequencies and interpolated.
+    Return the response to acceleration, counts/(m/s2), interpolated from a thousand frequencies.
 
     Evaluating every line took two thirds of the whole chain. Logarithm of amplitude and phase are
     smooth: the difference is below 1e-8 up to 0.9 of the Nyquist frequency. The value at frequency
     0 is that of the first line.
     """
     low, high = frequencies[1], frequencies[-1]
-    lines = np.unique(
-        np.concatenate((np.geomspace(low, high, 200), np.linspace(high / 1000, high, 1000)))
-    )
+    # Frequencies that resolve both logarithmic and linear changes
+    logarithmic, linear = np.geomspace(low, high, 200), np.linspace(high / 1000, high, 1000)
+    lines = np.unique(np.concatenate((logarithmic, linear)))
     values = response.get_evalresp_response_for_frequencies(lines, output="ACC")
     if not np.all(np.abs(values) > 0):
         raise ValueError("it is zero at some frequency")
-    places = np.maximum(frequencies, low)
-    smooth = CubicSpline(lines, np.log(np.abs(values)) + 1j * np.unwrap(np.angle(values)))
-    return np.asarray(np.exp(smooth(places)))
+    # Logarithm of the response: amplitude as real part, phase as imaginary part
+    logarithm = np.log(np.abs(values)) + 1j * np.unwrap(np.angle(values))
+    smooth = CubicSpline(lines, logarithm)
+    return np.asarray(np.exp(smooth(np.maximum(frequencies, low))))

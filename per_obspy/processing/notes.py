@@ -1,6 +1,13 @@
-"""What was done to a trace: one line a step in ``stats.processing``, every chosen number in ``stats.per_obspy``."""
+"""
+Notes on a trace: steps and chosen numbers in its ``stats``, and copies that share the response.
 
-from obspy import Trace
+``stats.processing`` has one line per step, ``stats.per_obspy`` every number that was chosen for the
+record.
+"""
+
+from copy import deepcopy
+
+from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.errors import Rejection
@@ -15,18 +22,18 @@ def noted(trace: Trace, step: str, **numbers: Value) -> None:
     Parameters
     ----------
     trace : obspy Trace
-        Changed in place: only ever a step's own copy.
+        Changed in place: always the step's own copy.
     step : str
-        What happened, in a few words; appended to ``stats.processing``.
+        Short description; appended to ``stats.processing``.
     **numbers : str, float or int
-        What was chosen for this record; kept in ``stats.per_obspy``.
+        Choices for this record; stored in ``stats.per_obspy``.
     """
     trace.stats.setdefault("processing", []).append(f"per_obspy: {step}")
     remembered(trace, **numbers)
 
 
 def remembered(trace: Trace, **numbers: Value) -> None:
-    """Keep numbers of this record in ``stats.per_obspy`` of a step's own copy; see `noted`."""
+    """Store numbers of a record in ``stats.per_obspy`` of a step's own copy; see `noted`."""
     trace.stats.setdefault("per_obspy", AttribDict()).update(numbers)
 
 
@@ -36,5 +43,32 @@ def rejection(trace: Trace, *reasons: str) -> Rejection:
 
 
 def is_processed(trace: Trace) -> bool:
-    """Tell whether others have processed a trace."""
+    """Return whether a trace is marked as processed, by others or by an earlier run."""
     return bool(trace.stats.get("processing_level") == "processed")
+
+
+def copied(stream: Stream) -> Stream:
+    """
+    Return a copy of every trace with the same ``stats.response``.
+
+    The response is never changed, and copying it took a quarter of the whole chain.
+
+    Parameters
+    ----------
+    stream : obspy Stream
+
+    Returns
+    -------
+    obspy Stream
+    """
+    return Stream([_copied(trace) for trace in stream])
+
+
+def _copied(trace: Trace) -> Trace:
+    """Return a copy of one trace that shares the response."""
+    shared = ("response", "endtime")
+    own = {name: deepcopy(value) for name, value in trace.stats.items() if name not in shared}
+    out = Trace(trace.data.copy(), own)
+    if "response" in trace.stats:
+        out.stats.response = trace.stats.response
+    return out

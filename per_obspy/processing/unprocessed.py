@@ -1,4 +1,4 @@
-"""The record as it was before its baseline, taper and filter, to be shown beside what became of it."""
+"""The raw record in m/s2 over the time of its processed one, for comparison in figures."""
 
 from obspy import Stream, Trace
 
@@ -11,35 +11,37 @@ from per_obspy.processing.station.merging import merged
 
 def before_processing(stream: Stream, processed: Trace, settings: Processing) -> Trace | None:
     """
-    Return the raw record of a processed trace in m/s2, without the mean of its noise, over the time that was processed.
+    Return the raw record of a processed trace in m/s2 over the processed time.
+
+    Only the mean of its noise is removed.
 
     Parameters
     ----------
     stream : obspy Stream
-        All channels of the station, as they were read.
+        All channels of the station as read.
     processed : obspy Trace
         From `process_station`.
     settings : Processing
-        Those that it was processed with.
+        Settings of that processing.
 
     Returns
     -------
     obspy Trace or None
-        None where others had processed it.
+        None if the record came processed by others.
     """
-    raw, _ = merged(
-        Stream([one for one in stream if one.id == processed.id and not is_processed(one)])
-    )
+    pieces = [trace for trace in stream if trace.id == processed.id and not is_processed(trace)]
+    raw, _ = merged(Stream(pieces))
     if not raw:
         return None
-    chosen = processed.stats.per_obspy
-    physical = in_acceleration(raw, gain_tolerance=settings.gain_tolerance)[0]
-    pads = [
-        round(float(chosen.get(name, 0.0)) / processed.stats.delta)
-        for name in ("pad_before", "pad_after")
-    ]
-    start = processed.stats.starttime + pads[0] * processed.stats.delta - physical.stats.starttime
+    physical = in_acceleration(raw, settings.gain_tolerance)[0]
+    # Start of the processed record without its pads, s and samples after that of the raw one
+    chosen, dt = processed.stats.per_obspy, processed.stats.delta
+    before = round(float(chosen.get("pad_before", 0.0)) / dt)
+    after = round(float(chosen.get("pad_after", 0.0)) / dt)
+    start = processed.stats.starttime + before * dt - physical.stats.starttime
     first = max(round(start / physical.stats.delta), 0)
-    physical.data = physical.data[first : first + processed.stats.npts - sum(pads)]
+    # The samples between the pads
+    count = processed.stats.npts - (before + after)
+    physical.data = physical.data[first : first + count]
     physical.stats.starttime += first * physical.stats.delta
     return mean_removed(Stream([physical]), float(chosen.noise))[0]

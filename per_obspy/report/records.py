@@ -13,6 +13,7 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.checks import FloatArray
+from per_obspy.config import Processing
 from per_obspy.files import written_whole
 from per_obspy.processing.noise.signal_to_noise import noise_spectra
 from per_obspy.report.style import (
@@ -24,6 +25,7 @@ from per_obspy.report.style import (
 )
 from per_obspy.tables.processed import COLUMNS
 
+SMOOTHING = Processing().smoothing  # b of the Konno-Ohmachi window
 PAGE = (11.7, 8.3)  # inches: A4, landscape
 
 #: Limit of a vertical axis over the largest processed value: a drift beyond is cut.
@@ -147,7 +149,7 @@ def _draw_fourier(axes: Axes, record: FloatArray, dt: float) -> None:
 
 def _draw_noise(axes: Axes, unfiltered: FloatArray, dt: float, noise: float, lowest: float) -> None:
     """Draw the smoothed amplitudes of signal and noise from the lowest frequency on."""
-    spectra = noise_spectra(unfiltered, dt, noise)
+    spectra = noise_spectra(unfiltered, dt, noise, SMOOTHING)
     known = spectra.frequencies >= lowest
     frequency, signal = spectra.frequencies[known], spectra.signal[known]
     # In the colours of the record and of the noise window

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.config import Codes
-from per_obspy.inventory.naming import joined_names
 from per_obspy.inventory.schema import Column
+from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.values import both, values
 
 INCH, FOOT = 0.0254, 0.3048

@@ -7,7 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from per_obspy.config import Screening
-from per_obspy.inventory.naming import joined_names
+from per_obspy.inventory.table_columns import joined_names
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.values import Table, both, number, values
 

@@ -1,4 +1,4 @@
-"""The index of stored inventories: what goes in comes out, changes are noticed, regions are found."""
+"""Index of stored inventories: entries come back, changes are noticed, regions are found."""
 
 import datetime
 from pathlib import Path
@@ -26,20 +26,22 @@ ORIGIN = Origin(
 )
 
 
+def town(longitude, latitude, count):
+    """Return a small simulated inventory around a place."""
+    return simulated_pairs([longitude], [latitude], count, seed=1, radius=2000.0, touching=0.5)
+
+
 @pytest.fixture
 def index(tmp_path):
-    (tmp_path / "data").mkdir()
-    simulated_pairs([-67.95], [-20.35], 20, seed=1).to_csv(
-        tmp_path / "data" / "old.csv", index=False
-    )
-    simulated_pairs([10.0], [50.0], 30, seed=1).to_parquet(tmp_path / "data" / "new.parquet")
-    add_inventory(tmp_path / "catalog.toml", tmp_path / "data" / "old.csv", ORIGIN)
-    add_inventory(
-        tmp_path / "catalog.toml",
-        tmp_path / "data" / "new.parquet",
-        ORIGIN._replace(name="Neustadt ü"),
-    )
-    return tmp_path / "catalog.toml"
+    """Index of two inventories in a folder of their own."""
+    # two places, two kinds of files
+    target, folder = tmp_path / "catalog.toml", tmp_path / "data"
+    folder.mkdir()
+    town(-67.95, -20.35, 20).to_csv(folder / "old.csv", index=False)
+    town(10.0, 50.0, 30).to_parquet(folder / "new.parquet")
+    add_inventory(target, folder / "old.csv", ORIGIN)
+    add_inventory(target, folder / "new.parquet", ORIGIN._replace(name="Neustadt ü"))
+    return target
 
 
 def test_what_goes_in_comes_out(index):
@@ -61,6 +63,7 @@ def test_the_folder_may_move(index, tmp_path):
 def test_a_changed_and_a_missing_file_are_noticed(index):
     old, new = stored_inventories(index)
     assert check_inventories(index) == ()
+    # one cell changes its length, one file disappears
     old.file.write_text(old.file.read_text().replace("inside", "end", 1))
     new.file.unlink()
     changed, missing = check_inventories(index)
@@ -88,7 +91,7 @@ def test_regions_find_what_they_touch(index):
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "expected"),
+    ("first", "second", "expected"),
     [
         ((0, 0, 2, 2), (1, 1, 3, 3), True),
         ((0, 0, 9, 9), (4, 4, 5, 5), True),
@@ -100,8 +103,9 @@ def test_regions_find_what_they_touch(index):
         ((179, 0, -179, 1), (0, 0, 1, 1), False),
     ],
 )
-def test_boxes_touch_both_ways_round(one, other, expected):
-    assert touch(Box(*one), Box(*other)) == touch(Box(*other), Box(*one)) == expected
+def test_boxes_touch_both_ways_round(first, second, expected):
+    assert touch(Box(*first), Box(*second)) is expected
+    assert touch(Box(*second), Box(*first)) is expected
 
 
 def test_bounding_box_across_the_date_line():
@@ -118,13 +122,14 @@ def test_a_bounding_box_of_one_place():
 
 
 def test_entries_that_cannot_be(index, tmp_path):
+    # a name that is taken, an empty text, a table without a usable row
     file = tmp_path / "data" / "old.csv"
     with pytest.raises(CatalogError, match="name = 'old town' is taken"):
         add_inventory(index, file, ORIGIN)
     with pytest.raises(CatalogError, match=r"licence of the inventory .* is empty"):
         add_inventory(index, file, ORIGIN._replace(name="third", licence=" "))
     bad = tmp_path / "bad.csv"
-    simulated_pairs([10.0], [50.0], 1, seed=1).assign(gap=-1.0).to_csv(bad, index=False)
+    town(10.0, 50.0, 1).assign(gap=-1.0).to_csv(bad, index=False)
     with pytest.raises(CatalogError, match=r"bad.csv: no usable row: gap = -1 m is outside"):
         add_inventory(index, bad, ORIGIN._replace(name="third"))
     assert len(stored_inventories(index)) == 2

@@ -1,4 +1,4 @@
-"""Each fault that a row can have, its wording, and that all faults of a row are told."""
+"""Each fault that a row can have, its wording, and all faults of one row together."""
 
 import numpy as np
 import pandas as pd
@@ -35,13 +35,17 @@ def test_a_good_row_in_the_order_of_the_schema():
     assert list(pairs.columns) == [*(name for name in COLUMNS if name in row), "extra"]
 
 
+UNIT_OF_GAP = "(given in millimetres or centimetres by mistake?)"
+FRACTION = "(a fraction is expected, not per cent)"
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
         ({"gap": -0.01}, "gap = -0.01 m is outside 0 to 10 m"),
-        ({"gap": 50.0}, "gap = 50 m is outside 0 to 10 m (given in millimetres or centimetres by mistake?)"),
+        ({"gap": 50.0}, f"gap = 50 m is outside 0 to 10 m {UNIT_OF_GAP}"),
         ({"gap": np.nan}, "gap is empty"),
-        ({"gap": np.inf}, "gap = inf m is outside 0 to 10 m (given in millimetres or centimetres by mistake?)"),
+        ({"gap": np.inf}, f"gap = inf m is outside 0 to 10 m {UNIT_OF_GAP}"),
         ({"gap": "a lot"}, "gap = 'a lot' is not a number"),
         ({"pair_id": ""}, "pair_id is empty"),
         ({"height_1": 0.0, "storeys_1": np.nan}, "height_1 = 0 m is outside 2 to 1000 m"),
@@ -50,15 +54,16 @@ def test_a_good_row_in_the_order_of_the_schema():
         ({"height_2": 9.0, "storeys_2": 9.0},
          "height_2 = 9 m with storeys_2 = 9 makes floors of 1 m, outside 2 to 12 m"),
         ({"period_1": 0.0}, "period_1 = 0 s is outside 0.01 to 20 s"),
-        ({"damping_2": 1.0}, "damping_2 = 1 is outside 0 to 1 (a fraction is expected, not per cent)"),
-        ({"damping_2": 5.0}, "damping_2 = 5 is outside 0 to 1 (a fraction is expected, not per cent)"),
+        ({"damping_2": 1.0}, f"damping_2 = 1 is outside 0 to 1 {FRACTION}"),
+        ({"damping_2": 5.0}, f"damping_2 = 5 is outside 0 to 1 {FRACTION}"),
         ({"damping_1": -0.1}, "damping_1 = -0.1 is outside 0 to 1"),
         ({"mass_1": -2e5}, "mass_1 = -200000 kg is outside 1 to 1e+12 kg"),
         ({"period_1": 500.0}, "period_1 = 500 s is outside 0.01 to 20 s (in milliseconds?)"),
         ({"mass_1": 0.0}, "mass_1 = 0 kg is outside 1 to 1e+12 kg"),
         ({"system_1": "masonry"},
          "system_1 = 'masonry' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
-        ({"system_2": 3}, "system_2 = '3' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
+        ({"system_2": 3},
+         "system_2 = '3' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
         ({"position": "middle"}, "position = 'middle' is unknown, expected end, inside"),
         ({"restitution": 1.2}, "restitution = 1.2 is outside 0 to 1"),
         ({"hardening_1": 1.0}, "hardening_1 = 1 is outside 0 to 1"),
@@ -138,7 +143,8 @@ def test_duplicates_after_the_first_are_rejected():
     table = pd.DataFrame([_row(), _row(pair_id="b"), _row(gap=0.3), _row(gap=0.2)])
     pairs = checked_pairs(table, "pairs.csv")
     assert pairs["gap"].tolist() == [0.1, 0.1]
-    assert [one.row for one in pairs.attrs["rejected"]] == [4, 5]
+    # lines of the file: the header is line 1
+    assert [rejection.row for rejection in pairs.attrs["rejected"]] == [4, 5]
     assert pairs.attrs["rejected"][0].reasons == ("pair_id = 'a' stands in an earlier row already",)
 
 

@@ -1,4 +1,4 @@
-"""Completion of the pair table: what is given stays, what is not is derived, and each derived value is marked."""
+"""Completion of the pair table: given values stay, others are derived and marked."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from per_obspy import asce7_period, ec8_period
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.inventory.contact import contact_participation
+from per_obspy.inventory.contact_height import contact_participation
 from per_obspy.inventory.schema import COLUMNS, COMPLETED
 
 PLACE = {
@@ -28,28 +28,25 @@ def _completed(building=None, **columns):
 
 
 def test_what_is_given_stays_and_is_not_marked():
-    given = {}
-    for i, scale in ((1, 1.0), (2, 1.1)):
-        given |= {
-            f"height_{i}": 12.0 * scale,
-            f"storeys_{i}": 4.0,
-            f"system_{i}": "steel_mrf",
-            f"period_{i}": 0.7 * scale,
-        }
-        given |= {
-            f"damping_{i}": 0.02 * scale,
-            f"mass_{i}": 4e5 * scale,
-            f"participation_{i}": 1.1 * scale,
-        }
-        given |= {f"yield_displacement_{i}": 0.03 * scale, f"hardening_{i}": 0.05 * scale}
-        given |= {f"period_log_std_{i}": 0.1 * scale, f"damping_log_std_{i}": 0.2 * scale}
-    given |= {
-        "contact_height": 11.0,
-        "floor_offset": 0.2,
-        "restitution": 0.4,
-        "gap_std": 0.01,
-        "azimuth": 30.0,
+    # every quantity of a building, building 2 with 1.1 times the numbers of building 1
+    building = {
+        "height": 12.0,
+        "period": 0.7,
+        "damping": 0.02,
+        "mass": 4e5,
+        "participation": 1.1,
+        "yield_displacement": 0.03,
+        "hardening": 0.05,
+        "period_log_std": 0.1,
+        "damping_log_std": 0.2,
     }
+    given = {f"{name}_1": value for name, value in building.items()}
+    given |= {f"{name}_2": 1.1 * value for name, value in building.items()}
+    for i in (1, 2):
+        given |= {f"storeys_{i}": 4.0, f"system_{i}": "steel_mrf"}
+    # every quantity of the pair
+    given |= {"contact_height": 11.0, "floor_offset": 0.2, "restitution": 0.4}
+    given |= {"gap_std": 0.01, "azimuth": 30.0}
     row = _completed(**given)
     assert row["derived"] == ""
     assert {name: row[name] for name in given} == given
@@ -60,7 +57,7 @@ def test_a_bare_row_is_marked_where_it_was_filled():
     both = ("system", "storeys", "period", "damping", "participation", "mass")
     expected = {f"{name}_{i}" for name in both for i in (1, 2)} | {"contact_height", "restitution"}
     assert set(row["derived"].split()) == expected
-    assert row["storeys_1"], row["storeys_2"] == (4.0, 3.0)
+    assert (row["storeys_1"], row["storeys_2"]) == (4.0, 3.0)
     assert row["contact_height"] == 9.0
     assert_allclose(row["mass_1"] / row["mass_2"], 4 / 3, rtol=1e-14)  # equal areas are assumed
     assert row[["damping_1", "restitution", "gap_std", "hardening_1"]].tolist() == [
@@ -116,9 +113,9 @@ def test_a_building_of_unknown_size_is_a_plain_oscillator():
     assert row["mass_1"] == row["contact_mass_1"] == 3e5  # as heavy as its neighbour
     assert {"participation_1", "mass_1"} <= set(row["derived"].split())
     assert np.isnan([row["height_1"], row["storeys_1"]]).all()
-    nothing = _completed(period_1=0.8, period_2=0.9)
-    assert nothing["mass_1"] == nothing["mass_2"] > 0
-    assert np.isnan(nothing["contact_height"])
+    bare = _completed(period_1=0.8, period_2=0.9)
+    assert bare["mass_1"] == bare["mass_2"] > 0
+    assert np.isnan(bare["contact_height"])
 
 
 def test_mass_from_area_and_storeys():
@@ -143,7 +140,7 @@ def test_yield_displacement_from_coefficient():
             {"storeys_1": 3.0, "storeys_2": 3.0},
             True,
         ),  # floors of the first at 4, 8, 12 m; roof of the second at 9 m
-        ({}, False),  # derived storeys do not say where floors are
+        ({}, False),  # derived storeys have no floors at known heights
         ({"floor_offset": -1.0}, True),
     ],
 )
@@ -162,23 +159,23 @@ def test_middle_of_the_pair():
     )  # would catch a mean of 0.0001 degrees
 
 
-def test_swapping_the_buildings_swaps_the_columns():
-    # would catch an index 1 where 2 is meant
-    first = {
-        "height": 30.0,
-        "storeys": 10.0,
-        "system": "steel_mrf",
-        "area": 300.0,
-        "yield_coefficient": 0.1,
-    }
-    second = {"height": 9.0, "period": 0.4, "damping": 0.02}
-    one = _completed(
-        **{f"{k}_1": v for k, v in first.items()}, **{f"{k}_2": v for k, v in second.items()}
-    )
-    two = _completed(
-        **{f"{k}_2": v for k, v in first.items()}, **{f"{k}_1": v for k, v in second.items()}
-    )
-    for name in (
+TALL = {
+    "height": 30.0,
+    "storeys": 10.0,
+    "system": "steel_mrf",
+    "area": 300.0,
+    "yield_coefficient": 0.1,
+}
+LOW = {"height": 9.0, "period": 0.4, "damping": 0.02}
+
+
+def _numbered(building, index):
+    return {f"{name}_{index}": value for name, value in building.items()}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
         "period",
         "mass",
         "contact_mass",
@@ -186,8 +183,14 @@ def test_swapping_the_buildings_swaps_the_columns():
         "damping",
         "yield_displacement",
         "storeys",
-    ):
-        assert (one[f"{name}_1"], one[f"{name}_2"]) == (two[f"{name}_2"], two[f"{name}_1"])
+    ],
+)
+def test_swapping_the_buildings_swaps_the_columns(name):
+    # would catch an index 1 where 2 is meant
+    straight = _completed(**_numbered(TALL, 1), **_numbered(LOW, 2))
+    swapped = _completed(**_numbered(LOW, 1), **_numbered(TALL, 2))
+    assert straight[f"{name}_1"] == swapped[f"{name}_2"]
+    assert straight[f"{name}_2"] == swapped[f"{name}_1"]
 
 
 def test_everything_the_physics_needs_is_there_and_named_in_the_schema():

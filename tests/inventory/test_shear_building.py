@@ -70,10 +70,8 @@ def test_scaling(factor):
 
 def test_energy_is_the_same_seen_from_any_floor():
     masses, stiffnesses = _random_building(5)
-    energies = [
-        one.mass * one.participation**2
-        for one in (equivalent_sdof(masses, stiffnesses, i) for i in range(5))
-    ]
+    oscillators = [equivalent_sdof(masses, stiffnesses, level) for level in range(5)]
+    energies = [sdof.mass * sdof.participation**2 for sdof in oscillators]
     assert_allclose(energies, energies[0], rtol=1e-11)
 
 

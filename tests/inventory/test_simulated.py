@@ -1,4 +1,4 @@
-"""Simulated inventories: valid by the reader's own checks, reproducible, where they should be, and varied."""
+"""Simulated inventories: valid by the reader's own checks, reproducible, well placed, varied."""
 
 import numpy as np
 import pandas as pd
@@ -10,11 +10,12 @@ from per_obspy.inventory.checking import checked_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 
 STATIONS = [-67.95, -67.80], [-20.35, -20.25]
+RADIUS, TOUCHING = 2000.0, 0.5
 
 
 @pytest.fixture(scope="module")
 def pairs() -> pd.DataFrame:
-    return simulated_pairs(*STATIONS, 4000, seed=20)
+    return simulated_pairs(*STATIONS, 4000, 20, RADIUS, TOUCHING)
 
 
 def test_every_row_passes_the_checks_of_an_inventory(pairs, tmp_path):
@@ -24,16 +25,18 @@ def test_every_row_passes_the_checks_of_an_inventory(pairs, tmp_path):
 
 
 def test_the_seed_decides(pairs):
-    pd.testing.assert_frame_equal(simulated_pairs(*STATIONS, 4000, seed=20), pairs)
-    assert not simulated_pairs(*STATIONS, 4000, seed=21).equals(pairs)
+    repeated = simulated_pairs(*STATIONS, 4000, 20, RADIUS, TOUCHING)
+    pd.testing.assert_frame_equal(repeated, pairs)
+    assert not simulated_pairs(*STATIONS, 4000, 21, RADIUS, TOUCHING).equals(pairs)
 
 
-def test_pairs_stand_within_the_radius_of_a_station():
-    table = simulated_pairs([-67.95], [-20.35], 200, seed=1, radius=500.0)
+def test_pairs_lie_within_the_radius_of_a_station():
+    table = simulated_pairs([-67.95], [-20.35], 200, 1, 500.0, TOUCHING)
     rows = table[["latitude_1", "longitude_1"]].to_numpy()
     distance = [gps2dist_azimuth(-20.35, -67.95, *row)[0] for row in rows]
     assert max(distance) < 505.0  # flat geometry, off by less than 1 %
-    assert max(distance) > 450.0  # and they use the room
+    # 200 pairs anywhere on the disc: all within 450 m with a probability of 0.81**200
+    assert max(distance) > 450.0
 
 
 def test_azimuth_points_from_the_first_building_to_the_second(pairs):
@@ -47,43 +50,78 @@ def test_azimuth_points_from_the_first_building_to_the_second(pairs):
 def test_streets_share_their_direction(pairs):
     west = pairs[pairs["longitude_1"] < -67.88]
     folded = np.exp(4j * np.deg2rad(west["azimuth"]))
-    assert abs(folded.mean()) > 0.95  # scattered by 2 degrees about a right-angled grid
+    # a right-angled grid with a scatter s of 2 degrees: the mean is exp(-(4 s)**2 / 2), rounding to
+    # degrees included; 7 standard deviations of that mean of 2000 pairs
+    expected = np.exp(-8 * np.deg2rad(np.sqrt(2.0**2 + 1 / 12)) ** 2)
+    assert abs(folded.mean()) == pytest.approx(expected, abs=0.002)
 
 
-def test_it_looks_like_a_town(pairs):
-    n = len(pairs)
-    # shares of n rows: four standard deviations of a binomial share of one half
-    scatter = 4 * 0.5 / np.sqrt(n)
-    assert abs((pairs["gap"] == 0).mean() - 0.5) < scatter
-    assert (pairs["height_1"] == pairs["height_2"]).mean() > 0.4
-    assert pairs["system_1"].nunique() == 4
-    assert pairs.loc[pairs["gap"] > 0, "gap"].between(0.01, 1.5).all()
-    assert 3 <= pairs["storeys_1"].median() <= 5
-    assert abs(pairs["period_1"].notna().mean() - 0.5) < scatter
+def _scatter(share: float, count: int) -> float:
+    """Return four standard deviations of a binomial share."""
+    return 4 * np.sqrt(share * (1 - share) / count)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "share"),
+    [
+        ("gap", 0.0, TOUCHING),
+        ("position", "inside", 0.6),
+        ("system_1", "steel_mrf", 0.10),
+        ("system_1", "concrete_mrf", 0.50),
+        ("system_1", "ebf_brbf", 0.05),
+        ("system_2", "other", 0.35),
+    ],
+)
+def test_shares_of_a_town(pairs, column, value, share):
+    assert abs((pairs[column] == value).mean() - share) < _scatter(share, len(pairs))
+
+
+@pytest.mark.parametrize("column", ["period_1", "period_2", "damping_1", "damping_2"])
+def test_half_the_buildings_are_measured(pairs, column):
+    assert abs(pairs[column].notna().mean() - 0.5) < _scatter(0.5, len(pairs))
+
+
+def test_neighbours_are_often_equally_high(pairs):
+    # 45 % on purpose, and of the others as many as two buildings of different pairs by chance
+    share = (pairs["height_1"] == pairs["height_2"]).mean()
+    by_chance = (pairs["height_1"].to_numpy() == np.roll(pairs["height_2"], 1)).mean()
+    expected = 0.45 + 0.55 * by_chance
+    assert abs(share - expected) < _scatter(expected, len(pairs)) + _scatter(by_chance, len(pairs))
+
+
+def test_sizes_of_a_town(pairs):
+    # a lognormal of median 4 and deviation 0.6 is below 3.5 in 41 % and below 4.5 in 58 % of the
+    # buildings: ten standard deviations of 4000 buildings from one half
+    assert pairs["storeys_1"].median() == 4
+    gaps = pairs.loc[pairs["gap"] > 0, "gap"]
+    assert gaps.between(0.01, 1.5).all()
+    # four standard errors of the median of a lognormal of deviation 0.9, and half a centimetre
+    tolerance = 4 * 1.2533 * 0.9 / np.sqrt(len(gaps)) + 0.005 / 0.08
+    assert abs(np.log(gaps.median() / 0.08)) < tolerance
 
 
 def test_measured_periods_scatter_about_the_formula(pairs):
     measured = pairs[pairs["period_1"].notna()]
-    residual = np.log(
-        measured["period_1"] / asce7_period(measured["height_1"], measured["system_1"])
-    )
+    formula = asce7_period(measured["height_1"], measured["system_1"])
+    residual = np.log(measured["period_1"] / formula)
+    # four standard errors of the mean and of the deviation of a normal quantity
     assert abs(residual.mean()) < 4 * 0.3 / np.sqrt(len(measured))
-    assert abs(residual.std() - 0.3) < 0.03
+    assert abs(residual.std() - 0.3) < 4 * 0.3 / np.sqrt(2 * len(measured))
 
 
 def test_touching_is_a_parameter():
-    assert (simulated_pairs(*STATIONS, 50, seed=3, touching=1.0)["gap"] == 0).all()
-    assert (simulated_pairs(*STATIONS, 50, seed=3, touching=0.0)["gap"] > 0).all()
+    assert (simulated_pairs(*STATIONS, 50, 3, RADIUS, touching=1.0)["gap"] == 0).all()
+    assert (simulated_pairs(*STATIONS, 50, 3, RADIUS, touching=0.0)["gap"] > 0).all()
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([], [], 5, 1), "rows of equal length"),
-        (([1.0], [2.0, 3.0], 5, 1), "rows of equal length"),
-        (([1.0], [99.0], 5, 1), "latitudes must be between -85 and 85, got 99"),
-        (([1.0], [2.0], 0, 1), "count must be at least 1, got 0"),
-        (([1.0], [2.0], 5, 1, 0.0), "radius must be positive"),
+        (([], [], 5, 1, 10.0, 0.5), "rows of equal length"),
+        (([1.0], [2.0, 3.0], 5, 1, 10.0, 0.5), "rows of equal length"),
+        (([1.0], [99.0], 5, 1, 10.0, 0.5), "latitudes must be between -85 and 85, got 99"),
+        (([1.0], [2.0], 0, 1, 10.0, 0.5), "count must be at least 1, got 0"),
+        (([1.0], [2.0], 5, 1, 0.0, 0.5), "radius must be positive"),
         (([1.0], [2.0], 5, 1, 10.0, 1.5), r"touching must be between 0 and 1, got 1\.5"),
     ],
 )

@@ -1,3 +1,5 @@
+"""Records processed by others: samples stay, corners and usable periods come from the header."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -25,14 +27,11 @@ def test_samples_and_corners_pass(earthquake):
     given = others(earthquake(), corners=AttribDict(highpass=0.1, lowpass=30.0))
     out = passed_through(given, SETTINGS)[0]
     assert_array_equal(out.data, earthquake())
-    kept = out.stats.per_obspy
-    assert (kept.highpass, kept.lowpass, kept.highpass_source, kept.lowpass_source) == (
-        0.1,
-        30.0,
-        "header",
-        "header",
-    )
-    assert kept.longest_period == pytest.approx(8.0)
+    # the corners of the header and the periods that follow from them
+    known = out.stats.per_obspy
+    assert (known.highpass, known.lowpass) == (0.1, 30.0)
+    assert (known.highpass_source, known.lowpass_source) == ("header", "header")
+    assert known.longest_period == pytest.approx(8.0)
     assert "per_obspy" not in given[0].stats
 
 
@@ -46,23 +45,22 @@ def test_silent_headers_are_limited_by_their_drift(earthquake, drift, longest):
     # the drift has 20 s; mutation: taking the duration as the limit calls the record usable to 96 s
     time = np.arange(12000) / RATE
     out = passed_through(others(earthquake() + drift * np.sin(2 * np.pi * time / 20)), SETTINGS)[0]
-    kept = out.stats.per_obspy
-    assert longest[0] < kept.longest_period <= longest[1]
-    assert "the header is silent" in kept.highpass_source
-    assert kept.lowpass == 37.5
+    known = out.stats.per_obspy
+    assert longest[0] < known.longest_period <= longest[1]
+    assert "the header is silent" in known.highpass_source
+    assert known.lowpass == 37.5
     assert_array_equal(out.data, earthquake() + drift * np.sin(2 * np.pi * time / 20))
 
 
 def test_a_drift_that_no_corner_cleans_leaves_short_periods(earthquake):
     settings = Processing(highpass_range=(0.001, 0.02), drift=1e-6)
-    kept = passed_through(others(earthquake()), settings)[0].stats.per_obspy
-    assert kept.longest_period == pytest.approx(40.0)
-    assert "drifts at any corner" in kept.highpass_source
+    known = passed_through(others(earthquake()), settings)[0].stats.per_obspy
+    assert known.longest_period == pytest.approx(40.0)
+    assert "drifts at any corner" in known.highpass_source
 
 
 def test_motion_that_does_not_rest_is_a_warning(earthquake):
-    kept = passed_through(others(earthquake() + 0.05, header_peak=99.0), SETTINGS)[
-        0
-    ].stats.per_obspy
-    assert "final velocity over its peak" in kept.warnings
-    assert "largest sample off the header's 99" in kept.warnings
+    moving = others(earthquake() + 0.05, header_peak=99.0)
+    known = passed_through(moving, SETTINGS)[0].stats.per_obspy
+    assert "final velocity over its peak" in known.warnings
+    assert "largest sample off the header's 99" in known.warnings

@@ -1,3 +1,5 @@
+"""One instrument through all steps: shared corners, noise windows, permanent offsets."""
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -20,19 +22,19 @@ def record(earthquake):
     """Return a function that makes one component of a record with a little noise."""
 
     def make(channel="HNE", seed=1, factor=1.0, onset=20.0, **stats):
-        samples = earthquake(seed, onset=onset) + 1e-4 * np.random.default_rng(seed + 50).normal(
-            size=12000
-        )
-        dip = -90.0 if channel.endswith("Z") else 0.0
+        noise = 1e-4 * np.random.default_rng(seed + 50).normal(size=12000)
         header = {
             "network": "XX",
             "station": "STA",
             "channel": channel,
             "sampling_rate": 100.0,
             "units": "m/s2",
+            "starttime": START,
+            # verticals point upwards
+            "sensor_dip": -90.0 if channel.endswith("Z") else 0.0,
+            "per_obspy": AttribDict(),
         }
-        header |= {"starttime": START, "sensor_dip": dip, "per_obspy": AttribDict()} | stats
-        return Trace(factor * samples, header)
+        return Trace(factor * (earthquake(seed, onset=onset) + noise), header | stats)
 
     return make
 
@@ -41,9 +43,9 @@ def test_horizontals_share_their_corners_and_the_vertical_has_its_own(record):
     three = Stream([record("HNE", 1), record("HNN", 2), record("HNZ", 3)])
     out, rejected = process_instrument(three, SETTINGS, None)
     assert rejected == ()
-    east, north, vertical = (
-        out.select(channel=code)[0].stats.per_obspy for code in ("HNE", "HNN", "HNZ")
-    )
+    codes = ("HNE", "HNN", "HNZ")
+    east, north, vertical = (out.select(channel=code)[0].stats.per_obspy for code in codes)
+    # the narrower of the two bands
     assert east.highpass == north.highpass == max(east.own_highpass, north.own_highpass)
     assert "own_highpass" not in vertical
     assert {"shared"} < {east.highpass_source, north.highpass_source}
@@ -55,9 +57,8 @@ def test_noise_is_measured_before_the_wave_of_the_vertical(record):
 
 
 def test_an_outlier_is_dropped_with_its_figure(record):
-    out, rejected = process_instrument(
-        Stream([record("HNE"), record("HNN", 2, factor=8.0), record("HNZ", 3)]), SETTINGS, None
-    )
+    three = Stream([record("HNE"), record("HNN", 2, factor=8.0), record("HNZ", 3)])
+    out, rejected = process_instrument(three, SETTINGS, None)
     assert {trace.stats.channel for trace in out} == {"HNE", "HNZ"}
     assert "peak over that of" in rejected[0].reasons[0]
 
@@ -73,12 +74,11 @@ def test_one_bad_horizontal_does_not_decide_the_corners_of_the_other(record):
 
 @pytest.mark.parametrize(("size", "corner"), [(4.0, 0.3), (6.0, 0.1)])
 def test_without_noise_the_magnitude_decides_from_event_or_header(record, size, corner):
+    # a record that starts half a second before the wave
     source = Source(START, 0.0, 0.0, 1e4, size)
-    late = record(onset=0.5)
-    by_event, _ = process_instrument(Stream([late]), SETTINGS, source)
-    by_header, _ = process_instrument(
-        Stream([record(onset=0.5, event=AttribDict(magnitude=size))]), SETTINGS, None
-    )
+    by_event, _ = process_instrument(Stream([record(onset=0.5)]), SETTINGS, source)
+    late = record(onset=0.5, event=AttribDict(magnitude=size))
+    by_header, _ = process_instrument(Stream([late]), SETTINGS, None)
     for out in (by_event, by_header):
         assert out[0].stats.per_obspy.lowest_highpass == corner
         assert out[0].stats.per_obspy.highpass >= corner
@@ -93,53 +93,51 @@ def test_a_second_pass_changes_nothing(record):
 
 def test_a_raw_record_goes_before_the_same_record_processed_by_others(record):
     others = record(processing_level="processed", corners=AttribDict(highpass=0.3, lowpass=25.0))
-    kept, rejected = process_station(Stream([others, record()]), SETTINGS)
-    assert kept[0].stats.per_obspy.highpass < 0.3
+    accepted, rejected = process_station(Stream([others, record()]), SETTINGS)
+    assert accepted[0].stats.per_obspy.highpass < 0.3
     assert len(rejected) == 1
+    # unless it cannot be used
     broken = record()
     broken.data = np.full(12000, np.nan)
-    kept, rejected = process_station(Stream([others, broken]), SETTINGS)
-    assert kept[0].stats.per_obspy.highpass == 0.3
+    accepted, rejected = process_station(Stream([others, broken]), SETTINGS)
+    assert accepted[0].stats.per_obspy.highpass == 0.3
     assert "not finite" in rejected[0].reasons[0]
 
 
-def test_sensors_of_a_building_stay_apart(record):
-    floors = [
-        record(code, seed, location=floor)
-        for seed, floor in enumerate(("01", "02"))
-        for code in ("HNE", "HNN")
-    ]
-    apart, rejected = process_instruments(Stream(floors), SETTINGS)
-    assert [{trace.stats.location for trace in one} for one in apart] == [{"01"}, {"02"}]
+def test_sensors_of_a_building_are_separate(record):
+    floors = Stream()
+    for seed, floor in enumerate(("01", "02")):
+        floors += Stream([record(code, seed, location=floor) for code in ("HNE", "HNN")])
+    instruments, rejected = process_instruments(floors, SETTINGS)
     assert rejected == ()
+    # both horizontals of a floor, floor by floor
+    locations = [trace.stats.location for instrument in instruments for trace in instrument]
+    assert list(map(len, instruments)) == [2, 2]
+    assert locations == ["01", "01", "02", "02"]
 
 
 def test_hours_of_quiet_do_not_swallow_the_shaking(record):
     # mutation: without the cut the taper of a tenth of a long record reaches into the shaking
-    short = record()
-    long = record()
-    quiet = 1e-4 * np.random.default_rng(4).normal(size=60_000)
-    long.data = np.concatenate(
-        (quiet, long.data, 1e-4 * np.random.default_rng(5).normal(size=60_000))
-    )
+    short, long = record(), record()
+    before = 1e-4 * np.random.default_rng(4).normal(size=60_000)
+    after = 1e-4 * np.random.default_rng(5).normal(size=60_000)
+    long.data = np.concatenate((before, long.data, after))
     settings = Processing(longest_noise=19.0, longest_signal=100.0, highpass=0.1)
-    ours, theirs = (
-        process_instrument(Stream([one]), settings, None)[0][0] for one in (long, short)
+    cut, whole = (
+        process_instrument(Stream([trace]), settings, None)[0][0] for trace in (long, short)
     )
-    assert np.abs(ours.data).max() == pytest.approx(np.abs(theirs.data).max(), rel=1e-3)
-    assert ours.stats.npts < 20_000  # 119 s and the pads of 75 s, not 22 minutes
+    assert np.abs(cut.data).max() == pytest.approx(np.abs(whole.data).max(), rel=1e-3)
+    assert cut.stats.npts < 20_000  # 119 s and the pads of 75 s, not 22 minutes
 
 
 def offset_record(record, displacement, after=5e-4):
-    """Return a record whose ground moves for good within 4 s of the shaking, with a baseline that shifts as well."""
+    """Return a record with a permanent displacement (m) within 4 s and a baseline that shifts."""
     trace = record()
-    trace.data = acausal_bandpass(
-        trace.data, 100.0, 0.2, np.inf
-    )  # comes to rest, but for what is added here
+    # comes to rest, but for the additions
+    trace.data = acausal_bandpass(trace.data, 100.0, 0.2, np.inf)
     time = np.arange(12000) / 100.0
-    velocity = displacement * np.where(
-        np.abs(time - 25) < 2, (1 + np.cos(np.pi * (time - 25) / 2)) / 4, 0.0
-    )
+    pulse = (1 + np.cos(np.pi * (time - 25) / 2)) / 4
+    velocity = displacement * np.where(np.abs(time - 25) < 2, pulse, 0.0)
     trace.data = trace.data + np.gradient(velocity, 0.01) + np.where(time > 45, after, 0.0)
     return trace
 
@@ -151,16 +149,17 @@ def test_a_permanent_offset_is_kept_on_request(record, displacement):
         process_instrument(Stream([offset_record(record, size)]), settings, None)[0]
         for size in (0.0, displacement)
     )
-    final = [integrated(integrated(out))[0].data[-1] for out in (plain, offset)]
-    # the shift alone would move the ground by 1.4 m; what bridges the shaking is a guess, worth a
-    # decimetre or two
-    assert abs(final[0]) < 0.2
-    assert final[1] - final[0] == pytest.approx(displacement, rel=0.15)
+    without, final = (integrated(integrated(out))[0].data[-1] for out in (plain, offset))
+    # the shift alone would move the ground by 1.4 m; the bridge over the shaking is a guess, good
+    # to a decimetre or two
+    assert abs(without) < 0.2
+    assert final - without == pytest.approx(displacement, rel=0.15)
+    # the chain for other records filters it away
     filtered, _ = process_instrument(Stream([offset_record(record, displacement)]), SETTINGS, None)
     assert abs(integrated(integrated(filtered))[0].data[-1]) < 0.05
-    kept = offset[0].stats.per_obspy
-    assert kept.highpass_source.startswith("not applied")
-    assert kept.longest_period == pytest.approx(96.0)
+    chosen = offset[0].stats.per_obspy
+    assert chosen.highpass_source.startswith("not applied")
+    assert chosen.longest_period == pytest.approx(96.0)
 
 
 def test_an_offset_without_quiet_ends_is_rejected(record):

@@ -1,4 +1,4 @@
-"""Spectra of real records after processing, held to what any spectrum of a filtered motion must do: no model needed."""
+"""Laws that the spectra of any filtered motion obey, checked on real records; no model needed."""
 
 import numpy as np
 import pytest
@@ -19,12 +19,12 @@ def motion(request, real_data):
     """North, east, dt and numbers chosen of one processed station."""
     found = find_stations(real_data / "records" / "ridgecrest2019_mseed")
     stream, _ = read_station(found.stations[request.param], found.inventory, request.param)
-    kept, _ = process_station(stream, Processing())
-    pair = [trace for trace in kept if is_horizontal(trace)]
-    pair_motion = north_and_east(
-        *(one.data for one in pair), *(one.stats.sensor_azimuth for one in pair)
-    )
-    return (*pair_motion, pair[0].stats.delta, pair[0].stats.per_obspy)
+    processed, _ = process_station(stream, Processing())
+    # horizontals turned from the azimuths of their sensors
+    first, second = (trace for trace in processed if is_horizontal(trace))
+    azimuths = first.stats.sensor_azimuth, second.stats.sensor_azimuth
+    north, east = north_and_east(first.data, second.data, *azimuths)
+    return north, east, first.stats.delta, first.stats.per_obspy
 
 
 def rotd50_sd(motion, periods):
@@ -40,18 +40,18 @@ def rotd50_peak(north, east):
 def test_the_spectrum_is_smooth(motion):
     periods = STEP ** np.arange(0, 200) * 0.1
     sa = (2 * np.pi / periods) ** 2 * rotd50_sd(motion, periods)
-    # an oscillator cannot tell periods apart that are closer than its half-power width, 2 x damping
-    # = 10 %: over a fifth of that the spectrum changes by less than 2 % / 10 % = 20 %; spikes and
-    # dropouts at one period would
+    # an oscillator cannot separate periods closer than its half-power width, 2 x damping = 10 %:
+    # over a fifth of that the spectrum changes by less than 2 % / 10 % = 20 %; spikes and dropouts
+    # at one period would change it by more
     assert np.abs(np.diff(np.log(sa))).max() < 0.2
-    # and it has no line: no value stands out from its neighbours at 4 % distance by a quarter
+    # and it has no line: no value exceeds its neighbours at 4 % distance by a quarter
     middle = np.log(sa[2:-2]) - 0.5 * (np.log(sa[:-4]) + np.log(sa[4:]))
     assert np.abs(middle).max() < 0.25
 
 
 def test_stiff_oscillators_feel_the_peak_acceleration(motion):
     sa = (2 * np.pi / 0.01) ** 2 * rotd50_sd(motion, [0.01])[0]
-    # nothing above the corner of 37.5 Hz is left: at 100 Hz the amplification is 1 / (1 - (37.5 /
+    # the motion ends at the corner of 37.5 Hz: at 100 Hz the amplification is 1 / (1 - (37.5 /
     # 100)^2) = 1.16 at most, for motion that is all at the corner; the strongest of it is below 10
     # Hz, where it is 1.01
     np.testing.assert_allclose(sa, rotd50_peak(*motion[:2]), rtol=0.05)
@@ -59,11 +59,10 @@ def test_stiff_oscillators_feel_the_peak_acceleration(motion):
 
 def test_beyond_the_corner_there_is_only_the_peak_displacement(motion):
     north, east, dt, chosen = motion
-    displacement = [np.cumsum(np.cumsum(one)) * dt**2 for one in (north, east)]
+    displacement = [np.cumsum(np.cumsum(motion)) * dt**2 for motion in (north, east)]
     sd = rotd50_sd(motion, [10 / chosen.highpass])[0]
-    # ten periods of the corner: the oscillator stands still and the ground moves below it; what is
-    # left of the ground at the corner moves it by (1 / 10)^2 at most, in cycles that resonate no
-    # more than a few times
+    # ten periods of the corner: the oscillator rests and the ground moves below it; motion at the
+    # corner moves it by (1 / 10)^2 at most, in cycles that resonate no more than a few times
     np.testing.assert_allclose(sd, rotd50_peak(*displacement), rtol=0.1)
 
 

@@ -1,4 +1,4 @@
-"""What recorders add to a known ground motion, and what is left of it in PER after processing."""
+"""Errors of the spectra after processing, for known motion with the faults of recorders."""
 
 import numpy as np
 import pytest
@@ -26,8 +26,18 @@ DRIFTS = {
 
 
 def error(samples, truth):
-    spectra = [per_spectrum(one, 1 / RATE, PERIODS) for one in (samples, truth)]
-    return np.abs(np.log(spectra[0] / spectra[1]))
+    """Return the logarithmic errors of PER at the periods."""
+    found, expected = (per_spectrum(motion, 1 / RATE, PERIODS) for motion in (samples, truth))
+    return np.abs(np.log(found / expected))
+
+
+def recovered(truth, recorded):
+    """Return the errors of PER, the mask of usable periods, and the numbers of the processing."""
+    header = {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"}
+    processed = process(Stream([Trace(recorded, header)]))[0]
+    chosen = processed.stats.per_obspy
+    usable = (chosen.shortest_period <= PERIODS) & (chosen.longest_period >= PERIODS)
+    return error(processed.data, truth), usable, chosen
 
 
 @pytest.mark.parametrize("drift", DRIFTS)
@@ -37,48 +47,39 @@ def test_the_spectrum_is_recovered_inside_the_usable_periods(earthquake, drift):
         rng = np.random.default_rng(100 + seed)
         truth = earthquake(seed)
         recorded = truth + 1e-5 * rng.normal(size=COUNT) + DRIFTS[drift](rng)
-        header = {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"}
-        processed = process(Stream([Trace(recorded, header)]))[0]
-        usable = processed.stats.per_obspy
-        wrong = error(processed.data, truth)
-        good = (usable.shortest_period <= PERIODS) & (usable.longest_period >= PERIODS)
-        inside.append(wrong[good].max())
-        median.append(np.median(wrong[good]))
-        outside.append(wrong[2 * usable.longest_period < PERIODS].max())
-        assert (
-            usable.longest_period > 10
-        )  # s: errors are not avoided by calling everything unusable
+        errors, usable, chosen = recovered(truth, recorded)
+        inside.append(errors[usable].max())
+        median.append(np.median(errors[usable]))
+        outside.append(errors[2 * chosen.longest_period < PERIODS].max())
+        # s: errors are not avoided by calling everything unusable
+        assert chosen.longest_period > 10
     # at 0.8 of the corner's period the filter has amplitude 0.95: errors of a few percent near the
     # limit, stated as 6 %
     assert max(inside) < 0.06
     assert max(median) < 0.002
-    # honest: what lies well beyond the limit is worse
+    # honest: periods well beyond the limit are worse
     assert np.mean(outside) > 1.5 * np.mean(inside)
 
 
-def shifted(truth, shift, start, end):
-    """Return the largest error of PER inside the usable periods and the warnings, for a shift between two times."""
+def shifted(truth, shift):
+    """Return largest error of PER inside the usable periods and warnings, for 15 s of a shift."""
     recorded = truth + 1e-5 * np.random.default_rng(100).normal(size=COUNT)
-    recorded[round(start * RATE) : round(end * RATE)] += shift
-    processed = process(
-        Stream([Trace(recorded, {"sampling_rate": RATE, "units": "m/s2", "channel": "HNE"})])
-    )[0]
-    usable = processed.stats.per_obspy
-    good = (usable.shortest_period <= PERIODS) & (usable.longest_period >= PERIODS)
-    return error(processed.data, truth)[good].max(), usable.get("warnings", "")
+    recorded[round(22 * RATE) : round(37 * RATE)] += shift
+    errors, usable, chosen = recovered(truth, recorded)
+    return errors[usable].max(), chosen.get("warnings", "")
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_strong_shifts_during_the_shaking_are_flagged(earthquake, seed):
-    # 15 s of 0.05 m/s2 leave 0.75 m/s: PER inside the usable periods is wrong by 12 to 21 %, which
-    # the record must say
-    wrong, warnings = shifted(earthquake(seed), 0.05, 22, 37)
-    assert wrong > 0.06  # else there is nothing to warn of
+    # 15 s of 0.05 m/s2 leave 0.75 m/s: PER inside the usable periods is wrong by 12 to 21 %, of
+    # which the record must warn
+    largest, warnings = shifted(earthquake(seed), 0.05)
+    assert largest > 0.06  # else the warning would be false
     assert "the baseline shifted during the shaking" in warnings
-    # without a shift nothing is said, although this ground itself ends with up to 0.23 of its peak
-    # velocity
-    wrong, warnings = shifted(earthquake(seed), 0.0, 22, 37)
-    assert wrong < 0.06
+    # without a shift there is no warning, although this ground itself ends with up to 0.23 of its
+    # peak velocity
+    largest, warnings = shifted(earthquake(seed), 0.0)
+    assert largest < 0.06
     assert "baseline" not in warnings
 
 
@@ -88,53 +89,60 @@ def test_a_real_sensor_that_tilted_is_flagged_and_its_neighbours_are_not(real_da
     # signal to noise
     folder = real_data / "records" / "ridgecrest2019_mseed"
     found = find_stations(folder)
-    kept, _ = process_station(
-        read_station(found.stations["CI.SLA"], found.inventory, "CI.SLA")[0], Processing()
-    )
-    flagged = {
-        one.stats.channel
-        for one in kept
-        if "baseline shifted" in one.stats.per_obspy.get("warnings", "")
+    stream, _ = read_station(found.stations["CI.SLA"], found.inventory, "CI.SLA")
+    processed, _ = process_station(stream, Processing())
+    warnings = {
+        trace.stats.channel: trace.stats.per_obspy.get("warnings", "") for trace in processed
     }
-    assert flagged == {"HNN"}
+    flagged = [channel for channel, text in warnings.items() if "baseline shifted" in text]
+    assert flagged == ["HNN"]
+
+
+def horizontals(stream):
+    return [trace for trace in stream if trace.stats.sensor_dip == 0]
+
+
+def spectra(trace, reference, periods):
+    """Return PER of two traces at the periods, m."""
+    return [per_spectrum(motion.data, motion.stats.delta, periods) for motion in (trace, reference)]
 
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("record", ["20161113_110300_HSES_20", "20161113_110313_THZ_20"])
 def test_geonet_raw_records_give_the_spectra_of_geonets_own_processing(real_data, record):
     folder = real_data / "records" / "kaikoura2016_geonet"
-    raw, official = (
-        read(str(folder / f"{record}.{suffix}"), format="GEONET") for suffix in ("V1A", "V2A")
-    )
-    ours, rejected = process_station(raw, Processing())
+    raw = read(str(folder / f"{record}.V1A"), format="GEONET")
+    official = read(str(folder / f"{record}.V2A"), format="GEONET")
+    processed, rejected = process_station(raw, Processing())
     assert rejected == ()
     periods = np.geomspace(0.2, 4.0, 25)
-    for trace in (one for one in ours if one.stats.sensor_dip == 0):
-        theirs = next(one for one in official if one.stats.channel[-1] == trace.stats.channel[-1])
-        spectra = [per_spectrum(one.data, one.stats.delta, periods) for one in (trace, theirs)]
+    for trace in horizontals(processed):
+        direction = trace.stats.channel[-1]
+        (reference,) = (other for other in official if other.stats.channel[-1] == direction)
+        found, expected = spectra(trace, reference, periods)
         # GeoNet filters from 0.1-0.25 Hz, resamples to 50 Hz and cuts after 164 s: 7 % is what the
         # choices are worth
-        np.testing.assert_allclose(spectra[0], spectra[1], rtol=0.07)
+        np.testing.assert_allclose(found, expected, rtol=0.07)
 
 
 @pytest.mark.real_data
 def test_willow_creek_raw_gives_the_spectra_of_its_official_record(real_data):
     folder = real_data / "spectra_v3" / "nc71734741_willowcreek2012"
-    raw, official = (read(str(folder / f"CE89146.{suffix}")) for suffix in ("V1", "V2"))
-    ours, rejected = process_station(raw, Processing())
+    raw, official = read(str(folder / "CE89146.V1")), read(str(folder / "CE89146.V2"))
+    processed, rejected = process_station(raw, Processing())
     assert rejected == ()
-    theirs = official.select(channel=ours[0].stats.channel)[0].stats.corners.highpass
-    periods = np.geomspace(0.1, 0.8 / theirs, 25)
-    for trace in (one for one in ours if one.stats.sensor_dip == 0):
-        same = next(
-            one
-            for one in official.select(channel=trace.stats.channel)
-            if one.stats.get("quantity") == "acceleration"
-        )
-        spectra = [per_spectrum(one.data, one.stats.delta, periods) for one in (trace, same)]
+    # the official file has velocity and displacement too
+    accelerations = Stream(
+        [trace for trace in official if trace.stats.get("quantity") == "acceleration"]
+    )
+    corner = official.select(channel=processed[0].stats.channel)[0].stats.corners.highpass
+    periods = np.geomspace(0.1, 0.8 / corner, 25)
+    for trace in horizontals(processed):
+        reference = accelerations.select(channel=trace.stats.channel)[0]
+        found, expected = spectra(trace, reference, periods)
         # their corner of 0.3 Hz bends the last octave; below it the two agree within 1 %
-        np.testing.assert_allclose(spectra[0], spectra[1], rtol=0.06)
-        np.testing.assert_allclose(spectra[0][:15], spectra[1][:15], rtol=0.012)
+        np.testing.assert_allclose(found, expected, rtol=0.06)
+        np.testing.assert_allclose(found[:15], expected[:15], rtol=0.012)
 
 
 def test_the_start_of_the_pads_is_the_start_of_the_trace(earthquake):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.inventory.files.writing import write_pairs
-from per_obspy.inventory.footprints.pairs import pairs_from_footprints
+from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.run import run
 from per_obspy.spectra.storage import read_spectra

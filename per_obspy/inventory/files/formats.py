@@ -1,4 +1,4 @@
-"""Files of pairs of either kind: Parquet here, CSV in a module of its own."""
+"""Files of pairs by suffix: Parquet files, and CSV files from :mod:`.csv_rows`."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from per_obspy.inventory.files.csv_rows import CsvFile
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
 from per_obspy.inventory.schema import COLUMNS
 
-#: How pandas calls a column that only numbers the rows.
+#: Prefix that pandas gives to a column of row numbers.
 INDEX = "__index_level_"
 
 
@@ -28,45 +28,46 @@ class ParquetFile:
         self.names: Sequence[str] = [name for name in names if not name.startswith(INDEX)]
 
     def identifiers(self) -> Iterator[pa.Array]:
-        """Give the names of the pairs, block by block."""
+        """Yield the identifiers of the pairs, block by block."""
         with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
             for batch in stored.iter_batches(columns=[IDENTIFIER]):
                 yield batch.column(0).cast(pa.string())
 
     def rows(self, size: int) -> Iterator[RawRows]:
-        """Give the rows, so many at a time."""
+        """Yield blocks of so many rows."""
         line = 2
         with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
             for batch in stored.iter_batches(batch_size=size, columns=self.names):
+                # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
-                yield RawRows(
-                    str(self.file), _with_numbers(pa.Table.from_batches([batch])), lines, ()
-                )
+                table = _with_numbers(pa.Table.from_batches([batch]))
+                yield RawRows(str(self.file), table, lines, ())
                 line += batch.num_rows
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
+        """Turn a fault of the reader into one of the file."""
         try:
             yield
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-            raise CatalogError(
-                str(self.file), told_apart(self.file, "Parquet table", error)
-            ) from error
+            problem = told_apart(self.file, "Parquet table", error)
+            raise CatalogError(str(self.file), problem) from error
 
 
 def _with_numbers(table: pa.Table) -> pa.Table:
-    """Return the table with truth values as 0 and 1 where numbers belong, as some programs write what was observed."""
+    """
+    Return the table with 0 and 1 for booleans in columns of numbers.
+
+    Some programs write the column ``observed`` as booleans.
+    """
     for i, column in enumerate(table.schema):
-        if (
-            pa.types.is_boolean(column.type)
-            and column.name in COLUMNS
-            and COLUMNS[column.name].dtype == "float64"
-        ):
+        is_number = column.name in COLUMNS and COLUMNS[column.name].dtype == "float64"
+        if is_number and pa.types.is_boolean(column.type):
             table = table.set_column(i, column.name, table[i].cast(pa.float64()))
     return table
 
 
-#: What layers of footprints are called, which are no pairs yet.
+#: Suffixes of layers of footprints, which are not pairs yet.
 FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb")
 
 _KINDS: dict[str, type[CsvFile] | type[ParquetFile]] = {".csv": CsvFile, ".parquet": ParquetFile}
@@ -81,14 +82,13 @@ def pair_file(path: Path) -> PairFile:
     CatalogError
         If it does not exist, is of an unknown kind, or cannot be read.
     """
+    # Layers of footprints are a common mistake
     if path.suffix.lower() not in _KINDS:
-        made = (
-            "; per-obspy pairs makes such a table of footprints"
-            if path.suffix.lower() in FOOTPRINTS
-            else ""
-        )
+        is_layer = path.suffix.lower() in FOOTPRINTS
+        advice = "; per-obspy pairs makes such a table of footprints" if is_layer else ""
+        expected = " or ".join(_KINDS)
         raise CatalogError(
-            str(path), f"unknown suffix {path.suffix!r}, expected {' or '.join(_KINDS)}{made}"
+            str(path), f"unknown suffix {path.suffix!r}, expected {expected}{advice}"
         )
     if not path.is_file():
         raise CatalogError(str(path), "no such file")

@@ -1,8 +1,8 @@
 """
-Files of pairs as blocks of raw rows, so that no inventory needs to fit in memory.
+Blocks of raw rows of a file of pairs, so that an inventory need not fit in memory.
 
-A file is gone through twice: once for what must be known of it as a whole (its columns, and which
-names of pairs may stand twice), then block by block.
+A file is read twice: once as a whole for its columns and for identifiers of pairs that may occur
+twice, then block by block.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,23 +16,24 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
 
+#: Column with the name of the pair.
 IDENTIFIER = "pair_id"
 
 
 class RawRows(NamedTuple):
     """
-    Consecutive rows of a file as they stand there.
+    Consecutive rows of a file before any check.
 
     Attributes
     ----------
     source : str
         The file.
     table : Table
-        Numbers that could not all be read are still text.
+        Cells as read; a column of numbers with a cell that is none is still text.
     lines : (n_rows,) ndarray of int
         Line of each row in its file; the header is line 1.
     broken : tuple of Rejection
-        Lines between them that are no rows.
+        Lines between the rows that are no rows.
     """
 
     source: str
@@ -42,19 +43,19 @@ class RawRows(NamedTuple):
 
 
 class PairFile(Protocol):
-    """A file of pairs of some kind: its columns, the names of its pairs, its rows."""
+    """A file of pairs: its columns, the identifiers of its pairs, its rows."""
 
     names: Sequence[str]
 
     def identifiers(self) -> Iterator[pa.Array]:
-        """Give the names of the pairs, block by block."""
+        """Yield the identifiers of the pairs, block by block."""
 
     def rows(self, size: int) -> Iterator[RawRows]:
-        """Give the rows, so many at a time."""
+        """Yield blocks of so many rows."""
 
 
 def name_hashes(names: pa.Array) -> NDArray[np.uint64]:
-    """Return a hash of each name, blanks around it not counted."""
+    """Return a hash of each identifier without the blanks around it."""
     text = pc.fill_null(pc.utf8_trim_whitespace(names), "").to_numpy(zero_copy_only=False)
     hashes: NDArray[np.uint64] = pd.util.hash_array(
         np.asarray(text, dtype=object), categorize=False

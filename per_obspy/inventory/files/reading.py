@@ -1,4 +1,4 @@
-"""Read tables of building pairs, CSV or Parquet, into accepted rows and reasons for the others: whole or in chunks."""
+"""Readers of pair tables, CSV or Parquet, whole or in chunks, with reasons for rejected rows."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from per_obspy.inventory.checking import Rejections, check_columns, checked_pair
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows, name_hashes
 
-#: As many rows as any table has.
+#: More rows than any table has.
 ALL = 1 << 40
 
 
@@ -26,9 +26,9 @@ class PairChunk(NamedTuple):
     Attributes
     ----------
     rows : RawRows
-        As they stand in their file.
+        Before any check.
     repeated : (n_rows,) ndarray of bool
-        Whether the row's ``pair_id`` stands in an earlier row of the inventory.
+        Whether an earlier row of the inventory has the row's ``pair_id``.
     """
 
     rows: RawRows
@@ -43,7 +43,7 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     ----------
     path : str or Path
         ``.csv`` (UTF-8, comma separated, one header line) or ``.parquet``. Columns, units and
-        allowed ranges stand in ``per_obspy.inventory.schema.COLUMNS``; further columns are carried
+        allowed ranges are in ``per_obspy.inventory.schema.COLUMNS``; further columns are carried
         through.
 
     Returns
@@ -64,26 +64,22 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     blocks = list(file.rows(ALL))
     if not any(len(block.table) or block.broken for block in blocks):
         raise CatalogError(str(path), "the table has no rows")
-    rows = RawRows(
-        str(path),
-        pa.concat_tables(
-            [block.table for block in blocks if len(block.table)] or [blocks[0].table]
-        ),
-        np.concatenate([block.lines for block in blocks]),
-        tuple(one for block in blocks for one in block.broken),
-    )
-    return _checked(rows, None)
+    # Join the blocks; empty ones may have other types
+    tables = [block.table for block in blocks if len(block.table)] or [blocks[0].table]
+    lines = np.concatenate([block.lines for block in blocks])
+    broken = tuple(line for block in blocks for line in block.broken)
+    return _checked(RawRows(str(path), pa.concat_tables(tables), lines, broken), None)
 
 
 class PairInventory:
     """
-    An inventory in one file or several, read in chunks, its files one after the other.
+    An inventory in one file or several, read in chunks, file after file.
 
     Parameters
     ----------
     paths : sequence of Path
-        CSV or Parquet. Apart from a chunk, memory holds 8 bytes a row, to know which names are
-        repeated.
+        CSV or Parquet. Besides a chunk, memory holds 8 bytes per row to find repeated
+        identifiers.
 
     Attributes
     ----------
@@ -103,20 +99,25 @@ class PairInventory:
         for path, file in self._files.items():
             check_columns(file.names, str(path))
         self.names = set.intersection(*(set(file.names) for file in self._files.values()))
-        counts = {
-            path: [name_hashes(block) for block in file.identifiers()]
-            for path, file in self._files.items()
-        }
-        for path, blocks in counts.items():
+        # Hashes that occur twice: candidates for repeated identifiers
+        hashes = self._identifier_hashes()
+        self.count = len(hashes)
+        distinct, times = np.unique(hashes, return_counts=True)
+        self._repeated: NDArray[np.uint64] = distinct[times > 1]
+
+    def _identifier_hashes(self) -> NDArray[np.uint64]:
+        """Return a hash per row of all files; raise CatalogError if a file has no row."""
+        # Read every file before any is refused
+        hashes = {}
+        for path, file in self._files.items():
+            hashes[path] = [name_hashes(block) for block in file.identifiers()]
+        for path, blocks in hashes.items():
             if not sum(map(len, blocks)):
                 raise CatalogError(str(path), "the table has no rows")
-        hashes = np.concatenate([block for blocks in counts.values() for block in blocks])
-        self.count = len(hashes)
-        names, times = np.unique(hashes, return_counts=True)
-        self._repeated: NDArray[np.uint64] = names[times > 1]
+        return np.concatenate([block for blocks in hashes.values() for block in blocks])
 
     def chunks(self, size: int) -> Iterator[PairChunk]:
-        """Give so many rows at a time; no chunk holds rows of two files."""
+        """Yield chunks of so many rows; no chunk has rows of two files."""
         seen: set[str] = set()
         for file in self._files.values():
             for rows in file.rows(size):
@@ -126,8 +127,14 @@ class PairInventory:
 def _repeated(
     identifiers: pa.ChunkedArray, hashes: NDArray[np.uint64], seen: set[str]
 ) -> NDArray[np.bool_]:
-    """Return which names were seen before; only names whose hash is repeated are remembered."""
-    text = pc.utf8_trim_whitespace(pc.fill_null(identifiers.cast(pa.string()), "")).combine_chunks()
+    """
+    Return the rows whose identifier occurred before.
+
+    Only identifiers whose hash is repeated are added to those seen.
+    """
+    filled = pc.fill_null(identifiers.cast(pa.string()), "")
+    text = pc.utf8_trim_whitespace(filled).combine_chunks()
+    # A hash may be shared by chance: the identifiers themselves decide
     repeated = np.isin(name_hashes(text), hashes)
     for row in np.flatnonzero(repeated).tolist():
         name = text[row].as_py()
@@ -137,15 +144,16 @@ def _repeated(
 
 
 def checked_chunk(chunk: PairChunk) -> pd.DataFrame:
-    """Return the accepted rows of a chunk, as :func:`read_pairs` gives those of a table."""
+    """Return the accepted rows of a chunk in the form of :func:`read_pairs`."""
     return _checked(chunk.rows, chunk.repeated)
 
 
 def _checked(rows: RawRows, repeated: NDArray[np.bool_] | None) -> pd.DataFrame:
-    # what pandas once said of the table counts for nothing: it would take a column of names for the
-    # index
+    """Check raw rows and add the broken lines to the rejected rows, in the order of the file."""
+    # Metadata that pandas stored in the file could turn a column into the index
     table: pd.DataFrame = rows.table.replace_schema_metadata(None).to_pandas()
     pairs = checked_pairs(table, rows.source, rows.lines, repeated)
-    rejected: tuple[Rejection, ...] = (*pairs.attrs["rejected"], *rows.broken)
-    pairs.attrs["rejected"] = Rejections(sorted(rejected, key=lambda rejection: rejection.row or 0))
+    rejected: list[Rejection] = [*pairs.attrs["rejected"], *rows.broken]
+    rejected.sort(key=lambda rejection: rejection.row or 0)
+    pairs.attrs["rejected"] = Rejections(rejected)
     return pairs

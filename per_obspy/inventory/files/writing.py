@@ -10,7 +10,7 @@ from per_obspy.files import written_whole
 
 def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
     """
-    Write a pair table that :func:`~per_obspy.inventory.files.reading.read_pairs` reads back; whole or not at all.
+    Write a pair table in the form that ``read_pairs`` reads, whole or not at all.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
     """
     file = Path(path)
     plain = pairs.copy()
-    plain.attrs = {}  # what was rejected has a file of its own
+    plain.attrs = {}  # rejected rows have a file of their own
     if file.suffix.lower() not in (".csv", ".parquet"):
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected .csv or .parquet")
     with written_whole(file) as part:

@@ -1,4 +1,4 @@
-"""Foreign column names and codes of footprint layers, one small table a source."""
+"""Column names and codes of footprint layers from other sources, one small table per source."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from per_obspy.errors import CatalogError, did_you_mean
 
 class Importer(NamedTuple):
     """
-    How one source names what the pair table needs.
+    Names and codes of one source for the columns of the pair table.
 
     Attributes
     ----------
@@ -19,12 +19,12 @@ class Importer(NamedTuple):
     needed : tuple of str
         Columns by which a layer of this source is recognised.
     columns : dict
-        Our name of a building's quantity -> the source's column. Absent columns are no fault.
+        Name of a building's quantity in the schema -> the source's column, which may be absent.
     systems : dict
-        The source's codes of a structural system, material and lateral system joined by a blank ->
-        one of ours; others stay empty and are derived.
+        The source's code, material and lateral system joined by a blank -> structural system of the
+        schema; other codes stay empty and are derived.
     system_columns : tuple of str
-        Where the source keeps material and lateral system; empty if it does not.
+        The source's columns of material and lateral system; empty if it has none.
     carried : tuple of str
         Columns to carry along unchanged.
     """
@@ -37,7 +37,8 @@ class Importer(NamedTuple):
     carried: tuple[str, ...] = ()
 
 
-_OUR_NAMES = (
+#: Quantities of a building that a layer may give under the names of the schema.
+_SCHEMA_NAMES = (
     "building_id",
     "height",
     "storeys",
@@ -50,9 +51,9 @@ _OUR_NAMES = (
 )
 
 #: SeismicBuildingExposure (surveys of Guatemala, San Jose). Its ``floor_height`` is in metres in
-#: one city and in decimetres in another, and ``height`` is there, so it is not used.
-#: ``pounding_effect`` is the surveyor's judgement of what may happen, no observation. Infilled
-#: frames and walls have periods of ``other``.
+#: one city and in decimetres in another; it is not used, because there is ``height``.
+#: ``pounding_effect`` is the surveyor's judgement of a possibility, no observation. Infilled frames
+#: and walls have periods of ``other``.
 SEISMIC_BUILDING_EXPOSURE = Importer(
     "SeismicBuildingExposure",
     ("n_storeys", "touches_left", "touches_right", "llrs"),
@@ -90,70 +91,72 @@ OPENSTREETMAP = Importer(
     ("building",),
 )
 
-#: Our own names; also for layers of which only some columns are known.
-OWN = Importer("per_obspy", (), {name: name for name in _OUR_NAMES}, {}, ())
+#: Names of the schema; also for layers of which only some columns are known.
+OWN = Importer("per_obspy", (), {name: name for name in _SCHEMA_NAMES}, {}, ())
 
+#: In the order in which a layer is recognised; the last one fits every layer.
 IMPORTERS = (SEISMIC_BUILDING_EXPOSURE, OPENSTREETMAP, OWN)
 
 
 def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
     """
-    Return the attributes of buildings under our names, and after them the columns to carry along.
+    Return the attributes of buildings under the schema's names, then the columns to carry along.
 
     Parameters
     ----------
     attributes : DataFrame
-        As the layer has them, one row a footprint; the index is the number of the feature.
+        One row per footprint with the layer's columns; the index is the number of the feature.
     source : str
         The file, for messages.
 
     Raises
     ------
     CatalogError
-        If nothing tells how high a building is.
+        If the layer has neither height nor storeys nor period.
     """
-    importer = next(one for one in IMPORTERS if set(one.needed) <= set(attributes.columns))
-    found = {
-        ours: attributes[theirs]
-        for ours, theirs in importer.columns.items()
-        if theirs in attributes.columns
+    names = set(attributes.columns)
+    importer = next(importer for importer in IMPORTERS if set(importer.needed) <= names)
+    # Columns that the layer has
+    columns = {
+        name: attributes[column] for name, column in importer.columns.items() if column in names
     }
-    if not {"height", "storeys", "period"} & set(found):
-        columns = ", ".join(map(str, attributes.columns)) or "none"
-        asked = next(
-            filter(
-                None,
-                (
-                    did_you_mean(name, map(str, attributes.columns))
-                    for name in ("height", "storeys")
-                ),
-            ),
-            "",
-        )
-        raise CatalogError(
-            source,
-            f"no column height, storeys or period in the layer (columns found: {columns:.200}){asked}",
-        )
-    table = pd.DataFrame(found, index=attributes.index)
-    if "system" in attributes.columns and not importer.systems:
+    if not {"height", "storeys", "period"} & set(columns):
+        raise CatalogError(source, _no_height(attributes))
+    table = pd.DataFrame(columns, index=attributes.index)
+    # Structural systems by name or by code
+    if "system" in names and not importer.systems:
         table["system"] = attributes["system"].fillna("")
-    elif set(importer.system_columns) <= set(attributes.columns) and importer.systems:
-        material, resisting = (
-            attributes[name].fillna("").astype(str) for name in importer.system_columns
-        )
-        codes = material + " " + resisting
-        table["system"] = codes.map(importer.systems).fillna("")
-    carried = [name for name in importer.carried if name in attributes.columns]
+    elif set(importer.system_columns) <= names and importer.systems:
+        table["system"] = _coded_systems(attributes, importer)
+    carried = [name for name in importer.carried if name in names]
     table["building_id"] = _identifiers(table)
     return table.join(attributes[carried])
 
 
+def _no_height(attributes: pd.DataFrame) -> str:
+    """Return the message for a layer without heights, with a similar column if there is one."""
+    columns = list(map(str, attributes.columns))
+    suggestion = did_you_mean("height", columns) or did_you_mean("storeys", columns)
+    found = ", ".join(columns) or "none"
+    problem = "no column height, storeys or period in the layer"
+    return f"{problem} (columns found: {found:.200}){suggestion}"
+
+
+def _coded_systems(attributes: pd.DataFrame, importer: Importer) -> pd.Series:
+    """Return structural systems from the codes of material and lateral system, "" if unknown."""
+    material, lateral = (
+        attributes[name].fillna("").astype(str) for name in importer.system_columns
+    )
+    return (material + " " + lateral).map(importer.systems).fillna("")
+
+
 def _identifiers(table: pd.DataFrame) -> pd.Series:
-    """Return identifiers as text: whole numbers without a decimal point, and the feature's number where none is."""
+    """Return identifiers as text, and the number of the feature where a building has none."""
     numbers = pd.Series([f"feature {number}" for number in table.index], index=table.index)
     if "building_id" not in table:
         return numbers
     given = table["building_id"]
+    # Whole numbers that were stored as floats lose their decimal point
     if pd.api.types.is_float_dtype(given) and (given.dropna() % 1 == 0).all():
         given = given.astype("Int64")
     text = given.astype(str).str.strip()

@@ -1,10 +1,10 @@
 """
-Neighbouring footprints: gap, overlap, facing walls, azimuth and place in the row. Coordinates are metres.
+Neighbouring footprints: gap, overlap, facing walls, azimuth and place in the row.
 
-Two walls face each other if they are antiparallel within 30 degrees, overlap along their length and
-stand no further apart than the gap and ``FACING_DEPTH``. The axis of the pair is the mean normal of
-its facing walls, weighted by length; without facing walls (two corners meet) it is the shortest
-connection.
+Coordinates are metres. Two walls face each other if they are antiparallel within 30 degrees,
+overlap along their length and are no more distant than the gap and ``FACING_DEPTH``. The axis of
+the pair is the mean normal of its facing walls, weighted by length; without facing walls (two
+corners meet) it is the shortest connection.
 """
 
 from typing import NamedTuple
@@ -21,20 +21,22 @@ IntArray = NDArray[np.int64]
 #: Gaps below this are coordinates' round-off: the buildings touch, m.
 TOUCHING = 1e-3
 
-#: Walls that stand back by this much from the nearest ones still count as facing, m.
+#: Walls set back by this much from the nearest ones still count as facing, m.
 FACING_DEPTH = 0.25
 
-#: Largest angle between facing walls, degrees; and between the axis and a neighbour that continues
-#: the row.
-FACING_ANGLE, ROW_ANGLE = 30.0, 45.0
+#: Largest angle between facing walls, degrees.
+FACING_ANGLE = 30.0
 
-#: Pairs treated at a time, to bound memory.
+#: Largest angle between the axis and the direction of a neighbour that continues the row, degrees.
+ROW_ANGLE = 45.0
+
+#: Pairs per block, to bound memory.
 CHUNK = 20_000
 
 
 class Neighbours(NamedTuple):
     """
-    Pairs of footprints, ``first < second``, one element a pair.
+    Pairs of footprints, ``first < second``, one element per pair.
 
     Attributes
     ----------
@@ -43,7 +45,7 @@ class Neighbours(NamedTuple):
     gap : (n_pairs,) ndarray
         Shortest distance, m; 0 if they touch.
     overlap : (n_pairs,) ndarray
-        Area that both cover, m2.
+        Area covered by both, m2.
     facing_length : (n_pairs,) ndarray
         Length over which walls face each other, m.
     azimuth : (n_pairs,) ndarray
@@ -62,7 +64,11 @@ class Neighbours(NamedTuple):
 
 
 class _Walls(NamedTuple):
-    """Walls of all buildings, those of building ``i`` at ``offset[i]:offset[i + 1]``; the outside is on their right."""
+    """
+    Walls of all buildings, from start to end with the outside on the right.
+
+    Those of building ``i`` are ``offset[i]:offset[i + 1]``.
+    """
 
     offset: IntArray
     start: FloatArray
@@ -80,56 +86,78 @@ def neighbours(polygons: Geometries, distance: float) -> Neighbours:
     distance : float
         Largest gap, m.
     """
-    one, other = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=distance)
-    order = np.lexsort((other, one))
-    first, second = one[order], other[order]
-    first, second = first[first < second], second[first < second]
+    first, second = _close(polygons, distance)
     gap = shapely.distance(polygons[first], polygons[second])
     gap = np.where(gap < TOUCHING, 0.0, gap)
-    facing, axis = _facing(polygons, first, second, gap)
-    axis = np.where(
-        facing[:, None] > 0.0, axis, _connection(polygons[first], polygons[second], gap)
-    )
+    # Axis by facing walls where there are any, else by the shortest connection
+    facing, normals = _facing(polygons, first, second, gap)
+    connection = _connection(polygons[first], polygons[second], gap)
+    axis = np.where(facing[:, None] > 0.0, normals, connection)
     azimuth = np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
-    overlap, met = np.zeros(gap.size), gap == 0.0
-    overlap[met] = shapely.area(shapely.intersection(polygons[first[met]], polygons[second[met]]))
-    return Neighbours(first, second, gap, overlap, facing, azimuth, _inside(first, second, azimuth))
+    overlap = _overlap(polygons, first, second, gap)
+    is_inside = _inside_row(first, second, azimuth)
+    return Neighbours(first, second, gap, overlap, facing, azimuth, is_inside)
+
+
+def _close(polygons: Geometries, distance: float) -> tuple[IntArray, IntArray]:
+    """Return the positions of footprints within a distance, every pair once and in order."""
+    tree = shapely.STRtree(polygons)
+    query, found = tree.query(polygons, predicate="dwithin", distance=distance)
+    order = np.lexsort((found, query))
+    first, second = query[order], found[order]
+    is_once = first < second
+    return first[is_once], second[is_once]
+
+
+def _overlap(
+    polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
+) -> FloatArray:
+    """Return the area covered by both footprints of each pair, m2."""
+    overlap, touch = np.zeros(gap.size), gap == 0.0
+    shared = shapely.intersection(polygons[first[touch]], polygons[second[touch]])
+    overlap[touch] = shapely.area(shared)
+    return overlap
 
 
 def _connection(first: Geometries, second: Geometries, gap: FloatArray) -> FloatArray:
-    """Return the shortest connection of each pair; of touching ones, the line between the centres."""
+    """Return the shortest connection of each pair; if they touch, the line between the centres."""
     line = shapely.get_coordinates(shapely.shortest_line(first, second)).reshape(-1, 2, 2)
-    centre = shapely.get_coordinates(shapely.centroid(second)) - shapely.get_coordinates(
-        shapely.centroid(first)
-    )
-    connection: FloatArray = np.where(gap[:, None] > 0.0, line[:, 1] - line[:, 0], centre)
+    # A shortest line of length 0 has no direction
+    centre_1 = shapely.get_coordinates(shapely.centroid(first))
+    centre_2 = shapely.get_coordinates(shapely.centroid(second))
+    between_walls, between_centres = line[:, 1] - line[:, 0], centre_2 - centre_1
+    connection: FloatArray = np.where(gap[:, None] > 0.0, between_walls, between_centres)
     return connection
 
 
 def _walls(polygons: Geometries) -> _Walls:
-    parts, building = shapely.get_parts(
-        shapely.orient_polygons(polygons, exterior_cw=False), return_index=True
-    )
+    """Return the walls of all rings, courtyards too."""
+    # Rings with the building on their left, and the building of each ring
+    anticlockwise = shapely.orient_polygons(polygons, exterior_cw=False)
+    parts, building = shapely.get_parts(anticlockwise, return_index=True)
     rings, part = shapely.get_rings(parts, return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
-    wall = (ring[1:] == ring[:-1]) & (points[1:] != points[:-1]).any(axis=1)
-    owner = building[part[ring[:-1][wall]]]
+    # Two successive points of one ring that differ make a wall
+    is_wall = (ring[1:] == ring[:-1]) & (points[1:] != points[:-1]).any(axis=1)
+    owner = building[part[ring[:-1][is_wall]]]
     offset = np.searchsorted(owner, np.arange(len(polygons) + 1))
-    return _Walls(offset, points[:-1][wall], points[1:][wall])
+    return _Walls(offset, points[:-1][is_wall], points[1:][is_wall])
 
 
 def _facing(
     polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the length over which walls face each other, and the sum of their normals times that length."""
+    """Return the length of facing walls of each pair, m, and the sum of normal times length."""
     walls, bounds = _walls(polygons), shapely.bounds(polygons)
     length, axis = np.zeros(first.size), np.zeros((first.size, 2))
     for start in range(0, first.size, CHUNK):
         rows = slice(start, start + CHUNK)
         reach = gap[rows] + FACING_DEPTH
-        one = _near(walls, first[rows], bounds[second[rows]], reach)
-        two = _near(walls, second[rows], bounds[first[rows]], reach)
-        pair, wall_1, wall_2 = _combined(one, two, reach.size)
+        # Combinations of walls that come near the other building
+        near_1 = _near(walls, first[rows], bounds[second[rows]], reach)
+        near_2 = _near(walls, second[rows], bounds[first[rows]], reach)
+        pair, wall_1, wall_2 = _combined(near_1, near_2, reach.size)
+        # Sums over the combinations of each pair
         shared, normal = _facing_walls(walls, wall_1, wall_2, reach[pair])
         length[rows] = np.bincount(pair, shared, minlength=reach.size)
         for i in (0, 1):
@@ -138,7 +166,7 @@ def _facing(
 
 
 def _expanded(starts: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
-    """Return, for ranges ``start:start + count``, which range each element is of, and the element."""
+    """Return range and value of each element of the ranges ``start:start + count``."""
     owner = np.repeat(np.arange(counts.size), counts)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return owner, starts[owner] + within
@@ -147,59 +175,84 @@ def _expanded(starts: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
 def _near(
     walls: _Walls, building: IntArray, box: FloatArray, reach: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Return pair and wall for the walls of each pair's building that come near the other's bounding box."""
-    pair, wall = _expanded(
-        walls.offset[building], walls.offset[building + 1] - walls.offset[building]
-    )
-    low = np.minimum(walls.start[wall], walls.end[wall]) <= box[pair, 2:] + reach[pair, None]
-    high = np.maximum(walls.start[wall], walls.end[wall]) >= box[pair, :2] - reach[pair, None]
-    near = (low & high).all(axis=1)
-    return pair[near], wall[near]
+    """Return pair and wall of the walls that come near the bounding box of the other building."""
+    first = walls.offset[building]
+    pair, wall = _expanded(first, walls.offset[building + 1] - first)
+    # Bounding box of each wall against that of the building, widened by the reach
+    start, end = walls.start[wall], walls.end[wall]
+    is_low = np.minimum(start, end) <= box[pair, 2:] + reach[pair, None]
+    is_high = np.maximum(start, end) >= box[pair, :2] - reach[pair, None]
+    is_near = (is_low & is_high).all(axis=1)
+    return pair[is_near], wall[is_near]
 
 
 def _combined(
-    one: tuple[IntArray, IntArray], two: tuple[IntArray, IntArray], n_pairs: int
+    near_1: tuple[IntArray, IntArray], near_2: tuple[IntArray, IntArray], n_pairs: int
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return every combination of a wall of the first and a wall of the second building of the same pair."""
-    counts = np.bincount(two[0], minlength=n_pairs)
+    """Return pair and both walls of every combination of walls of the two buildings of a pair."""
+    (pair_1, wall_1), (pair_2, wall_2) = near_1, near_2
+    counts = np.bincount(pair_2, minlength=n_pairs)
     starts = np.cumsum(counts) - counts
-    row, other = _expanded(starts[one[0]], counts[one[0]])
-    return one[0][row], one[1][row], two[1][other]
+    row_1, row_2 = _expanded(starts[pair_1], counts[pair_1])
+    return pair_1[row_1], wall_1[row_1], wall_2[row_2]
 
 
 def _facing_walls(
-    walls: _Walls, one: IntArray, two: IntArray, reach: FloatArray
+    walls: _Walls, wall_1: IntArray, wall_2: IntArray, reach: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the shared length of walls that face each other (0 for others) and the normal out of the first."""
-    span = walls.end[one] - walls.start[one]
-    length = np.hypot(*span.T)
-    along = span / length[:, None]
-    normal = np.column_stack([along[:, 1], -along[:, 0]])
-    begin, end = walls.start[two] - walls.start[one], walls.end[two] - walls.start[one]
-    along_begin, along_end = np.sum(begin * along, axis=1), np.sum(end * along, axis=1)
+    """Return shared lengths of facing walls, m, 0 for others, and normals out of first walls."""
+    along, normal, length = _directions(walls, wall_1)
+    # Second wall seen from the start of the first
+    begin = walls.start[wall_2] - walls.start[wall_1]
+    end = walls.end[wall_2] - walls.start[wall_1]
+    along_begin, along_end = _dot(begin, along), _dot(end, along)
+    # Length that both share, where the second wall runs against the first
     low = np.maximum(0.0, np.minimum(along_begin, along_end))
     high = np.minimum(length, np.maximum(along_begin, along_end))
-    other = np.hypot(*(end - begin).T)
-    antiparallel = (along_end - along_begin) < -np.cos(np.deg2rad(FACING_ANGLE)) * other
-    share = np.divide(
-        (low + high) / 2.0 - along_begin,
-        along_end - along_begin,
-        out=np.zeros_like(low),
-        where=antiparallel,
-    )
-    apart = np.sum((begin + share[:, None] * (end - begin)) * normal, axis=1)
-    facing = antiparallel & (high > low) & (apart >= -FACING_DEPTH) & (apart <= reach)
-    return np.where(facing, high - low, 0.0), normal
+    is_antiparallel = _antiparallel(begin, end, along_end - along_begin)
+    # Distance of the second wall at the middle of the shared length
+    to_middle = (low + high) / 2.0 - along_begin
+    share = _ratio(to_middle, along_end - along_begin, is_antiparallel)
+    distance = _dot(begin + share[:, None] * (end - begin), normal)
+    is_near = (distance >= -FACING_DEPTH) & (distance <= reach)
+    return np.where(is_antiparallel & (high > low) & is_near, high - low, 0.0), normal
 
 
-def _inside(first: IntArray, second: IntArray, azimuth: FloatArray) -> NDArray[np.bool_]:
-    """Return where both buildings of a pair have a further neighbour opposite to the other one."""
+def _directions(walls: _Walls, wall: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return unit vectors along walls and out of their buildings, and lengths, m."""
+    span = walls.end[wall] - walls.start[wall]
+    length = np.hypot(*span.T)
+    along = span / length[:, None]
+    return along, np.column_stack([along[:, 1], -along[:, 0]]), length
+
+
+def _antiparallel(begin: FloatArray, end: FloatArray, advance: FloatArray) -> NDArray[np.bool_]:
+    """Return walls that run against a direction, from their ends and their advance along it, m."""
+    length = np.hypot(*(end - begin).T)
+    return np.asarray(advance < -np.cos(np.deg2rad(FACING_ANGLE)) * length)
+
+
+def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the scalar product of each row."""
+    return np.asarray(np.sum(first * second, axis=1))
+
+
+def _ratio(part: FloatArray, whole: FloatArray, where: NDArray[np.bool_]) -> FloatArray:
+    """Return part / whole in the rows of a mask, 0 in others."""
+    return np.divide(part, whole, out=np.zeros_like(part), where=where)
+
+
+def _inside_row(first: IntArray, second: IntArray, azimuth: FloatArray) -> NDArray[np.bool_]:
+    """Return where both buildings of a pair have a further neighbour on the opposite side."""
+    # Each pair seen from both buildings, grouped by building
     building = np.concatenate([first, second])
     direction = np.concatenate([azimuth, azimuth + 180.0])
     order = np.argsort(building, kind="stable")
     counts = np.bincount(building)
     starts = np.cumsum(counts) - counts
+    # Each neighbour against every neighbour of the same building
     seen, other = _expanded(starts[building], counts[building])
-    opposite = np.abs((direction[order][other] - direction[seen]) % 360.0 - 180.0) < ROW_ANGLE
-    continued = np.bincount(seen, opposite, minlength=building.size) > 0
-    return continued[: first.size] & continued[first.size :]
+    turn = (direction[order][other] - direction[seen]) % 360.0
+    is_opposite = np.abs(turn - 180.0) < ROW_ANGLE
+    continues = np.bincount(seen, is_opposite, minlength=building.size) > 0
+    return continues[: first.size] & continues[first.size :]

@@ -1,4 +1,8 @@
-"""Taper, zero padding and the acausal Butterworth filter; the pads stay, for the filtered motion leaks into them."""
+"""
+Taper, zero padding and the acausal Butterworth filter.
+
+The pads stay: the filtered motion leaks into them.
+"""
 
 from functools import reduce
 
@@ -9,10 +13,13 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from per_obspy.checks import FloatArray, finite, number, positive
 from per_obspy.processing.notes import noted
 
+#: Length of each pad in periods of the corner per order of the filter (Boore 2005).
+PAD = 0.75
 
-def tapered(stream: Stream, fraction: float = 0.05) -> Stream:
+
+def tapered(stream: Stream, fraction: float) -> Stream:
     """
-    Return a copy whose ends rise from and fall to zero as half a Hann window each.
+    Return a copy with ends that rise from and fall to zero as half a Hann window each.
 
     Parameters
     ----------
@@ -32,14 +39,14 @@ def tapered(stream: Stream, fraction: float = 0.05) -> Stream:
     return out
 
 
-def padded(stream: Stream, highpass: float, order: int = 5) -> Stream:
+def padded(stream: Stream, highpass: float, order: int) -> Stream:
     """
-    Return a copy with zeros before and after, 1.5 order / highpass seconds in total, half on each side.
+    Return a copy with zeros before and after.
 
-    The pads hold the transients of the acausal filter. They are kept: velocity and displacement
-    integrated from the filtered record return to rest in them, and oscillators start from rest only
-    before them. ``starttime`` moves to the first zero. The end gets the few samples more that make
-    the length quick to transform.
+    They last 1.5 order / highpass seconds in total, half on each side, and hold the transients of
+    the acausal filter. They are kept: velocity and displacement integrated from the filtered record
+    return to rest in them, and oscillators start from rest only before them. ``starttime`` moves to
+    the first zero. The end gets the few samples more that make the length quick to transform.
 
     Parameters
     ----------
@@ -61,17 +68,16 @@ def padded(stream: Stream, highpass: float, order: int = 5) -> Stream:
     out = stream.copy()
     for trace in out:
         dt, count = trace.stats.delta, trace.stats.npts
-        side = int(np.ceil(0.75 * order / highpass / dt))
-        length = next_fast_len(count + 2 * side, real=True)
-        trace.data = np.pad(trace.data, (side, length - count - side))
-        trace.stats.starttime -= side * dt
-        after = (length - count - side) * dt
-        noted(
-            trace,
-            f"{side * dt:g} s of zeros before and {after:g} s after",
-            pad_before=side * dt,
-            pad_after=after,
-        )
+        # The end gets the samples up to the next length that is quick to transform
+        before = int(np.ceil(PAD * order / highpass / dt))
+        length = next_fast_len(count + 2 * before, real=True)
+        after = length - count - before
+        trace.data = np.pad(trace.data, (before, after))
+        trace.stats.starttime -= before * dt
+        # Seconds of zeros
+        pads = {"pad_before": before * dt, "pad_after": after * dt}
+        step = f"{pads['pad_before']:g} s of zeros before and {pads['pad_after']:g} s after"
+        noted(trace, step, **pads)
     return out
 
 
@@ -79,7 +85,7 @@ def butterworth_amplitude(
     frequencies: FloatArray, highpass: float, lowpass: float, order: int
 ) -> FloatArray:
     r"""
-    Return the amplitude of a Butterworth band-pass without phase.
+    Compute the amplitude of a Butterworth band-pass without phase.
 
     .. math:: |H(f)| = [1 + (f_{hp}/f)^{2n}]^{-1/2} \, [1 + (f/f_{lp})^{2n}]^{-1/2}
 
@@ -88,7 +94,7 @@ def butterworth_amplitude(
     frequencies : (n_frequencies,) ndarray
         At least 0, Hz.
     highpass, lowpass : float
-        Corners, where each factor is 1/sqrt(2), Hz; 0 and infinity leave the factor out.
+        Corners, at which each factor is 1/sqrt(2), Hz; 0 and infinity leave the factor out.
     order : int
         n, dimensionless.
 
@@ -106,16 +112,16 @@ def butterworth_amplitude(
     >>> butterworth_amplitude(np.array([0.0, 0.1, 1.0, 30.0]), 0.1, 30.0, 5).round(4)
     array([0.    , 0.7071, 1.    , 0.7071])
     """
+    # Both terms of the equation; a high-pass has amplitude 0 at frequency 0
+    at_zero = np.inf if highpass else 0.0
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        low = np.where(
-            frequencies > 0, _power(highpass / frequencies, 2 * order), np.inf if highpass else 0.0
-        )
+        low = np.where(frequencies > 0, _power(highpass / frequencies, 2 * order), at_zero)
         high = _power(frequencies / lowpass, 2 * order)
     return np.asarray(1 / np.sqrt((1 + low) * (1 + high)))
 
 
 def _power(values: FloatArray, exponent: int) -> FloatArray:
-    """Return values to an even power by products: 10 times faster than ``**``, which takes logarithms."""
+    """Return values to an even power by products, 10 times faster than ``**`` by logarithms."""
     return reduce(np.multiply, [np.square(values)] * (exponent // 2))
 
 
@@ -123,7 +129,7 @@ def acausal_bandpass(
     data: FloatArray, df: float, highpass: float, lowpass: float, order: int = 5
 ) -> FloatArray:
     """
-    Return samples filtered without phase, in the frequency domain, circularly: pad them first.
+    Filter samples without phase in the frequency domain, circularly: pad them first.
 
     ``trace.filter("acausal_butterworth", highpass=..., lowpass=...)`` calls it.
 
@@ -146,13 +152,14 @@ def acausal_bandpass(
     return np.asarray(irfft(rfft(samples) * amplitude, samples.size))
 
 
-def filtered(stream: Stream, highpass: float, lowpass: float, order: int = 5) -> Stream:
+def filtered(stream: Stream, highpass: float, lowpass: float, order: int) -> Stream:
     """
-    Return a copy filtered by `acausal_bandpass`; for the padded record.
+    Return a copy filtered by `acausal_bandpass`.
 
     Parameters
     ----------
     stream : obspy Stream
+        Padded.
     highpass, lowpass, order
         As in `butterworth_amplitude`.
 
@@ -162,14 +169,10 @@ def filtered(stream: Stream, highpass: float, lowpass: float, order: int = 5) ->
     """
     out = stream.copy()
     for trace in out:
-        trace.data = acausal_bandpass(
-            trace.data, trace.stats.sampling_rate, highpass, lowpass, order
-        )
+        rate = trace.stats.sampling_rate
+        trace.data = acausal_bandpass(trace.data, rate, highpass, lowpass, order)
+        # Corners as applied: a high-pass at 0 is none
         applied = {"highpass": highpass, "lowpass": lowpass} if highpass else {"lowpass": lowpass}
-        noted(
-            trace,
-            f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz",
-            order=order,
-            **applied,
-        )
+        step = f"acausal Butterworth, order {order}, {highpass:g}-{lowpass:g} Hz"
+        noted(trace, step, order=order, **applied)
     return out

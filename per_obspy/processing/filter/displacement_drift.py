@@ -1,25 +1,34 @@
-"""The lowest high-pass corner whose displacement does not wander."""
+"""Drift of the displacement of a record, and the lowest high-pass corner that cleans it."""
 
 from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.optimize import brentq
 
 from per_obspy.checks import FloatArray
-from per_obspy.processing.filter.butterworth import butterworth_amplitude
+from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
 
+#: Order of the polynomial that is the drift.
 POLYNOMIAL_ORDER = 5
-STEP = 1.2  # ratio of successive trial corners
-FASTEST = 10.0  # Hz: what is faster moves displacement by less than a thousandth, so it is left out
+
+#: Ratio of successive trial corners.
+STEP = 1.2
+
+#: Frequencies above move the displacement by less than a thousandth and are left out, Hz.
+FASTEST = 10.0
+
+#: A corner is found to this difference of its logarithm.
+TOLERANCE = 1e-3
 
 
 def displacement_drift(
     acceleration: FloatArray, dt: float, lowest: float, order: int
 ) -> Callable[[float], float]:
     r"""
-    Return how much of a record's displacement is drift, as a function of the high-pass corner.
+    Return the share of drift in a record's displacement as a function of the high-pass corner.
 
     .. math:: d(f_{hp}) = \max_t |p_5(t)| / \max_t |u(t)|
 
@@ -33,7 +42,7 @@ def displacement_drift(
     dt : float
         Sampling interval, s.
     lowest : float
-        Lowest corner that will be asked for, Hz: it decides the length of the pads.
+        Lowest corner to be tried, Hz: it decides the length of the pads.
     order : int
         Of the Butterworth filter.
 
@@ -46,22 +55,21 @@ def displacement_drift(
     ----------
     Ramos-Sepulveda et al. 2023 (algorithm auto_fchp of Brandenberg and others; gmprocess adopted
     it): the criterion and its target; the polynomial of fifth order and the search from above are
-    our choices.
+    choices of this package.
     """
+    # Pads and record on a grid that is thinner by a whole number
     thin = max(int(0.5 / (FASTEST * dt)), 1)
-    side = thin * int(np.ceil(0.75 * order / lowest / dt / thin))
-    length = thin * next_fast_len(int(np.ceil((acceleration.size + 2 * side) / thin)), real=True)
-    points, first, count = length // thin, side // thin, acceleration.size // thin
-    frequencies = rfftfreq(length, dt)[: points // 2 + 1]
-    angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
-    padded = np.pad(acceleration, (side, length - acceleration.size - side))
-    spectrum = -rfft(padded)[: frequencies.size] / (angular**2 * thin)
+    side = thin * int(np.ceil(PAD * order / lowest / dt / thin))
+    points = next_fast_len(int(np.ceil((acceleration.size + 2 * side) / thin)), real=True)
+    first, count = side // thin, acceleration.size // thin
+    # Spectrum of the displacement before the filter
+    frequencies, spectrum = _displacement_spectrum(acceleration, dt, side, thin * points, thin)
     basis = _polynomial_basis(count)
 
     def drift(highpass: float) -> float:
-        displacement = irfft(
-            spectrum * butterworth_amplitude(frequencies, highpass, np.inf, order), points
-        )
+        amplitude = butterworth_amplitude(frequencies, highpass, np.inf, order)
+        displacement = irfft(spectrum * amplitude, points)
+        # Least-squares polynomial over the record without its pads
         record = displacement[first : first + count]
         largest = np.abs(record).max()
         return float(np.abs(basis @ (basis.T @ record)).max() / largest) if largest > 0 else 0.0
@@ -69,17 +77,29 @@ def displacement_drift(
     return drift
 
 
+def _displacement_spectrum(
+    acceleration: FloatArray, dt: float, side: int, length: int, thin: int
+) -> tuple[FloatArray, NDArray[np.complex128]]:
+    """Return frequencies, Hz, and spectrum of the displacement of a padded record."""
+    points = length // thin
+    frequencies = rfftfreq(length, dt)[: points // 2 + 1]
+    angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
+    padded = np.pad(acceleration, (side, length - acceleration.size - side))
+    # The inverse transform has fewer points by the factor of thinning
+    return frequencies, -rfft(padded)[: frequencies.size] / (angular**2 * thin)
+
+
 @lru_cache(maxsize=4)
 def _polynomial_basis(count: int) -> FloatArray:
-    """Return orthonormal polynomials over evenly spaced points, (count, order + 1); components share it."""
+    """Return orthonormal polynomials over evenly spaced points, (count, order + 1)."""
     return np.linalg.qr(np.vander(np.linspace(-1, 1, count), POLYNOMIAL_ORDER + 1))[0]
 
 
 def clean_highpass(
-    drift: Callable[[float], float], lowest: float, highest: float = 0.5, target: float = 0.02
+    drift: Callable[[float], float], lowest: float, highest: float, target: float
 ) -> float | None:
     """
-    Return the lowest corner from which on the displacement is clean, at this corner and at all higher ones.
+    Return the lowest corner at which, and above which, the displacement is clean.
 
     Corners are tried from the highest down in steps of a fifth until the drift exceeds the target;
     the root inside that step is found by Brent's method in logarithmic frequency, to 0.1 % of the
@@ -92,7 +112,7 @@ def clean_highpass(
     lowest, highest : float
         Corners allowed, Hz.
     target : float
-        Drift that is clean, dimensionless.
+        Largest drift of a clean displacement, dimensionless.
 
     Returns
     -------
@@ -102,11 +122,14 @@ def clean_highpass(
     lower = highest
     if drift(lower) > target:
         return None
+
+    def excess(log_corner: float) -> float:
+        return drift(np.exp(log_corner)) - target
+
+    # Steps down to the first corner that is not clean, then the root inside the last step
     while lower > lowest:
         upper, lower = lower, max(lower / STEP, lowest)
         if drift(lower) > target:
-            root = brentq(
-                lambda x: drift(np.exp(x)) - target, np.log(lower), np.log(upper), xtol=1e-3
-            )
+            root = brentq(excess, np.log(lower), np.log(upper), xtol=TOLERANCE)
             return float(np.exp(root))
     return float(lower)

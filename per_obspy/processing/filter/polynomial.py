@@ -1,4 +1,4 @@
-"""Baselines that the earthquake did not make: means and polynomial trends."""
+"""Baselines of constant and polynomial form: means and trends."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from per_obspy.processing.notes import noted
 
 def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
     """
-    Return a copy without the mean of its quiet beginning, or of the whole record where there is none.
+    Return a copy without the mean of its quiet beginning, or else of the whole record.
 
     Parameters
     ----------
@@ -30,6 +30,7 @@ def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
     """
     out = stream.copy()
     for trace in out:
+        # Samples of the noise, if there are any
         quiet = trace.data[: max(round(pre_event / trace.stats.delta), 0)]
         samples = quiet if quiet.size else trace.data
         mean = float(samples.mean())
@@ -63,23 +64,23 @@ def trend_removed(stream: Stream, order: int = 1) -> Stream:
 
 def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:
     """
-    Return a copy without the baseline that a function of `velocity_baseline` takes out.
+    Return a copy without the baseline that a function of `velocity` removes.
 
     Parameters
     ----------
     stream : obspy Stream
     removed : callable
-        From samples, m/s2, and options to samples.
+        From samples, m/s2, sampling interval, s, and options to samples.
     **options : float
-        What the function needs, SI.
+        Further arguments of the function, SI.
 
     Returns
     -------
     obspy Stream
     """
     out = stream.copy()
-    told = ", ".join(f"{name} {value:g}" for name, value in options.items())
+    numbers = ", ".join(f"{name} {value:g}" for name, value in options.items())
     for trace in out:
         trace.data = removed(trace.data, trace.stats.delta, **options)
-        noted(trace, f"baseline by {removed.__name__} removed ({told})")
+        noted(trace, f"baseline by {removed.__name__} removed ({numbers})")
     return out

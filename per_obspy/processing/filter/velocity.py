@@ -1,4 +1,4 @@
-"""Baselines that shift during the shaking, seen in velocity or displacement and taken out of the acceleration."""
+"""Baselines that shift during the shaking, found in velocity or displacement."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -10,13 +10,22 @@ from scipy.interpolate import CubicHermiteSpline
 
 from per_obspy.checks import FloatArray, number, positive, record
 
-LATEST_START = 0.9  # of the record, where the quiet end must have begun
+#: Latest start of the quiet end, fraction of the record.
+LATEST_START = 0.9
+
+#: Trial ends of the shaking.
 TRIAL_ENDS = 12
+
+#: Orders of the polynomials of the velocity before and after the shaking.
+EARLY_ORDERS, LATE_ORDERS = (1, 2), (1, 2, 3)
+
+#: Fewest samples after the shaking to which a line is fitted.
+FEWEST_AFTER = 10
 
 
 def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> FloatArray:
     r"""
-    Return acceleration without two baseline shifts, one during the shaking and one from then on.
+    Remove two baseline shifts from acceleration, one during the shaking and one from then on.
 
     A line is fitted to the velocity after the shaking; its slope is the shift there, and the shift
     during the shaking is what brings the velocity from zero onto that line:
@@ -49,10 +58,11 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211, eq. (1)-(3).
     """
     samples, time = _samples_and_times(data, dt)
-    if not 0 <= first < second <= time[-1] - 10 * dt:
+    if not 0 <= first < second <= time[-1] - FEWEST_AFTER * dt:
         raise ValueError(
             f"first and second must be times within the record, got {first:g} and {second:g} s"
         )
+    # Shifts after t2 and between t1 and t2: a_f and a_m
     constant, slope = _final_line(samples, time, second)
     during = (constant + slope * second) / (second - first)
     shift = np.where(time >= second, slope, np.where(time >= first, during, 0.0))
@@ -61,10 +71,10 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
 
 def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
     """
-    Return the velocity that is left when the shaking ends: that of the line through the velocity from then on, m/s.
+    Return the residual velocity at the end of the shaking, m/s.
 
-    The ground has come to rest by then, so that this is the integral of what the baseline did
-    during the shaking.
+    It is that of the line through the velocity from then on. The ground has come to rest by then,
+    so that this is the integral of the baseline's shifts during the shaking.
 
     Parameters
     ----------
@@ -78,7 +88,7 @@ def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
     Returns
     -------
     float
-        Not negative.
+        At least 0.
 
     Examples
     --------
@@ -93,9 +103,10 @@ def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
 
 def crossing_time(data: FloatArray, dt: float, first: float, second: float) -> float:
     """
-    Return the t2 at which the line through the final velocity crosses zero, if that is between the times, else second.
+    Return the t2 at which the line through the final velocity crosses zero.
 
-    With it the shift during the shaking vanishes: the baseline has a single step.
+    It must lie between the two times, else the second is returned. With it the shift during the
+    shaking vanishes: the baseline has a single step.
 
     Parameters
     ----------
@@ -120,12 +131,12 @@ def crossing_time(data: FloatArray, dt: float, first: float, second: float) -> f
 
 def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> FloatArray:
     """
-    Return acceleration without the slope of what is left in its velocity before and after the shaking.
+    Remove the slope of the residual velocity before and after the shaking from acceleration.
 
     Before the onset the velocity is fitted by a line or a parabola, after the shaking by a
     polynomial up to third order; a cubic that meets both with their slopes bridges the shaking.
-    When the shaking ends is tried in steps, and the combination with the smallest velocity outside
-    the shaking is taken.
+    Ends of the shaking are tried in steps, and the combination with the smallest velocity outside
+    the shaking is used.
 
     ``trace.detrend("velocity_residual", dt=..., onset=..., end=...)`` calls it.
 
@@ -150,39 +161,48 @@ def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> 
 
     References
     ----------
-    Jones, Kalkan & Stephens 2017, U.S. Geological Survey Open-File Report 2017-1008: adaptive
-    baseline correction, after whose idea this is made.
+    Jones, Kalkan & Stephens 2017, U.S. Geological Survey Open-File Report 2017-1008: the idea of
+    the adaptive baseline correction.
     """
     samples, time = _samples_and_times(data, dt)
     latest = LATEST_START * time[-1]
     if not 0 < onset < end <= latest:
         raise ValueError(
-            f"onset and end must be times within the first 90 % of the record, got {onset:g} and {end:g} s"
+            "onset and end must be times within the first 90 % of the record, "
+            f"got {onset:g} and {end:g} s"
         )
     velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
-    outside = (time < onset) | (time >= end)
-    candidates = _residual_baselines(velocity, time, onset, np.linspace(end, latest, TRIAL_ENDS))
-    best = min(candidates, key=lambda baseline: float(np.mean((velocity - baseline)[outside] ** 2)))
+    is_outside = (time < onset) | (time >= end)
+
+    def mean_square(baseline: FloatArray) -> float:
+        return float(np.mean((velocity - baseline)[is_outside] ** 2))
+
+    # Baseline of the velocity that leaves least outside the shaking
+    ends = np.linspace(end, latest, TRIAL_ENDS)
+    best = min(_residual_baselines(velocity, time, onset, ends), key=mean_square)
     return samples - np.gradient(best, dt)
 
 
 def _residual_baselines(
     velocity: FloatArray, time: FloatArray, onset: float, ends: FloatArray
 ) -> Iterator[FloatArray]:
+    """Yield the trial baselines of the velocity, m/s."""
     before = time <= onset
-    for end, early, late in product(ends, (1, 2), (1, 2, 3)):
+    for end, early, late in product(ends, EARLY_ORDERS, LATE_ORDERS):
+        # Polynomials outside the shaking
         after = time >= end
         first = Polynomial.fit(time[before], velocity[before], early)
         last = Polynomial.fit(time[after], velocity[after], late)
-        bridge = CubicHermiteSpline(
-            [onset, end], [first(onset), last(end)], [first.deriv()(onset), last.deriv()(end)]
-        )
+        # Cubic with their values and slopes at the ends of the shaking
+        values = [first(onset), last(end)]
+        slopes = [first.deriv()(onset), last.deriv()(end)]
+        bridge = CubicHermiteSpline([onset, end], values, slopes)
         yield np.where(before, first(time), np.where(after, last(time), bridge(time)))
 
 
 def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> FloatArray:
     """
-    Return acceleration without the second derivative of the polynomial that fits its displacement.
+    Remove the second derivative of the polynomial that fits the displacement from acceleration.
 
     The polynomial has no constant and no linear term: the ground starts at rest.
 
@@ -210,24 +230,26 @@ def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> Floa
     samples, time = _samples_and_times(data, dt)
     if order < 2:
         raise ValueError(f"order must be at least 2, got {order}")
-    displacement = cumulative_trapezoid(
-        cumulative_trapezoid(samples, dx=dt, initial=0), dx=dt, initial=0
-    )
+    velocity = cumulative_trapezoid(samples, dx=dt, initial=0)
+    displacement = cumulative_trapezoid(velocity, dx=dt, initial=0)
+    # Least squares in powers of time over the duration
     duration = time[-1]
     powers = np.arange(2, order + 1)
     terms = (time[:, None] / duration) ** powers
     coefficients, *_ = np.linalg.lstsq(terms, displacement)
+    # Second derivative of each power
     curvature = powers * (powers - 1) * (time[:, None] / duration) ** (powers - 2) / duration**2
     return np.asarray(samples - curvature @ coefficients)
 
 
 def _samples_and_times(data: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Return checked samples and their times, s."""
     samples = record("data", data)
     return samples, np.arange(float(samples.size)) * number("dt", dt, positive)
 
 
 def _final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[float, float]:
-    """Return the constant, m/s, and the slope, m/s2, of the line through the velocity from the start on."""
+    """Return constant, m/s, and slope, m/s2, of the line through the velocity from a start on."""
     velocity = cumulative_trapezoid(samples, time, initial=0)
     after = time >= start
     constant, slope = Polynomial.fit(time[after], velocity[after], 1).convert().coef

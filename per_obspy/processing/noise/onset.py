@@ -1,8 +1,9 @@
-"""When the P wave arrives: three pickers that share no idea, their median, and the travel time of a known event."""
+"""Pickers of the first P wave: three independent methods and their median."""
 
 from statistics import median
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from obspy import Trace
 from obspy.signal.trigger import pk_baer
 from scipy.signal import butter, sosfilt
@@ -10,12 +11,20 @@ from scipy.signal import butter, sosfilt
 from per_obspy.checks import FloatArray
 
 TINY = np.finfo(float).tiny
-FEWEST = 20  # samples up to the peak
+
+#: Fewest samples, and shortest time in s, up to the peak of a record that can be picked.
+FEWEST, SHORTEST = 20, 0.5
+
+#: Windows before and after a pick whose root mean squares are compared, s.
+CLEAR_WINDOW = 2.0
+
+#: Variances of fewer samples at the ends of a record are not reliable.
+EDGE = 10
 
 
 def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | None:
     """
-    Return when the first wave arrives, as the median of three pickers.
+    Pick the first wave of a record as the median of three pickers.
 
     Parameters
     ----------
@@ -27,46 +36,52 @@ def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | N
     Returns
     -------
     (onset, spread) or None
-        Seconds from the first sample, and between the earliest and the latest picker; None if
-        nothing stands out.
+        Seconds from the first sample, and between the earliest and the latest picker; None if no
+        wave is clear.
     """
     dt = trace.stats.delta
     samples = _band_passed(trace.data, dt)
-    until = samples[: int(np.abs(samples).argmax()) + 1]
-    if until.size < max(0.5 / dt, FEWEST):
+    until_peak = samples[: int(np.abs(samples).argmax()) + 1]
+    if until_peak.size < max(SHORTEST / dt, FEWEST):
         return None
+    # Median of the pickers that find a wave inside the record
     picks = [
-        aic_onset(until),
-        energy_ratio_onset(until, max(round(1.0 / dt), 2)),
+        aic_onset(until_peak),
+        energy_ratio_onset(until_peak, max(round(1.0 / dt), 2)),
         baer_onset(samples, dt),
     ]
     found = sorted(pick for pick in picks if pick is not None and 0 < pick < samples.size - 1)
     if not found:
         return None
     onset = int(median(found))
-    before = samples[max(onset - round(2.0 / dt), 0) : onset]
-    after = samples[onset : onset + round(2.0 / dt)]
-    if np.sqrt(np.mean(after**2)) < clearest * np.sqrt(np.mean(before**2)):
+    # The wave must be larger than what precedes it
+    if not _is_clear(samples, onset, round(CLEAR_WINDOW / dt), clearest):
         return None
     return onset * dt, (found[-1] - found[0]) * dt
 
 
+def _is_clear(samples: FloatArray, onset: int, window: int, clearest: float) -> bool:
+    """Return whether the root mean square after an onset exceeds that before it enough."""
+    before = samples[max(onset - window, 0) : onset]
+    after = samples[onset : onset + window]
+    return not np.sqrt(np.mean(after**2)) < clearest * np.sqrt(np.mean(before**2))
+
+
 def _band_passed(samples: FloatArray, dt: float) -> FloatArray:
-    """Return the samples between 1 and 20 Hz, filtered causally so that nothing arrives early."""
-    sections = butter(
-        2, [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)], "bandpass", fs=1 / dt, output="sos"
-    )
+    """Return the samples between 1 and 20 Hz, filtered causally so that no wave arrives early."""
+    corners = [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)]
+    sections = butter(2, corners, "bandpass", fs=1 / dt, output="sos")
     place = np.linspace(-1, 1, samples.size)
-    return np.asarray(
-        sosfilt(sections, samples - np.polynomial.Polynomial.fit(place, samples, 1)(place))
-    )
+    trend = Polynomial.fit(place, samples, 1)(place)
+    return np.asarray(sosfilt(sections, samples - trend))
 
 
 def aic_onset(samples: FloatArray) -> int:
     r"""
     Return the sample that best divides a record into two stationary parts.
 
-    .. math:: AIC(k) = k \log \sigma^2(x_1 \ldots x_k) + (N - k - 1) \log \sigma^2(x_{k+1} \ldots x_N)
+    .. math:: AIC(k) = k \log \sigma^2(x_1 \ldots x_k)
+                       + (N - k - 1) \log \sigma^2(x_{k+1} \ldots x_N)
 
     Parameters
     ----------
@@ -81,16 +96,18 @@ def aic_onset(samples: FloatArray) -> int:
     ----------
     Maeda 1985, Zisin 38, 365-379.
     """
+    # Variances of both parts by running sums
     count = np.arange(1, samples.size)
+    rest = samples.size - count
     sums, squares = np.cumsum(samples), np.cumsum(samples**2)
     left = squares[:-1] / count - (sums[:-1] / count) ** 2
-    rest = samples.size - count
     right = (squares[-1] - squares[:-1]) / rest - ((sums[-1] - sums[:-1]) / rest) ** 2
-    floor = 1e-12 * max(squares[-1] / samples.size, TINY)  # below the rounding of the running sums
-    criterion = count * np.log(np.maximum(left, floor)) + (rest - 1) * np.log(
-        np.maximum(right, floor)
-    )
-    edge = min(10, count.size // 4)  # variances of a few samples mean nothing
+    # Criterion, with variances that are not below the rounding of the running sums
+    floor = 1e-12 * max(squares[-1] / samples.size, TINY)
+    first = count * np.log(np.maximum(left, floor))
+    second = (rest - 1) * np.log(np.maximum(right, floor))
+    criterion = first + second
+    edge = min(EDGE, count.size // 4)
     return int(criterion[edge : count.size - edge].argmin()) + edge + 1
 
 
@@ -108,24 +125,26 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
     Returns
     -------
     int or None
-        None if the record does not hold two windows.
+        None if the record is shorter than two windows.
 
     References
     ----------
     Akram & Eaton 2016, Geophysics 81, KS71-KS91: energy ratio.
     """
+    # Energies of windows as differences of the running energy
     energy = np.concatenate(([0.0], np.cumsum(samples**2)))
     places = np.arange(window, samples.size - window)
     if not places.size:
         return None
     before = energy[places] - energy[places - window]
     after = energy[places + window] - energy[places]
-    return int(places[(after / (before + 1e-12 * energy[-1] + TINY)).argmax()])
+    ratio = after / (before + 1e-12 * energy[-1] + TINY)
+    return int(places[ratio.argmax()])
 
 
 def baer_onset(samples: FloatArray, dt: float) -> int | None:
     """
-    Return the sample that the picker of Baer & Kradolfer finds, or None.
+    Return the sample picked by the method of Baer & Kradolfer, or None.
 
     Parameters
     ----------
@@ -144,6 +163,7 @@ def baer_onset(samples: FloatArray, dt: float) -> int | None:
     second = round(1.0 / dt)
     if samples.size < 4 * second or not samples.any():
         return None
+    # The picker works in single precision
     scaled = (samples / np.abs(samples).max()).astype(np.float32)
     pick, _ = pk_baer(
         scaled, 1 / dt, round(0.2 * second), round(0.6 * second), 7.0, 12.0, second, second

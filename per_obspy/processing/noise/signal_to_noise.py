@@ -1,4 +1,4 @@
-"""How far a record stands above its own noise, by frequency."""
+"""Spectra of signal and noise of a record, and the band in which the signal clears the noise."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,14 @@ from scipy.signal.windows import tukey
 from per_obspy.checks import FloatArray
 from per_obspy.processing.noise.smoothing import konno_ohmachi
 
-CENTRES_A_DECADE = 40
-SIGNIFICANT = 0.95  # of the squared acceleration
+#: Smoothed spectral values per decade of frequency, and the lowest frequency, Hz.
+CENTRES_PER_DECADE, LOWEST_FREQUENCY = 40, 0.001
+
+#: Share of the squared acceleration at which the significant shaking ends.
+SIGNIFICANT = 0.95
+
+#: Share of a window that its cosine tapers cover.
+TAPERED = 0.1
 
 
 class NoiseSpectra(NamedTuple):
@@ -23,7 +29,7 @@ class NoiseSpectra(NamedTuple):
     frequencies : (n_frequencies,) ndarray
         Logarithmically spaced, Hz.
     signal, noise : (n_frequencies,) ndarray
-        Amplitudes, m/s; the noise as it would be over the length of the signal.
+        Amplitudes, m/s; the noise scaled to the length of the signal.
     """
 
     frequencies: FloatArray
@@ -32,16 +38,16 @@ class NoiseSpectra(NamedTuple):
 
     @property
     def ratio(self) -> FloatArray:
-        """Signal to noise, dimensionless; infinite where there is no noise."""
+        """Return signal to noise, dimensionless; infinite where there is no noise."""
         with np.errstate(divide="ignore"):
             return np.asarray(self.signal / self.noise)
 
 
 def noise_spectra(
-    acceleration: FloatArray, dt: float, onset: float, bandwidth: float = 20.0
+    acceleration: FloatArray, dt: float, onset: float, bandwidth: float
 ) -> NoiseSpectra:
     """
-    Return the smoothed spectra of the noise before the onset and of the shaking after it.
+    Compute the smoothed spectra of the noise before the onset and of the shaking after it.
 
     The signal lasts until 95 % of the squared acceleration after the onset. Noise is stationary, so
     that its amplitude grows with the root of the window's length: it is scaled to the length of the
@@ -55,7 +61,7 @@ def noise_spectra(
     dt : float
         Sampling interval, s.
     onset : float
-        Where the noise ends, s from the first sample; at least 2 dt.
+        End of the noise, s from the first sample; at least 2 dt.
     bandwidth : float
         Of the Konno-Ohmachi window, dimensionless.
 
@@ -63,18 +69,16 @@ def noise_spectra(
     -------
     NoiseSpectra
     """
+    # Noise before the onset, significant shaking after it
     first = round(onset / dt)
     noise = acceleration[:first] - acceleration[:first].mean()
     signal = acceleration[first : first + significant_samples(acceleration[first:])]
-    length = 2 ** int(
-        np.ceil(np.log2(2 * max(noise.size, signal.size)))
-    )  # few lengths, so that weights are reused
+    # Amplitudes of both at the same frequencies; few lengths, so that smoothing weights are reused
+    length = 2 ** int(np.ceil(np.log2(2 * max(noise.size, signal.size))))
+    amplitudes = dt * np.abs(rfft(_tapered_windows(signal, noise, length)))
     centres = _centres(dt)
-    windows = np.zeros((2, length))
-    for row, part in zip(windows, (signal, noise), strict=True):
-        row[: part.size] = part * tukey(part.size, 0.1)
-    amplitudes = dt * np.abs(rfft(windows))
     smooth = konno_ohmachi(amplitudes, 1 / (length * dt), centres, bandwidth)
+    # Noise over the length of the signal; carried on below one cycle in its window
     frequencies = np.array(centres)
     scaled = smooth[1] * np.sqrt(signal.size / noise.size)
     resolved = min(int(np.searchsorted(frequencies, 1 / (noise.size * dt))), frequencies.size - 1)
@@ -82,16 +86,25 @@ def noise_spectra(
     return NoiseSpectra(frequencies, smooth[0], scaled)
 
 
+def _tapered_windows(signal: FloatArray, noise: FloatArray, length: int) -> FloatArray:
+    """Return signal and noise, tapered, in two rows of a length, zeros behind them."""
+    windows = np.zeros((2, length))
+    for row, part in zip(windows, (signal, noise), strict=True):
+        row[: part.size] = part * tukey(part.size, TAPERED)
+    return windows
+
+
 def significant_samples(acceleration: FloatArray) -> int:
-    """Return how many samples hold 95 % of the squared acceleration, m2/s4, from the first sample on."""
+    """Return the number of samples from the first on that have 95 % of the squared motion."""
     energy = np.cumsum(acceleration**2)
     return int(np.searchsorted(energy, SIGNIFICANT * energy[-1])) + 1
 
 
 def _centres(dt: float) -> tuple[float, ...]:
-    lowest, nyquist = 0.001, 0.5 / dt
-    count = int(CENTRES_A_DECADE * np.log10(nyquist / lowest)) + 1
-    return tuple(np.geomspace(lowest, nyquist, count).tolist())
+    """Return the frequencies of smoothed spectra up to the Nyquist frequency, Hz."""
+    nyquist = 0.5 / dt
+    count = int(CENTRES_PER_DECADE * np.log10(nyquist / LOWEST_FREQUENCY)) + 1
+    return tuple(np.geomspace(LOWEST_FREQUENCY, nyquist, count).tolist())
 
 
 def within(spectra: NoiseSpectra, low: float, high: float) -> NoiseSpectra:
@@ -102,7 +115,7 @@ def within(spectra: NoiseSpectra, low: float, high: float) -> NoiseSpectra:
 
 def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] | None:
     """
-    Return the widest band (in octaves) in which signal exceeds noise by the threshold.
+    Return the widest band (in octaves) with signal to noise above the threshold.
 
     Parameters
     ----------
@@ -113,10 +126,11 @@ def clear_band(spectra: NoiseSpectra, threshold: float) -> tuple[float, float] |
     Returns
     -------
     (low, high) or None
-        Hz; None if there is no frequency at which it does.
+        Hz; None if there is no such frequency.
     """
-    clear = np.concatenate(([False], spectra.ratio >= threshold, [False]))
-    edges = np.flatnonzero(np.diff(clear))
+    # Edges of the runs of clear frequencies
+    is_clear = np.concatenate(([False], spectra.ratio >= threshold, [False]))
+    edges = np.flatnonzero(np.diff(is_clear))
     if not edges.size:
         return None
     starts, stops = edges[::2], edges[1::2] - 1
@@ -130,8 +144,11 @@ def weakest_ratio(spectra: NoiseSpectra, band: tuple[float, float]) -> float:
 
 
 def sustained_ratio(spectra: NoiseSpectra) -> float:
-    """Return the largest signal to noise that holds over an octave, dimensionless: single lines may stand out."""
-    octave = round(CENTRES_A_DECADE * np.log10(2.0))
-    return float(
-        minimum_filter1d(spectra.ratio, octave, mode="constant", cval=0.0).max(initial=0.0)
-    )
+    """
+    Return the largest signal to noise that holds over an octave, dimensionless.
+
+    Single spectral lines may exceed the noise by chance.
+    """
+    octave = round(CENTRES_PER_DECADE * np.log10(2.0))
+    over_octave = minimum_filter1d(spectra.ratio, octave, mode="constant", cval=0.0)
+    return float(over_octave.max(initial=0.0))

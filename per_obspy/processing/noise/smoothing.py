@@ -1,18 +1,19 @@
-"""Konno-Ohmachi smoothing of spectra, as a sparse matrix that is made once for a grid and kept."""
+"""Konno-Ohmachi smoothing of spectra by a sparse matrix, computed once per grid."""
 
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from per_obspy.checks import FloatArray
 
 
 def konno_ohmachi(
-    amplitudes: FloatArray, step: float, centres: tuple[float, ...], bandwidth: float = 20.0
+    amplitudes: FloatArray, step: float, centres: tuple[float, ...], bandwidth: float
 ) -> FloatArray:
     r"""
-    Return spectra smoothed with a window of constant width on a logarithmic axis.
+    Smooth spectra with a window of constant width on a logarithmic axis.
 
     .. math:: w(f) = \left[ \frac{\sin(b \log_{10}(f/f_c))}{b \log_{10}(f/f_c)} \right]^4
 
@@ -23,7 +24,7 @@ def konno_ohmachi(
     step : float
         Between frequencies, Hz.
     centres : tuple of float
-        Where the smoothed spectrum is wanted, Hz; hashable, because the weights are kept.
+        Frequencies of the smoothed spectrum, Hz; hashable, because the weights are cached.
     bandwidth : float
         b, dimensionless.
 
@@ -46,22 +47,27 @@ def konno_ohmachi(
 
 @lru_cache(maxsize=8)
 def _weights(count: int, step: float, centres: tuple[float, ...], bandwidth: float) -> csr_array:
-    lobe = 10 ** (np.pi / bandwidth)
+    """Return the weights of the spectral lines, one row per centre, each row of sum 1."""
     columns, values, ends = [], [], [0]
     for centre in centres:
-        first = max(int(np.ceil(centre / lobe / step)), 1)
-        last = min(int(centre * lobe / step), count - 1)
-        lines = (
-            np.arange(first, last + 1)
-            if last >= first
-            else np.array([min(max(round(centre / step), 1), count - 1)])
-        )
+        lines = _lines(count, step, centre, bandwidth)
+        # Eq. (4) of Konno & Ohmachi; equal weights where it vanishes at every line
         window = np.sinc(bandwidth * np.log10(lines * step / centre) / np.pi) ** 4
-        values.append(
-            window / window.sum() if window.sum() > 0 else np.full(lines.size, 1 / lines.size)
-        )
+        total = window.sum()
+        values.append(window / total if total > 0 else np.full(lines.size, 1 / lines.size))
         columns.append(lines)
         ends.append(ends[-1] + lines.size)
-    return csr_array(
-        (np.concatenate(values), np.concatenate(columns), ends), shape=(len(centres), count)
-    )
+    # Compressed sparse rows
+    stored = np.concatenate(values), np.concatenate(columns), ends
+    return csr_array(stored, shape=(len(centres), count))
+
+
+def _lines(count: int, step: float, centre: float, bandwidth: float) -> NDArray[np.int64]:
+    """Return the spectral lines in the main lobe around a centre, Hz, or the nearest line."""
+    lobe = 10 ** (np.pi / bandwidth)
+    first = max(int(np.ceil(centre / lobe / step)), 1)
+    last = min(int(centre * lobe / step), count - 1)
+    # Below the first lines the main lobe may hold none
+    if last >= first:
+        return np.arange(first, last + 1)
+    return np.array([min(max(round(centre / step), 1), count - 1)])

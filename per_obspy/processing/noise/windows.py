@@ -1,4 +1,4 @@
-"""Where the noise ends: before the first wave, by picks and, for a known event, by the travel time of P."""
+"""Noise windows: end of the noise by picks and, for a known event, by the travel time of P."""
 
 from functools import lru_cache
 from statistics import median
@@ -13,13 +13,18 @@ from per_obspy.processing.noise.onset import picked_onset
 from per_obspy.processing.notes import noted
 from per_obspy.processing.station.components import is_horizontal
 
+#: Velocity model of the Earth for travel times.
 MODEL = "iasp91"
-METRES_A_KILOMETRE = 1000.0
+
+METRES_PER_KILOMETRE = 1000.0
+
+#: Depth of a hypocentre whose depth is unknown, km.
+UNKNOWN_DEPTH = 10
 
 
 class Source(NamedTuple):
     """
-    What the chain needs of an event.
+    Origin and magnitude of an event.
 
     Attributes
     ----------
@@ -41,17 +46,19 @@ class Source(NamedTuple):
 
 
 def source_of(event: Event) -> Source:
-    """Return the preferred origin and magnitude of an event that has an origin; an unknown depth counts as 10 km."""
+    """Return the preferred origin and magnitude of an event with at least one origin."""
     origin = event.preferred_origin() or event.origins[0]
     magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
-    depth = 10 * METRES_A_KILOMETRE if origin.depth is None else max(origin.depth, 0.0)
+    # Depths above the reference surface count as 0
+    unknown = UNKNOWN_DEPTH * METRES_PER_KILOMETRE
+    depth = unknown if origin.depth is None else max(origin.depth, 0.0)
     size = None if magnitude is None else float(magnitude.mag)
     return Source(origin.time, origin.latitude, origin.longitude, depth, size)
 
 
 def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
     """
-    Return when the first P wave is computed to arrive, or None where the trace has no coordinates.
+    Compute the arrival time of the first P wave, None if the trace has no coordinates.
 
     References
     ----------
@@ -61,46 +68,46 @@ def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
     if not place:
         return None
     degrees = locations2degrees(source.latitude, source.longitude, place.latitude, place.longitude)
-    arrivals = _model().get_travel_times(
-        source.depth / METRES_A_KILOMETRE, degrees, phase_list=["ttp"]
-    )
+    kilometres = source.depth / METRES_PER_KILOMETRE
+    arrivals = _model().get_travel_times(kilometres, degrees, phase_list=["ttp"])
     return source.time + arrivals[0].time if arrivals else None
 
 
 @lru_cache(maxsize=1)
 def _model() -> TauPyModel:
+    """Return the velocity model, loaded once."""
     return TauPyModel(MODEL)
 
 
 def noise_window_noted(
     stream: Stream,
-    margin: float = 0.5,
-    shortest: float = 2.0,
-    tolerance: float = 10.0,
-    source: Source | None = None,
-    pre_event: float | None = None,
+    margin: float,
+    shortest: float,
+    tolerance: float,
+    source: Source | None,
+    pre_event: float | None,
 ) -> Stream:
     """
-    Return a copy of the components of one instrument that know how much noise precedes the first wave.
+    Return a copy of the components of one instrument with the length of their leading noise.
 
-    The pick is the vertical's, which P moves most, or else the median of the horizontals'. With a
-    known event a pick farther from the computed P than the tolerance is discarded, and the computed
-    P is used if no pick is left.
+    The pick is that of the vertical, on which P is largest, or else the median of the horizontals.
+    With a known event a pick farther from the computed P than the tolerance is discarded, and the
+    computed P is used if no pick is left.
 
     Parameters
     ----------
     stream : obspy Stream
         Raw or physical, not padded.
     margin : float
-        s before the first wave where the noise ends.
+        s before the first wave at which the noise ends.
     shortest : float
         Shorter noise counts as none, s.
     tolerance : float
         Between a pick and the computed P, s.
-    source : Source, optional
+    source : Source or None
         The event, if known.
-    pre_event : float, optional
-        s of noise at the beginning, where that is known: nothing is picked.
+    pre_event : float or None
+        s of noise at the beginning, if known: no wave is picked.
 
     Returns
     -------
@@ -110,57 +117,65 @@ def noise_window_noted(
     """
     out = stream.copy()
     if pre_event is not None:
+        step = f"noise: first {pre_event:g} s"
         for trace in out:
-            noted(
-                trace,
-                f"noise: first {pre_event:g} s",
-                noise=pre_event,
-                onset_source="configuration",
-            )
+            noted(trace, step, noise=pre_event, onset_source="configuration")
         return out
-    onset, how = _onset(stream, tolerance, source)
+    onset, method = _onset(stream, tolerance, source)
     for trace in out:
-        quiet = (
-            -1.0
-            if onset is None
-            else min(onset, trace.stats.endtime) - margin - trace.stats.starttime
-        )
+        # Seconds from the first sample of this component
+        quiet = _noise_before(trace, onset, margin)
         noise = quiet if quiet >= shortest else 0.0
-        noted(trace, f"noise: first {noise:.2f} s ({how})", noise=float(noise), onset_source=how)
+        step = f"noise: first {noise:.2f} s ({method})"
+        noted(trace, step, noise=float(noise), onset_source=method)
         if onset is not None:
             trace.stats.per_obspy.onset = str(onset)
     return out
 
 
+def _noise_before(trace: Trace, onset: UTCDateTime | None, margin: float) -> float:
+    """Return the length of the noise up to a margin before the onset, s; negative without onset."""
+    if onset is None:
+        return -1.0
+    end = min(onset, trace.stats.endtime) - margin
+    return float(end - trace.stats.starttime)
+
+
 def _onset(
     stream: Stream, tolerance: float, source: Source | None
 ) -> tuple[UTCDateTime | None, str]:
+    """Return the time of the first wave, None if there is no clear one, and the method."""
     computed = p_arrival(stream[0], source) if source and stream else None
-    verticals = [trace for trace in stream if not is_horizontal(trace)]
-    for group in (verticals, [trace for trace in stream if is_horizontal(trace)]):
-        picks = [(trace.stats.starttime, picked_onset(trace)) for trace in group]
-        times = [start + pick[0] for start, pick in picks if pick is not None]
-        near = [time for time in times if computed is None or abs(time - computed) <= tolerance]
-        if near:
-            middle = median(time.timestamp for time in near)
-            return UTCDateTime(
-                middle
-            ), f"median of {len(near)} picked {'vertical' if group is verticals else 'horizontal'}"
+    # The vertical first: P moves it most
+    for direction in ("vertical", "horizontal"):
+        group = [trace for trace in stream if is_horizontal(trace) == (direction == "horizontal")]
+        times = _picked_times(group)
+        if computed is not None:
+            times = [time for time in times if abs(time - computed) <= tolerance]
+        if times:
+            middle = median(time.timestamp for time in times)
+            return UTCDateTime(middle), f"median of {len(times)} picked {direction}"
     if computed is not None:
         return computed, f"travel time of P, {MODEL}"
     return None, "no clear onset"
 
 
-def trimmed(stream: Stream, before: float = 120.0, after: float = 600.0) -> Stream:
+def _picked_times(traces: list[Trace]) -> list[UTCDateTime]:
+    """Return the times of the first wave of the traces that have a clear one."""
+    picks = [(trace.stats.starttime, picked_onset(trace)) for trace in traces]
+    return [start + pick[0] for start, pick in picks if pick is not None]
+
+
+def trimmed(stream: Stream, before: float, after: float) -> Stream:
     """
-    Return a copy without what lies far from the first wave: the hours of a continuous record.
+    Return a copy without the samples far from the first wave: the hours of a continuous record.
 
     Parameters
     ----------
     stream : obspy Stream
         From `noise_window_noted`; traces without an onset stay whole.
     before, after : float
-        What is kept before and after the first wave, s.
+        Time kept before and after the first wave, s.
 
     Returns
     -------
@@ -170,13 +185,12 @@ def trimmed(stream: Stream, before: float = 120.0, after: float = 600.0) -> Stre
     for trace in out:
         start, end = trace.stats.starttime, trace.stats.endtime
         onset = UTCDateTime(trace.stats.per_obspy.get("onset", start))
-        if "onset" in trace.stats.per_obspy and (start < onset - before or end > onset + after):
+        is_longer = start < onset - before or end > onset + after
+        if "onset" in trace.stats.per_obspy and is_longer:
             trace.trim(onset - before, onset + after)
+            # The noise is shorter by the time that was cut before it
             cut = trace.stats.starttime - start
             noise = max(float(trace.stats.per_obspy.noise) - cut, 0.0)
-            noted(
-                trace,
-                f"{cut:.2f} s cut before and {end - trace.stats.endtime:.2f} s after",
-                noise=noise,
-            )
+            step = f"{cut:.2f} s cut before and {end - trace.stats.endtime:.2f} s after"
+            noted(trace, step, noise=noise)
     return out

@@ -1,4 +1,4 @@
-"""Velocity and displacement of a record, and whether they come to rest."""
+"""Checks that velocity and displacement of a processed record come to rest."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,8 @@ from per_obspy.config import Checks
 from per_obspy.processing.notes import noted
 from per_obspy.processing.quality.findings import Finding, above
 
-WORDS = {"acceleration": ("velocity", "m/s"), "velocity": ("displacement", "m")}
+#: Quantity -> its integral and the unit of that.
+INTEGRALS = {"acceleration": ("velocity", "m/s"), "velocity": ("displacement", "m")}
 
 
 def integrated(stream: Stream) -> Stream:
@@ -29,7 +30,7 @@ def integrated(stream: Stream) -> Stream:
     """
     out = stream.copy()
     for trace in out:
-        quantity, units = WORDS[trace.stats.get("quantity", "acceleration")]
+        quantity, units = INTEGRALS[trace.stats.get("quantity", "acceleration")]
         trace.data = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)
         trace.stats.quantity, trace.stats.units = quantity, units
         noted(trace, f"integrated to {quantity}")
@@ -38,7 +39,9 @@ def integrated(stream: Stream) -> Stream:
 
 def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     """
-    Give a finding where velocity or displacement does not come to rest, pads included, or did not before the filter.
+    Yield findings where velocity or displacement does not come to rest, pads included.
+
+    A residual velocity before the filter is a finding too.
 
     Parameters
     ----------
@@ -52,25 +55,22 @@ def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     Finding
     """
     velocity = integrated(Stream([trace]))
-    displacement = integrated(velocity)
-    for name, motion in (
-        ("final_velocity", velocity[0].data),
-        ("final_displacement", displacement[0].data),
-    ):
+    displacement = integrated(velocity)[0].data
+    # Last value over the largest
+    motions = {"final_velocity": velocity[0].data, "final_displacement": displacement}
+    for name, motion in motions.items():
         peak = np.abs(motion).max()
         ratio = float(abs(motion[-1]) / peak) if peak else 0.0
-        yield from above(
-            name, getattr(checks, name), ratio, f"{name.replace('_', ' ')} over its peak:"
-        )
+        meaning = f"{name.replace('_', ' ')} over its peak:"
+        yield from above(name, getattr(checks, name), ratio, meaning)
     yield from _shift_findings(trace, float(np.abs(velocity[0].data).max()), checks)
 
 
 def _shift_findings(trace: Trace, peak: float, checks: Checks) -> Iterator[Finding]:
-    """Give a finding where the velocity that stayed before the filter, m/s, is large beside the peak now."""
-    stayed = float(trace.stats.get("per_obspy", {}).get("residual_velocity", 0.0))
+    """Yield a finding where the residual velocity before the filter is large for the peak, m/s."""
+    residual = float(trace.stats.get("per_obspy", {}).get("residual_velocity", 0.0))
+    ratio = residual / peak if peak else 0.0
     meaning = (
         "the baseline shifted during the shaking: velocity that stayed, over the peak velocity"
     )
-    yield from above(
-        "baseline_shift", checks.baseline_shift, stayed / peak if peak else 0.0, meaning
-    )
+    yield from above("baseline_shift", checks.baseline_shift, ratio, meaning)

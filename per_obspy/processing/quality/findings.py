@@ -1,4 +1,4 @@
-"""What checks find: every failed check adds a reason with its figure; none stops another, or another trace."""
+"""Findings of failed checks, each with its figure; no finding stops another check or trace."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -17,11 +17,11 @@ class Finding(NamedTuple):
     Attributes
     ----------
     check : str
-        Its name in the configuration.
+        Name of the check in the configuration.
     level : str
         reject, warn or note.
     reason : str
-        With the figure and the threshold.
+        Contains the figure and the threshold.
     """
 
     check: str
@@ -45,7 +45,7 @@ def above(check: str, setting: Check, figure: float, meaning: str) -> list[Findi
 
 def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     """
-    Return a trace that knows its warnings and notes (a copy if there are any); raise if one finding rejects.
+    Return a trace with its warnings and notes, a copy if there are any.
 
     Parameters
     ----------
@@ -56,30 +56,37 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     -------
     obspy Stream
         Of one trace, with ``warnings`` and ``notes`` in ``stats.per_obspy``: reasons joined by
-        semicolons; the names of the checks that warn stand in ``failed_checks``, joined by spaces.
+        semicolons; ``failed_checks`` has the names of the checks that warn, joined by spaces.
 
     Raises
     ------
     RecordRejected
-        With the reasons that reject first, then the warnings.
+        If a finding rejects, with the rejecting reasons first, then the warnings.
     """
     found = list(findings)
-    reject, warn, note = (
-        [one.reason for one in found if one.level == level] for level in ("reject", "warn", "note")
-    )
-    if reject:
-        raise RecordRejected(trace.id, *reject, *_earlier(trace, "warnings"), *warn)
-    out = trace.copy() if warn or note else trace
-    for name, reasons in (("warnings", warn), ("notes", note)):
+    rejecting, warnings = _reasons(found, "reject"), _reasons(found, "warn")
+    if rejecting:
+        raise RecordRejected(trace.id, *rejecting, *_earlier(trace, "warnings"), *warnings)
+    # Texts of earlier checks come first
+    notes = _reasons(found, "note")
+    out = trace.copy() if warnings or notes else trace
+    for name, reasons in (("warnings", warnings), ("notes", notes)):
         if reasons:
             remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})
-    if warn:
-        names = [one.check for one in found if one.level == "warn"]
+    # Names of the checks behind the warnings
+    if warnings:
+        names = [finding.check for finding in found if finding.level == "warn"]
         remembered(out, failed_checks=" ".join([*_earlier(trace, "failed_checks"), *names]))
     return Stream([out])
 
 
+def _reasons(findings: list[Finding], level: str) -> list[str]:
+    """Return the reasons of the findings of one level."""
+    return [finding.reason for finding in findings if finding.level == level]
+
+
 def _earlier(trace: Trace, name: str) -> list[str]:
+    """Return the text of earlier checks on a trace, if there is one."""
     text = trace.stats.get("per_obspy", {}).get(name)
     return [text] if text else []
 
@@ -88,7 +95,7 @@ def surviving(
     step: Callable[[Stream], Stream], stream: Stream
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Apply a step trace by trace, so that one bad trace never loses the others.
+    Apply a step trace by trace, so that a bad trace is rejected alone.
 
     Parameters
     ----------
@@ -98,15 +105,15 @@ def surviving(
 
     Returns
     -------
-    kept : obspy Stream
-        What the step returned for the traces that it accepted.
-    lost : tuple of Rejection
-        One row for each of the others.
+    accepted : obspy Stream
+        Results of the step.
+    rejected : tuple of Rejection
+        One row for each other trace.
     """
-    kept, lost = Stream(), []
+    accepted, rejected = Stream(), []
     for trace in stream:
         try:
-            kept += step(Stream([trace]))
+            accepted += step(Stream([trace]))
         except RecordRejected as fault:
-            lost.append(rejection(trace, *fault.reasons))
-    return kept, tuple(lost)
+            rejected.append(rejection(trace, *fault.reasons))
+    return accepted, tuple(rejected)

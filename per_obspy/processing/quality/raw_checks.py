@@ -1,6 +1,7 @@
-"""Checks of raw samples: what a sensor or a recorder did that the ground did not."""
+"""Checks of raw samples for faults of sensor and recorder, and for other events in the record."""
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +14,36 @@ from per_obspy.config import Checks
 from per_obspy.processing.noise.signal_to_noise import SIGNIFICANT
 from per_obspy.processing.quality.findings import Finding, above, below
 
-FEWEST = 50  # samples of which anything can be said
-FULL_SCALE = 2**23  # of a 24-bit counter
-NEIGHBOURS = 2  # samples on each side that belong to a spike
-VICINITY = 0.5  # s
-SMALLEST_SPIKE = 0.05  # of the peak
-QUIET, ENVELOPE = 0.05, 5.0  # of the peak; s
-MOVING = 0.2  # of the largest root mean square
+#: Fewest samples and fewest different values of a record.
+FEWEST, FEWEST_LEVELS = 50, 3
+
+#: Counts at full scale of a 24-bit counter.
+FULL_SCALE = 2**23
+
+#: A spike: samples on each side that belong to it, time around it, s, and least share of the peak.
+NEIGHBOURS, VICINITY, SMALLEST_SPIKE = 2, 0.5, 0.05
+
+#: Quiet between two events: share of the peak of the running root mean square over a time, s.
+QUIET, ENVELOPE = 0.05, 5.0
+
+#: Moving ground: share of the peak of the running root mean square over a time, s.
+MOVING, STANDSTILL_ENVELOPE = 0.2, 2.0
+
+#: Samples nearer to an extreme than this share of the range are at it.
+AT_EXTREME = 1e-6
+
+#: A spike is compared with no less than this share of the peak.
+SPIKE_FLOOR = 1e-9
 
 
 def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     """
-    Give every failed check of one raw trace.
+    Yield every failed check of one raw trace.
 
     Parameters
     ----------
     trace : obspy Trace
-        Counts or m/s2, not yet changed by any step.
+        Counts or m/s2, before any step.
     checks : Checks
         Thresholds and levels.
 
@@ -37,20 +51,15 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
     ------
     Finding
     """
-    different = np.unique(trace.data).size
-    yield from below(
-        "sampling_rate", checks.sampling_rate, trace.stats.sampling_rate, "sampling rate, Hz:"
-    )
-    yield from below(
-        "duration", checks.duration, trace.stats.npts * trace.stats.delta, "duration, s:"
-    )
-    yield from below("levels", checks.levels, different, "different values (dead channel):")
-    if different < 3 or trace.stats.npts < FEWEST:
-        yield Finding(
-            "levels",
-            "reject",
-            f"{different} different values in {trace.stats.npts} samples are no record",
-        )
+    levels, rate, count = np.unique(trace.data).size, trace.stats.sampling_rate, trace.stats.npts
+    seconds = count * trace.stats.delta
+    yield from below("sampling_rate", checks.sampling_rate, rate, "sampling rate, Hz:")
+    yield from below("duration", checks.duration, seconds, "duration, s:")
+    yield from below("levels", checks.levels, levels, "different values (dead channel):")
+    # Further checks need a record
+    if levels < FEWEST_LEVELS or count < FEWEST:
+        reason = f"{levels} different values in {count} samples are no record"
+        yield Finding("levels", "reject", reason)
     else:
         yield from _recorder_findings(trace, checks)
         yield from _shaking_findings(detrend(trace.data), trace.stats.delta, checks)
@@ -58,51 +67,48 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
 
 
 def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
-    run = longest_extreme_run(trace.data)
+    """Yield the failed checks of the recorder: clipping, use of the counter, dropouts, spikes."""
+    samples, dt = trace.data, trace.stats.delta
+    run = longest_extreme_run(samples)
     if run >= checks.clipped_run.threshold:
-        yield Finding(
-            "clipped_run", checks.clipped_run.level, f"clipped: {run} equal samples at an extreme"
-        )
+        reason = f"clipped: {run} equal samples at an extreme"
+        yield Finding("clipped_run", checks.clipped_run.level, reason)
+    # Physical units have no full scale
     if trace.stats.get("units", "counts") == "counts":
-        use = float(np.abs(trace.data).max()) / FULL_SCALE
-        yield from above(
-            "counter_use", checks.counter_use, use, "peak over the full scale of a 24-bit counter:"
-        )
-    still = longest_standstill(trace.data, trace.stats.delta)
+        use = float(np.abs(samples).max()) / FULL_SCALE
+        meaning = "peak over the full scale of a 24-bit counter:"
+        yield from above("counter_use", checks.counter_use, use, meaning)
+    still = longest_standstill(samples, dt)
     yield from above("dropout", checks.dropout, still, "dropout, s without change:")
-    spike = largest_spike(detrend(trace.data), trace.stats.delta)
+    spike = largest_spike(detrend(samples), dt)
     yield from above("spike", checks.spike, spike, "spike or step, over its vicinity:")
 
 
 def _shaking_findings(samples: FloatArray, dt: float, checks: Checks) -> Iterator[Finding]:
+    """Yield the failed checks of the motion: zero crossings, its ends, further events."""
     rate = np.count_nonzero(np.diff(np.signbit(samples))) / (samples.size * dt)
     yield from below("zero_crossings", checks.zero_crossings, rate, "zero crossings a second:")
+    # Root mean squares of the first and the last second over the peak
     second, peak = max(round(1 / dt), 1), np.abs(samples).max()
-    first, last = (
-        float(np.sqrt(np.mean(part**2)) / peak) for part in (samples[:second], samples[-second:])
-    )
-    yield from above(
-        "late_trigger", checks.late_trigger, first, "late trigger: first second over the peak:"
-    )
-    yield from above(
-        "cut_off", checks.cut_off, last, "ends while shaking: last second over the peak:"
-    )
-    yield from above(
-        "second_event",
-        checks.second_event,
-        later_event(samples, dt),
-        "another event, over the peak:",
-    )
+    first = float(np.sqrt(np.mean(samples[:second] ** 2)) / peak)
+    last = float(np.sqrt(np.mean(samples[-second:] ** 2)) / peak)
+    meaning = "late trigger: first second over the peak:"
+    yield from above("late_trigger", checks.late_trigger, first, meaning)
+    meaning = "ends while shaking: last second over the peak:"
+    yield from above("cut_off", checks.cut_off, last, meaning)
+    # Shaking before or after a quiet time
+    later = later_event(samples, dt)
+    yield from above("second_event", checks.second_event, later, "another event, over the peak:")
 
 
 def header_findings(trace: Trace, checks: Checks) -> list[Finding]:
     """
-    Return a finding if the largest sample, with or without the mean, is not the peak that the header tells.
+    Return a finding if the largest sample, with or without the mean, is not the header's peak.
 
     Parameters
     ----------
     trace : obspy Trace
-        With ``header_peak``, in the unit of the samples, where the header has one.
+        With ``header_peak`` in the unit of the samples, if the header has one.
     checks : Checks
         Thresholds and levels.
 
@@ -110,36 +116,33 @@ def header_findings(trace: Trace, checks: Checks) -> list[Finding]:
     -------
     list of Finding
     """
-    told = trace.stats.get("header_peak")
-    if not told:
+    header_peak = trace.stats.get("header_peak")
+    if not header_peak:
         return []
+    # Some headers give the peak before the mean was removed
     peaks = np.abs(trace.data).max(), np.abs(trace.data - trace.data.mean()).max()
-    error = min(abs(float(peak) / told - 1) for peak in peaks)
-    return above(
-        "header_peak",
-        checks.header_peak,
-        error,
-        f"largest sample off the header's {told:g} by a share of",
-    )
+    error = min(abs(float(peak) / header_peak - 1) for peak in peaks)
+    meaning = f"largest sample off the header's {header_peak:g} by a share of"
+    return above("header_peak", checks.header_peak, error, meaning)
 
 
-def runs(same: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return where the runs of true values begin and where the first value after each is."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
+def runs(values: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first position of each run of true values, and the position after its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], values, [False]))))
     return edges[::2], edges[1::2]
 
 
 def longest_extreme_run(samples: FloatArray) -> int:
     """
-    Return the longest run of equal samples at the largest or the smallest value: a signal pinned at the rails.
+    Return the longest run of equal samples at the largest or the smallest value.
 
-    Coarse recorders stand still at every turn of the motion: a run that is not twice the longest
-    one between the extremes counts as 1.
+    A clipped signal has such runs. Coarse recorders repeat values at every turn of the motion: a
+    run that is not twice the longest one between the extremes counts as 1.
 
     Parameters
     ----------
     samples : (n_samples,) ndarray
-        Raw: a trend hides the rails.
+        Raw: removing a trend hides the extremes.
 
     Returns
     -------
@@ -150,31 +153,44 @@ def longest_extreme_run(samples: FloatArray) -> int:
     >>> longest_extreme_run(np.array([0.0, 3.0, 3.0, 3.0, -1.0, -2.0]))
     3
     """
-    close = 1e-6 * np.ptp(samples)
+    # Runs at the extremes
+    close = AT_EXTREME * np.ptp(samples)
     low, high = samples <= samples.min() + close, samples >= samples.max() - close
-    pinned = max(int(np.subtract(*runs(at)[::-1]).max()) for at in (low, high))
-    between = np.concatenate(
-        ([False], (np.diff(samples) == 0) & ~(low | high)[1:] & _shaking(samples)[1:])
-    )
-    starts, stops = runs(between)
-    longest = int((stops - starts).max()) + 1 if starts.size else 1
+    pinned = max(_longest(low), _longest(high))
+    # Runs of equal samples elsewhere during the shaking
+    repeats = (np.diff(samples) == 0) & ~(low | high)[1:] & _shaking(samples)[1:]
+    longest = _longest(np.concatenate(([False], repeats))) + 1
     return pinned if pinned >= 2 * longest else 1
 
 
+def _longest(values: NDArray[np.bool_]) -> int:
+    """Return the length of the longest run of true values, 0 if there is none."""
+    starts, stops = runs(values)
+    return int((stops - starts).max()) if starts.size else 0
+
+
 def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
-    """Tell which samples lie between 5 and 95 % of the squared motion."""
+    """Return the samples between 5 and 95 % of the squared motion."""
     energy = np.cumsum((samples - samples.mean()) ** 2)
-    return np.asarray(
-        (energy >= (1 - SIGNIFICANT) * energy[-1]) & (energy <= SIGNIFICANT * energy[-1])
-    )
+    first, last = (1 - SIGNIFICANT) * energy[-1], SIGNIFICANT * energy[-1]
+    return np.asarray((energy >= first) & (energy <= last))
+
+
+def _running_rms(
+    squares: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
+) -> FloatArray:
+    """Return the running root mean square of squared samples over a time, s."""
+    means = uniform_filter1d(squares, max(round(seconds / dt), 1), mode=mode)
+    # Rounding of the running sum may leave small negative values
+    return np.asarray(np.sqrt(np.maximum(means, 0)))
 
 
 def longest_standstill(samples: FloatArray, dt: float) -> float:
     """
-    Return how long a record stands still while the ground moves, s.
+    Return the longest time without change while the ground moves, s.
 
-    The ground moves where, at both ends of the standstill, the root mean square over 2 s exceeds a
-    fifth of its largest value: coarse recorders may stand still before and after.
+    The ground moves if the root mean square over 2 s exceeds a fifth of its largest value at both
+    ends of that time: the samples of coarse recorders may be constant before and after.
 
     Parameters
     ----------
@@ -188,7 +204,8 @@ def longest_standstill(samples: FloatArray, dt: float) -> float:
     float
     """
     squares = (samples - samples.mean()) ** 2
-    envelope = np.sqrt(np.maximum(uniform_filter1d(squares, max(round(2.0 / dt), 1)), 0))
+    envelope = _running_rms(squares, STANDSTILL_ENVELOPE, dt, "reflect")
+    # Runs of equal samples with moving ground at both ends
     starts, stops = runs(np.diff(samples) == 0)
     moving = np.minimum(envelope[starts], envelope[stops]) > MOVING * envelope.max()
     return float((stops - starts)[moving].max() * dt) if moving.any() else 0.0
@@ -196,10 +213,11 @@ def longest_standstill(samples: FloatArray, dt: float) -> float:
 
 def largest_spike(samples: FloatArray, dt: float) -> float:
     """
-    Return by how much a single sample stands out, over the largest such jump within half a second around it.
+    Return the largest jump of a single sample over the largest other jump around it.
 
-    The jump of a sample is its distance from the mean of its two neighbours. Jumps below 5 % of the
-    record's peak do not count.
+    Others are those within half a second, without the two neighbours on each side. The jump of a
+    sample is its distance from the mean of its two neighbours. Jumps below 5 % of the record's peak
+    do not count.
 
     Parameters
     ----------
@@ -212,22 +230,27 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     float
         Dimensionless; near 1 for ground motion.
     """
+    # Distance of each sample from the mean of its neighbours
     jumps = np.zeros(samples.size)
     jumps[1:-1] = np.abs(samples[1:-1] - 0.5 * (samples[:-2] + samples[2:]))
+    # Largest jump in windows before and after, clear of the spike itself
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
     side = maximum_filter1d(jumps, width, mode="constant", origin=0)
     shift = NEIGHBOURS + 1 + width // 2
     around = np.maximum(np.roll(side, shift), np.roll(side, -shift))
-    large = jumps > SMALLEST_SPIKE * np.abs(samples).max()
-    floor = 1e-9 * np.abs(samples).max()
-    return float((jumps[large] / np.maximum(around[large], floor)).max()) if large.any() else 0.0
+    peak = np.abs(samples).max()
+    is_large = jumps > SMALLEST_SPIKE * peak
+    if not is_large.any():
+        return 0.0
+    return float((jumps[is_large] / np.maximum(around[is_large], SPIKE_FLOOR * peak)).max())
 
 
 def later_event(samples: FloatArray, dt: float) -> float:
     """
-    Return the peak of what comes after the record has become quiet, or before it was, over the peak.
+    Return the peak of another event over the peak of the record.
 
-    Quiet is a running root mean square over 5 s below 5 % of its largest value.
+    Another event comes after the record has become quiet, or ends before it was quiet. Quiet is a
+    running root mean square over 5 s below 5 % of its largest value.
 
     Parameters
     ----------
@@ -241,9 +264,8 @@ def later_event(samples: FloatArray, dt: float) -> float:
     float
         Of the running root mean square, dimensionless.
     """
-    envelope = np.sqrt(
-        np.maximum(uniform_filter1d(samples**2, max(round(ENVELOPE / dt), 1), mode="constant"), 0)
-    )
+    envelope = _running_rms(samples**2, ENVELOPE, dt, "constant")
+    # First quiet sample after the main event, last one before it
     main, largest = int(envelope.argmax()), float(envelope.max())
     quiet = np.flatnonzero(envelope < QUIET * largest)
     after, before = quiet[quiet > main], quiet[quiet < main]
@@ -254,7 +276,7 @@ def later_event(samples: FloatArray, dt: float) -> float:
 
 def outlier_findings(stream: Stream, checks: Checks) -> dict[str, list[Finding]]:
     """
-    Return, by trace, the components of one instrument whose peak is several times that of both their sisters.
+    Return a finding for a component whose peak is several times that of both other components.
 
     Parameters
     ----------
@@ -266,12 +288,13 @@ def outlier_findings(stream: Stream, checks: Checks) -> dict[str, list[Finding]]
     Returns
     -------
     dict
-        Trace identifier to findings; with fewer than three components nobody can tell which is
-        wrong.
+        Trace identifier to findings; empty with fewer than three components, of which none can be
+        called wrong.
     """
     peaks = {trace.id: float(np.abs(trace.data - trace.data.mean()).max()) for trace in stream}
     if len(peaks) < 3:
         return {}
+    # The largest peak against the next one
     largest, second = sorted(peaks, key=peaks.__getitem__, reverse=True)[:2]
     ratio = peaks[largest] / peaks[second] if peaks[second] else np.inf
     return {largest: above("outlier", checks.outlier, ratio, f"peak over that of {second}:")}

@@ -1,4 +1,4 @@
-"""Channels made whole from their pieces; what is missing is a reason, never a zero."""
+"""Channels joined from their pieces; missing samples reject a channel and never become zeros."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -7,17 +7,19 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.copying import copied
-from per_obspy.processing.notes import is_processed
+from per_obspy.processing.notes import copied, is_processed
 from per_obspy.processing.quality.findings import surviving
 from per_obspy.processing.station.splicing import spliced
 
-LARGEST = 1e30  # counts or m/s2; beyond it squares overflow, and no recorder goes there
+#: Largest sample, counts or m/s2: squares of larger ones overflow, and no recorder writes them.
+LARGEST = 1e30
 
 
 def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     """
-    Join the pieces of each channel; gaps, masked samples and samples that are not finite are reasons, never zeros.
+    Join the pieces of each channel.
+
+    Gaps, masked samples and samples that are not finite are reasons for rejection, never zeros.
 
     Parameters
     ----------
@@ -27,7 +29,7 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     Returns
     -------
     whole : obspy Stream
-        One new float64 trace a channel.
+        One new float64 trace per channel.
     rejected : tuple of Rejection
         The channels that cannot be joined.
     """
@@ -39,22 +41,24 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
 
 
 def _channel(trace: Trace) -> tuple[str, bool]:
+    """Return the channel of a piece; raw and processed pieces do not mix."""
     return trace.id, is_processed(trace)
 
 
 def _joined(name: str, pieces: Stream) -> Stream:
+    """Return the pieces of one channel as one trace."""
     copies = Stream([_in_float64(piece) for piece in pieces if piece.stats.npts])
     reasons = [f"pieces differ in {field}: {values}" for field, values in _differences(copies)]
     if not copies:
         reasons = ["no samples"]
     if reasons:
         raise RecordRejected(name, *reasons)
-    whole = copied(copies).merge(method=0)  # samples that overlap and disagree are masked
+    # Samples that overlap and disagree are masked
+    whole = copied(copies).merge(method=0)
     reasons = _holes(whole[0])
+    # Overlapping pieces may still agree at other times than their clocks have
     if reasons:
-        joined = (
-            None if any(seconds > 0 for *_, seconds, _ in copies.get_gaps()) else spliced(copies)
-        )
+        joined = None if _has_gaps(copies) else spliced(copies)
         if joined is None or len(copies) == 1:
             raise RecordRejected(name, *reasons)
         whole = Stream([joined])
@@ -63,16 +67,22 @@ def _joined(name: str, pieces: Stream) -> Stream:
 
 
 def _in_float64(trace: Trace) -> Trace:
+    """Return a copy in float64, masked if the samples were masked."""
     out = copied(Stream([trace]))[0]
-    out.data = (
-        np.ma.asarray(out.data, dtype=np.float64)
-        if np.ma.isMA(out.data)
-        else out.data.astype(np.float64)
-    )
+    if np.ma.isMA(out.data):
+        out.data = np.ma.asarray(out.data, dtype=np.float64)
+    else:
+        out.data = out.data.astype(np.float64)
     return out
 
 
+def _has_gaps(pieces: Stream) -> bool:
+    """Return whether time is missing between pieces; overlaps are negative gaps."""
+    return any(seconds > 0 for *_, seconds, _ in pieces.get_gaps())
+
+
 def _differences(pieces: Iterable[Trace]) -> list[tuple[str, str]]:
+    """Return name and values of each property in which the pieces of a channel differ."""
     found = []
     for field in ("sampling_rate", "calib", "units"):
         values = {piece.stats.get(field) for piece in pieces}
@@ -82,15 +92,18 @@ def _differences(pieces: Iterable[Trace]) -> list[tuple[str, str]]:
 
 
 def _holes(trace: Trace) -> list[str]:
-    missing = np.ma.getmaskarray(trace.data)
-    wrong = ~(np.abs(np.ma.getdata(trace.data)) < LARGEST) & ~missing
-    texts = (
-        (missing, "samples are missing (gap or contradicting overlap)"),
-        (wrong, f"samples are not finite or beyond {LARGEST:g}"),
-    )
-    times = trace.stats.starttime, trace.stats.delta
-    return [
-        f"{np.count_nonzero(bad)} of {bad.size} {text}, the first at {times[0] + int(bad.argmax()) * times[1]}"
-        for bad, text in texts
-        if bad.any()
-    ]
+    """Return the reasons for missing and unusable samples, with their number and first time."""
+    is_missing = np.ma.getmaskarray(trace.data)
+    is_wrong = ~(np.abs(np.ma.getdata(trace.data)) < LARGEST) & ~is_missing
+    faults = {
+        "samples are missing (gap or contradicting overlap)": is_missing,
+        f"samples are not finite or beyond {LARGEST:g}": is_wrong,
+    }
+    # Number and first time of the samples of each fault
+    reasons = []
+    for fault, samples in faults.items():
+        if samples.any():
+            count = np.count_nonzero(samples)
+            first = trace.stats.starttime + int(samples.argmax()) * trace.stats.delta
+            reasons.append(f"{count} of {samples.size} {fault}, the first at {first}")
+    return reasons

@@ -1,4 +1,4 @@
-"""Pieces of one record whose clocks contradict their samples: joined where the samples agree."""
+"""Pieces of one record with contradicting clocks, joined at the overlap where samples agree."""
 
 from functools import reduce
 
@@ -8,25 +8,25 @@ from obspy import Stream, Trace
 from per_obspy.checks import FloatArray
 from per_obspy.processing.notes import noted
 
-SHORTEST_OVERLAP = 2.0  # s
+#: Shortest and longest overlap of two pieces, s.
+SHORTEST_OVERLAP, LONGEST_OVERLAP = 2.0, 30.0
+
+#: Smallest correlation of the samples in an overlap, dimensionless.
+AGREEMENT = 0.98
 
 
-def spliced(pieces: Stream, longest: float = 30.0, agreement: float = 0.98) -> Trace | None:
+def spliced(pieces: Stream) -> Trace | None:
     """
-    Return pieces that overlap in time and contradict each other as one trace, if they agree at another overlap.
+    Join pieces that overlap in time and contradict each other, if they agree at another overlap.
 
-    Recorders that wrote a long record to several files stamped each with the whole second of their
-    own clock, off by seconds. The overlap with the highest correlation is taken; inside it one
-    piece fades into the other.
+    Recorders that wrote a long record to several files gave each the whole second of their own
+    clock, off by seconds. The overlap with the highest correlation is used; inside it one piece
+    fades into the other.
 
     Parameters
     ----------
     pieces : obspy Stream
         Of one channel, with equal sampling.
-    longest : float
-        Longest overlap that is looked for, s.
-    agreement : float
-        Smallest correlation of the samples in the overlap, dimensionless.
 
     Returns
     -------
@@ -34,33 +34,28 @@ def spliced(pieces: Stream, longest: float = 30.0, agreement: float = 0.98) -> T
         From the start of the first piece on; None if no overlap agrees.
     """
     ordered = sorted(pieces, key=lambda piece: piece.stats.starttime)
-    return reduce(
-        lambda joined, piece: _two(joined, piece, longest, agreement),
-        ordered[1:],
-        ordered[0].copy(),
-    )
+    return reduce(_spliced_pair, ordered[1:], ordered[0].copy())
 
 
-def _two(first: Trace | None, second: Trace, longest: float, agreement: float) -> Trace | None:
+def _spliced_pair(first: Trace | None, second: Trace) -> Trace | None:
+    """Return two pieces as one trace, None if they agree at no overlap."""
     if first is None:
         return None
+    # Overlap by the samples, and by the clocks
     dt = first.stats.delta
-    count, correlation = best_overlap(
-        first.data, second.data, round(SHORTEST_OVERLAP / dt), round(longest / dt)
-    )
-    if correlation < agreement:
+    shortest, longest = round(SHORTEST_OVERLAP / dt), round(LONGEST_OVERLAP / dt)
+    count, correlation = best_overlap(first.data, second.data, shortest, longest)
+    if correlation < AGREEMENT:
         return None
-    told = (first.stats.endtime - second.stats.starttime) / dt + 1
+    by_clocks = (first.stats.endtime - second.stats.starttime) / dt + 1
+    shift = float(by_clocks - count) * dt
+    # The first piece fades into the second
     fade = np.linspace(0, 1, count)
     both = (1 - fade) * first.data[-count:] + fade * second.data[:count]
     out = first.copy()
     out.data = np.concatenate((first.data[:-count], both, second.data[count:]))
-    shift = float(told - count) * dt
-    noted(
-        out,
-        f"pieces joined where they agree ({correlation:.3f}), {shift:.2f} s from their clocks",
-        splice_shift=shift,
-    )
+    agreement = f"pieces joined where they agree ({correlation:.3f})"
+    noted(out, f"{agreement}, {shift:.2f} s from their clocks", splice_shift=shift)
     return out
 
 
@@ -68,14 +63,14 @@ def best_overlap(
     first: FloatArray, second: FloatArray, shortest: int, longest: int
 ) -> tuple[int, float]:
     """
-    Return how many samples at the end of one piece are best matched by the beginning of another.
+    Return the number of samples by which the end of one piece best overlaps the next one.
 
     Parameters
     ----------
     first, second : (n_samples,) ndarray
-        In one unit.
+        Samples in the same unit.
     shortest, longest : int
-        Overlaps that are tried, samples.
+        Range of trial overlaps, samples.
 
     Returns
     -------
@@ -88,7 +83,8 @@ def best_overlap(
     return count, correlation
 
 
-def _correlation(one: FloatArray, other: FloatArray) -> float:
-    one, other = one - one.mean(), other - other.mean()
-    size = np.sqrt((one @ one) * (other @ other))
-    return float(one @ other / size) if size > 0 else 0.0
+def _correlation(first: FloatArray, second: FloatArray) -> float:
+    """Return the coefficient of correlation, 0 if a part is constant."""
+    first, second = first - first.mean(), second - second.mean()
+    size = np.sqrt((first @ first) * (second @ second))
+    return float(first @ second / size) if size > 0 else 0.0

@@ -38,7 +38,7 @@ def csv(tmp_path):
 
 def _in_chunks(paths, size):
     tables = [checked_chunk(chunk) for chunk in PairInventory(paths).chunks(size)]
-    rejected = [one for table in tables for one in table.attrs["rejected"]]
+    rejected = [rejection for table in tables for rejection in table.attrs["rejected"]]
     for table in tables:
         table.attrs = {}
     return pd.concat([table for table in tables if len(table)], ignore_index=True), rejected
@@ -54,7 +54,7 @@ def test_chunks_hold_what_the_whole_file_holds(csv, size):
     table, left_out = _in_chunks([csv], size)
     assert_frame_equal(table, whole)
     assert left_out == rejected
-    assert [(one.name, one.row) for one in left_out] == [
+    assert [(rejection.name, rejection.row) for rejection in left_out] == [
         ("b", 3), ("broken", 6), ("a", 7), ("d", 8), ("c", 9), ("broken too", 11),
     ]  # fmt: skip
 
@@ -76,7 +76,7 @@ def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, s
     table, rejected = _in_chunks([path], size)
     assert table["pair_id"].tolist() == ["a", "e"]
     reason = "{} has a line break: is a quotation mark not closed? {} further lines are lost"
-    assert [(one.name, one.row, *one.reasons) for one in rejected] == [
+    assert [(rejection.name, rejection.row, *rejection.reasons) for rejection in rejected] == [
         ("short", 3, "2 columns, the header has 10"),
         ("b", 4, reason.format("note", 2)),
         ("short too", 7, "1 columns, the header has 10"),
@@ -93,7 +93,10 @@ def test_a_quotation_mark_that_swallows_a_block_of_the_reader_is_found(tmp_path)
         "\n".join([HEADER, *rows[:19_000], _row("open", note='"x'), *rows[19_000:], ""])
     )
     table, rejected = _in_chunks([path], 7000)
-    assert (len(table), [(one.name, one.row) for one in rejected]) == (19_000, [("open", 19_002)])
+    assert (len(table), [(rejection.name, rejection.row) for rejection in rejected]) == (
+        19_000,
+        [("open", 19_002)],
+    )
     path.write_text("\n".join([HEADER, *rows[:5000], _row("open", note='"x'), *rows[5000:], ""]))
     with pytest.raises(
         CatalogError, match=r"pairs\.csv: line 5002 has a quotation mark that is not closed on it"

@@ -1,4 +1,4 @@
-"""Files of pairs: what is read, and each kind of file that cannot be."""
+"""CSV files of pairs: rows that are read, and files that are wrong as a whole."""
 
 import numpy as np
 import pandas as pd
@@ -55,11 +55,13 @@ def test_byte_order_mark_line_endings_blank_lines_and_spaces(write, ending):
 
 def test_a_row_names_its_line_also_after_blank_and_broken_lines(write):
     # would catch line numbers counted from the rows that were read
-    pairs = read_pairs(
-        write(f"{HEADER}\n\n{GOOD}\n008,0.1\n{GOOD.replace('0.05', '-1').replace('007', '009')}\n")
-    )
+    negative = GOOD.replace("0.05", "-1").replace("007", "009")
+    pairs = read_pairs(write(f"{HEADER}\n\n{GOOD}\n008,0.1\n{negative}\n"))
     assert len(pairs) == 1
-    assert [(one.name, one.row) for one in pairs.attrs["rejected"]] == [("008", 4), ("009", 5)]
+    assert [(rejection.name, rejection.row) for rejection in pairs.attrs["rejected"]] == [
+        ("008", 4),
+        ("009", 5),
+    ]
     assert pairs.attrs["rejected"][0].reasons == ("2 columns, the header has 9",)
     assert pairs.attrs["rejected"][1].reasons == ("gap = -1 m is outside 0 to 10 m",)
 
@@ -88,76 +90,40 @@ def test_a_whole_column_of_text_rejects_rows_not_the_file(tmp_path):
     assert pairs.attrs["rejected"][0].reasons == ("gap = '1,5' is not a number",)
 
 
-@pytest.mark.parametrize(
-    ("content", "name", "message"),
-    [
-        (b"", "pairs.csv", "not a CSV table: it is an empty file"),
-        (f"{HEADER}\n", "pairs.csv", "the table has no rows"),
-        (f"{HEADER}\n\n\n", "pairs.csv", "the table has no rows"),
-        (f"{HEADER.replace('gap,', '')}\n{GOOD.replace('0.05,', '')}\n", "pairs.csv", "missing column gap "),
-        (
-            f"{HEADER.replace('height_2', 'hoehe_2')}\n{GOOD}\n",
-            "pairs.csv",
-            "missing column height_2 or storeys_2 or period_2 ",
-        ),
-        (f"{HEADER}\n{GOOD}\n".replace(",", ";"), "pairs.csv", "columns are separated by semicolons, commas are"),
-        (f"{HEADER},gap\n{GOOD},0.1\n", "pairs.csv", "column gap stands more than once"),
-        (f"{HEADER}\n{GOOD.replace('shop', 'café')}\n".encode("latin-1"), "pairs.csv",
-         "line 2 is not UTF-8 .byte 0xe9 at position 57"),
-        (f"{HEADER}\n{GOOD}\n".encode("utf-16"), "pairs.csv", "line 1 is not UTF-8"),
-        (f"{HEADER}é\n{GOOD}\n".encode("latin-1"), "pairs.csv", "line 1 is not UTF-8"),
-        (b"PAR1 no, it is not", "pairs.parquet", "not a Parquet table"),
-        (b"", "pairs.parquet", "not a Parquet table"),
-        (f"{HEADER}\n{GOOD}\n".replace(",", "\t"), "pairs.csv", "columns are separated by tabulators, commas are exp"),
-        (f"{HEADER.upper()}\n{GOOD}\n", "pairs.csv", r"missing column pair_id, .*, did you mean PAIR_ID\?$"),
-        (b"%PDF-1.4\n%\xe2\xe3\n", "pairs.csv", "not a CSV table: it is a PDF document"),
-        (b"%PDF-1.4\n", "pairs.parquet", "not a Parquet table: it is a PDF document"),
-        (b"PK\x03\x04" + bytes(range(256)), "pairs.csv", "it is a ZIP archive, as Excel workbooks are"),
-        (bytes(100), "pairs.csv", "not a CSV table: it holds zero bytes"),
-        (f"{HEADER}\n{GOOD}".encode() + b"\xc3", "pairs.csv", "line 2 is not UTF-8"),
-        (b"x", "town.gpkg", r"expected .csv or .parquet; per-obspy pairs makes such a table of footprints"),
-        (b"x", "pairs.xlsx", r"unknown suffix '.xlsx', expected .csv or .parquet"),
-    ],
-)  # fmt: skip
-def test_files_that_are_wrong_as_a_whole(write, content, name, message):
-    path = write(content, name)
+ROW = f"{HEADER}\n{GOOD}\n"
+PDF = b"%PDF-1.4\n"
+
+#: content, and message, of a CSV file that is no pair table
+WRONG_CSV = [
+    (b"", "not a CSV table: it is an empty file"),
+    (f"{HEADER}\n", "the table has no rows"),
+    (f"{HEADER}\n\n\n", "the table has no rows"),
+    (ROW.replace("gap,", "").replace("0.05,", ""), "missing column gap "),
+    (ROW.replace("height_2", "hoehe_2"), "missing column height_2 or storeys_2 or period_2 "),
+    (ROW.replace(",", ";"), "columns are separated by semicolons, commas are"),
+    (ROW.replace(",", "\t"), "columns are separated by tabulators, commas are exp"),
+    (f"{HEADER},gap\n{GOOD},0.1\n", "column gap stands more than once"),
+    (f"{HEADER.upper()}\n{GOOD}\n", r"missing column pair_id, .*, did you mean PAIR_ID\?$"),
+    (
+        ROW.replace("shop", "café").encode("latin-1"),
+        "line 2 is not UTF-8 .byte 0xe9 at position 57",
+    ),
+    (ROW.encode("utf-16"), "line 1 is not UTF-8"),
+    (f"{HEADER}é\n{GOOD}\n".encode("latin-1"), "line 1 is not UTF-8"),
+    (f"{HEADER}\n{GOOD}".encode() + b"\xc3", "line 2 is not UTF-8"),
+    (PDF + b"%\xe2\xe3\n", "not a CSV table: it is a PDF document"),
+    (b"PK\x03\x04" + bytes(range(256)), "it is a ZIP archive, as Excel workbooks are"),
+    (bytes(100), "not a CSV table: it holds zero bytes"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), WRONG_CSV)
+def test_files_that_are_wrong_as_a_whole(write, content, message):
+    path = write(content)
     with pytest.raises(CatalogError, match=message) as error:
         read_pairs(path)
     assert str(error.value).startswith(f"{path}: ")
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("damage", ["cut", "zeroed"])
-def test_a_damaged_parquet_table(write, tmp_path, damage):
-    read_pairs(write(f"{HEADER}\n{GOOD}\n")).to_parquet(tmp_path / "whole.parquet")
-    whole = (tmp_path / "whole.parquet").read_bytes()
-    damaged = {"cut": whole[: len(whole) // 2], "zeroed": whole[:40] + bytes(300) + whole[340:]}[
-        damage
-    ]
-    with pytest.raises(CatalogError, match=r"damaged\.parquet: not a Parquet table"):
-        read_pairs(write(damaged, "damaged.parquet"))
-
-
-def test_truth_values_are_observations(write, tmp_path):
-    # would catch a column with empty cells, which pandas gives as objects
-    table = read_pairs(
-        write("\n".join([HEADER, GOOD, GOOD.replace("007", "008"), GOOD.replace("007", "009")]))
-    )
-    table.assign(observed=[True, False, None]).to_parquet(tmp_path / "seen.parquet")
-    assert_frame_equal(
-        read_pairs(tmp_path / "seen.parquet")[["observed"]],
-        pd.DataFrame({"observed": [1, 0, np.nan]}),
-    )
-
-
-def test_an_index_of_pandas_is_a_column_or_nothing(write, tmp_path):
-    # would catch names that become the index, and an index of numbers that becomes a column
-    table = read_pairs(write("\n".join([HEADER, GOOD, GOOD.replace("007", "008")])))
-    table.attrs = {}
-    table.set_index("pair_id").to_parquet(tmp_path / "named.parquet")
-    assert read_pairs(tmp_path / "named.parquet")["pair_id"].tolist() == ["007", "008"]
-    table.set_axis([5, 9]).to_parquet(tmp_path / "numbered.parquet")
-    assert_frame_equal(read_pairs(tmp_path / "numbered.parquet"), table)
 
 
 def test_names_that_are_no_text(write, tmp_path):
@@ -170,7 +136,7 @@ def test_names_that_are_no_text(write, tmp_path):
 def test_a_table_of_broken_lines_alone_says_so_line_by_line(write):
     pairs = read_pairs(write(f"{HEADER}\n{GOOD.replace('corner', chr(34) + 'corner')}\n008,0.1\n"))
     assert pairs.empty
-    assert [one.row for one in pairs.attrs["rejected"]] == [2]
+    assert [rejection.row for rejection in pairs.attrs["rejected"]] == [2]
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -11,7 +11,8 @@ from per_obspy.inventory.simulated import simulated_pairs
 
 @pytest.mark.parametrize("name", ["pairs.csv", "pairs.parquet"])
 def test_what_is_written_is_read_back(tmp_path, name):
-    write_pairs(simulated_pairs([10.0], [50.0], 30, seed=1), tmp_path / "made.csv")
+    table = simulated_pairs([10.0], [50.0], 30, seed=1, radius=2000.0, touching=0.5)
+    write_pairs(table, tmp_path / "made.csv")
     pairs = read_pairs(tmp_path / "made.csv")
     pairs.attrs["rejected"] = ("not part of the table",)
     write_pairs(pairs, tmp_path / name)

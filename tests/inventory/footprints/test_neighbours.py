@@ -48,7 +48,7 @@ def test_facing_length_is_what_both_walls_share():
 
 
 def test_a_wall_that_stands_back_does_not_face():
-    # an L: 4 m of its wall at 0.1 m, the other 8 m stand back by 3 m
+    # an L: 4 m of its wall at 0.1 m, the other 8 m set back by 3 m
     corner = shapely.Polygon([(10.1, 0), (20, 0), (20, 12), (13.1, 12), (13.1, 4), (10.1, 4)])
     near = _found(HOUSE, corner)
     assert_allclose(near.facing_length, 4.0, rtol=1e-12)
@@ -63,9 +63,9 @@ def test_the_far_side_and_the_inside_of_walls_do_not_face():
 
 def test_corners_that_meet_have_no_facing_wall_but_an_axis():
     near = _found(HOUSE, shapely.box(11, 13, 20, 20))
-    assert_allclose(
-        [near.gap[0], near.facing_length[0], near.azimuth[0]], [np.sqrt(2), 0.0, 45.0], atol=1e-12
-    )
+    measured = [near.gap[0], near.facing_length[0], near.azimuth[0]]
+    assert_allclose(measured, [np.sqrt(2), 0.0, 45.0], atol=1e-12)
+    # corners that touch: the axis joins the centres
     touching = _found(shapely.box(0, 0, 10, 10), shapely.box(10, 10, 20, 20))
     assert_allclose([touching.gap[0], touching.azimuth[0]], [0.0, 45.0], atol=1e-12)
 
@@ -90,6 +90,7 @@ def test_round_off_is_no_gap():
 def test_a_building_of_two_parts_and_a_courtyard():
     parts = shapely.MultiPolygon([shapely.box(0, 0, 4, 12), shapely.box(6, 0, 10, 12)])
     assert_allclose(_found(parts, shapely.box(10.5, 0, 20, 12)).facing_length, 12.0, rtol=1e-12)
+    # a house inside a courtyard faces four walls of 9 m
     yard = shapely.box(0, 0, 30, 30).difference(shapely.box(10, 10, 20, 20))
     near = _found(yard, shapely.box(10.5, 10.5, 19.5, 19.5))
     assert_allclose([near.gap[0], near.facing_length[0]], [0.5, 36.0], rtol=1e-12)
@@ -124,10 +125,10 @@ def test_all_pairs_of_a_random_town_by_brute_force():
     ])  # fmt: skip
     near = neighbours(town, 2.0)
     brute = shapely.distance(town[:, None], town[None, :])
-    one, other = np.nonzero(np.triu(brute <= 2.0, k=1))
-    assert_array_equal(near.first, one)
-    assert_array_equal(near.second, other)
-    assert_allclose(near.gap, brute[one, other], atol=module.TOUCHING)
+    first, second = np.nonzero(np.triu(brute <= 2.0, k=1))
+    assert_array_equal(near.first, first)
+    assert_array_equal(near.second, second)
+    assert_allclose(near.gap, brute[first, second], atol=module.TOUCHING)
 
 
 def test_chunks_do_not_change_a_bit(monkeypatch):

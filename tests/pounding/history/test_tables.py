@@ -31,7 +31,7 @@ def test_structures_without_a_gap_start_in_contact():
     # mutation: gaps of the right neighbour
     table = structure_table([Structure(1.0, 0.05, 1.0)] * 3)
     row = row_at_rest(table, np.array([0.0, 0.1]), np.array([0.5, 0.6]))
-    assert row[:, motion.STUCK].tolist() == [1.0, 0.0, 0.0]
+    assert row[:, motion.IN_CONTACT].tolist() == [1.0, 0.0, 0.0]
     assert row[:2, motion.GAP].tolist() == [0.0, 0.1]
     assert row[:2, motion.RESTITUTION].tolist() == [0.5, 0.6]
     assert_array_equal(row[:, :6], table)
@@ -42,8 +42,8 @@ def test_segments_are_as_short_as_needed_and_no_shorter(frequency, dt):
     # mutation: rounding down, a phase of a whole sampling interval
     parts = refinement(frequency, dt)
     assert math.log2(parts) == int(math.log2(parts))
-    assert frequency * dt / parts <= motion.LARGEST_PHASE * (1.0 + 1e-12)
-    assert parts == 1 or frequency * dt / (parts / 2) > motion.LARGEST_PHASE
+    assert frequency * dt / parts <= motion.LARGEST_ANGLE * (1.0 + 1e-12)
+    assert parts == 1 or frequency * dt / (parts / 2) > motion.LARGEST_ANGLE
 
 
 @given(st.floats(0.01, 10.0), st.floats(1e-3, 0.1))

@@ -10,6 +10,7 @@ from per_obspy.processing.filter.corners import (
     fallback_highpass,
     highest_corner,
     lowest_highpass,
+    usable_periods_noted,
 )
 
 TABLE = Processing().fallback_highpass
@@ -37,11 +38,10 @@ def test_a_magnitude_below_the_table_gets_the_constant():
 
 def test_both_horizontals_get_the_narrower_band():
     out = corners_shared(Stream([trace(0.1, 20.0), trace(0.3, 30.0)]))
-    assert [(one.stats.per_obspy.highpass, one.stats.per_obspy.lowpass) for one in out] == [
-        (0.3, 20.0)
-    ] * 2
-    assert out[0].stats.per_obspy.own_highpass == 0.1
-    assert [one.stats.per_obspy.highpass_source for one in out] == ["shared", "noise"]
+    first, second = (trace.stats.per_obspy for trace in out)
+    assert (first.highpass, first.lowpass) == (second.highpass, second.lowpass) == (0.3, 20.0)
+    assert first.own_highpass == 0.1
+    assert (first.highpass_source, second.highpass_source) == ("shared", "noise")
 
 
 def test_limits_from_length_and_sampling():
@@ -50,6 +50,15 @@ def test_limits_from_length_and_sampling():
     assert highest_corner(trace(), 20.0).frequency == 20.0
 
 
-def test_the_reason_says_what_decided():
+def test_the_reason_names_the_limit():
     clean = clean_corner(trace(), lowest_highpass(trace()), 0.5, 0.02, 5)
     assert clean.reason == "one cycle in the record"
+
+
+@pytest.mark.parametrize(("lowpass", "dt", "shortest"), [(25.0, 0.001, 0.05), (25.0, 0.02, 0.1)])
+def test_usable_periods_stay_inside_corners_and_sampling(lowpass, dt, shortest):
+    trace = Trace(header={"delta": dt, "per_obspy": AttribDict(highpass=0.1, lowpass=lowpass)})
+    out = usable_periods_noted(Stream([trace]), usable=0.8)[0].stats.per_obspy
+    assert out.longest_period == pytest.approx(8.0)
+    assert out.shortest_period == pytest.approx(shortest)
+    assert "longest_period" not in trace.stats.per_obspy

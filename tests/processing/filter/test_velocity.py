@@ -16,7 +16,7 @@ DT, ONSET, END = 0.01, 20.0, 50.0
 
 @pytest.fixture(scope="module")
 def truth(earthquake):
-    """Return motion that ends at rest, so that what is left after a correction is the correction's."""
+    """Motion that ends at rest, so that the rest after a correction belongs to the correction."""
     record = earthquake(shaking=8.0)
     record[2000:5000] -= record[2000:5000].sum() / 3000
     return record
@@ -35,7 +35,7 @@ def shifted(truth, during, after):
 @pytest.mark.parametrize(("during", "after"), [(0.01, 0.002), (-0.02, 0.001), (0.0, 0.003)])
 def test_two_shifts_are_taken_out(truth, during, after):
     out = boore_segments(shifted(truth, during, after), DT, ONSET, END)
-    # the coda after t2 moves by 1e-5 m/s2: the line cannot tell it from a shift
+    # the coda after t2 moves by 1e-5 m/s2: the line cannot separate it from a shift
     assert_allclose(out, truth, atol=2e-4)
 
 

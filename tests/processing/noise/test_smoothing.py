@@ -14,22 +14,20 @@ def test_against_the_full_window_of_obspy():
     spectrum = 1 + np.random.default_rng(1).random(600) + frequencies
     places = np.searchsorted(frequencies, CENTRES)
     expected = konno_ohmachi_smoothing(spectrum, frequencies, 20, normalize=True)[places]
-    ours = konno_ohmachi(np.concatenate(([0.0], spectrum)), STEP, tuple(frequencies[places]), 20.0)
+    found = konno_ohmachi(np.concatenate(([0.0], spectrum)), STEP, tuple(frequencies[places]), 20.0)
     # the side lobes left out weigh 0.2 % each of the centre, all together 1 % of the window
-    assert_allclose(ours, expected, rtol=0.01)
+    assert_allclose(found, expected, rtol=0.01)
 
 
 def test_a_flat_spectrum_stays_flat_even_where_it_is_coarse():
     # mutation: weights that are not normalised; centres below the first line
     centres = (0.001, 0.06, 1.0, 29.0)
-    assert_allclose(konno_ohmachi(np.ones(601), STEP, centres), 1.0, rtol=1e-12)
+    assert_allclose(konno_ohmachi(np.ones(601), STEP, centres, 20.0), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("factor", [1e-6, 3.0])
 def test_smoothing_is_linear(factor):
     spectra = np.random.default_rng(2).random((2, 601))
-    assert_allclose(
-        konno_ohmachi(factor * spectra, STEP, CENTRES),
-        factor * konno_ohmachi(spectra, STEP, CENTRES),
-        rtol=1e-12,
-    )
+    smooth = konno_ohmachi(spectra, STEP, CENTRES, 20.0)
+    scaled = konno_ohmachi(factor * spectra, STEP, CENTRES, 20.0)
+    assert_allclose(scaled, factor * smooth, rtol=1e-12)

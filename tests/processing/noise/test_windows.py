@@ -22,6 +22,11 @@ def component(samples, channel="HNZ", dip=-90.0, **stats):
     return Trace(samples + noise, header | {"per_obspy": AttribDict()} | stats)
 
 
+def with_window(*traces, source=None, pre_event=None):
+    """Return components with noise windows: 0.5 s before the wave, at least 2 s, picks to 10 s."""
+    return noise_window_noted(Stream(traces), 0.5, 2.0, 10.0, source, pre_event)
+
+
 def at(latitude):
     return AttribDict(latitude=latitude, longitude=0.0, elevation=0.0)
 
@@ -42,6 +47,7 @@ def test_the_preferred_origin_and_magnitude_are_used():
         Origin(time=START, latitude=1, longitude=2, depth=3e3),
         Origin(time=START, latitude=4, longitude=5),
     ]
+    # the first origin and magnitude, then the preferred ones
     event = Event(origins=origins, magnitudes=[Magnitude(mag=6.0), Magnitude(mag=7.0)])
     assert source_of(event) == Source(START, 1.0, 2.0, 3e3, 6.0)
     event.preferred_origin_id = origins[1].resource_id
@@ -50,59 +56,61 @@ def test_the_preferred_origin_and_magnitude_are_used():
 
 
 def test_noise_ends_before_the_pick_of_the_vertical(earthquake):
-    stream = Stream([component(earthquake(1)), component(earthquake(2, onset=25.0), "HNE", 0.0)])
-    out = noise_window_noted(stream, margin=0.5)
+    # the horizontal alone would give 24.5 s
+    vertical, horizontal = (
+        component(earthquake(1)),
+        component(earthquake(2, onset=25.0), "HNE", 0.0),
+    )
+    out = with_window(vertical, horizontal)
     assert [trace.stats.per_obspy.noise for trace in out] == pytest.approx([19.5, 19.5], abs=0.3)
     assert "vertical" in out[0].stats.per_obspy.onset_source
     assert UTCDateTime(out[0].stats.per_obspy.onset) - START == pytest.approx(20.0, abs=0.3)
-    assert "noise" not in stream[0].stats.per_obspy
+    assert "noise" not in vertical.stats.per_obspy
 
 
 def test_without_a_vertical_the_horizontals_decide(earthquake):
-    out = noise_window_noted(
-        Stream([component(earthquake(1), "HNE", 0.0), component(earthquake(2), "HNN", 0.0)])
-    )
+    east, north = component(earthquake(1), "HNE", 0.0), component(earthquake(2), "HNN", 0.0)
+    out = with_window(east, north)
     assert out[0].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
     assert "median of 2 picked horizontal" in out[0].stats.per_obspy.onset_source
 
 
 def test_each_component_counts_from_its_own_start(earthquake):
     late = component(earthquake(onset=18.0), "HNE", 0.0, starttime=START + 2)
-    out = noise_window_noted(Stream([component(earthquake()), late]))
+    out = with_window(component(earthquake()), late)
     assert out[1].stats.per_obspy.noise == pytest.approx(out[0].stats.per_obspy.noise - 2)
 
 
-def test_a_pick_far_from_the_computed_arrival_is_replaced_by_it(earthquake):
+@pytest.mark.parametrize(
+    ("delay", "noise", "method"), [(1.0, 19.5, "picked vertical"), (40.0, 59.5, "travel time")]
+)
+def test_a_pick_far_from_the_computed_arrival_is_replaced_by_it(earthquake, delay, noise, method):
     trace = component(earthquake(), coordinates=at(0.5))
     travel = 0.5 * DEGREE / 5.8
-    near, far = (Source(START + 20 + delay - travel, 0.0, 0.0, 0.0, None) for delay in (1.0, 40.0))
-    assert noise_window_noted(Stream([trace]), source=near)[
-        0
-    ].stats.per_obspy.noise == pytest.approx(19.5, abs=0.3)
-    out = noise_window_noted(Stream([trace]), source=far)[0].stats.per_obspy
-    assert out.noise == pytest.approx(59.5, abs=0.1)
-    assert "travel time" in out.onset_source
+    source = Source(START + 20 + delay - travel, 0.0, 0.0, 0.0, None)
+    out = with_window(trace, source=source)[0].stats.per_obspy
+    assert out.noise == pytest.approx(noise, abs=0.3)
+    assert method in out.onset_source
 
 
 def test_no_onset_is_no_noise():
-    out = noise_window_noted(Stream([component(np.zeros(6000))]))[0].stats.per_obspy
+    out = with_window(component(np.zeros(6000)))[0].stats.per_obspy
     assert (out.noise, out.onset_source) == (0.0, "no clear onset")
 
 
 def test_noise_shorter_than_the_limit_counts_as_none(earthquake):
-    out = noise_window_noted(Stream([component(earthquake(onset=2.0))]), shortest=2.0)[
-        0
-    ].stats.per_obspy
+    # 1.5 s are left before the margin of 0.5 s
+    out = with_window(component(earthquake(onset=2.0)))[0].stats.per_obspy
     assert out.noise == 0.0
 
 
 def test_a_given_length_of_noise_is_used(earthquake):
-    out = noise_window_noted(Stream([component(earthquake())]), pre_event=7.0)[0].stats.per_obspy
+    out = with_window(component(earthquake()), pre_event=7.0)[0].stats.per_obspy
     assert (out.noise, out.onset_source) == (7.0, "configuration")
 
 
 def test_hours_around_the_shaking_are_cut(earthquake):
-    given = noise_window_noted(Stream([component(earthquake())]))
+    given = with_window(component(earthquake()))
     out = trimmed(given, before=15.0, after=60.0)[0]
     onset = UTCDateTime(given[0].stats.per_obspy.onset)
     assert out.stats.starttime - (onset - 15.0) == pytest.approx(0.0, abs=0.006)  # half a sample
@@ -113,5 +121,5 @@ def test_hours_around_the_shaking_are_cut(earthquake):
 
 def test_short_records_and_records_without_an_onset_stay_whole(earthquake):
     for samples in (earthquake(), np.zeros(12000)):
-        given = noise_window_noted(Stream([component(samples)]))
-        assert trimmed(given, before=200.0) == given
+        given = with_window(component(samples))
+        assert trimmed(given, before=200.0, after=600.0) == given

@@ -18,6 +18,7 @@ def test_a_constant_acceleration_gives_a_line_and_a_parabola():
     given = Stream([trace(np.full(101, 3.0))])
     velocity = integrated(given)
     displacement = integrated(velocity)
+    # the trapezoidal rule is exact for a constant, and for a line
     time = np.arange(101) * DT
     assert_allclose(velocity[0].data, 3 * time, rtol=1e-12)
     assert_allclose(displacement[0].data, 1.5 * time**2, rtol=1e-12)
@@ -33,7 +34,7 @@ def test_a_motion_that_comes_to_rest_is_fine():
 
 def test_a_motion_that_goes_on_is_found_with_its_figures():
     found = list(final_findings(trace(np.ones(1000)), Checks()))
-    assert [(one.check, one.level) for one in found] == [
+    assert [(finding.check, finding.level) for finding in found] == [
         ("final_velocity", "reject"),
         ("final_displacement", "reject"),
     ]

@@ -16,15 +16,18 @@ def test_thresholds_belong_to_the_good_side():
 
 def test_levels_decide_what_a_finding_means():
     trace = Trace(np.zeros(3), {"channel": "HNE"})
-    kept = judged(
+    accepted = judged(
         trace,
         [Finding("a", "warn", "one"), Finding("b", "note", "two"), Finding("c", "warn", "three")],
     )[0]
-    assert (kept.stats.per_obspy.warnings, kept.stats.per_obspy.notes) == ("one; three", "two")
-    assert kept.stats.per_obspy.failed_checks == "a c"  # not b, which only notes
+    assert (accepted.stats.per_obspy.warnings, accepted.stats.per_obspy.notes) == (
+        "one; three",
+        "two",
+    )
+    assert accepted.stats.per_obspy.failed_checks == "a c"  # not b, which only notes
     with pytest.raises(RecordRejected) as caught:
         judged(
-            kept,
+            accepted,
             [
                 Finding("d", "reject", "four"),
                 Finding("e", "reject", "five"),
@@ -35,13 +38,14 @@ def test_levels_decide_what_a_finding_means():
     assert "per_obspy" not in trace.stats
 
 
-def test_one_bad_trace_does_not_lose_the_others():
+def test_a_bad_trace_is_rejected_alone():
+    # a step that refuses one channel
     def picky(stream):
         if stream[0].stats.channel == "HNE":
             raise RecordRejected(stream[0].id, "first", "second")
         return stream
 
     traces = [Trace(np.zeros(3), {"channel": channel}) for channel in ("HNE", "HNN")]
-    kept, lost = surviving(picky, Stream(traces))
-    assert [one.stats.channel for one in kept] == ["HNN"]
-    assert lost[0].reasons == ("first", "second")
+    accepted, rejected = surviving(picky, Stream(traces))
+    assert [trace.stats.channel for trace in accepted] == ["HNN"]
+    assert rejected[0].reasons == ("first", "second")

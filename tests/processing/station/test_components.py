@@ -5,6 +5,8 @@ from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.processing.station.components import instruments, is_horizontal, oriented, paired
 
+OVERLAP = 0.8  # of the longer horizontal
+
 
 def trace(channel="HNE", count=1000, start=0.0, location="", **stats):
     header = {
@@ -21,7 +23,7 @@ def trace(channel="HNE", count=1000, start=0.0, location="", **stats):
 def test_inputs_stay_unchanged():
     stream = Stream([trace(), trace(start=10.0), trace("HNN")])
     before = stream.copy()
-    paired(oriented(stream[1:]))
+    paired(oriented(stream[1:]), OVERLAP)
     assert stream == before
 
 
@@ -41,7 +43,7 @@ def test_inputs_stay_unchanged():
         ("H1", None, True),
     ],
 )
-def test_the_code_tells_the_direction_where_metadata_are_silent(channel, azimuth, horizontal):
+def test_the_code_gives_the_direction_without_metadata(channel, azimuth, horizontal):
     out = oriented(Stream([trace(channel)]))[0]
     assert out.stats.get("sensor_azimuth") == azimuth
     assert is_horizontal(out) is horizontal
@@ -54,24 +56,25 @@ def test_metadata_go_before_the_code():
     assert out.stats.per_obspy.azimuth_source == "metadata"
 
 
-def test_instruments_stay_apart_and_accelerometers_go_first():
+def name(component):
+    return f"{component.stats.location}.{component.stats.channel}"
+
+
+def names(stream):
+    """Return location and channel of the traces of each instrument."""
+    return [list(map(name, group)) for group in instruments(stream)]
+
+
+def test_instruments_are_separate_and_accelerometers_go_first():
     codes = ["BHE", "HHE", "BNE", "HNE", "HNN"]
-    found = instruments(Stream([trace(code) for code in codes] + [trace("HNE", location="10")]))
-    assert [[(one.stats.location, one.stats.channel) for one in group] for group in found] == [
-        [("", "HNE"), ("", "HNN")],
-        [("10", "HNE")],
-        [("", "BNE")],
-        [("", "HHE")],
-        [("", "BHE")],
-    ]
+    stream = Stream([trace(code) for code in codes] + [trace("HNE", location="10")])
+    expected = [[".HNE", ".HNN"], ["10.HNE"], [".BNE"], [".HHE"], [".BHE"]]
+    assert names(stream) == expected
 
 
-def test_surface_and_borehole_stay_apart_and_the_surface_goes_first():
-    found = instruments(Stream([trace(code) for code in ("EW1", "NS1", "EW2", "NS2")]))
-    assert [[one.stats.channel for one in group] for group in found] == [
-        ["EW2", "NS2"],
-        ["EW1", "NS1"],
-    ]
+def test_surface_and_borehole_are_separate_and_the_surface_goes_first():
+    stream = Stream([trace(code) for code in ("EW1", "NS1", "EW2", "NS2")])
+    assert names(stream) == [[".EW2", ".NS2"], [".EW1", ".NS1"]]
 
 
 def test_codes_that_are_azimuths_belong_to_one_instrument():
@@ -81,12 +84,9 @@ def test_codes_that_are_azimuths_belong_to_one_instrument():
 def test_horizontals_come_out_with_the_same_times():
     # mutation: trimming by time alone leaves the fraction of a sample
     early, late = trace("HNE", 1000), trace("HNN", 1000, start=0.504)
-    kept, rejected = paired(oriented(Stream([early, late, trace("HNZ")])))
-    east, north, vertical = (
-        kept.select(channel="HNE")[0],
-        kept.select(channel="HNN")[0],
-        kept.select(channel="HNZ")[0],
-    )
+    accepted, rejected = paired(oriented(Stream([early, late, trace("HNZ")])), OVERLAP)
+    codes = ("HNE", "HNN", "HNZ")
+    east, north, vertical = (accepted.select(channel=code)[0] for code in codes)
     assert rejected == ()
     assert east.stats.starttime == north.stats.starttime == late.stats.starttime
     assert_array_equal(east.data, early.data[50:])
@@ -107,23 +107,22 @@ def test_horizontals_come_out_with_the_same_times():
 )
 def test_a_horizontal_that_does_not_fit_is_a_reason(second, reason):
     options = {"sensor_azimuth": 0.0} | second
-    kept, rejected = paired(
-        oriented(Stream([trace("HNE", 1001, sensor_azimuth=90.0), trace("HNN", **options)]))
-    )
-    assert [one.stats.channel for one in kept] == ["HNE"]
+    stream = Stream([trace("HNE", 1001, sensor_azimuth=90.0), trace("HNN", **options)])
+    accepted, rejected = paired(oriented(stream), OVERLAP)
+    assert [component.stats.channel for component in accepted] == ["HNE"]
     assert any(reason in text for text in rejected[0].reasons)
 
 
 def test_sensors_at_odd_angles_pair():
-    kept, rejected = paired(
-        oriented(Stream([trace("HN1", sensor_azimuth=207.0), trace("HN2", sensor_azimuth=297.0)]))
-    )
-    assert (len(kept), rejected) == (2, ())
+    stream = Stream([trace("HN1", sensor_azimuth=207.0), trace("HN2", sensor_azimuth=297.0)])
+    accepted, rejected = paired(oriented(stream), OVERLAP)
+    assert (len(accepted), rejected) == (2, ())
 
 
 def test_extra_components_are_reasons():
+    # one component of each direction too many
     extra = [trace("HNE"), trace("HNN"), trace("HN3"), trace("HNZ"), trace("HNV", sensor_dip=-90.0)]
-    kept, rejected = paired(oriented(Stream(extra)))
-    assert len(kept) == 3
+    accepted, rejected = paired(oriented(Stream(extra)), OVERLAP)
+    assert len(accepted) == 3
     reasons = " ".join(row.reasons[0] for row in rejected)
     assert reasons.count("a third horizontal") == reasons.count("a second vertical") == 1

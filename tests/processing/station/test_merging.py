@@ -26,7 +26,7 @@ def test_pieces_that_follow_each_other_become_one_trace():
 
 def test_a_gap_is_a_reason_and_not_zeros():
     whole, rejected = merged(Stream([trace(), trace(start=12.0), trace("HNN")]))
-    assert [kept.id for kept in whole] == ["XX.STA..HNN"]
+    assert [component.id for component in whole] == ["XX.STA..HNN"]
     assert rejected[0].name == "XX.STA..HNE"
     assert "200 of 2200 samples are missing" in rejected[0].reasons[0]
     assert "2020-01-01T00:00:10" in rejected[0].reasons[0]

@@ -10,13 +10,14 @@ RATE = 100.0
 
 
 def pieces(samples, overlap, clock_error, noise=0.0):
-    """Return the samples in two halves that share an overlap (s), the second one's clock wrong by so many seconds."""
+    """Return two halves that share an overlap (s); the clock of the second is wrong by seconds."""
     half, count = samples.size // 2, round(overlap * RATE)
-    second = samples[half - count :] + noise * np.random.default_rng(5).normal(
-        size=samples.size - half + count
-    )
-    header = {"sampling_rate": RATE, "channel": "HNE", "starttime": UTCDateTime(2010, 2, 27)}
-    late = {"starttime": UTCDateTime(2010, 2, 27) + (half - count) / RATE + clock_error}
+    second = samples[half - count :]
+    second = second + noise * np.random.default_rng(5).normal(size=second.size)
+    # times by the clocks
+    start = UTCDateTime(2010, 2, 27)
+    header = {"sampling_rate": RATE, "channel": "HNE", "starttime": start}
+    late = {"starttime": start + (half - count) / RATE + clock_error}
     return Stream([Trace(samples[:half], header), Trace(second, header | late)])
 
 
@@ -39,9 +40,9 @@ def test_one_piece_fades_into_the_other(earthquake):
 
 
 def test_pieces_that_agree_nowhere_are_not_joined(earthquake):
-    one, other = pieces(earthquake(onset=40.0), 20.0, 0.0)
-    other.data = other.data[::-1].copy()
-    assert spliced(Stream([one, other])) is None
+    first, second = pieces(earthquake(onset=40.0), 20.0, 0.0)
+    second.data = second.data[::-1].copy()
+    assert spliced(Stream([first, second])) is None
 
 
 def test_the_overlap_is_found_exactly(earthquake):
@@ -62,12 +63,11 @@ def test_a_gap_is_never_closed(earthquake):
 @pytest.mark.real_data
 @pytest.mark.parametrize("station", ["angol", "stgomaipu", "curico"])
 def test_maule_records_in_two_files_become_one(real_data, station):
-    # their files overlap by 20 s, their clocks say 7 to 9 s
+    # their files overlap by 20 s, by their clocks 7 to 9 s
     folder = real_data / "records" / "maule2010_renadic"
     parts = [read(str(path), format="RENADIC") for path in sorted(folder.glob(f"{station}*.v1"))]
     whole, rejected = merged(parts[0] + parts[1])
     assert not [row for row in rejected if "HN4" not in row.name]
     moving = [trace for trace in whole if np.ptp(trace.data)]
-    assert {trace.stats.npts for trace in moving} == {
-        parts[0][0].stats.npts + parts[1][0].stats.npts - 1999
-    }
+    count = parts[0][0].stats.npts + parts[1][0].stats.npts - 1999
+    assert {trace.stats.npts for trace in moving} == {count}

@@ -1,3 +1,5 @@
+"""Baseline and corners chosen together: noise, configuration, shifts during the shaking."""
+
 import numpy as np
 import pytest
 from obspy import Stream, Trace
@@ -5,21 +7,15 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Check, Checks, Processing
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.filter.automatic import corners_noted
+from per_obspy.processing.filter.baseline_and_corners import corners_noted
 
 RATE = 100.0
 SETTINGS = Processing()
 
 
 def record(samples, noise=20.0):
-    return Stream(
-        [
-            Trace(
-                samples,
-                {"sampling_rate": RATE, "units": "m/s2", "per_obspy": AttribDict(noise=noise)},
-            )
-        ]
-    )
+    header = {"sampling_rate": RATE, "units": "m/s2", "per_obspy": AttribDict(noise=noise)}
+    return Stream([Trace(samples, header)])
 
 
 def noisy(samples, level, seed=21):
@@ -27,23 +23,24 @@ def noisy(samples, level, seed=21):
 
 
 def test_a_quiet_record_gets_the_widest_band(earthquake):
-    kept = corners_noted(record(noisy(earthquake(), 1e-5)), SETTINGS, None)[0].stats.per_obspy
-    assert kept.highpass < 0.05
-    assert kept.lowpass == 37.5
-    assert kept.lowpass_source == "0.75 Nyquist"
-    assert kept.baseline == "mean and line"
-    assert kept.signal_to_noise > 100
+    chosen = corners_noted(record(noisy(earthquake(), 1e-5)), SETTINGS, None)[0].stats.per_obspy
+    assert chosen.highpass < 0.05
+    assert chosen.lowpass == 37.5
+    assert chosen.lowpass_source == "0.75 Nyquist"
+    assert chosen.baseline == "mean and line"
+    assert chosen.signal_to_noise > 100
 
 
 def test_more_noise_means_a_narrower_band(earthquake):
-    bands = [
+    quiet, loud = (
         corners_noted(record(noisy(earthquake(), level)), SETTINGS, None)[0].stats.per_obspy
         for level in (0.01, 0.1)
-    ]
-    assert bands[0].highpass < bands[1].highpass
-    assert bands[1].lowpass < bands[0].lowpass
-    assert (bands[1].highpass_source, bands[1].lowpass_source) == ("noise", "noise")
-    assert "signal-to-noise ratio in 0.2-10 Hz" in bands[1].warnings
+    )
+    # both ends of the band move inwards, because of the noise
+    assert quiet.highpass < loud.highpass
+    assert loud.lowpass < quiet.lowpass
+    assert (loud.highpass_source, loud.lowpass_source) == ("noise", "noise")
+    assert "signal-to-noise ratio in 0.2-10 Hz" in loud.warnings
 
 
 def test_noise_without_a_signal_is_rejected():
@@ -55,15 +52,15 @@ def test_noise_without_a_signal_is_rejected():
 def test_without_noise_the_table_or_the_constant_is_the_lowest_corner(
     earthquake, magnitude, source
 ):
-    kept = corners_noted(record(earthquake()[2000:], 0.0), SETTINGS, magnitude)[0].stats.per_obspy
-    assert kept.highpass >= kept.lowest_highpass == (0.3 if magnitude else 0.08)
-    assert source in kept.lowest_highpass_source
+    chosen = corners_noted(record(earthquake()[2000:], 0.0), SETTINGS, magnitude)[0].stats.per_obspy
+    assert chosen.highpass >= chosen.lowest_highpass == (0.3 if magnitude else 0.08)
+    assert source in chosen.lowest_highpass_source
 
 
 def test_corners_of_the_configuration_are_not_searched(earthquake):
     settings = Processing(highpass=0.4, lowpass=20.0)
-    kept = corners_noted(record(earthquake()), settings, None)[0].stats.per_obspy
-    assert (kept.highpass, kept.lowpass, kept.highpass_source) == (0.4, 20.0, "configuration")
+    chosen = corners_noted(record(earthquake()), settings, None)[0].stats.per_obspy
+    assert (chosen.highpass, chosen.lowpass, chosen.highpass_source) == (0.4, 20.0, "configuration")
 
 
 def test_a_baseline_that_shifts_during_the_shaking_costs_the_long_periods(earthquake):
@@ -72,12 +69,11 @@ def test_a_baseline_that_shifts_during_the_shaking_costs_the_long_periods(earthq
     time = np.arange(12000) / RATE
     shift = np.where(time > 50, 0.02, np.where(time > 21, -0.2, 0.0))
     settings = Processing(highpass_range=(0.001, 0.15))
-    kept = corners_noted(record(noisy(earthquake(shaking=6.0) + shift, 1e-5)), settings, None)[
-        0
-    ].stats.per_obspy
-    assert kept.baseline in ("displacement polynomial", "two segments", "velocity residual")
-    assert kept.highpass == 0.15
-    assert "baseline shifts" in kept.highpass_source
+    shifted = record(noisy(earthquake(shaking=6.0) + shift, 1e-5))
+    chosen = corners_noted(shifted, settings, None)[0].stats.per_obspy
+    assert chosen.baseline in ("displacement polynomial", "two segments", "velocity residual")
+    assert chosen.highpass == 0.15
+    assert "baseline shifts" in chosen.highpass_source
 
 
 def test_a_displacement_that_no_corner_cleans_is_rejected(earthquake):
@@ -89,8 +85,8 @@ def test_a_displacement_that_no_corner_cleans_is_rejected(earthquake):
 def test_levels_of_the_configuration_decide():
     lenient = Processing(checks=Checks(signal_to_noise=Check(threshold=2.0, level="warn")))
     samples = noisy(np.zeros(12000), 1.0) + np.sin(np.arange(12000) / 30)
-    kept = corners_noted(record(samples), lenient, None)[0].stats.per_obspy
-    assert kept.highpass > 0
+    chosen = corners_noted(record(samples), lenient, None)[0].stats.per_obspy
+    assert chosen.highpass > 0
 
 
 def test_inputs_stay_unchanged(earthquake):

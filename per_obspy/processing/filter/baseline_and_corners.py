@@ -1,4 +1,4 @@
-"""The baseline and the corners of one record, chosen together, so that the displacement comes clean."""
+"""Baseline and corners of one record, chosen together so that the displacement is clean."""
 
 from collections.abc import Iterator
 
@@ -35,12 +35,13 @@ from per_obspy.processing.noise.signal_to_noise import (
 from per_obspy.processing.notes import noted, remembered
 from per_obspy.processing.quality.findings import Finding, below, judged
 
-FEWEST = 10  # samples of quiet to which a parabola may be fitted
+#: Fewest samples of noise to which a parabola is fitted.
+FEWEST = 10
 
 
 def corners_noted(stream: Stream, settings: Processing, magnitude: float | None) -> Stream:
     """
-    Return a copy of one record without its baseline, tapered, that knows the corners of its filter.
+    Return a copy of one record without its baseline, tapered, with the corners of its filter.
 
     Parameters
     ----------
@@ -62,30 +63,30 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     """
     plain = _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
     level = trend_removed(plain)
+    # Spectra of signal and noise between the corners that length and sampling allow
     outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)
     if spectra is not None:
         spectra = within(spectra, *(corner.frequency for corner in outer))
     checked = judged(level[0], _noise_findings(spectra, settings))
+    # Corners by noise, then the baseline and the high-pass corner by displacement
     lowest, lowpass = _limits(checked[0], spectra, outer, settings, magnitude)
     if settings.highpass is not None:
-        ready, highpass = (
-            tapered(checked, settings.taper),
-            Corner(settings.highpass, "configuration"),
-        )
+        ready = tapered(checked, settings.taper)
+        highpass = Corner(settings.highpass, "configuration")
     else:
         ready, highpass = _clean_baseline(checked, lowest, settings)
     width = lowpass.frequency / highpass.frequency
-    wide = judged(
-        ready[0],
-        below("bandwidth", settings.checks.bandwidth, width, "low-pass over high-pass corner:"),
-    )
+    meaning = "low-pass over high-pass corner:"
+    wide = judged(ready[0], below("bandwidth", settings.checks.bandwidth, width, meaning))
     return _noted(wide, highpass, lowpass)
 
 
 def offset_kept(stream: Stream, settings: Processing) -> Stream:
     """
-    Return a copy of one record that keeps its permanent displacement: without its velocity residual, not high-passed.
+    Return a copy of one record that keeps its permanent displacement.
+
+    Its residual velocity is removed, and it is not high-passed.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def offset_kept(stream: Stream, settings: Processing) -> Stream:
     Returns
     -------
     obspy Stream
-        Tapered. ``highpass`` is one cycle in the record: it limits the usable periods, and is not
+        Tapered. ``highpass`` is one cycle in the record: it limits the usable periods and is not
         applied.
 
     Raises
@@ -112,93 +113,98 @@ def offset_kept(stream: Stream, settings: Processing) -> Stream:
             level[0].id,
             f"permanent offset needs quiet ends, shakes from {onset:.1f} to {end:.1f} s",
         )
-    out = tapered(detrended(level, velocity_residual, onset=onset, end=end), settings.taper)
+    straight = detrended(level, velocity_residual, onset=onset, end=end)
+    out = tapered(straight, settings.taper)
     remembered(out[0], baseline="velocity residual")
+    # Corners that limit the usable periods
     lowest = Corner(lowest_highpass(out[0]).frequency, "not applied: permanent offset kept")
-    return _noted(out, lowest, highest_corner(out[0], settings.lowpass or settings.highest_lowpass))
+    highest = highest_corner(out[0], settings.lowpass or settings.highest_lowpass)
+    return _noted(out, lowest, highest)
 
 
 def _residual_noted(stream: Stream) -> Stream:
-    """Return a copy that knows the velocity left at the end of the shaking, where there is quiet before and after."""
+    """Return a copy with the residual velocity after the shaking, if the record has quiet ends."""
     out = stream.copy()
-    _, end, quiet = _shaking_times(out[0])
-    if quiet:
-        remembered(
-            out[0], residual_velocity=residual_velocity(out[0].data, out[0].stats.delta, end)
-        )
+    _, end, has_quiet_ends = _shaking_times(out[0])
+    if has_quiet_ends:
+        velocity = residual_velocity(out[0].data, out[0].stats.delta, end)
+        remembered(out[0], residual_velocity=velocity)
     return out
 
 
 def _shaking_times(trace: Trace) -> tuple[float, float, bool]:
-    """Return onset and end, s, of the shaking, and whether there is quiet before and after."""
+    """Return onset and end of the shaking, s, and whether the record is quiet before and after."""
     dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
     end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
-    return onset, end, FEWEST * dt <= onset < end <= LATEST_START * (trace.stats.npts - 1) * dt
+    latest = LATEST_START * (trace.stats.npts - 1) * dt
+    return onset, end, FEWEST * dt <= onset < end <= latest
 
 
 def _outer_corners(trace: Trace, settings: Processing) -> tuple[Corner, Corner]:
-    """Return the corners that the length of the record and its sampling allow."""
+    """Return the outermost corners that length and sampling of the record allow."""
     low = max(lowest_highpass(trace), Corner(settings.highpass_range[0], "lowest allowed"))
     return low, highest_corner(trace, settings.highest_lowpass)
 
 
 def _clean_baseline(stream: Stream, lowest: Corner, settings: Processing) -> tuple[Stream, Corner]:
     """
-    Return the record with the plain baseline if any corner cleans that, else with the one that does best.
+    Return the record with the plain baseline if any corner cleans that, else with the best one.
 
-    A baseline that shifts during the shaking can be made to look clean at low corners without being
-    right there: with it the highest corner is used.
+    A baseline that shifts during the shaking can look clean at low corners without being right
+    there: with it the highest corner is used.
     """
-    found = _cleaned(stream, "mean and line", lowest, settings)
-    if found is not None:
-        return found
-    others = (_cleaned(other, name, lowest, settings) for name, other in _other_baselines(stream))
-    clean = [one for one in others if one is not None]
+    plain = _cleaned(stream, "mean and line", lowest, settings)
+    if plain is not None:
+        return plain
+    # Baselines that some corner cleans
+    clean = []
+    for name, other in _other_baselines(stream):
+        cleaned = _cleaned(other, name, lowest, settings)
+        if cleaned is not None:
+            clean.append(cleaned)
     highest = settings.highpass_range[1]
     if not clean:
         reason = f"displacement drifts with every baseline and the corner at {highest:g} Hz"
         raise RecordRejected(stream[0].id, reason)
-    record, corner = min(clean, key=lambda one: one[1].frequency)
-    return record, max(
-        corner, Corner(highest, "highest allowed: the baseline shifts during the shaking")
-    )
+    record, corner = min(clean, key=lambda cleaned: cleaned[1].frequency)
+    reason = "highest allowed: the baseline shifts during the shaking"
+    return record, max(corner, Corner(highest, reason))
 
 
 def _cleaned(
     stream: Stream, baseline: str, lowest: Corner, settings: Processing
 ) -> tuple[Stream, Corner] | None:
-    """Return the tapered record and the corner that cleans its displacement, or None where none does."""
+    """Return the tapered record and the corner that cleans its displacement, None without one."""
     candidate = tapered(stream, settings.taper)
     remembered(candidate[0], baseline=baseline)
-    corner = clean_corner(
-        candidate[0], lowest, settings.highpass_range[1], settings.drift, settings.order
-    )
+    highest = settings.highpass_range[1]
+    corner = clean_corner(candidate[0], lowest, highest, settings.drift, settings.order)
     return None if corner is None else (candidate, corner)
 
 
 def _other_baselines(stream: Stream) -> Iterator[tuple[str, Stream]]:
-    """Give the record with each baseline that may shift during the shaking, where the record leaves room for it."""
-    onset, end, quiet = _shaking_times(stream[0])
+    """Yield name and record without each baseline that may shift during the shaking."""
+    onset, end, has_quiet_ends = _shaking_times(stream[0])
     yield "displacement polynomial", detrended(stream, displacement_polynomial)
-    if quiet:
+    if has_quiet_ends:
         second = crossing_time(stream[0].data, stream[0].stats.delta, onset, end)
         yield "two segments", detrended(stream, boore_segments, first=onset, second=second)
         yield "velocity residual", detrended(stream, velocity_residual, onset=onset, end=end)
 
 
 def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Iterator[Finding]:
-    checks = settings.checks
+    """Yield a finding if the signal clears the noise nowhere, or not in the required band."""
     if spectra is None:
         return
+    checks = settings.checks
     best = sustained_ratio(spectra)
-    yield from below(
-        "signal_to_noise", checks.signal_to_noise, best, "signal-to-noise ratio of the best octave"
-    )
+    meaning = "signal-to-noise ratio of the best octave"
+    yield from below("signal_to_noise", checks.signal_to_noise, best, meaning)
+    # Band in which periods of buildings lie
     low, high = settings.required_band
-    ratio = weakest_ratio(spectra, settings.required_band)
-    yield from below(
-        "clear_band", checks.clear_band, ratio, f"signal-to-noise ratio in {low:g}-{high:g} Hz"
-    )
+    weakest = weakest_ratio(spectra, settings.required_band)
+    meaning = f"signal-to-noise ratio in {low:g}-{high:g} Hz"
+    yield from below("clear_band", checks.clear_band, weakest, meaning)
 
 
 def _limits(
@@ -208,29 +214,29 @@ def _limits(
     settings: Processing,
     magnitude: float | None,
 ) -> tuple[Corner, Corner]:
-    """Return the lowest high-pass and the highest low-pass corner that the record allows, noting its noise."""
+    """Return the lowest high-pass and the highest low-pass corner; note the noise on the trace."""
     lowest, lowpass = outer
-    band = clear_band(spectra, settings.checks.signal_to_noise.threshold) if spectra else None
+    threshold = settings.checks.signal_to_noise.threshold
+    band = clear_band(spectra, threshold) if spectra else None
     if spectra is None or band is None:
-        fallback = fallback_highpass(
-            magnitude, settings.fallback_highpass, settings.unknown_highpass
-        )
-        lowest = max(fallback, lowest)
+        # Without measurable noise the magnitude decides
+        table, unknown = settings.fallback_highpass, settings.unknown_highpass
+        lowest = max(fallback_highpass(magnitude, table, unknown), lowest)
     else:
-        remembered(
-            trace, clear_from=band[0], clear_to=band[1], signal_to_noise=sustained_ratio(spectra)
-        )
-        lowest = Corner(band[0], "noise") if band[0] > spectra.frequencies[0] else lowest
-        lowpass = Corner(band[1], "noise") if band[1] < spectra.frequencies[-1] else lowpass
+        # Ends of the clear band, unless it reaches the outermost corners
+        low, high = band
+        remembered(trace, clear_from=low, clear_to=high, signal_to_noise=sustained_ratio(spectra))
+        lowest = Corner(low, "noise") if low > spectra.frequencies[0] else lowest
+        lowpass = Corner(high, "noise") if high < spectra.frequencies[-1] else lowpass
     remembered(trace, lowest_highpass=lowest.frequency, lowest_highpass_source=lowest.reason)
     if settings.lowpass is not None:
-        lowpass = min(
-            Corner(settings.lowpass, "configuration"), highest_corner(trace, settings.lowpass)
-        )
+        configured = Corner(settings.lowpass, "configuration")
+        lowpass = min(configured, highest_corner(trace, settings.lowpass))
     return lowest, lowpass
 
 
 def _noted(stream: Stream, highpass: Corner, lowpass: Corner) -> Stream:
+    """Return a copy with both corners and their reasons."""
     out = stream.copy()
     for name, corner in (("highpass", highpass), ("lowpass", lowpass)):
         noted(out[0], f"{name} corner {corner.frequency:.4g} Hz: {corner.reason}")

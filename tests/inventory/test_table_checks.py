@@ -1,11 +1,11 @@
-"""Profile of an inventory."""
+"""Checks of a pair table as a whole: its profile, derived and unused columns, odd units."""
 
 import numpy as np
 import pandas as pd
 
 from per_obspy.errors import Rejection
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.inventory.profile import (
+from per_obspy.inventory.table_checks import (
     derived_counts,
     faults_by_column,
     inventory_profile,
@@ -63,8 +63,8 @@ def test_gaps_in_another_unit_are_suspected_as_a_whole():
     # 3 to 8 mm are gaps in metres that each row may have, and that hardly any town has
     assert suspicions(_pairs(gap=[0.0, 0.3])) == []
     assert suspicions(_pairs(gap=[0.0, 0.0])) == []
-    (told,) = suspicions(_pairs(gap=[0.0, 8.0]))
-    assert "8 m" in told
+    (warning,) = suspicions(_pairs(gap=[0.0, 8.0]))
+    assert "8 m" in warning
 
 
 def test_faults_are_counted_by_column():

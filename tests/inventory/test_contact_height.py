@@ -1,10 +1,10 @@
-"""Participation and generalised mass: published values, limits, energy, and the modal sums they stand for."""
+"""Participation and generalised mass: published values, limits, energy and modal sums."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.inventory.contact import (
+from per_obspy.inventory.contact_height import (
     contact_mass,
     contact_participation,
     floor_offset,
@@ -71,7 +71,7 @@ def test_floor_offset_does_not_depend_on_the_order():
 
 
 def test_ground_is_no_floor_to_hit():
-    # a 1.4 m wall beside storeys of 3 m is 1.6 m below the first floor, not 1.4 m above ground
+    # a 1.4 m wall next to storeys of 3 m is 1.6 m below the first floor, not 1.4 m above ground
     assert_allclose(floor_offset(1.4, 1, 9.0, 3), 1.6, rtol=1e-14)
 
 

@@ -1,5 +1,5 @@
 """
-From a building to its oscillator at contact height: participation, generalised mass, misaligned floors.
+The oscillator of a building at contact height: participation, generalised mass, misaligned floors.
 
 Equal floor masses and a first mode that grows linearly with height are assumed; for a building with
 a model of its own use ``shear_building.equivalent_sdof``.
@@ -12,7 +12,8 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 
 
-def _ratio(contact_height: ArrayLike, height: ArrayLike) -> FloatArray:
+def _height_ratio(contact_height: ArrayLike, height: ArrayLike) -> FloatArray:
+    """Return z_c / H after checking both heights, m."""
     contact = checks.positive("contact_height", contact_height)
     total = checks.positive("height", height)
     ratio: FloatArray = np.asarray(contact / total)
@@ -27,7 +28,7 @@ def contact_participation(
     storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike
 ) -> FloatArray:
     """
-    Displacement at contact height over that of the oscillator, ``q = 3N/(2N+1) z_c/H``.
+    Compute the displacement at contact height over the oscillator's, ``q = 3N/(2N+1) z_c/H``.
 
     Parameters
     ----------
@@ -59,7 +60,8 @@ def contact_participation(
     array([1.  , 1.2 , 1.29, 1.36, 1.43])
     """
     count = checks.positive("storeys", storeys)
-    participation: FloatArray = 3.0 * count / (2.0 * count + 1.0) * _ratio(contact_height, height)
+    factor = 3.0 * count / (2.0 * count + 1.0)
+    participation: FloatArray = factor * _height_ratio(contact_height, height)
     return participation
 
 
@@ -67,10 +69,11 @@ def contact_mass(
     mass: ArrayLike, storeys: ArrayLike, height: ArrayLike, contact_height: ArrayLike
 ) -> FloatArray:
     """
-    Generalised first-mode mass at contact height, ``m*_c = M (N+1)(2N+1)/(6 N**2) (H/z_c)**2``.
+    Compute the first-mode mass at contact height, ``m*_c = M (N+1)(2N+1)/(6 N**2) (H/z_c)**2``.
 
-    It is ``sum(m phi**2) / phi_c**2`` with the assumptions of :func:`contact_participation`: the
-    mass that takes part in an impact, neither the effective modal mass nor the mass of a floor.
+    The generalised mass ``sum(m phi**2) / phi_c**2`` with the assumptions of
+    :func:`contact_participation`: the mass that takes part in an impact, neither the effective
+    modal mass nor the mass of a floor.
 
     Parameters
     ----------
@@ -99,7 +102,7 @@ def contact_mass(
     300000.0
     """
     total, count = checks.positive("mass", mass), checks.positive("storeys", storeys)
-    ratio = _ratio(contact_height, height)
+    ratio = _height_ratio(contact_height, height)
     generalised: FloatArray = (
         total * (count + 1.0) * (2.0 * count + 1.0) / (6.0 * count**2) / ratio**2
     )
@@ -110,9 +113,9 @@ def floor_offset(
     height_1: ArrayLike, storeys_1: ArrayLike, height_2: ArrayLike, storeys_2: ArrayLike
 ) -> FloatArray:
     """
-    Height between the roof of the lower building and the nearest floor of the taller one, in m.
+    Compute the height between the lower roof and the nearest floor of the taller building, m.
 
-    Floors are taken as equally high within a building. Every argument may be an array (m and
+    Storeys are taken as equally high within a building. Every argument may be an array (m and
     numbers of storeys).
 
     Examples
@@ -123,12 +126,18 @@ def floor_offset(
     first, second = checks.positive("height_1", height_1), checks.positive("height_2", height_2)
     storey_1 = first / checks.positive("storeys_1", storeys_1)
     storey_2 = second / checks.positive("storeys_2", storeys_2)
-    lower, storey = np.minimum(first, second), np.where(first >= second, storey_1, storey_2)
+    # Roof of the lower building against the storeys of the taller one
+    lower = np.minimum(first, second)
+    storey = np.where(first >= second, storey_1, storey_2)
     nearest = np.maximum(np.rint(lower / storey), 1.0)
     offset: FloatArray = np.abs(lower - nearest * storey)
     return offset
 
 
 def floors_misaligned(offset: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
-    """Return where a floor offset (m) exceeds the tolerance (m): floors may then hit columns, outside the method."""
+    """
+    Return where a floor offset (m) exceeds the tolerance (m).
+
+    Floors of one building may then hit columns of the other, which is outside the method.
+    """
     return np.asarray(np.abs(checks.finite("offset", offset)) > tolerance)

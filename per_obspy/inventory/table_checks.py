@@ -1,0 +1,89 @@
+"""
+Checks of a pair table as a whole: ranges of its columns, derived and unused columns, odd units.
+
+They find what is possible row by row but odd for the table, and change no row.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+
+import pandas as pd
+
+from per_obspy.config import Building
+from per_obspy.errors import Rejection, did_you_mean
+from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.schema import COLUMNS
+
+#: Neighbours are sought within about this gap, m: a wider median suggests another unit.
+WIDE_GAP = 3.0
+
+
+def inventory_profile(pairs: pd.DataFrame) -> pd.DataFrame:
+    """
+    Describe every known column of a pair table.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        From :func:`~per_obspy.inventory.files.reading.read_pairs`.
+
+    Returns
+    -------
+    profile : DataFrame
+        One row per column of the schema that the table has: ``column, unit, given`` (rows with a
+        value), ``smallest, median, largest`` (in the column's unit, NaN for text) and
+        ``most_frequent`` (as text, empty if no row has a value).
+    """
+    return pd.DataFrame([_column_profile(name, pairs[name]) for name in COLUMNS if name in pairs])
+
+
+def _column_profile(name: str, values: pd.Series) -> dict[str, object]:
+    """Return the row of the profile for one column."""
+    given = values[values.notna() & (values != "")]
+    # Text has no range
+    numbers = given if COLUMNS[name].dtype == "float64" else given.iloc[:0].astype(float)
+    counts = given.value_counts()
+    return {
+        "column": name,
+        "unit": COLUMNS[name].unit,
+        "given": len(given),
+        "smallest": numbers.min(),
+        "median": numbers.median(),
+        "largest": numbers.max(),
+        "most_frequent": str(counts.index[0]) if len(counts) else "",
+    }
+
+
+def derived_counts(pairs: pd.DataFrame) -> dict[str, int]:
+    """Return the number of rows in which each column is missing and will be derived or assumed."""
+    counts: Counter[str] = Counter()
+    combinations = completed_pairs(pairs, Building())["derived"].value_counts()
+    for names, rows in combinations.items():
+        counts.update(dict.fromkeys(str(names).split(), int(rows)))
+    return dict(counts)
+
+
+def unused_columns(pairs: pd.DataFrame) -> list[str]:
+    """Return the columns unknown to the schema, each with a similar name of a known one."""
+    return [f"{name}{did_you_mean(str(name), COLUMNS)}" for name in pairs if name not in COLUMNS]
+
+
+def faults_by_column(rejected: Iterable[Rejection]) -> dict[str, int]:
+    """
+    Return the number of rejections for each column, most first.
+
+    A reason that concerns several columns counts by itself.
+    """
+    reasons = (reason for rejection in rejected for reason in rejection.reasons)
+    columns = (reason.partition(" = ")[0] for reason in reasons)
+    return dict(Counter(columns).most_common())
+
+
+def suspicions(pairs: pd.DataFrame) -> list[str]:
+    """Return warnings about values that are possible row by row but odd for the whole table."""
+    median = pairs["gap"][pairs["gap"] > 0.0].median()
+    if median > WIDE_GAP:
+        return [
+            f"the median of the gaps above 0 is {median:g} m: given in millimetres or centimetres?"
+        ]
+    return []

@@ -1,0 +1,146 @@
+"""Layers of footprints: files of another kind, damaged files, layers to choose from."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet
+import pyogrio
+import pytest
+import shapely
+
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.footprints.layers import read_layer
+
+#: four houses of 1e-4 degrees
+HOUSES = [shapely.box(10 + x * 1e-3, 50, 10.0001 + x * 1e-3, 50.0001) for x in range(4)]
+HEIGHTS = [12.0, 9.0, 6.0, 3.0]
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(polygons, name="town.gpkg", crs="EPSG:4326", **options):
+        path = tmp_path / name
+        pyogrio.raw.write(
+            path,
+            shapely.to_wkb(np.array(polygons, dtype=object)),
+            [np.array(HEIGHTS[: len(polygons)])],
+            ["height"],
+            geometry_type="Polygon",
+            crs=crs,
+            **options,
+        )
+        return path
+
+    return write
+
+
+def _write_geoparquet(path, **column):
+    described = {"primary_column": "shape", "columns": {"shape": {"encoding": "WKB"} | column}}
+    table = pa.table({"height": HEIGHTS, "shape": shapely.to_wkb(HOUSES).tolist()})
+    pa.parquet.write_table(table.replace_schema_metadata({"geo": json.dumps(described)}), path)
+    return path
+
+
+def test_polygons_and_attributes_have_the_number_of_the_feature(write):
+    # would catch numbers counted from the features that are left
+    layer = read_layer(write([HOUSES[0], None, HOUSES[2]]))
+    assert layer.attributes.index.tolist() == [1, 3]
+    assert layer.attributes["height"].tolist() == [12.0, 6.0]
+    assert [(row.row, row.reasons) for row in layer.rejected] == [(2, ("no geometry",))]
+    assert shapely.equals_exact(layer.polygons, np.array([HOUSES[0], HOUSES[2]]), 1e-12).all()
+
+
+KINDS = {
+    "town.gpkg": "GeoPackage",
+    "town.geojson": "GeoJSON file",
+    "town.shp": "Shapefile",
+    "town.fgb": "FlatGeobuf file",
+    "town.parquet": "Parquet table",
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"Dear colleague,\n", ": "),
+        (b"%PDF-1.4\n", ": it is a PDF document$"),
+        (b"", ": it is an empty file$"),
+    ],
+)
+def test_files_of_another_kind(tmp_path, name, content, reason):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(CatalogError, match=f"{name}: not a {KINDS[name]}{reason}"):
+        read_layer(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["town.gpkg", "town.geojson"])
+def test_files_that_were_cut(write, name):
+    path = write(HOUSES, name)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(CatalogError, match=f"{name}: not a Geo") as error:
+        read_layer(path)
+    assert "\n" not in str(error.value)
+
+
+def test_missing_files_and_unknown_suffixes(write, tmp_path):
+    with pytest.raises(CatalogError, match=r"absent\.gpkg: no such file"):
+        read_layer(tmp_path / "absent.gpkg")
+    (tmp_path / "plan.dwg").touch()
+    with pytest.raises(CatalogError, match=r"plan\.dwg: unknown suffix '\.dwg', expected one of"):
+        read_layer(tmp_path / "plan.dwg")
+    write(HOUSES, "town.shp")
+    (tmp_path / "town.prj").unlink()
+    with pytest.raises(CatalogError, match=r"town\.shp: no coordinate reference system"):
+        read_layer(tmp_path / "town.shp")
+
+
+def test_damaged_geoparquet(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet")
+    content = path.read_bytes()
+    path.write_bytes(content[:100] + bytes(400) + content[500:])
+    with pytest.raises(CatalogError, match=r"town\.parquet: not a Parquet table"):
+        read_layer(path)
+
+
+@pytest.mark.parametrize(
+    "geo", ["{", "{}", "[]", '{"primary_column": "x", "columns": {"x": {"encoding": "WKB"}}}']
+)
+def test_wrong_geoparquet_metadata(tmp_path, geo):
+    table = pa.table({"height": HEIGHTS}).replace_schema_metadata({"geo": geo})
+    pa.parquet.write_table(table, tmp_path / "town.parquet")
+    with pytest.raises(CatalogError, match="wrong GeoParquet metadata"):
+        read_layer(tmp_path / "town.parquet")
+
+
+def test_another_encoding_of_geoparquet(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet", encoding="polygon")
+    with pytest.raises(CatalogError, match="encoded as 'polygon', expected WKB"):
+        read_layer(path)
+
+
+def test_a_parquet_table_of_pairs_is_no_layer(tmp_path):
+    pd.DataFrame({"pair_id": ["a"]}).to_parquet(tmp_path / "pairs.parquet")
+    with pytest.raises(CatalogError, match="no GeoParquet metadata"):
+        read_layer(tmp_path / "pairs.parquet")
+
+
+def test_unknown_coordinate_reference_system_of_geoparquet(tmp_path):
+    with pytest.raises(CatalogError, match="no coordinate reference system"):
+        read_layer(_write_geoparquet(tmp_path / "town.parquet", crs=None))
+    with pytest.raises(CatalogError, match="unknown coordinate reference system 'EPSG:1'"):
+        read_layer(_write_geoparquet(tmp_path / "town.parquet", crs="EPSG:1"))
+
+
+def test_several_layers_need_a_name(write):
+    path = write(HOUSES, layer="old_town")
+    write(HOUSES[:2], layer="new_town", crs="EPSG:4258", append=True)
+    with pytest.raises(CatalogError, match="several layers, name one: old_town, new_town"):
+        read_layer(path)
+    with pytest.raises(
+        CatalogError, match=r"no layer 'harbour' \(layers found: old_town, new_town\)"
+    ):
+        read_layer(path, "harbour")
+    assert len(read_layer(path, "new_town").polygons) == 2

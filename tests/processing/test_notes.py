@@ -1,0 +1,51 @@
+"""Notes on a trace, rows of rejected traces, and copies that share the response."""
+
+import numpy as np
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core import AttribDict
+from obspy.core.inventory import Response
+
+from per_obspy.processing.notes import copied, is_processed, noted, rejection
+
+
+def test_a_copy_is_equal_and_shares_nothing_but_the_response():
+    header = {
+        "station": "STA",
+        "delta": 0.02,
+        "starttime": UTCDateTime(2020, 1, 1),
+        "corners": AttribDict(highpass=0.1),
+    }
+    stream = Stream(
+        [Trace(np.arange(5.0), header | {"response": Response(), "processing": ["one"]}), Trace()]
+    )
+    before, out = stream.copy(), copied(stream)
+    assert out == stream
+    assert out[0].stats.response is stream[0].stats.response
+    out[0].data[0], out[0].stats.corners.highpass = 7.0, 0.2
+    out[0].stats.processing.append("two")
+    assert stream == before  # would catch a copy of the header that is not deep
+
+
+def test_masked_samples_stay_masked():
+    data = np.ma.masked_equal(np.arange(5.0), 2.0)
+    assert copied(Stream([Trace(data)]))[0].data.mask.tolist() == data.mask.tolist()
+
+
+def test_steps_are_listed_and_numbers_are_replaced():
+    trace = Trace(np.zeros(3))
+    noted(trace, "first step", corner=0.1)
+    noted(trace, "second step", corner=0.2, order=5)
+    assert trace.stats.processing == ["per_obspy: first step", "per_obspy: second step"]
+    assert trace.stats.per_obspy == {"corner": 0.2, "order": 5}
+
+
+def test_a_rejection_names_trace_and_file():
+    trace = Trace(np.zeros(3), {"channel": "HNE", "source": "a.mseed"})
+    row = rejection(trace, "first", "second")
+    assert row == ("record", "...HNE", "a.mseed", None, ("first", "second"))
+
+
+def test_only_the_level_processed_counts_as_processed():
+    levels = ("processed", "raw", "unknown")
+    traces = [Trace(header={"processing_level": level}) for level in levels]
+    assert [is_processed(trace) for trace in [*traces, Trace()]] == [True, False, False, False]
