@@ -1,4 +1,4 @@
-"""A station with a record, and pairs of buildings beside it."""
+"""A station with a record, and pairs of buildings near it."""
 
 import numpy as np
 import pandas as pd
@@ -18,10 +18,9 @@ def make_station(
     name="ONE", scale=1.0, channels=("HNN", "HNE"), latitude=10.0, longest=9.0, seed=4
 ):
     """Return the Dataset of a station with a burst of noise, 40 s at 0.01 s."""
-    motion = (
-        np.random.default_rng(seed).normal(size=(len(channels), 4000)) * np.hanning(4000) * scale
-    )
-    motion = np.cumsum(motion, axis=1)
+    noise = np.random.default_rng(seed).normal(size=(len(channels), 4000))
+    # Integrated for long periods, then brought to zero mean and quiet ends
+    motion = np.cumsum(noise * np.hanning(4000) * scale, axis=1)
     motion = (motion - motion.mean(axis=1, keepdims=True)) * np.hanning(4000)
     traces = [
         Trace(
@@ -44,7 +43,7 @@ def make_station(
 
 
 def make_pairs(rows):
-    """Return a checked pair table; every row is a dict of what differs from two plain buildings beside the station."""
+    """Return a checked pair table; rows are changes to two plain buildings near the station."""
     plain = {
         "longitude_1": 20.0,
         "latitude_1": 10.0,
