@@ -1,8 +1,8 @@
 """
 Command line: each command parses its arguments, calls one function and prints.
 
-Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 a service
-is unavailable.
+Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 a
+service is unavailable.
 """
 
 import os
