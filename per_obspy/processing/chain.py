@@ -3,7 +3,7 @@
 import logging
 from collections import defaultdict
 
-from obspy import Stream
+from obspy import Stream, Trace
 from obspy.core.event import Event
 
 from per_obspy.config import Processing
@@ -21,13 +21,15 @@ DEFAULTS = Processing()
 log = logging.getLogger(__name__)
 
 
-def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None = None) -> Stream:
+def process(
+    stream: Stream | Trace, settings: Processing = DEFAULTS, event: Event | None = None
+) -> Stream:
     """
     Process the records of a stream so that spectra can be computed from them.
 
     Parameters
     ----------
-    stream : obspy Stream
+    stream : obspy Stream or Trace
         Any number of stations; counts with a response attached, or m/s2 (``stats.units``).
     settings : Processing
         Every number of the chain, with its unit.
@@ -46,7 +48,14 @@ def process(stream: Stream, settings: Processing = DEFAULTS, event: Event | None
     ------
     RecordRejected
         If no trace is left, with every reason of every trace.
+    TypeError
+        If the argument is neither a Stream nor a Trace.
     """
+    # One trace is a stream of one
+    if isinstance(stream, Trace):
+        stream = Stream([stream])
+    if not isinstance(stream, Stream):
+        raise TypeError(f"stream must be an ObsPy Stream or Trace, got {type(stream).__name__}")
     stations: dict[tuple[str, str], Stream] = defaultdict(Stream)
     for trace in stream:
         stations[trace.stats.network, trace.stats.station] += trace

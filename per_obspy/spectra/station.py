@@ -60,7 +60,7 @@ Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
 
 
 def station_spectra(
-    stream: Stream,
+    stream: Stream | Trace,
     periods: ArrayLike | None = None,
     dampings: Sequence[float] = STORED_DAMPINGS,
     azimuth_step: int = STORED_AZIMUTH_STEP,
@@ -70,7 +70,7 @@ def station_spectra(
 
     Parameters
     ----------
-    stream : Stream
+    stream : Stream or Trace
         Processed acceleration of one station, m/s², one trace per component, as
         :func:`per_obspy.process` returns it. Two horizontals share their start, interval and
         length.
@@ -96,7 +96,7 @@ def station_spectra(
     """
     grid = _grid(periods)
     damping = np.atleast_1d(checks.fraction_of_critical("dampings", dampings))
-    traces = _components(stream)
+    traces = _components(Stream([stream]) if isinstance(stream, Trace) else stream)
     horizontals = [trace for name, trace in traces.items() if name != "vertical"]
     motion, azimuths = _horizontal_motion(horizontals)
 

@@ -44,6 +44,17 @@ def channels(stream):
     return [trace.stats.channel for trace in stream]
 
 
+def test_a_trace_is_a_stream_of_one():
+    record = trace()
+    assert_array_equal(process(record)[0].data, process(Stream([record]))[0].data)
+
+
+@pytest.mark.parametrize("wrong", [None, np.zeros(100), "record.mseed"])
+def test_anything_else_is_named_with_its_type(wrong):
+    with pytest.raises(TypeError, match=f"Stream or Trace, got {type(wrong).__name__}"):
+        process(wrong)
+
+
 def test_the_offset_of_the_baseline_does_not_matter():
     plain, shifted = process(station()), process(station(samples=pulse(offset=3.0)))
     for expected, found in zip(plain, shifted, strict=True):

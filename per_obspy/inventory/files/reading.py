@@ -35,14 +35,15 @@ class PairChunk(NamedTuple):
     repeated: NDArray[np.bool_]
 
 
-def read_pairs(path: str | Path) -> pd.DataFrame:
+def read_pairs(path: str | Path | pd.DataFrame) -> pd.DataFrame:
     """
     Read and check a table of building pairs.
 
     Parameters
     ----------
-    path : str or Path
-        ``.csv`` (UTF-8, comma separated, one header line) or ``.parquet``. Columns, units and
+    path : str, Path or DataFrame
+        ``.csv`` (UTF-8, comma separated, one header line) or ``.parquet``, or a table in memory,
+        whose rows count as following a header in line 1. Columns, units and
         allowed ranges are in ``per_obspy.inventory.schema.COLUMNS``; further columns are carried
         through.
 
@@ -58,7 +59,14 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     CatalogError
         If the file cannot be read, is of an unknown kind, is not UTF-8, is empty or lacks a
         required column.
+    TypeError
+        If the argument is neither a path nor a table.
     """
+    # A table in memory is checked as it is
+    if isinstance(path, pd.DataFrame):
+        return _checked_table(path)
+    if not isinstance(path, str | Path):
+        raise TypeError(f"path must be a path or a DataFrame, got {type(path).__name__}")
     file = pair_file(Path(path))
     check_columns(file.names, str(path))
     blocks = list(file.rows(ALL))
@@ -69,6 +77,14 @@ def read_pairs(path: str | Path) -> pd.DataFrame:
     lines = np.concatenate([block.lines for block in blocks])
     broken = tuple(line for block in blocks for line in block.broken)
     return _checked(RawRows(str(path), pa.concat_tables(tables), lines, broken), None)
+
+
+def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Check a pair table that is in memory already."""
+    check_columns([str(name) for name in table], "table")
+    if table.empty:
+        raise CatalogError("table", "the table has no rows")
+    return checked_pairs(table.reset_index(drop=True), "table")
 
 
 class PairInventory:

@@ -131,8 +131,6 @@ def acausal_bandpass(
     """
     Filter samples without phase in the frequency domain, circularly: pad them first.
 
-    ``trace.filter("acausal_butterworth", highpass=..., lowpass=...)`` calls it.
-
     Parameters
     ----------
     data : (n_samples,) array_like

@@ -32,8 +32,6 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
 
     .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = v_f(t_2) / (t_2 - t_1)
 
-    ``trace.detrend("boore_segments", dt=..., first=..., second=...)`` calls it.
-
     Parameters
     ----------
     data : (n_samples,) array_like
@@ -138,8 +136,6 @@ def velocity_residual(data: FloatArray, dt: float, onset: float, end: float) -> 
     Ends of the shaking are tried in steps, and the combination with the smallest velocity outside
     the shaking is used.
 
-    ``trace.detrend("velocity_residual", dt=..., onset=..., end=...)`` calls it.
-
     Parameters
     ----------
     data : (n_samples,) array_like
@@ -205,8 +201,6 @@ def displacement_polynomial(data: FloatArray, dt: float, order: int = 6) -> Floa
     Remove the second derivative of the polynomial that fits the displacement from acceleration.
 
     The polynomial has no constant and no linear term: the ground starts at rest.
-
-    ``trace.detrend("displacement_polynomial", dt=...)`` calls it.
 
     Parameters
     ----------

@@ -31,6 +31,34 @@ def test_a_good_row(write):
     assert pairs.attrs["rejected"] == ()
 
 
+def test_a_table_in_memory_is_checked_like_a_file(tmp_path):
+    # would catch: rows that are numbered by the index of the table
+    row = {"pair_id": "a", "gap": 0.1}
+    for i in (1, 2):
+        row |= {f"longitude_{i}": 0.3, f"latitude_{i}": 0.0, f"height_{i}": 10.0 + i}
+    table = pd.DataFrame([row, row | {"pair_id": "b", "gap": -1.0}], index=[7, 9])
+    table.to_csv(tmp_path / "pairs.csv", index=False)
+    pairs, from_file = read_pairs(table), read_pairs(tmp_path / "pairs.csv")
+    pd.testing.assert_frame_equal(pairs, from_file)
+    (rejected,) = pairs.attrs["rejected"]
+    (known,) = from_file.attrs["rejected"]
+    assert rejected == known._replace(source="table")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [(pd.DataFrame({"pair_id": ["a"]}), "longitude_1"), (pd.DataFrame(), "table")],
+)
+def test_a_table_in_memory_that_is_wrong_as_a_whole(wrong, message):
+    with pytest.raises(CatalogError, match=message):
+        read_pairs(wrong)
+
+
+def test_what_is_neither_path_nor_table_is_named_with_its_type():
+    with pytest.raises(TypeError, match="got list"):
+        read_pairs([1, 2])
+
+
 def test_unknown_columns_of_numbers_stay_numbers(write):
     pairs = read_pairs(write(f"{HEADER},floor area ratio\n{GOOD},2.5\n"))
     assert pairs["floor area ratio"].dtype == np.float64
