@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.spectra import blocks
+from per_obspy.kernels.spectra import tile_search as blocks
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -99,7 +99,7 @@ def choose(
     """Raise the largest values to the samples of a stretch; return (tile, lane) where more may lie in between."""
     tiles = stretch.peaks.shape[1]
     chosen = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.select(
+    count = blocks.choose_tiles(
         kept, stretch.peaks, stretch.jumps, *block[:3], block.wanted, largest, chosen
     )
     return chosen[:count]
@@ -114,7 +114,7 @@ def raise_between(
     largest: FloatArray,
 ) -> None:
     """Raise the largest values by what lies between the samples of the chosen tiles, from the states before them."""
-    blocks.repeat(*stretch[:4], *block[:3], kept, states, chosen, largest)
+    blocks.search_tiles(*stretch[:4], *block[:3], kept, states, chosen, largest)
 
 
 def raise_to_samples(stretch: Ground, kept: FloatArray, largest: FloatArray) -> None:

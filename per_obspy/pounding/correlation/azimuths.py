@@ -13,8 +13,8 @@ from scipy import fft
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.relative.input_moments import TILE, input_moments
-from per_obspy.kernels.relative.worst_azimuth import furthest_apart
+from per_obspy.kernels.relative.input_moments import LAG_TILE, input_moments
+from per_obspy.kernels.relative.worst_azimuth import largest_separation
 
 
 def directional_correlation(
@@ -153,7 +153,7 @@ def worst_azimuth(
     rest = np.zeros(int(np.ceil(2.0 * float(np.max(2.0 * np.pi / pairs[[0, 3]])) / step)))
     components = _closed(checks.record("north", north), checks.record("east", east))
     apart = np.empty((2, pairs.shape[1]))
-    furthest_apart(
+    largest_separation(
         np.append(components[0], rest),
         np.append(components[1], rest),
         step,
@@ -195,7 +195,7 @@ def _sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, F
             np.abs(spectra[1]) ** 2,
         ]
     )
-    lagged, firsts = np.zeros((2, 3, -(-count // TILE) * TILE + 2))
+    lagged, firsts = np.zeros((2, 3, -(-count // LAG_TILE) * LAG_TILE + 2))
     lagged[:, :count] = fft.irfft(powers, fft.next_fast_len(2 * count, real=True))[:, :count]
     firsts[0, :count], firsts[2, :count] = north[0] * north, east[0] * east
     firsts[1, :count] = north[0] * east + east[0] * north
