@@ -27,7 +27,7 @@ def value_and_slope(table, line, column, terms, time):
 
 @lean
 def size_and_curvature(table, line, column, terms, end):
-    """Return bounds on [0, end]: of the polynomial without its constant, and of its second derivative."""
+    """Return bounds on [0, end] of a polynomial less its constant and of its second derivative."""
     size = curvature = 0.0
     power = 1.0  # end**(n - 2)
     if terms > 1:
@@ -43,7 +43,7 @@ def size_and_curvature(table, line, column, terms, end):
 @lean
 def first_fall(table, line, column, terms, sign, start, end, rounding):
     """
-    Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, or -1 if it does not.
+    Return the first time in [start, end] at which ``sign * polynomial`` falls to zero, else -1.
 
     With K >= -p'' the step ``2 p / (c + sqrt(c² + 2 K p))``, c = -p', never passes a root, and ends
     like Newton's. A start at zero that rises is not a fall: the same step, written for c < 0,
@@ -55,7 +55,8 @@ def first_fall(table, line, column, terms, sign, start, end, rounding):
 
 @lean
 def fall_within(table, line, column, terms, sign, start, end, rounding, size, curvature):
-    """Return what ``first_fall`` does, with the bounds of ``size_and_curvature``."""
+    """Return the result of ``first_fall`` from given bounds of ``size_and_curvature``."""
+    # Too far from zero to fall to it anywhere
     if sign * table[line, column] > size + rounding:
         return -1.0
     if terms > 2:  # the second coefficient's share in the bound has a sign
@@ -68,9 +69,10 @@ def fall_within(table, line, column, terms, sign, start, end, rounding, size, cu
         if value <= tolerance and closing > 0.0:
             return time
         step = safe_step(max(value, 0.0), closing, curvature)
+        # A start at zero that rises: leave it
         if value <= tolerance:
             step = max(step, LEAST_ADVANCE * end)
-            if step == 0.0:  # nothing is left of the interval
+            if step == 0.0:  # the end of the interval
                 return -1.0
         elif time + step == time:
             return time
@@ -81,7 +83,11 @@ def fall_within(table, line, column, terms, sign, start, end, rounding, size, cu
 
 @lean
 def safe_step(value, closing, curvature):
-    """Return a step within which a function of this value, closing speed and largest downward curvature has no root."""
+    """
+    Return a step within which a function has no root.
+
+    It is known by its value, its closing speed and its largest downward curvature.
+    """
     squared = closing * closing + 2.0 * curvature * value
     if squared < 0.0:
         return math.inf
@@ -93,7 +99,7 @@ def safe_step(value, closing, curvature):
 
 @lean
 def is_last_root(table, line, column, terms, time, end):
-    """Tell whether a polynomial cannot turn between a root and the end of the interval."""
+    """Return whether a polynomial cannot turn between a root and the end of the interval."""
     _, curvature = size_and_curvature(table, line, column, terms, end)
     _, slope = value_and_slope(table, line, column, terms, time)
     return abs(slope) > curvature * (end - time)

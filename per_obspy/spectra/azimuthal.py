@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import REFERENCE_DAMPING
-from per_obspy.kernels.spectra import azimuth_steps, blocks
-from per_obspy.kernels.spectra import azimuths as kernels
+from per_obspy.kernels.spectra import azimuth_samples as kernels
+from per_obspy.kernels.spectra import azimuth_steps
+from per_obspy.kernels.spectra import tile_search as blocks
 from per_obspy.spectra.elastic import grid_of, row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (
     Oscillators,

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import REFERENCE_DAMPING
-from per_obspy.kernels.spectra import blocks, radius, response
+from per_obspy.kernels.spectra import radius, response
+from per_obspy.kernels.spectra import tile_search as blocks
 from per_obspy.spectra.oscillator_blocks import (
     Oscillators,
     TiledRecord,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.spectra import blocks
+from per_obspy.kernels.spectra import tile_search as blocks
 from per_obspy.threads import map_in_threads
 
 Part = TypeVar("Part")
@@ -115,7 +115,7 @@ def select_tiles(
     """
     tiles = stretch.peaks.shape[1]
     selected = np.empty((tiles * blocks.LANES, 2), dtype=np.int64)
-    count = blocks.select(
+    count = blocks.choose_tiles(
         tile_states, stretch.peaks, stretch.jumps, *block[:3], block.size, largest, selected
     )
     return selected[:count]
@@ -130,7 +130,7 @@ def raise_between_samples(
     largest: FloatArray,
 ) -> None:
     """Raise the largest values by the motion between the samples of tiles, from their states."""
-    blocks.repeat(*stretch[:4], *block[:3], tile_states, states, selected, largest)
+    blocks.search_tiles(*stretch[:4], *block[:3], tile_states, states, selected, largest)
 
 
 def raise_to_samples(stretch: TiledRecord, tile_states: FloatArray, largest: FloatArray) -> None:

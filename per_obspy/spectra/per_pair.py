@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.maxima.maxima import largest_responses
+from per_obspy.kernels.maxima.oscillator_maxima import largest_responses
 from per_obspy.spectra.elastic import row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (
     Oscillators,

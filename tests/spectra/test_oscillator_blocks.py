@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from per_obspy.kernels.spectra import blocks
+from per_obspy.kernels.spectra import tile_search as blocks
 from per_obspy.spectra.oscillator_blocks import (
     over_blocks,
     prepare_oscillators,

@@ -1,10 +1,10 @@
 r"""
-A stationary value within one step where its condition is monotone: the root of a cubic, set right on the series.
+The stationary value within one step where its condition is monotone, from the root of a cubic.
 
 The displacement is stationary where ``z = 0``, the squared radius also where ``2 xi z + a = 0``. A
-condition whose slope at one end exceeds what it can change over the step has one root at most,
-which lies close to that of the cubic with the same values and slopes at both ends. At a stationary
-point a small shift changes the value by its square.
+condition whose slope at one end exceeds its largest change over the step has one root at most,
+which lies close to that of the cubic with the same values and slopes at both ends; Newton's method
+on the series corrects it. At a stationary point a small shift changes the value by its square.
 """
 
 from per_obspy.kernels._jit import kernel
@@ -19,58 +19,69 @@ SMALL_SHIFT = 1e-5
 @kernel
 def raise_to_root(number, ends, rates, damping, phase, terms, work, best):
     """
-    Raise the largest values to the one at the root of ``2 xi z + a`` (number 0) or ``z`` (1) in a short step.
+    Raise the largest values to the one at the root of a condition in a short step.
 
-    ``ends``: u, z and the acceleration before and after the step. Return whether it is certain that
-    there is no other.
+    The condition is ``2 xi z + a`` (number 0) or ``z`` (1). ``ends``: u, z and the acceleration
+    before and after the step. Returns whether it is certain that there is no other root.
     """
+    # Value and slope of the condition at both ends
     rate = (ends[5] - ends[2]) / phase
     start = _condition(number, ends[0], ends[1], ends[2], rate, damping)
     end = _condition(number, ends[3], ends[4], ends[5], rate, damping)
+    # Monotone if a slope exceeds the largest change of slope over the step
     level = 2.0 * damping if number == 0 else 1.0
     if max(abs(start[1]), abs(end[1])) <= level * rates[1]:
         return False
     if start[0] * end[0] < 0.0:
-        motion, speed = work[0], work[1]
-        fill_series(ends[0], ends[1], ends[2], rate, 1.0, damping, terms, motion, speed)
+        displacement = work[0]
+        velocity = work[1]
+        fill_series(ends[0], ends[1], ends[2], rate, 1.0, damping, terms, displacement, velocity)
         root = phase * _cubic_root(start, end, phase)
-        _raise(number, root, phase, ends[2], rate, damping, terms, motion, speed, best)
+        _raise(number, root, phase, ends[2], rate, damping, terms, displacement, velocity, best)
     return True
 
 
 @kernel
 def _condition(number, u, z, acceleration, rate, damping):
     """Return a condition and its derivative with respect to the phase."""
-    change = -2.0 * damping * z - u - acceleration
+    z_rate = -2.0 * damping * z - u - acceleration
     if number == 1:
-        return z, change
-    return 2.0 * damping * z + acceleration, 2.0 * damping * change + rate
+        return z, z_rate
+    return 2.0 * damping * z + acceleration, 2.0 * damping * z_rate + rate
 
 
 @kernel
 def _cubic_root(start, end, phase):
-    """Return the part of a step at which the cubic with these values and slopes vanishes, nearly."""
-    value, slope, slope_end = start[0], phase * start[1], phase * end[1]
+    """Return the part of a step at which the cubic with these values and slopes nearly vanishes."""
+    # Coefficients of the cubic in the part of the step
+    value = start[0]
+    slope = phase * start[1]
+    slope_end = phase * end[1]
     change = end[0] - value
-    square, cube = 3.0 * change - 2.0 * slope - slope_end, slope + slope_end - 2.0 * change
+    square = 3.0 * change - 2.0 * slope - slope_end
+    cube = slope + slope_end - 2.0 * change
+    # Newton's method from the root of the chord
     part = -value / change
     for _ in range(CUBIC_STEPS):
-        here = value + part * (slope + part * (square + part * cube))
+        height = value + part * (slope + part * (square + part * cube))
         steepness = slope + part * (2.0 * square + 3.0 * part * cube)
-        part = min(max(part - here / steepness, 0.0), 1.0) if steepness != 0.0 else part
+        part = min(max(part - height / steepness, 0.0), 1.0) if steepness != 0.0 else part
     return part
 
 
 @kernel
-def _raise(number, root, phase, acceleration, rate, damping, terms, motion, speed, best):
+def _raise(number, root, phase, acceleration, rate, damping, terms, displacement, velocity, best):
     """Raise the largest values to the one near a root of a condition."""
+    # Newton's method on the series
     for _ in range(SERIES_STEPS):
-        u, z = derivative(motion, terms, 0, root), derivative(speed, terms, 0, root)
+        u = derivative(displacement, terms, 0, root)
+        z = derivative(velocity, terms, 0, root)
         value, slope = _condition(number, u, z, acceleration + rate * root, rate, damping)
         shift = -value / slope
         if abs(shift) <= SMALL_SHIFT:
             break
         root = min(max(root + shift, 0.0), phase)
+    # Value at the root, to second order in the last shift
     if number == 1:
         u += 0.5 * shift * z
         best[1] = max(best[1], abs(u))

@@ -1,12 +1,13 @@
 r"""
-Largest values between two samples, exact: within a step, by Taylor series and the roots of their derivatives.
+Largest values between two samples, exact, by Taylor series and the roots of their derivatives.
 
 The radius is stationary where ``z = 0`` or ``2 xi z + a = 0``, the displacement where ``z = 0``,
 the velocity where ``z' = 0``, the absolute acceleration ``-(u + 2 xi z)`` where ``z + 2 xi z' =
-0``. The second derivative of each condition solves the homogeneous equation of the oscillator, so
-that it has at most one root in a span of half a radian. That root bounds the pieces on which the
-first derivative is monotone, whose roots bound the pieces on which the condition is monotone: no
-stationary point can be missed. Displacements are counted in ``a / omega²``, time as phase.
+0`` (theory.md 2). The second derivative of each condition solves the homogeneous equation of the
+oscillator, so that it has at most one root in a span of half a radian. That root bounds the pieces
+on which the first derivative is monotone, whose roots bound the pieces on which the condition is
+monotone: no stationary point can be missed. Displacements are counted in ``a / omega²``, time as
+phase.
 """
 
 import math
@@ -32,8 +33,9 @@ INVERSES = tuple(1.0 / ((n + 2) * (n + 1)) for n in range(TERMS))
 
 @kernel
 def series_terms(span):
-    """Return after how many terms a series may end."""
-    terms, size = 4, span * span * span / 6.0
+    """Return the number of terms after which a series may end."""
+    terms = 4
+    size = span * span * span / 6.0
     while size > NEGLIGIBLE and terms < TERMS:
         size *= span / terms
         terms += 1
@@ -41,31 +43,38 @@ def series_terms(span):
 
 
 @kernel
-def fill_series(u, z, acceleration, rate, stiffness, damping, terms, motion, speed):
+def fill_series(u, z, acceleration, rate, stiffness, damping, terms, displacement, velocity):
     """
-    Fill the Taylor coefficients of displacement and velocity from the state and the acceleration at the start.
+    Fill the Taylor coefficients of displacement and velocity from the state at the start.
 
     ``u'' + 2 xi u' + stiffness u = -(acceleration + rate phase)``; the stiffness of the linear
     oscillator is 1.
     """
-    motion[0], motion[1] = u, z
-    motion[2] = -0.5 * (2.0 * damping * z + stiffness * u + acceleration)
-    motion[3] = -(4.0 * damping * motion[2] + stiffness * z + rate) / 6.0
+    # The first terms hold state and acceleration; later ones follow from the two before
+    displacement[0] = u
+    displacement[1] = z
+    displacement[2] = -0.5 * (2.0 * damping * z + stiffness * u + acceleration)
+    displacement[3] = -(4.0 * damping * displacement[2] + stiffness * z + rate) / 6.0
     for n in range(2, terms - 1):
-        motion[n + 2] = (
-            -(2.0 * damping * (n + 1) * motion[n + 1] + stiffness * motion[n]) * INVERSES[n]
-        )
+        force = 2.0 * damping * (n + 1) * displacement[n + 1] + stiffness * displacement[n]
+        displacement[n + 2] = -force * INVERSES[n]
+    # The velocity is the derivative, term by term
     for n in range(terms):
-        speed[n] = (n + 1) * motion[n + 1]
+        velocity[n] = (n + 1) * displacement[n + 1]
 
 
 @kernel
-def fill_condition(number, acceleration, rate, damping, terms, speed, condition):
-    """Fill the coefficients of what vanishes where stationary: ``2 xi z + a``, ``z``, ``z'`` or ``z + 2 xi z'``."""
+def fill_condition(number, acceleration, rate, damping, terms, velocity, condition):
+    """
+    Fill the coefficients of a condition that vanishes at stationary points.
+
+    Conditions by number: ``2 xi z + a``, ``z``, ``z'``, ``z + 2 xi z'``.
+    """
+    # Factors of z and of z'
     level = 2.0 * damping if number == 0 else (0.0 if number == 2 else 1.0)
     slope = 0.0 if number < 2 else (1.0 if number == 2 else 2.0 * damping)
     for n in range(terms):
-        condition[n] = level * speed[n] + slope * (n + 1) * speed[n + 1]
+        condition[n] = level * velocity[n] + slope * (n + 1) * velocity[n + 1]
     if number == 0:
         condition[0] += acceleration
         condition[1] += rate
@@ -83,7 +92,7 @@ def derivative(series, terms, order, phase):
 
 @kernel
 def is_monotone(series, terms, span):
-    """Tell whether the linear term outweighs all higher ones over the whole span."""
+    """Return whether the linear term outweighs all higher ones over the whole span."""
     higher = 0.0
     for n in range(terms - 1, 1, -1):
         higher = higher * span + n * abs(series[n])
@@ -91,40 +100,52 @@ def is_monotone(series, terms, span):
 
 
 @kernel
-def root(series, terms, order, left, right, at_left, at_right):
+def bracketed_root(series, terms, order, left, right, at_left, at_right):
     """Return the root between two phases with values of opposite sign (regula falsi, Illinois)."""
     tolerance = ROOT_TOLERANCE * (right - left)
     phase = left
     for _ in range(ROOT_STEPS):
+        # Root of the chord between the ends of the bracket
         previous = phase
         phase = (left * at_right - right * at_left) / (at_right - at_left)
-        here = derivative(series, terms, order, phase)
-        if abs(phase - previous) <= tolerance or here == 0.0:
+        value = derivative(series, terms, order, phase)
+        if abs(phase - previous) <= tolerance or value == 0.0:
             break
-        if here * at_right < 0.0:
-            left, at_left = right, at_right
+        # Replace one end; halve the value at an end that stays twice
+        if value * at_right < 0.0:
+            left = right
+            at_left = at_right
         else:
             at_left *= 0.5
-        right, at_right = phase, here
+        right = phase
+        at_right = value
     return phase
 
 
 @kernel
 def stationary_phases(series, terms, span, points):
-    """Leave in the points both ends and every root of the series in between, among others; return how many."""
-    points[0], points[1] = 0.0, span
+    """
+    Fill the points with both ends and every root of the series in between; return their number.
+
+    Roots of the derivatives are among the points too.
+    """
+    points[0] = 0.0
+    points[1] = span
     count = 2
+    # From the second derivative down to the series itself: the points so far bound pieces on
+    # which the next lower derivative is monotone
     order = 0 if is_monotone(series, terms, span) else 2
     while order >= 0:
         at_right = derivative(series, terms, order, points[count - 1])
         for i in range(count - 1, 0, -1):
             at_left = derivative(series, terms, order, points[i - 1])
             if at_left * at_right < 0.0:
+                # Insert the root of this piece
                 for k in range(count, i, -1):
                     points[k] = points[k - 1]
-                points[i] = root(
-                    series, terms, order, points[i - 1], points[i + 1], at_left, at_right
-                )
+                left = points[i - 1]
+                right = points[i + 1]
+                points[i] = bracketed_root(series, terms, order, left, right, at_left, at_right)
                 count += 1
             at_right = at_left
         order -= 1
@@ -132,30 +153,34 @@ def stationary_phases(series, terms, span, points):
 
 
 @kernel
-def largest_in_step(u, z, start, end, damping, phase, wanted, work, largest):
+def largest_in_step(u, z, start, end, damping, phase, selected, work, largest):
     """
-    Raise the largest squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|`` to those at the wanted stationary points.
+    Raise the largest values to those at the selected stationary points of a step.
 
-    The step starts from the state ``u, z`` and the acceleration goes from start to end; long steps
-    are cut into spans.
+    The values are squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|``. The step starts from the
+    state ``u, z`` and the acceleration goes from start to end; long steps are cut into spans.
     """
     spans = math.ceil(phase / LONGEST_SPAN)
     span = phase / spans
     terms = series_terms(span)
     rate = (end - start) / phase
-    motion, speed, condition, points = work[0], work[1], work[2], work[3]
+    displacement, velocity, condition, points = work[0], work[1], work[2], work[3]
     for i in range(spans):
+        # Series of the motion over this span
         acceleration = start + rate * (i * span)
-        fill_series(u, z, acceleration, rate, 1.0, damping, terms, motion, speed)
+        fill_series(u, z, acceleration, rate, 1.0, damping, terms, displacement, velocity)
         for number in range(4):
-            points[0], points[1] = 0.0, span
+            # Stationary points of a selected condition; else only the end of the span
+            points[0] = 0.0
+            points[1] = span
             count = 2
-            if wanted[number]:
-                fill_condition(number, acceleration, rate, damping, terms - 1, speed, condition)
+            if selected[number]:
+                fill_condition(number, acceleration, rate, damping, terms - 1, velocity, condition)
                 count = stationary_phases(condition, terms - 1, span, points)
+            # Raise all four values to those at the points; the last one starts the next span
             for k in range(1, count):
-                u = derivative(motion, terms, 0, points[k])
-                z = derivative(speed, terms, 0, points[k])
+                u = derivative(displacement, terms, 0, points[k])
+                z = derivative(velocity, terms, 0, points[k])
                 largest[0] = max(largest[0], u * u + z * z)
                 largest[1] = max(largest[1], abs(u))
                 largest[2] = max(largest[2], abs(z))
@@ -164,7 +189,11 @@ def largest_in_step(u, z, start, end, damping, phase, wanted, work, largest):
 
 @kernel
 def radius_bound(square, peak, damping, phase):
-    """Return what the radius cannot exceed within half a step of samples: it grows by at most ``|a|`` a phase."""
+    """
+    Return a bound of the radius within half a step of samples with this squared radius.
+
+    It grows by at most ``|a|`` per unit of phase.
+    """
     return (math.sqrt(square) + 0.5 * phase * peak) * math.exp(damping * phase)
 
 
@@ -176,61 +205,72 @@ def rate_bounds(radius, peak, jump, damping, phase):
     From ``|u + 2 xi z| <= sqrt(1 + 4 xi²) r``, ``z' = -(u + 2 xi z) - a``, ``z'' = -2 xi z' - z -
     a'``, ``(r²)'' = -8 xi z z' - 2 a z' - 2 z a'`` and ``a' = jump / phase``.
     """
-    speed = phase * (math.sqrt(1.0 + 4.0 * damping * damping) * radius + peak)
-    return (
-        speed,
-        2.0 * damping * speed + phase * radius + jump,
-        speed * (8.0 * damping * radius + 2.0 * peak) + 2.0 * radius * jump,
-    )
+    first = phase * (math.sqrt(1.0 + 4.0 * damping * damping) * radius + peak)
+    second = 2.0 * damping * first + phase * radius + jump
+    square = first * (8.0 * damping * radius + 2.0 * peak) + 2.0 * radius * jump
+    return first, second, square
 
 
 @kernel
 def slacks(rates, damping, phase):
     """
-    Return by how much squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|`` can exceed two samples between them.
+    Return bounds of how far values between two samples can exceed those at the samples.
 
-    Each is ``phase² / 8`` times a bound of its second derivative.
+    The values are squared radius, ``|u|``, ``|z|`` and ``|u + 2 xi z|``; each bound is ``phase² /
+    8`` times one of the second derivative.
     """
-    speed, change, square = rates
+    first, second, square = rates
     eighth = 0.125 * phase
     return (
         eighth * square,
-        eighth * speed,
-        eighth * change,
-        eighth * (speed + 2.0 * damping * change),
+        eighth * first,
+        eighth * second,
+        eighth * (first + 2.0 * damping * second),
     )
 
 
 @kernel
 def velocity_slack(highest, rates, jump, damping, phase):
     """
-    Return by how much ``|z|`` can exceed the highest of its samples between them, from ``z'' = -2 xi z' - z - a'``.
+    Return a bound of how far ``|z|`` between two samples can exceed the highest sample.
 
-    Tighter than `slacks` where the oscillator is stiff: ``|z|`` is far below the radius there.
+    From ``z'' = -2 xi z' - z - a'``. Tighter than `slacks` where the oscillator is stiff: ``|z|``
+    is far below the radius there.
     """
-    speed, change, _ = rates
+    first, second, _ = rates
     eighth = 0.125 * phase
-    return eighth * min(change, 2.0 * damping * speed + phase * (highest + eighth * change) + jump)
+    stiff = 2.0 * damping * first + phase * (highest + eighth * second) + jump
+    return eighth * min(second, stiff)
 
 
 @kernel
 def step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase):
     """
-    Return what ``|z|`` cannot exceed in a step.
+    Return a bound of ``|z|`` in a step.
 
     It leaves the cubic with the same values and slopes at both ends by at most ``phase⁴ |z''''| /
     384``, like ``s² (1 - s)²``; both together are a Bernstein polynomial, which never exceeds the
     largest of its coefficients. Each derivative of z, times a power of the phase, is bounded from
     its values at the ends and from the next one.
     """
-    lag, jump = 2.0 * damping * phase, phase * (end - start)
-    first, first_end = -lag * z - phase * (u + start), -lag * z_end - phase * (u_end + end)
+    viscosity = 2.0 * damping * phase
+    jump = phase * (end - start)
     square = phase * phase
-    second, second_end = -lag * first - square * z - jump, -lag * first_end - square * z_end - jump
-    third = max(abs(lag * second + square * first), abs(lag * second_end + square * first_end))
+    # First and second derivative of z at the ends, from the equation of motion
+    first = -viscosity * z - phase * (u + start)
+    first_end = -viscosity * z_end - phase * (u_end + end)
+    second = -viscosity * first - square * z - jump
+    second_end = -viscosity * first_end - square * z_end - jump
+    # Third derivative: largest value at the ends, and half a step of the fourth from there
+    third = max(
+        abs(viscosity * second + square * first),
+        abs(viscosity * second_end + square * first_end),
+    )
     widest = phase * rates[1]
-    third += 0.5 * (lag * (lag * widest + square * rates[0]) + square * widest)
-    fourth = lag * third + square * (max(abs(second), abs(second_end)) + 0.5 * third)
+    third += 0.5 * (viscosity * (viscosity * widest + square * rates[0]) + square * widest)
+    # Fourth derivative, from third and second
+    fourth = viscosity * third + square * (max(abs(second), abs(second_end)) + 0.5 * third)
+    # Largest Bernstein coefficient: both ends, two inner ones, and the middle with the deviation
     middle = abs(0.5 * (z + z_end) + (first - first_end) / 6.0) + fourth / 144.0
     return max(abs(z), abs(z_end), abs(z + 0.25 * first), abs(z_end - 0.25 * first_end), middle)
 
@@ -238,72 +278,84 @@ def step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase):
 @kernel
 def may_exceed(u, z, start, end, damping, phase, largest):
     """
-    Tell whether a step may hold a new largest value.
+    Return whether a step may hold a new largest value.
 
     The particular solution moves on a line, and around it the radius of the free vibration never
     grows.
     """
     rate = (end - start) / phase
     lean = 2.0 * damping * rate
+    # Radius of the free vibration around the particular solution
     swing = math.hypot(u + start - lean, z + rate)
-    still = max(abs(lean - start), abs(lean - end))
-    felt = max(abs(start), abs(end)) + math.sqrt(1.0 + 4.0 * damping * damping) * swing
+    # Largest displacement and absolute acceleration of the particular solution
+    static = max(abs(lean - start), abs(lean - end))
+    absolute = max(abs(start), abs(end)) + math.sqrt(1.0 + 4.0 * damping * damping) * swing
     return (
-        math.hypot(still, rate) + swing > math.sqrt(largest[0])
-        or still + swing > largest[1]
+        math.hypot(static, rate) + swing > math.sqrt(largest[0])
+        or static + swing > largest[1]
         or abs(rate) + swing > largest[2]
-        or felt > largest[3]
+        or absolute > largest[3]
     )
 
 
 @kernel
-def dips(rates, damping, phase):
+def sags(rates, damping, phase):
     """
-    Return how far ``2 xi z + a``, ``z``, ``z'`` and ``z + 2 xi z'`` can leave the straight line between two samples.
+    Return bounds of how far the conditions can leave the straight line between two samples.
 
-    Each is ``phase² / 8`` times a bound of its second derivative, which for ``z'`` is ``-2 xi z'' -
-    z'``.
+    The conditions are ``2 xi z + a``, ``z``, ``z'`` and ``z + 2 xi z'``. Each bound is ``phase² /
+    8`` times one of the second derivative, which for ``z'`` is ``-2 xi z'' - z'``.
     """
-    speed, change, _ = rates
-    z = 0.125 * phase * change
-    change_dip = 0.125 * phase * (2.0 * damping * change + speed)
-    return 2.0 * damping * z, z, change_dip, z + 2.0 * damping * change_dip
+    first, second, _ = rates
+    z = 0.125 * phase * second
+    z_rate = 0.125 * phase * (2.0 * damping * second + first)
+    return 2.0 * damping * z, z, z_rate, z + 2.0 * damping * z_rate
 
 
 @kernel
-def may_vanish(at_start, at_end, dip):
-    """Tell whether a function can have a root within a step over which it leaves the straight line by no more."""
-    return at_start * at_end <= 0.0 or min(abs(at_start), abs(at_end)) <= dip
+def may_vanish(at_start, at_end, sag):
+    """Return whether a function that leaves its chord by at most the sag can have a root."""
+    return at_start * at_end <= 0.0 or min(abs(at_start), abs(at_end)) <= sag
 
 
 @kernel
-def find_wanted(
-    u, z, start, u_end, z_end, end, damping, phase, radius, quantities, largest, wanted
+def select_conditions(
+    u, z, start, u_end, z_end, end, damping, phase, radius, quantities, largest, selected
 ):
     """
-    Tell which stationary points of a step may raise the largest values, in the order of `fill_condition`.
+    Select the stationary points of a step that may raise the largest values; return if any.
 
-    A point is wanted if the bound of its quantity exceeds the largest value and its condition may
-    vanish in the step; those of the displacement are also the radius's.
+    They are numbered as in `fill_condition`. A point is selected if the bound of its quantity
+    exceeds the largest value and its condition may vanish in the step; those of the displacement
+    are also the radius's.
     """
+    # Long steps: rule the whole step out first
     if phase > LONGEST_SPAN and not may_exceed(u, z, start, end, damping, phase, largest):
         return False
-    twice = 2.0 * damping
+    viscosity = 2.0 * damping
     rates = rate_bounds(radius, max(abs(start), abs(end)), abs(end - start), damping, phase)
-    slack, dip = slacks(rates, damping, phase), dips(rates, damping, phase)
+    slack = slacks(rates, damping, phase)
+    sag = sags(rates, damping, phase)
+    # Radius: stationary where 2 xi z + a = 0
     higher = max(u * u + z * z, u_end * u_end + z_end * z_end) + slack[0] > largest[0]
-    wanted[0] = higher and may_vanish(twice * z + start, twice * z_end + end, dip[0])
-    wanted[1] = wanted[2] = wanted[3] = False
+    selected[0] = higher and may_vanish(viscosity * z + start, viscosity * z_end + end, sag[0])
+    selected[1] = selected[2] = selected[3] = False
     if quantities > 1:
-        felt, felt_end = u + twice * z, u_end + twice * z_end
-        change, change_end = -felt - start, -felt_end - end
+        absolute = u + viscosity * z
+        absolute_end = u_end + viscosity * z_end
+        # Derivative z' at the ends, from the equation of motion
+        z_rate = -absolute - start
+        z_rate_end = -absolute_end - end
         higher |= max(abs(u), abs(u_end)) + slack[1] > largest[1]
+        # Velocity: stationary where z' = 0
         if step_velocity_bound(u, z, start, u_end, z_end, end, rates, damping, phase) > largest[2]:
-            wanted[2] = may_vanish(change, change_end, dip[2])
-        if max(abs(felt), abs(felt_end)) + slack[3] > largest[3]:
-            wanted[3] = may_vanish(z + twice * change, z_end + twice * change_end, dip[3])
-    wanted[1] = higher and may_vanish(z, z_end, dip[1])
-    return wanted[0] or wanted[1] or wanted[2] or wanted[3]
+            selected[2] = may_vanish(z_rate, z_rate_end, sag[2])
+        # Absolute acceleration: stationary where z + 2 xi z' = 0
+        if max(abs(absolute), abs(absolute_end)) + slack[3] > largest[3]:
+            selected[3] = may_vanish(z + viscosity * z_rate, z_end + viscosity * z_rate_end, sag[3])
+    # Radius and displacement: stationary where z = 0
+    selected[1] = higher and may_vanish(z, z_end, sag[1])
+    return selected[0] or selected[1] or selected[2] or selected[3]
 
 
 @kernel

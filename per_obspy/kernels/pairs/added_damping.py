@@ -1,4 +1,4 @@
-"""Least damping to add to both buildings of many pairs, from stored spectra."""
+"""Least damping to add to both buildings of many pairs, from stored spectra (theory.md 9)."""
 
 import math
 
@@ -6,22 +6,34 @@ from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.pairs.resampling import white_noise_correlation
 
 #: Step of the scan over the added damping; halved so many times before the first that is enough.
-STEP = 0.02
+SCAN_STEP = 0.02
 HALVINGS = 20
 
 
 @kernel
 def least_dampings(log_dampings, stored, pairs, largest, added):
     """
-    Fill ``added`` (n,) with the least damping that brings a pair's critical gap to its gap; NaN if none does.
+    Fill the least damping that brings the critical gap of each pair to its gap; NaN if none does.
 
-    ``stored`` (n, 2, dampings): logarithms of the radii of both buildings at their periods.
-    ``pairs`` (n, 6): log ratio of the periods (NaN: the buildings are uncorrelated), damping of 1
-    and of 2, log radius of 1 and of 2, gap. Up to ``largest`` is added as far as both buildings
-    still vibrate.
+    Parameters
+    ----------
+    log_dampings : (n_dampings,) ndarray
+        Natural logarithms of the stored dampings (fractions of critical), rising.
+    stored : (n, 2, n_dampings) ndarray
+        Natural logarithms of the radii (m) of both buildings at their periods.
+    pairs : (n, 6) ndarray
+        Columns: logarithm of the ratio of the periods (NaN: the buildings are uncorrelated),
+        damping of building 1 and of 2 (fractions of critical), logarithm of the radius (m) of 1 and
+        of 2, gap (m).
+    largest : float
+        Largest damping to add, as far as both buildings still vibrate, fraction of critical.
+    added : (n,) ndarray
+        Receives the damping to add to both buildings, fraction of critical.
     """
     for index in range(pairs.shape[0]):
-        pair, radii = pairs[index], stored[index]
+        pair = pairs[index]
+        radii = stored[index]
+        # Factors from the stored radii to those of the pair
         scale_1 = pair[3] - _log_radius(log_dampings, radii[0], pair[1])
         scale_2 = pair[4] - _log_radius(log_dampings, radii[1], pair[2])
         most = min(largest, 0.99 - max(pair[1], pair[2]))
@@ -30,14 +42,15 @@ def least_dampings(log_dampings, stored, pairs, largest, added):
 
 @kernel
 def _least(log_dampings, radii, pair, scale_1, scale_2, most):
-    """Scan the added damping, which need not always help, and halve the step before the first that is enough."""
+    """Return the least added damping by a scan: more damping does not always help."""
     if _excess(log_dampings, radii, pair, scale_1, scale_2, 0.0) <= 0.0:
         return 0.0
-    steps = math.ceil(most / STEP - 1e-9)
+    steps = math.ceil(most / SCAN_STEP - 1e-9)
     for k in range(1, steps + 1):
-        high = min(k * STEP, most)
+        high = min(k * SCAN_STEP, most)
         if _excess(log_dampings, radii, pair, scale_1, scale_2, high) <= 0.0:
-            low = (k - 1) * STEP
+            # Halve the step before the first damping that is enough
+            low = (k - 1) * SCAN_STEP
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
                 if _excess(log_dampings, radii, pair, scale_1, scale_2, middle) <= 0.0:
@@ -51,7 +64,9 @@ def _least(log_dampings, radii, pair, scale_1, scale_2, most):
 @kernel
 def _excess(log_dampings, radii, pair, scale_1, scale_2, added):
     """Return by how much the squared critical gap, eq. (15), is above the squared gap."""
-    damping_1, damping_2 = pair[1] + added, pair[2] + added
+    damping_1 = pair[1] + added
+    damping_2 = pair[2] + added
+    # Radii at the new dampings
     radius_1 = math.exp(scale_1 + _log_radius(log_dampings, radii[0], damping_1))
     radius_2 = math.exp(scale_2 + _log_radius(log_dampings, radii[1], damping_2))
     rho = 0.0 if math.isnan(pair[0]) else white_noise_correlation(pair[0], damping_1, damping_2)
@@ -66,16 +81,18 @@ def _excess(log_dampings, radii, pair, scale_1, scale_2, added):
 @kernel
 def _log_radius(log_dampings, radii, damping):
     """
-    Return the stored logarithm, linear in that of the damping.
+    Return the stored logarithm at a damping, linear in the logarithm of the damping.
 
     Below the stored dampings that of the smallest; above them the last slope goes on.
     """
     last = log_dampings.size - 1
     if last == 0:
         return radii[0]
-    place = math.log(max(damping, 1e-12))
+    # Lower neighbour among the stored dampings
+    log_damping = math.log(max(damping, 1e-12))
     k = 0
-    while k < last - 1 and place > log_dampings[k + 1]:
+    while k < last - 1 and log_damping > log_dampings[k + 1]:
         k += 1
-    part = max((place - log_dampings[k]) / (log_dampings[k + 1] - log_dampings[k]), 0.0)
+    width = log_dampings[k + 1] - log_dampings[k]
+    part = max((log_damping - log_dampings[k]) / width, 0.0)
     return radii[k] + part * (radii[k + 1] - radii[k])

@@ -14,13 +14,19 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.oscillator.exact_step import step
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.oscillator.within_step import radius_bound, rate_bounds
-from per_obspy.kernels.spectra.azimuths import GROUP, excess, fill_forms, floor_form, rerun_tile
-from per_obspy.kernels.spectra.blocks import LANES, TILE
-from per_obspy.kernels.spectra.peaks_within_steps import raise_to_peaks
+from per_obspy.kernels.spectra.azimuth_samples import (
+    GROUP,
+    excess_over_floor,
+    fill_forms,
+    floor_form,
+    rerun_tile,
+)
+from per_obspy.kernels.spectra.peaks_within_steps import raise_to_step_peaks
+from per_obspy.kernels.spectra.tile_search import LANES, TILE
 
-#: Values kept of a listed step: three forms, states before it, accelerations at its ends.
+#: Values stored of a listed step: three forms, states before it, accelerations at its ends.
 COLUMNS = 17
 
 
@@ -32,18 +38,22 @@ def _bounds(radius, peak, jump, oscillator):
     ``(r²)' = -2 z b`` with ``b = 2 xi z + a``, ``(u²)' = 2 u z``, and ``z''' = -2 xi z'' - z'``.
     """
     _, phase, damping, share = oscillator
-    twice = 2.0 * damping
-    z1, change, square = rate_bounds(radius, peak, jump, damping, phase)
-    z2 = phase * change
-    z3 = phase * (twice * z2 + phase * z1)
+    viscosity = 2.0 * damping
+    # Bounds of the first three derivatives of z, times the phase of a step
+    z1, z2_per_phase, square = rate_bounds(radius, peak, jump, damping, phase)
+    z2 = phase * z2_per_phase
+    z3 = phase * (viscosity * z2 + phase * z1)
+    # Second and fourth derivative of the square
     if share == 0.0:
         square = 2.0 * (phase * radius * radius + radius * z1)  # (u²)'' = 2 z² + 2 u z'
         fourth = 4.0 * phase * z2 * radius + 3.0 * phase * z1 * z1 + radius * z3
     else:
         fourth = (
-            z3 * (twice * radius + peak) + 3.0 * z2 * (twice * z1 + jump) + 3.0 * z1 * twice * z2
+            z3 * (viscosity * radius + peak)
+            + 3.0 * z2 * (viscosity * z1 + jump)
+            + 3.0 * z1 * viscosity * z2
         )
-        fourth += radius * twice * z3
+        fourth += radius * viscosity * z3
     return 0.125 * phase * square, 2.0 * phase * fourth / 144.0
 
 
@@ -51,22 +61,27 @@ def _bounds(radius, peak, jump, oscillator):
 def _fill_slopes(states, north, east, oscillator, slopes):
     """Fill the forms of the derivatives at the samples of a tile, times the phase of a step."""
     _, phase, damping, share = oscillator
-    own, twice = phase * (1.0 - share), 2.0 * damping
+    own = phase * (1.0 - share)
+    viscosity = 2.0 * damping
     for i in range(TILE + 1):
         un, zn, ue, ze = states[0, i], states[1, i], states[2, i], states[3, i]
-        xn = own * un - share * phase * (twice * zn + north[i])
-        xe = own * ue - share * phase * (twice * ze + east[i])
-        slopes[0, i], slopes[1, i], slopes[2, i] = (
-            zn * xn + ze * xe,
-            zn * xn - ze * xe,
-            zn * xe + ze * xn,
-        )
+        # Factor of z in half the derivative: -b for the radius, u for the displacement
+        xn = own * un - share * phase * (viscosity * zn + north[i])
+        xe = own * ue - share * phase * (viscosity * ze + east[i])
+        # Half sum, half difference and product, as the forms of the squares
+        slopes[0, i], slopes[1, i] = zn * xn + ze * xe, zn * xn - ze * xe
+        slopes[2, i] = zn * xe + ze * xn
 
 
 @kernel
 def _fill_coefficients(forms, slopes, bulge, coefficients):
-    """Fill the three inner coefficients of each step, (coefficient, form, step); the outer ones are the samples."""
+    """
+    Fill the three inner Bernstein coefficients of each step, (coefficient, form, step).
+
+    The outer ones are the samples.
+    """
     for row in range(3):
+        # The deviation from the cubic is the same along every azimuth: it raises the mean only
         extra = bulge if row == 0 else 0.0
         for i in range(TILE):
             f0, f1, s0, s1 = forms[row, i], forms[row, i + 1], slopes[row, i], slopes[row, i + 1]
@@ -77,11 +92,11 @@ def _fill_coefficients(forms, slopes, bulge, coefficients):
 
 @kernel
 def _mark_steps(coefficients, floor, marks):
-    """Mark with a positive number the steps whose inner coefficients exceed the floor along any azimuth."""
+    """Mark with a positive number the steps that exceed the floor along any azimuth."""
     marks[:] = 0.0
     for number in range(3):
         for i in range(TILE):
-            mark = excess(
+            mark = excess_over_floor(
                 coefficients[number, 0, i],
                 coefficients[number, 1, i],
                 coefficients[number, 2, i],
@@ -91,34 +106,56 @@ def _mark_steps(coefficients, floor, marks):
 
 
 @kernel
-def list_steps(north, east, peaks, jumps, kept, oscillator, directions, best, steps):
+def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, best, steps):
     """
     List the steps of one oscillator that may hold more than the largest squares at the samples.
 
-    ``steps`` (count, columns) receives three forms, the states before (u and z of north, u and z of
-    east), and both accelerations of both components. Returns how many there are.
+    Parameters
+    ----------
+    north, east : (tiles * TILE + 1,) ndarray
+        Components of the ground acceleration, scaled to a peak of order one.
+    peaks, jumps : (2, tiles) ndarray
+        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
+        either component.
+    checkpoints : (TILES, 6, LANES) ndarray
+        From `azimuth_samples.run_azimuth_tiles`.
+    oscillator : Oscillator
+        Lane, phase of a step (rad), damping (fraction of critical), and share: 1 for the radius, 0
+        for the displacement.
+    directions : (4, n_azimuths) ndarray
+        Cosine and sine of the azimuths, then of twice them; a whole number of groups.
+    best : (n_azimuths,) ndarray
+        Largest squares along each azimuth at the samples.
+    steps : (tiles * TILE, COLUMNS) ndarray
+        Receives, one row per step: the three inner Bernstein coefficients as forms (mean,
+        difference, product; 9 columns), u and z of north and of east before the step (4), north
+        acceleration before and after it, east acceleration before and after it.
+
+    Returns
+    -------
+    count : int
+        Number of rows of ``steps`` that are filled.
     """
     lane, phase, damping, share = oscillator
-    exact = step(1.0, damping, phase)
-    states, forms, slopes = (
-        np.empty((4, TILE + 1)),
-        np.empty((3, TILE + 1)),
-        np.empty((3, TILE + 1)),
-    )
+    exact = step_coefficients(1.0, damping, phase)
+    # Memory of one tile
+    states, forms = np.empty((4, TILE + 1)), np.empty((3, TILE + 1))
+    slopes = np.empty((3, TILE + 1))
     coefficients, marks = np.empty((3, 3, TILE)), np.empty(TILE)
     floor, least = floor_form(best, directions[2], directions[3])
     count = 0
     for tile in range(peaks.shape[1]):
-        peak, jump = (
-            math.hypot(peaks[0, tile], peaks[1, tile]),
-            math.hypot(jumps[0, tile], jumps[1, tile]),
-        )
-        radius = radius_bound(kept[tile, 4, lane], peak, damping, phase)
+        # Leave out a tile whose bound does not reach the smallest of the largest squares
+        peak = math.hypot(peaks[0, tile], peaks[1, tile])
+        jump = math.hypot(jumps[0, tile], jumps[1, tile])
+        radius = radius_bound(checkpoints[tile, 4, lane], peak, damping, phase)
         slack, bulge = _bounds(radius, peak, jump, oscillator)
-        if (kept[tile, 4, lane] if share == 1.0 else kept[tile, 5, lane]) + slack <= least:
+        sampled = checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]
+        if sampled + slack <= least:
             continue
+        # Squares and slopes at the samples, and the Bernstein coefficients between them
         first = tile * TILE
-        rerun_tile(north, east, kept, tile, lane, exact, states)
+        rerun_tile(north, east, checkpoints, tile, lane, exact, states)
         fill_forms(states, share, forms)
         _fill_slopes(
             states,
@@ -128,6 +165,7 @@ def list_steps(north, east, peaks, jumps, kept, oscillator, directions, best, st
             slopes,
         )
         _fill_coefficients(forms, slopes, bulge, coefficients)
+        # List the steps that exceed the floor along any azimuth
         _mark_steps(coefficients, floor, marks)
         for i in range(TILE):
             if marks[i] > 0.0:
@@ -135,30 +173,35 @@ def list_steps(north, east, peaks, jumps, kept, oscillator, directions, best, st
                     steps[count, number] = coefficients[number // 3, number % 3, i]
                 for row in range(4):
                     steps[count, 9 + row] = states[row, i]
-                steps[count, 13], steps[count, 14] = north[first + i], north[first + i + 1]
-                steps[count, 15], steps[count, 16] = east[first + i], east[first + i + 1]
+                # Accelerations at both ends of the step
+                steps[count, 13] = north[first + i]
+                steps[count, 14] = north[first + i + 1]
+                steps[count, 15] = east[first + i]
+                steps[count, 16] = east[first + i + 1]
                 count += 1
     return count
 
 
 @kernel
-def _mark_groups(one, edges, floors, marks):
+def _mark_groups(step, edges, floors, marks):
     """
-    Mark with a positive number the groups of azimuths along which a step may hold more than their smallest maximum.
+    Mark the groups of azimuths along which a step may hold more than their smallest maximum.
 
-    Returns how many. Over a group ``cos 2(t - t0)`` exceeds its larger value at the ends by no more
-    than ``1 - cos`` of half its width.
+    The mark is a positive number; returns how many there are. Over a group ``cos 2(t - t0)``
+    exceeds its larger value at the ends by no more than ``1 - cos`` of half its width.
     """
-    m0, d0, p0, m1, d1, p1 = one[0], one[1], one[2], one[3], one[4], one[5]
-    m2, d2, p2 = one[6], one[7], one[8]
-    size_0, size_1, size_2 = (
-        math.sqrt(d0 * d0 + p0 * p0),
-        math.sqrt(d1 * d1 + p1 * p1),
-        math.sqrt(d2 * d2 + p2 * p2),
-    )
+    # Three inner Bernstein coefficients: mean m, difference d, product p
+    m0, d0, p0 = step[0], step[1], step[2]
+    m1, d1, p1 = step[3], step[4], step[5]
+    m2, d2, p2 = step[6], step[7], step[8]
+    # Amplitudes over the azimuths
+    size_0 = math.sqrt(d0 * d0 + p0 * p0)
+    size_1 = math.sqrt(d1 * d1 + p1 * p1)
+    size_2 = math.sqrt(d2 * d2 + p2 * p2)
     count = 0
     for j in range(floors.size):
         c0, s0, c1, s1, rise = edges[0, j], edges[1, j], edges[2, j], edges[3, j], edges[4, j]
+        # Larger value at the ends of the group, and its rise in between
         early = m0 + max(d0 * c0 + p0 * s0, d0 * c1 + p0 * s1) + size_0 * rise
         middle = m1 + max(d1 * c0 + p1 * s0, d1 * c1 + p1 * s1) + size_1 * rise
         late = m2 + max(d2 * c0 + p2 * s0, d2 * c1 + p2 * s1) + size_2 * rise
@@ -168,7 +211,7 @@ def _mark_groups(one, edges, floors, marks):
 
 
 @kernel
-def _lower(best, floors):
+def _fill_group_floors(best, floors):
     """Fill the smallest of the largest squares of each group of azimuths."""
     for j in range(best.size // GROUP):
         floors[j] = best[j * GROUP]
@@ -179,52 +222,71 @@ def _lower(best, floors):
 @kernel
 def search_steps(steps, oscillator, directions, edges, best):
     """
-    Raise the largest squares along all azimuths to those in the listed steps, between their samples too.
+    Raise the largest squares along all azimuths to those in the listed steps, between samples too.
 
-    ``edges`` (5, groups): cosine and sine of twice the first and the last azimuth of each group,
-    and what may lie between; filled up with zeros to a multiple of the widest vector.
+    Parameters
+    ----------
+    steps : (count, COLUMNS) ndarray
+        From `list_steps`.
+    oscillator : Oscillator
+        Lane, phase of a step (rad), damping (fraction of critical), and share: 1 for the radius, 0
+        for the displacement.
+    directions : (4, n_azimuths) ndarray
+        Cosine and sine of the azimuths, then of twice them; a whole number of groups.
+    edges : (5, n_groups) ndarray
+        Cosine and sine of twice the first and of twice the last azimuth of each group, and the rise
+        of a cosine in between; filled up with zeros to a multiple of the widest vector.
+    best : (n_azimuths,) ndarray
+        Largest squared radius or displacement along each azimuth, raised in place, in the squared
+        unit of the acceleration (over ``omega⁴``).
     """
     floors, marks = np.full(edges.shape[1], np.inf), np.empty(edges.shape[1])
-    problems, places, largest = np.empty((4, LANES)), np.zeros(LANES, np.int64), np.empty(GROUP)
-    _lower(best, floors)
+    # Problems, one per step and azimuth, that are solved next to each other
+    problems, azimuths = np.empty((4, LANES)), np.zeros(LANES, np.int64)
+    largest = np.empty(GROUP)
+    _fill_group_floors(best, floors)
     count = 0
     for number in range(steps.shape[0]):
-        one = steps[number]
-        if _mark_groups(one, edges, floors, marks) == 0:
+        step = steps[number]
+        if _mark_groups(step, edges, floors, marks) == 0:
             continue
         for j in range(marks.size):
             if marks[j] > 0.0:
+                # Solve the problems when another group might not fit
                 if count + GROUP > LANES:
-                    raise_to_peaks(problems, places, count, oscillator, best)
-                    _lower(best, floors)
+                    raise_to_step_peaks(problems, azimuths, count, oscillator, best)
+                    _fill_group_floors(best, floors)
                     count = 0
                 count = _add_problems(
-                    one, j * GROUP, directions, best, largest, problems, places, count
+                    step, j * GROUP, directions, best, largest, problems, azimuths, count
                 )
-    raise_to_peaks(problems, places, count, oscillator, best)
+    raise_to_step_peaks(problems, azimuths, count, oscillator, best)
 
 
 @kernel
-def _add_problems(one, first, directions, best, largest, problems, places, count):
-    """Add those azimuths of a group along which a step may hold more than their own maximum; return the new count."""
+def _add_problems(step, first, directions, best, largest, problems, azimuths, count):
+    """
+    Add those azimuths of a group along which a step may hold more than their own maximum.
+
+    Returns the new number of problems.
+    """
+    # Largest Bernstein coefficient along each azimuth
     for k in range(GROUP):
         c2, s2 = directions[2, first + k], directions[3, first + k]
-        early = one[0] + (one[1] * c2 + one[2] * s2)
-        middle = one[3] + (one[4] * c2 + one[5] * s2)
-        late = one[6] + (one[7] * c2 + one[8] * s2)
+        early = step[0] + (step[1] * c2 + step[2] * s2)
+        middle = step[3] + (step[4] * c2 + step[5] * s2)
+        late = step[6] + (step[7] * c2 + step[8] * s2)
         largest[k] = max(early, middle, late)
     for k in range(GROUP):
-        place = first + k
-        if largest[k] > best[place]:
-            c, s = directions[0, place], directions[1, place]
-            problems[0, count], problems[1, count] = (
-                c * one[9] + s * one[11],
-                c * one[10] + s * one[12],
-            )
-            problems[2, count], problems[3, count] = (
-                c * one[13] + s * one[15],
-                c * one[14] + s * one[16],
-            )
-            places[count] = place
+        azimuth = first + k
+        if largest[k] > best[azimuth]:
+            # State and accelerations along the azimuth
+            c, s = directions[0, azimuth], directions[1, azimuth]
+            problems[0, count] = c * step[9] + s * step[11]
+            problems[1, count] = c * step[10] + s * step[12]
+            # Acceleration before and after the step
+            problems[2, count] = c * step[13] + s * step[15]
+            problems[3, count] = c * step[14] + s * step[16]
+            azimuths[count] = azimuth
             count += 1
     return count

@@ -1,9 +1,9 @@
 r"""
-Largest squares within many independent steps of one oscillator, side by side.
+Largest squares within many independent steps of one oscillator, computed next to each other.
 
-As in `between`, by Taylor series and the roots of ``z`` and ``2 xi z + a``. Where the linear term
-of such a condition outweighs all others it has one root at most, which Newton's method finds from
-the chord; every other step is left to `between`.
+As in `within_step`, by Taylor series and the roots of ``z`` and ``2 xi z + a``. Where the linear
+term of such a condition outweighs all others it has one root at most, which Newton's method finds
+from the chord; every other step is left to `within_step`.
 """
 
 import numpy as np
@@ -17,15 +17,15 @@ from per_obspy.kernels.oscillator.within_step import (
     series_terms,
     workspace,
 )
-from per_obspy.kernels.spectra.blocks import LANES
+from per_obspy.kernels.spectra.tile_search import LANES
 
 NEWTON_STEPS = 6
 
 
 @kernel
-def raise_to_peaks(problems, places, count, oscillator, best):
+def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
     """
-    Raise the largest squares at the places to those within the steps.
+    Raise the largest squares along the problems' azimuths to those within their steps.
 
     ``problems`` (4, lanes): u, z and the acceleration at the start, and the acceleration at the
     end. Only the first ``count`` are looked at.
@@ -34,66 +34,70 @@ def raise_to_peaks(problems, places, count, oscillator, best):
     squares, doubts = np.zeros(LANES), np.ones(LANES)
     for row in range(4):
         problems[row, count:] = 0.0
+    # Short steps: all problems next to each other
     if phase <= LONGEST_SPAN:
         doubts[:] = 0.0
-        _peaks(problems, phase, damping, share, squares, doubts)
-    here, wanted, work = np.empty(4), np.zeros(4, np.bool_), workspace()
-    wanted[0], wanted[1] = share == 1.0, True
+        _raise_to_roots(problems, phase, damping, share, squares, doubts)
+    # Doubtful ones alone: at z = 0, for the radius also at 2 xi z + a = 0
+    largest, selected, work = np.empty(4), np.zeros(4, np.bool_), workspace()
+    selected[0] = share == 1.0
+    selected[1] = True
     for lane in range(count):
         if doubts[lane] > 0.0:
-            here[:] = 0.0
-            u, z, start, end = (
-                problems[0, lane],
-                problems[1, lane],
-                problems[2, lane],
-                problems[3, lane],
-            )
-            largest_in_step(u, z, start, end, damping, phase, wanted, work, here)
-            squares[lane] = here[0] if share == 1.0 else here[1] * here[1]
-        best[places[lane]] = max(best[places[lane]], squares[lane])
+            largest[:] = 0.0
+            u, z = problems[0, lane], problems[1, lane]
+            start, end = problems[2, lane], problems[3, lane]
+            largest_in_step(u, z, start, end, damping, phase, selected, work, largest)
+            squares[lane] = largest[0] if share == 1.0 else largest[1] * largest[1]
+        best[azimuths[lane]] = max(best[azimuths[lane]], squares[lane])
 
 
 @kernel
-def _peaks(problems, phase, damping, share, squares, doubts):
-    """Raise the squares to those at the roots of the conditions; mark the lanes where these are not sure."""
+def _raise_to_roots(problems, phase, damping, share, squares, doubts):
+    """Raise the squares to those at the roots of the conditions; mark the lanes in doubt."""
+    # An even number of terms
     pairs = (series_terms(phase) + 1) // 2
-    motion, condition = np.empty((2 * pairs + 2, LANES)), np.empty((2 * pairs, LANES))
-    _fill_motion(problems, phase, damping, motion)
+    displacement = np.empty((2 * pairs + 2, LANES))
+    condition = np.empty((2 * pairs, LANES))
     roots = np.empty(LANES)
+    _fill_displacement(problems, phase, damping, displacement)
     for number in range(2 if share == 1.0 else 1):
-        _fill_condition(number, problems, phase, damping, motion, condition)
+        _fill_condition(number, problems, phase, damping, displacement, condition)
         _find_roots(condition, phase, roots, doubts)
-        _raise_squares(motion, roots, share, squares)
+        _raise_squares(displacement, roots, share, squares)
 
 
 @kernel
-def _fill_motion(problems, phase, damping, motion):
-    """Fill the Taylor coefficients of the displacements, as `between.fill_series`."""
-    twice = 2.0 * damping
+def _fill_displacement(problems, phase, damping, displacement):
+    """Fill the Taylor coefficients of the displacements, as `within_step.fill_series`."""
+    viscosity = 2.0 * damping
     for lane in range(LANES):
-        u, z, start, end = (
-            problems[0, lane],
-            problems[1, lane],
-            problems[2, lane],
-            problems[3, lane],
-        )
-        motion[0, lane], motion[1, lane] = u, z
-        motion[2, lane] = -0.5 * (twice * z + u + start)
-        motion[3, lane] = -(2.0 * twice * motion[2, lane] + z + (end - start) / phase) / 6.0
-    for n in range(2, motion.shape[0] - 2):
-        factor, inverse = twice * (n + 1), INVERSES[n]
+        u, z = problems[0, lane], problems[1, lane]
+        start, end = problems[2, lane], problems[3, lane]
+        # State and acceleration at the start
+        displacement[0, lane] = u
+        displacement[1, lane] = z
+        second = -0.5 * (viscosity * z + u + start)
+        displacement[2, lane] = second
+        force_rate = 2.0 * viscosity * second + z + (end - start) / phase
+        displacement[3, lane] = -force_rate / 6.0
+    # Each later term from the two before
+    for n in range(2, displacement.shape[0] - 2):
+        factor, inverse = viscosity * (n + 1), INVERSES[n]
         for lane in range(LANES):
-            motion[n + 2, lane] = -(factor * motion[n + 1, lane] + motion[n, lane]) * inverse
+            force = factor * displacement[n + 1, lane] + displacement[n, lane]
+            displacement[n + 2, lane] = -force * inverse
 
 
 @kernel
-def _fill_condition(number, problems, phase, damping, motion, condition):
+def _fill_condition(number, problems, phase, damping, displacement, condition):
     """Fill the coefficients of ``z`` (number 0) or ``2 xi z + a`` (1)."""
     level = 1.0 if number == 0 else 2.0 * damping
     for n in range(condition.shape[0]):
         factor = level * (n + 1)
         for lane in range(LANES):
-            condition[n, lane] = factor * motion[n + 1, lane]
+            condition[n, lane] = factor * displacement[n + 1, lane]
+    # Acceleration, linear over the step
     if number == 1:
         for lane in range(LANES):
             condition[0, lane] += problems[2, lane]
@@ -102,35 +106,40 @@ def _fill_condition(number, problems, phase, damping, motion, condition):
 
 @kernel
 def _evaluate(series, phases, values, slopes):
-    """Fill the values and the derivatives of the series at their phases, two of an even number of terms at a time."""
+    """Fill the values and the derivatives of the series at their phases, by Horner's rule."""
     values[:] = 0.0
     slopes[:] = 0.0
+    # Two of an even number of terms at a time
     for n in range(series.shape[0] - 1, 0, -2):
         for lane in range(LANES):
             phase, value = phases[lane], values[lane]
-            between = value * phase + series[n, lane]
-            slopes[lane] = (slopes[lane] * phase + value) * phase + between
-            values[lane] = between * phase + series[n - 1, lane]
+            half = value * phase + series[n, lane]
+            slopes[lane] = (slopes[lane] * phase + value) * phase + half
+            values[lane] = half * phase + series[n - 1, lane]
 
 
 @kernel
 def _find_roots(condition, phase, roots, doubts):
-    """Fill the root of each condition within the step, or its start where there is none; mark what is not sure."""
+    """Fill the root of each condition within the step, or its start; mark the lanes in doubt."""
     higher, values, slopes = np.zeros(LANES), np.empty(LANES), np.empty(LANES)
     highest, tolerances = np.empty(LANES), np.empty(LANES)
+    # Bound of the terms above the linear one
     for n in range(condition.shape[0] - 1, 1, -1):
         for lane in range(LANES):
             higher[lane] = higher[lane] * phase + n * abs(condition[n, lane])
     roots[:] = phase
     _evaluate(condition, roots, values, slopes)
     for lane in range(LANES):
+        # One root at most where the linear term outweighs the others; begin at that of the chord
         start, end = condition[0, lane], values[lane]
         steep = higher[lane] * phase < abs(condition[1, lane])
         crossing = steep and start * end < 0.0
         doubts[lane] = doubts[lane] if steep else 1.0
         roots[lane] = phase * start / (start - end) if crossing else 0.0
+        # Lanes without a root stay at the start of the step
         highest[lane] = phase if crossing else 0.0
         tolerances[lane] = ROOT_TOLERANCE * phase * abs(condition[1, lane]) if crossing else np.inf
+    # Newton's method, on all lanes until each has converged
     for _ in range(NEWTON_STEPS):
         _evaluate(condition, roots, values, slopes)
         open_lanes = 0
@@ -141,15 +150,16 @@ def _find_roots(condition, phase, roots, doubts):
             roots[lane] = min(max(roots[lane] - change, 0.0), highest[lane])
         if open_lanes == 0:
             return
+    # Lanes that have not converged are in doubt
     _evaluate(condition, roots, values, slopes)
     for lane in range(LANES):
         doubts[lane] = 1.0 if abs(values[lane]) > tolerances[lane] else doubts[lane]
 
 
 @kernel
-def _raise_squares(motion, phases, share, squares):
+def _raise_squares(displacement, phases, share, squares):
     """Raise the squares to those at the phases."""
     u, z = np.empty(LANES), np.empty(LANES)
-    _evaluate(motion, phases, u, z)
+    _evaluate(displacement, phases, u, z)
     for lane in range(LANES):
         squares[lane] = max(squares[lane], u[lane] * u[lane] + share * z[lane] * z[lane])

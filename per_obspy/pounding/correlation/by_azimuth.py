@@ -15,8 +15,8 @@ from scipy import fft
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.relative.input_moments import TILE, input_moments
-from per_obspy.kernels.relative.worst_azimuth import furthest_apart
+from per_obspy.kernels.relative.input_moments import LAG_TILE, input_moments
+from per_obspy.kernels.relative.worst_azimuth import largest_separation
 from per_obspy.pounding.structure import checked_oscillators
 
 
@@ -156,7 +156,7 @@ def worst_azimuth(
 
     # The direction of the longest vector q1 u1 - q2 u2 is the azimuth
     vector = np.empty((2, pairs.shape[1]))
-    furthest_apart(north, east, step, np.ascontiguousarray(pairs), vector)
+    largest_separation(north, east, step, np.ascontiguousarray(pairs), vector)
     azimuth: FloatArray = np.degrees(np.arctan2(vector[1], vector[0])) % 360.0
     return azimuth
 
@@ -195,7 +195,7 @@ def _sample_products(north: FloatArray, east: FloatArray) -> tuple[FloatArray, F
     power_both = 2.0 * (spectra[0].conj() * spectra[1]).real
     power_east = np.abs(spectra[1]) ** 2
     powers = np.stack([power_north, power_both, power_east])
-    lagged, firsts = np.zeros((2, 3, -(-count // TILE) * TILE + 2))
+    lagged, firsts = np.zeros((2, 3, -(-count // LAG_TILE) * LAG_TILE + 2))
     lagged[:, :count] = fft.irfft(powers, padded)[:, :count]
 
     # Products of the first sample with the sample at each distance

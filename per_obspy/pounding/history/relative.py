@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.relative.maxima import relative_maxima
+from per_obspy.kernels.relative.relative_maxima import relative_maxima
 from per_obspy.pounding.history.tables import closed_record
 from per_obspy.pounding.structure import checked_oscillators
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.kernels.oscillator import within_step
-from per_obspy.kernels.oscillator.exact_step import step
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
 
 
 def _series(*coefficients):
@@ -36,9 +36,9 @@ def test_no_root_is_missed(roots):
 
 def _largest(u, z, start, end, damping, phase):
     largest = np.zeros(4)
-    wanted = np.ones(4, dtype=bool)
+    selected = np.ones(4, dtype=bool)
     within_step.largest_in_step(
-        u, z, start, end, damping, phase, wanted, within_step.workspace(), largest
+        u, z, start, end, damping, phase, selected, within_step.workspace(), largest
     )
     return largest
 
@@ -47,12 +47,10 @@ def _dense(case, parts):
     u, z, start, end, damping, phase = case
     values = []
     for part in np.linspace(1 / parts, 1, parts):
-        a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase * part)
+        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(1.0, damping, phase * part)
         stop = start + (end - start) * part
-        x, w = (
-            a11 * u + a12 * z + b11 * start + b12 * stop,
-            a21 * u + a22 * z + b21 * start + b22 * stop,
-        )
+        x = a11 * u + a12 * z + b11 * start + b12 * stop
+        w = a21 * u + a22 * z + b21 * start + b22 * stop
         values.append((x * x + w * w, abs(x), abs(w), abs(x + 2 * damping * w)))
     return np.max(values, axis=0)
 
@@ -79,17 +77,15 @@ def test_largest_values_of_a_step(case):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_what_is_not_wanted_cannot_matter(seed):
+def test_conditions_that_are_not_selected_cannot_matter(seed):
     # catches bounds that are too small: values between the samples never exceed the largest unless
     # marked
     random = np.random.default_rng(seed)
     u, z, start, end = random.normal(size=4)
     damping, phase = random.uniform(0, 0.9), random.uniform(0.05, 3.0)
-    a11, a12, a21, a22, b11, b12, b21, b22 = step(1.0, damping, phase)
-    u_end, z_end = (
-        a11 * u + a12 * z + b11 * start + b12 * end,
-        a21 * u + a22 * z + b21 * start + b22 * end,
-    )
+    a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(1.0, damping, phase)
+    u_end = a11 * u + a12 * z + b11 * start + b12 * end
+    z_end = a21 * u + a22 * z + b21 * start + b22 * end
     dense = _dense((u, z, start, end, damping, phase), 200)
     square = max(u * u + z * z, u_end * u_end + z_end * z_end)
     radius = within_step.radius_bound(square, max(abs(start), abs(end)), damping, phase)
@@ -113,10 +109,10 @@ def test_what_is_not_wanted_cannot_matter(seed):
     known = np.full(4, np.inf)
     for row in range(4):
         known[row] = dense[row] * (1 - 1e-6)
-        wanted = np.zeros(4, dtype=bool)
-        within_step.find_wanted(
-            u, z, start, u_end, z_end, end, damping, phase, radius, 4, known, wanted
+        selected = np.zeros(4, dtype=bool)
+        within_step.select_conditions(
+            u, z, start, u_end, z_end, end, damping, phase, radius, 4, known, selected
         )
         if ends[:, row].max() < known[row]:
-            assert wanted.any()
+            assert selected.any()
         known[row] = np.inf

@@ -26,9 +26,8 @@ def test_uncorrelated_radii_fall_together(share):
 def test_limits():
     assert least(5.0 * (1.0 + 1e-12)) == 0.0  # but for rounding of logarithms
     assert np.isnan(least(5.0 * 0.3))  # 0.506 would be needed
-    assert np.isnan(
-        least(4.9, dampings=DAMPINGS[:1], stored=STORED[..., :1].copy())
-    )  # one damping tells nothing
+    # one stored damping has no slope
+    assert np.isnan(least(4.9, dampings=DAMPINGS[:1], stored=STORED[..., :1].copy()))
 
 
 def test_correlated_buildings_of_equal_period_keep_the_difference_of_their_radii():

@@ -1,4 +1,4 @@
-"""Probability over resampled buildings without any wrapper, so short that it also runs uncompiled."""
+"""Probability over resampled buildings, the kernel alone; it also runs uncompiled."""
 
 import numpy as np
 import pytest
@@ -13,23 +13,9 @@ STORED = RANDOM.normal(size=(2, 3, 5))
 NODES = RANDOM.normal(size=(7, 4))
 #: Azimuth; period, damping, their dispersions, radius of 1 and of 2; gap, dispersion. Nodes reach
 #: beyond the grid.
-PAIR = np.array(
-    [
-        1,
-        np.log(0.4),
-        np.log(0.05),
-        0.9,
-        0.5,
-        -1.0,
-        np.log(1.5),
-        np.log(0.04),
-        0.8,
-        0.6,
-        -1.3,
-        0.2,
-        0.3,
-    ]
-)
+BUILDING_1 = (np.log(0.4), np.log(0.05), 0.9, 0.5, -1.0)
+BUILDING_2 = (np.log(1.5), np.log(0.04), 0.8, 0.6, -1.3)
+PAIR = np.array([1, *BUILDING_1, *BUILDING_2, 0.2, 0.3])
 
 
 def chance(*rows, grid=(PERIODS, DAMPINGS, STORED), nodes=NODES):
@@ -40,8 +26,8 @@ def chance(*rows, grid=(PERIODS, DAMPINGS, STORED), nodes=NODES):
 
 def changed(**values):
     pair = PAIR.copy()
-    for place, value in values.items():
-        pair[int(place[1:])] = value
+    for column, value in values.items():
+        pair[int(column[1:])] = value
     return pair
 
 
@@ -50,23 +36,16 @@ def expected(pair, periods=PERIODS, dampings=DAMPINGS, stored=STORED):
     table = RegularGridInterpolator((dampings, periods), stored[int(pair[0])])
 
     def stored_at(period, damping):
-        return table(
-            np.stack(
-                [
-                    np.clip(damping, dampings[0], dampings[-1]),
-                    np.clip(period, periods[0], periods[-1]),
-                ],
-                -1,
-            )
-        )
+        inside = np.clip(damping, *dampings[[0, -1]]), np.clip(period, *periods[[0, -1]])
+        return table(np.stack(inside, -1))
 
-    radii, places = [], []
+    radii, oscillators = [], []
     for body, (by_period, by_damping) in enumerate((NODES.T[:2], NODES.T[2:])):
         own = pair[1 + 5 * body : 6 + 5 * body]
         period, damping = own[0] + by_period * own[2], own[1] + by_damping * own[3]
         radii.append(np.exp(own[4] + stored_at(period, damping) - stored_at(own[0], own[1])))
-        places.append((np.exp(period), np.exp(damping)))
-    (t1, x1), (t2, x2) = places
+        oscillators.append((np.exp(period), np.exp(damping)))
+    (t1, x1), (t2, x2) = oscillators
     ratio = t2 / t1
     above = 8 * np.sqrt(x1 * x2) * (x2 + x1 * ratio) * ratio**1.5
     rho = above / (
@@ -91,20 +70,18 @@ def test_against_scipy():
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_grid_of_one_point_is_the_same_everywhere(axis):
-    # mutation: a neighbour looked for that is not there
+    # mutation: a neighbour that does not exist
     grid = [PERIODS, DAMPINGS, STORED]
     twice = [PERIODS, DAMPINGS, STORED]
     grid[axis], twice[axis] = grid[axis][:1], np.array([-5.0, 5.0])
-    one = STORED[..., :1] if axis == 0 else STORED[:, :1]
-    grid[2], twice[2] = (
-        np.ascontiguousarray(one),
-        np.ascontiguousarray(np.repeat(one, 2, axis=2 - axis)),
-    )
+    point = STORED[..., :1] if axis == 0 else STORED[:, :1]
+    grid[2] = np.ascontiguousarray(point)
+    twice[2] = np.ascontiguousarray(np.repeat(point, 2, axis=2 - axis))
     assert chance(PAIR, grid=tuple(grid))[0] == pytest.approx(expected(PAIR, *twice), rel=1e-12)
 
 
-def test_what_is_certain():
-    # mutation: a logarithm of nothing, a division by no dispersion
+def test_certain_pairs():
+    # mutation: a logarithm of zero, a division by no dispersion
     twins = changed(
         p6=PAIR[1], p7=PAIR[2], p10=PAIR[5], **dict.fromkeys(("p3", "p4", "p8", "p9"), 0.0)
     )
@@ -115,7 +92,7 @@ def test_what_is_certain():
     assert chance(changed(p12=1e-9))[0] * len(NODES) == pytest.approx(sharp, abs=1e-12)
 
 
-def test_pairs_do_not_depend_on_their_company():
+def test_pairs_do_not_depend_on_each_other():
     pairs = [PAIR, changed(p0=0), changed(p11=0.1), changed(p1=-1.0)]
     assert chance(*pairs).tolist() == [chance(pair)[0] for pair in pairs]
 

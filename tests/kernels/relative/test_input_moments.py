@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from per_obspy.kernels.oscillator.exact_step import state_after
-from per_obspy.kernels.relative.input_moments import TILE, input_moments
+from per_obspy.kernels.relative.input_moments import LAG_TILE, input_moments
 
 DT, OMEGAS, DAMPINGS = 0.1, np.array([0.5, 4.0, 25.0]), np.array([0.0, 0.05, 0.2])
 
@@ -20,21 +20,27 @@ def record(count):
 
 def moments(north, east, omegas=OMEGAS, dampings=DAMPINGS):
     count = north.size
-    lagged, firsts = np.zeros((2, 3, -(-count // TILE) * TILE + 2))
-    for row, (one, other) in enumerate(((north, north), (north, east), (east, east))):
+    lagged, firsts = np.zeros((2, 3, -(-count // LAG_TILE) * LAG_TILE + 2))
+    for row, (first, second) in enumerate(((north, north), (north, east), (east, east))):
         products = [
-            one[: count - lag] @ other[lag:] + other[: count - lag] @ one[lag:]
+            first[: count - lag] @ second[lag:] + second[: count - lag] @ first[lag:]
             for lag in range(count)
         ]
         lagged[row, :count] = products if row == 1 else np.array(products) / 2
-        firsts[row, :count] = one[0] * other + other[0] * one if row == 1 else one[0] * other
+        firsts[row, :count] = first[0] * second
+        if row == 1:
+            firsts[row, :count] += second[0] * first
     found = np.empty((omegas.size, 2, 3))
     input_moments(lagged, firsts, DT, omegas, dampings, np.arange(omegas.size)[::-1].copy(), found)
     return found
 
 
 def integrals(ground, omega, damping, parts=64):
-    """Integrals of u a and v a by Boole's rule on each step cut into parts; its error falls like (ω dt / parts)⁶."""
+    """
+    Return the integrals of u a and v a by Boole's rule on each step cut into parts.
+
+    Its error falls like (ω dt / parts)⁶.
+    """
     weights = np.zeros(parts + 1)
     for first in range(0, parts, 4):
         weights[first : first + 5] += np.array([7, 32, 12, 32, 7]) * 2 / 45 * DT / parts
@@ -43,9 +49,9 @@ def integrals(ground, omega, damping, parts=64):
     for start, end in pairwise(ground):
         rate = (end - start) / DT
         for part, weight in enumerate(weights):
-            here = state_after(part / parts * DT, u, v, omega, damping, start, rate)
-            total += weight * np.array(here) * (start + (end - start) * part / parts)
-        u, v = here
+            state = state_after(part / parts * DT, u, v, omega, damping, start, rate)
+            total += weight * np.array(state) * (start + (end - start) * part / parts)
+        u, v = state
     return total
 
 
@@ -72,7 +78,7 @@ def test_work_of_the_ground_is_the_energy_of_an_undamped_oscillator():
     assert moments(north, east)[0, 1, 0] == pytest.approx(-energy, rel=1e-12)
 
 
-def test_what_an_oscillator_forgets_does_not_count():
+def test_forgotten_lags_do_not_count():
     # mutation: lags cut at a larger remainder, or for the fastest oscillator of a block instead of
     # each
     quiet = np.concatenate([np.full(5, 1.0), np.full(250, 0.3), [0.0]])

@@ -1,16 +1,16 @@
-"""Elementary functions of rows against SciPy and the standard library."""
+"""Functions of rows of numbers against SciPy and NumPy."""
 
 import numpy as np
 from scipy.special import ndtr
 
-from per_obspy.kernels.elementary import (
+from per_obspy.kernels.vector_functions import (
     exponentials,
     exponentials_less_one,
     logarithms,
     normal_tails,
 )
 
-ROOM = np.empty(200, np.int64)
+SCRATCH = np.empty(200, np.int64)
 
 
 def test_exponentials():
@@ -19,7 +19,7 @@ def test_exponentials():
         [np.linspace(-700.0, 700.0, 100), np.linspace(-1.0, 1.0, 97), [0.0, -1e3, -np.inf]]
     )
     found = x.copy()
-    exponentials(found, ROOM)
+    exponentials(found, SCRATCH)
     np.testing.assert_allclose(
         found[:-2], np.exp(x[:-2]), rtol=1e-15
     )  # a few units of the last place
@@ -38,7 +38,7 @@ def test_exponentials_less_one():
         ]
     )
     found = x.copy()
-    exponentials_less_one(found, ROOM)
+    exponentials_less_one(found, SCRATCH)
     np.testing.assert_allclose(found, np.expm1(x), rtol=1e-15)
 
 
@@ -46,17 +46,17 @@ def test_logarithms():
     # mutation: mantissa from 1 to 2, whose series is too short; the exponent's sign
     x = np.concatenate([np.geomspace(1e-300, 1e300, 100), np.linspace(0.5, 2.0, 99), [1.0]])
     found = x.copy()
-    logarithms(found, ROOM)
+    logarithms(found, SCRATCH)
     np.testing.assert_allclose(found, np.log(x), rtol=1e-15, atol=1e-16)
     assert found[-1] == 0.0
 
 
 def test_normal_tails():
-    # mutation: the lower tail; an error near 0 or far out. Rounding of x² counts x² times: 3e-13 at
-    # 36
+    # mutation: the lower tail; an error near 0 or far out. Rounding of x² counts x² times: 3e-13
+    # at 36
     x = np.concatenate([np.linspace(-6.0, 6.0, 150), np.linspace(6.0, 36.0, 47), [0.0, 1e3, -1e3]])
     found = x.copy()
-    normal_tails(found, np.empty(200), ROOM)
+    normal_tails(found, np.empty(200), SCRATCH)
     np.testing.assert_allclose(found[:-2], ndtr(-x[:-2]), rtol=5e-13)
     np.testing.assert_allclose(found, ndtr(-x), atol=5e-15)
     assert found[-1] == 1.0

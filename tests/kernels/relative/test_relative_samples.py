@@ -1,0 +1,52 @@
+"""Shifted states and relative displacements of blocks of pairs, against the plain step."""
+
+import numpy as np
+import pytest
+
+from per_obspy.kernels.relative.relative_samples import (
+    DISTANCE,
+    EXTREMES,
+    GREATEST,
+    LEAST,
+    PAIR_CHECKPOINT_ROWS,
+    PAIR_LANES,
+    PAIR_ROWS,
+    pack_pair,
+    run_pair_tiles,
+    start_pairs_at_rest,
+    state_of,
+)
+from per_obspy.kernels.spectra.tile_search import TILE
+
+DT, LANE = 0.1, 7
+
+
+@pytest.mark.parametrize("period", [0.5, 3.0, 0.1, 0.05, 0.025])
+def test_shifted_states_are_the_states(period, plain_states):
+    # mutation: shift, rotation or scale not undone; at 0.1 s / k the undamped input vanishes and
+    # cannot be scaled
+    ground = np.random.default_rng(2).standard_normal((2, 2 * TILE + 1))
+    damping = 0.05 if period > DT else 0.0
+    pair = np.array([2 * np.pi / period, damping, 1.2, 5.0, 0.02, 0.9, 0.8, 0.6])
+    table = np.empty((PAIR_ROWS, PAIR_LANES))
+    checkpoints = np.empty((2, PAIR_CHECKPOINT_ROWS, PAIR_LANES))
+    for lane in range(PAIR_LANES):
+        pack_pair(pair, DT, table, lane)
+    start_pairs_at_rest(ground[0, 0], ground[1, 0], table)
+    run_pair_tiles(ground[0], ground[1], table, checkpoints)
+
+    along = pair[6] * ground[0] + pair[7] * ground[1]
+    # plain states, from units of a / omega² to m
+    states = [plain_states(along, pair[row] * DT, pair[row + 1]) / pair[row] ** 2 for row in (0, 3)]
+    distance = pair[2] * states[0][:, 0] - pair[5] * states[1][:, 0]
+    tolerance = 1e-13 * np.abs(distance).max()  # rounding of 128 steps
+    tiles = distance[: TILE + 1], distance[TILE:]
+    greatest, least = checkpoints[:, GREATEST, LANE], checkpoints[:, LEAST, LANE]
+    np.testing.assert_allclose(greatest, [tile.max() for tile in tiles], atol=tolerance)
+    np.testing.assert_allclose(least, [tile.min() for tile in tiles], atol=tolerance)
+    for body in range(2):
+        shifted = checkpoints[1, 2 * body : 2 * body + 2, LANE]
+        found = state_of(body, table, LANE, *shifted, along[TILE])
+        np.testing.assert_allclose(found, states[body][TILE], atol=tolerance)
+    assert table[EXTREMES, LANE] == checkpoints[1, GREATEST, LANE]
+    assert table[DISTANCE, LANE] != 0.0

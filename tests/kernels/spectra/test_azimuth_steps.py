@@ -1,0 +1,133 @@
+"""Bounds that rule out steps along many azimuths, and the search of the steps that remain."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from per_obspy.kernels.oscillator import within_step
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.spectra import azimuth_samples, azimuth_steps
+from per_obspy.kernels.spectra.azimuth_samples import GROUP, Oscillator
+from per_obspy.kernels.spectra.tile_search import LANES, TILE, tile_extremes
+
+ANGLES = np.radians(np.arange(0.0, 180.0, 7.5))
+DIRECTIONS = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)])
+#: Values per step of the fine states.
+PARTS = 20
+
+
+def _record(tiles):
+    ground = np.zeros((2, tiles * TILE + 1))
+    noise = np.random.default_rng(6).normal(size=(2, tiles * TILE))
+    ground[:, :-1] = noise * [[1.0], [0.3]]
+    return ground
+
+
+def _extremes(ground):
+    """Return largest accelerations and changes of each tile, (2, component, tile)."""
+    extremes = np.empty((2, 2, (ground.shape[1] - 1) // TILE))
+    for component, motion in enumerate(ground):
+        tile_extremes(motion, extremes[0, component], extremes[1, component])
+    return extremes
+
+
+def _checkpoints(ground, phase, damping):
+    packed, state = np.empty((8, LANES)), np.zeros((4, LANES))
+    checkpoints = np.empty(((ground.shape[1] - 1) // TILE, 6, LANES))
+    azimuth_samples.pack_steps(np.full(LANES, phase), np.full(LANES, damping), packed)
+    azimuth_samples.run_azimuth_tiles(*ground, packed, state, checkpoints)
+    return checkpoints
+
+
+def _edges():
+    """Return the edges of the groups of azimuths, filled up with zeros."""
+    firsts, lasts = DIRECTIONS[2:, ::GROUP], DIRECTIONS[2:, GROUP - 1 :: GROUP]
+    rise = 1.0 - np.cos(ANGLES[GROUP - 1 :: GROUP] - ANGLES[::GROUP])
+    edges = np.concatenate([firsts, lasts, rise[np.newaxis]])
+    return np.pad(edges, ((0, 0), (0, -rise.size % GROUP)))
+
+
+def _fine_states(ground, phase, damping, plain_states):
+    """Return the states in equal parts of every step, (value, component, state)."""
+    samples = np.arange(ground.shape[1])
+    times = np.arange(PARTS * samples[-1] + 1) / PARTS
+    fine = [np.interp(times, samples, motion) for motion in ground]
+    return np.stack([plain_states(motion, phase / PARTS, damping) for motion in fine], axis=1)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("period", [4.0, 11.0, 60.0, 900.0])
+def test_steps_that_are_not_listed_hold_no_more_than_the_samples(period, share, plain_states):
+    # catches a bound that is too small, a slope with the wrong sign, and a floor above the largest
+    # squares; the search of the listed steps then gives the largest of all values
+    damping, phase = 0.05, 2.0 * np.pi / period
+    ground = _record(4)
+    checkpoints = _checkpoints(ground, phase, damping)
+    oscillator = Oscillator(0, phase, damping, share)
+    best, steps = np.zeros(ANGLES.size), np.empty((4 * TILE, azimuth_steps.COLUMNS))
+    azimuth_samples.raise_azimuths_to_samples(*ground, checkpoints, oscillator, DIRECTIONS, best)
+    count = azimuth_steps.list_steps(
+        *ground, *_extremes(ground), checkpoints, oscillator, DIRECTIONS, best, steps
+    )
+    states = _fine_states(ground, phase, damping, plain_states)
+    along = np.einsum("ick,ca->iak", states, DIRECTIONS[:2])
+    squares = along[..., 0] ** 2 + share * along[..., 1] ** 2
+    assert_allclose(best, squares[::PARTS].max(axis=0), rtol=1e-11)
+    listed = steps[:count, 9:13]
+    for i in range(4 * TILE):
+        if not np.any(np.all(np.abs(listed - states[PARTS * i].ravel()) < 1e-9, axis=1)):
+            within = squares[PARTS * i : PARTS * (i + 1) + 1].max(axis=0)
+            assert np.all(within <= best * (1 + 1e-12))
+    azimuth_steps.search_steps(steps[:count], oscillator, DIRECTIONS, _edges(), best)
+    dense = squares.max(axis=0)
+    assert np.all(best >= dense * (1 - 1e-11))
+    # parts miss a peak by h² / 8 of its second derivative, 2 a z' + 2 z a' with |z'| <= |a| + 1.1 r
+    peak = np.hypot(*np.abs(ground).max(axis=1))
+    radius = np.sqrt((states**2).sum(axis=(1, 2)).max())
+    curvature = 2.0 * (peak * (peak + 1.1 * radius) + radius * 2.0 * peak / phase)
+    assert_allclose(best, dense, rtol=1e-11, atol=(phase / PARTS) ** 2 / 8 * curvature)
+
+
+def _dense_step(states, ground, phase, damping, parts):
+    """Return the states in equal parts of a step from each state, (part, state, step)."""
+    dense = np.empty((parts + 1, 4, TILE))
+    for part in range(parts + 1):
+        share = max(part, 1e-3) / parts
+        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(1.0, damping, share * phase)
+        stop = ground[:, :-1] + (ground[:, 1:] - ground[:, :-1]) * part / parts
+        for row in (0, 2):
+            u, z = states[row, :-1], states[row + 1, :-1]
+            start, end = ground[row // 2, :-1], stop[row // 2]
+            dense[part, row] = a11 * u + a12 * z + b11 * start + b12 * end
+            dense[part, row + 1] = a21 * u + a22 * z + b21 * start + b22 * end
+    return dense
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("phase", [0.3, 1.0, 2.0, 3.0])
+def test_coefficients_of_a_step_are_never_exceeded(phase, share):
+    # catches a deviation from the cubic that is left out or too small, and slopes with the wrong
+    # sign or factor
+    damping = 0.1
+    random = np.random.default_rng(7)
+    states = random.normal(size=(4, TILE + 1))
+    ground = random.normal(size=(2, TILE + 1))
+    forms, slopes = np.empty((3, TILE + 1)), np.empty((3, TILE + 1))
+    inner, oscillator = np.empty((3, 3, TILE)), Oscillator(0, phase, damping, share)
+    dense = _dense_step(states, ground, phase, damping, 50)
+    for i in range(TILE):  # each step on its own: its end belongs to no other
+        ends = np.stack([states[:, i], dense[-1, :, i]], axis=1)
+        pair = np.concatenate([ends, np.zeros((4, TILE - 1))], axis=1)
+        motion = np.concatenate([ground[:, i : i + 2], np.zeros((2, TILE - 1))], axis=1)
+        azimuth_samples.fill_forms(pair, share, forms)
+        azimuth_steps._fill_slopes(pair, *motion, oscillator, slopes)
+        peak, jump = np.hypot(*np.abs(motion).max(axis=1)), np.hypot(*(motion[:, 1] - motion[:, 0]))
+        radius = within_step.radius_bound((ends**2).sum(axis=0).max(), peak, damping, phase)
+        _, bulge = azimuth_steps._bounds(radius, peak, jump, oscillator)
+        azimuth_steps._fill_coefficients(forms, slopes, bulge, inner)
+        for angle in np.linspace(0.0, np.pi, 7):
+            turned = np.array([1.0, np.cos(2 * angle), np.sin(2 * angle)])
+            bound = max((inner[:, :, 0] @ turned).max(), (forms[:, :2].T @ turned).max())
+            u = np.cos(angle) * dense[:, 0, i] + np.sin(angle) * dense[:, 2, i]
+            z = np.cos(angle) * dense[:, 1, i] + np.sin(angle) * dense[:, 3, i]
+            assert (u**2 + share * z**2).max() <= bound * (1 + 1e-12)

@@ -1,0 +1,63 @@
+"""Compiler options of all kernels: per_obspy.kernels._jit."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import config
+
+from per_obspy.kernels import _jit
+
+compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="kernels run uncompiled")
+
+DECORATORS = [_jit.kernel, _jit.lean, _jit.inlined]
+
+
+@pytest.mark.parametrize("decorator", DECORATORS)
+def test_nan_is_found(decorator):
+    # would catch: full fastmath, under which a kernel takes NaN for a number
+    @decorator
+    def is_nan(value):
+        return math.isnan(value)
+
+    assert is_nan(math.nan)
+    assert not is_nan(1.0)
+
+
+@compiled
+@pytest.mark.parametrize("decorator", DECORATORS)
+def test_division_by_zero_gives_infinity(decorator):
+    # would catch: Python's error model, which raises
+    @decorator
+    def quotient(above, below):
+        return above / below
+
+    assert quotient(1.0, 0.0) == math.inf
+
+
+@compiled
+@pytest.mark.parametrize("decorator", DECORATORS)
+def test_kernels_release_the_interpreter_and_are_stored(decorator):
+    @decorator
+    def double(value):
+        return 2.0 * value
+
+    assert double(1.5) == 3.0
+    assert double.targetoptions["nogil"]
+    assert double.stats.cache_path is not None
+
+
+def test_sums_keep_their_order():
+    # would catch: reassociation, after which a result depends on the length of a vector
+    @_jit.kernel
+    def total(values):
+        result = 0.0
+        for i in range(values.size):
+            result += values[i]
+        return result
+
+    values = np.random.default_rng(0).normal(size=1001) * 10.0 ** np.arange(-8, 9).repeat(60)[:1001]
+    expected = 0.0
+    for value in values.tolist():
+        expected += value
+    assert total(values) == expected
