@@ -16,7 +16,7 @@ from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.errors import RecordRejected
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import bytes_hash, file_hash, written_whole
 
 #: words of ``trace.stats`` that are kept where a trace has them
 WORDS = (
@@ -56,9 +56,16 @@ def write_description(path: Path, facts: dict[str, Any]) -> None:
         part.write_text(json.dumps({"shard": file_hash(path), **facts}), encoding="utf-8")
 
 
-def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
+def read_descriptions(path: Path, content: bytes | None = None) -> list[dict[str, Any]] | None:
     """
     Return what the JSON beside a MiniSEED file tells of its traces, or None where there is none.
+
+    Parameters
+    ----------
+    path : Path
+        MiniSEED file.
+    content : bytes, optional
+        Its bytes, where it has been read already.
 
     Raises
     ------
@@ -71,23 +78,33 @@ def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
         told = note["shard"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    if told != file_hash(path):
+    found = file_hash(path) if content is None else bytes_hash(content)
+    if told != found:
         raise RecordRejected(
             str(path), f"{path.with_suffix('.json').name} describes another file of this name"
         )
     return descriptions
 
 
-def described(stream: Stream, path: Path) -> Stream:
+def described(stream: Stream, path: Path, content: bytes | None = None) -> Stream:
     """
     Return traces just read from a file with what the JSON beside it tells of them; as they are where there is none.
+
+    Parameters
+    ----------
+    stream : Stream
+        Traces of the file.
+    path : Path
+        MiniSEED file.
+    content : bytes, optional
+        Its bytes, where it has been read already.
 
     Raises
     ------
     RecordRejected
         If the JSON tells of another file, or of other traces.
     """
-    descriptions = read_descriptions(path)
+    descriptions = read_descriptions(path, content)
     if descriptions is None:
         return stream
     if [one["npts"] for one in descriptions] != [trace.stats.npts for trace in stream]:

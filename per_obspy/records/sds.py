@@ -8,7 +8,7 @@ from obspy import Inventory, Stream, UTCDateTime
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.records.folder import (
-    FolderContents,
+    SourceContents,
     merged_inventory,
     read_inventories,
     read_station,
@@ -19,7 +19,7 @@ _DAY = 86400.0  # s
 
 def find_sds_stations(
     archive: str | Path, start: UTCDateTime, end: UTCDateTime, stationxml: str | Path | None = None
-) -> FolderContents:
+) -> SourceContents:
     """
     Find the stations of an SDS archive that have day files in a time window, from the names of the files only.
 
@@ -54,7 +54,7 @@ def find_sds_stations(
             str(folder), f"no day file YEAR/NET/STA/CHAN.D/... from {start} to {end}"
         )
     inventory = merged_inventory([] if stationxml is None else read_inventories(Path(stationxml)))
-    return FolderContents(
+    return SourceContents(
         {name: tuple(paths) for name, paths in sorted(stations.items())}, inventory, ()
     )
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pyarrow.parquet as pq
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binom
@@ -14,17 +13,16 @@ from scipy.stats import binom
 from per_obspy.files import written_whole
 from per_obspy.report.style import BUILDING_COLOURS, MOTION_COLOUR, save
 from per_obspy.screening.region.evaluation import Evaluation, evaluation
-from per_obspy.tables.risk import ranked
 
 
-def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
+def write_evaluation(risk: pd.DataFrame, folder: Path, simulated: bool) -> list[Path]:
     """
     Compare the pairs that somebody looked at with the prediction; without any, files of an earlier run are removed.
 
     Parameters
     ----------
-    risk : Path
-        Parquet file of the risk table; only with a column ``observed`` there is something to
+    risk : DataFrame
+        Risk table, or its observed pairs; only with a column ``observed`` there is something to
         compare.
     folder : Path
         For ``evaluation.json`` and, where there are probabilities, ``figures/reliability.png``.
@@ -39,26 +37,15 @@ def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
     table, figure = folder / "evaluation.json", folder / "figures" / "reliability.png"
     for old in (table, figure):
         old.unlink(missing_ok=True)
-    seen = _observed(risk)
-    if seen.empty:
+    if "observed" not in risk or risk["observed"].isna().all():
         return []
-    found = evaluation(seen)
+    found = evaluation(risk)
     with written_whole(table) as part:
         part.write_text(json.dumps(_plain(found), indent=1, allow_nan=False), encoding="utf-8")
     if found.reliability.empty:
         return [table]
     draw_reliability(found, figure, simulated)
     return [table, figure]
-
-
-def _observed(risk: Path) -> pd.DataFrame:
-    """Return the pairs that somebody looked at."""
-    names = ["observed", "state", "probability"]
-    if "observed" not in pq.read_schema(risk).names:
-        return pd.DataFrame(columns=names)
-    return pd.concat(
-        [piece[piece["observed"].notna()] for piece in ranked(risk, names)], ignore_index=True
-    )
 
 
 def _plain(found: Evaluation) -> dict[str, Any]:

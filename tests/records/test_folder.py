@@ -11,7 +11,8 @@ from obspy.core.inventory import Channel, Comment, Inventory, Network, Response,
 from obspy.core.inventory.response import InstrumentSensitivity
 
 from per_obspy.errors import CatalogError
-from per_obspy.records.folder import find_stations, read_event, read_station
+from per_obspy.records.event_file import read_event
+from per_obspy.records.folder import find_stations, read_station
 
 START = UTCDateTime(2020, 1, 2, 3, 4, 5)
 
