@@ -22,7 +22,7 @@ from per_obspy.errors import CatalogError, PerError, Rejection
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.jobs.parallel import results
 from per_obspy.processing.chain import process_station
-from per_obspy.records.event_file import EventFile
+from per_obspy.records.event_file import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
 from per_obspy.resume import Status, StatusError, changed_outputs, read_status, write_status
@@ -170,7 +170,7 @@ def do_stations(
     """
     missing = list[StationJob]()
     # A key that cannot be computed costs its own station only
-    for job in results(jobs, _with_key, _failed, 1, None):
+    for job in results(jobs, _prepared, _failed, 1, None):
         if isinstance(job, FinishedStation):
             yield job
             continue
@@ -182,9 +182,10 @@ def do_stations(
     yield from results(missing, do_station, _failed, workers, executor)
 
 
-def _with_key(job: StationJob) -> StationJob | FinishedStation:
-    """Return a job with its key."""
-    return job._replace(key=_key(job))
+def _prepared(job: StationJob) -> StationJob | FinishedStation:
+    """Return a job with its key, and with an event that can be sent to other processes."""
+    event = job.event and portable(job.event)
+    return job._replace(key=_key(job), event=event)
 
 
 def do_station(job: StationJob) -> FinishedStation:

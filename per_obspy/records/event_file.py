@@ -58,6 +58,20 @@ def read_event_file(path: Path) -> EventFile:
     return EventFile(path, bytes_hash(content), _only_event(events, str(path)))
 
 
+def portable(file: EventFile) -> EventFile:
+    """
+    Return an event file whose event can be sent to other processes.
+
+    Its event holds one origin and at most one magnitude, the preferred ones: ObsPy keeps which are
+    preferred in a table of its own process, so that a pickled event may have lost them.
+    """
+    event = file.event
+    origin = event.preferred_origin() or event.origins[0]
+    magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    magnitudes = [] if magnitude is None else [magnitude]
+    return file._replace(event=Event(origins=[origin], magnitudes=magnitudes))
+
+
 def _only_event(events: list[Event], source: str) -> Event:
     """Return the one event of a list; raise ``CatalogError`` if its origin or time is missing."""
     if len(events) != 1:

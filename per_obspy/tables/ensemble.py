@@ -1,4 +1,4 @@
-"""Files of several scenarios together: risk tables joined pair by pair, never in memory as a whole."""
+"""Files of several scenarios together: risk tables joined pair by pair, on disk."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -89,6 +89,7 @@ def write_ensemble(
             paths = {"rows": str(rows), "path": str(part)}
             database.execute(_ORDERED, {**paths, "statement": statement})
         kinds = write_rejected(_rejections(scenarios, joined), rejected)
+    # The worst rows as text, and the meaning of every column
     write_worst(table, csv_rows, text)
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
     write_described(described.values(), columns)

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,25 +102,32 @@ def write_risk(
     """
     names = ("risk.parquet", "risk.csv", "risk.columns.csv")
     table, text, columns = files = [folder / name for name in names]
-    schema, states = joined_schema(parts), Counter[str]()
+    # Schema of the whole, with the rank before the other columns
+    schema = joined_schema(parts)
     statement = json.dumps({"version": version("per_obspy"), **facts})
     whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
-    dictionaries = text_columns(whole)
-    with (
-        written_whole(table) as part,
-        written_whole(text) as lines,
-        bounded_database(folder) as database,
-        pq.ParquetWriter(part, whole, use_dictionary=dictionaries) as writer,
-    ):
-        for rows in _ranked_rows(parts, schema, whole):
-            writer.write_table(rows)
-            states.update(rows["state"].to_pylist())
-            # The worst rows are written as text too
-            before = rows["rank"][0].as_py() - 1
-            if before < csv_rows:
-                _append_csv(database, rows.slice(0, csv_rows - before), lines, header=before == 0)
+    with written_whole(table) as part, written_whole(text) as lines:
+        states = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
     write_columns(whole.names, columns)
     return RiskFiles(files, states)
+
+
+def _write_rows(rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int) -> Counter[str]:
+    """Write ranked rows as Parquet, the worst of them as CSV too, and count their states."""
+    states, first = Counter[str](), next(rows)
+    dictionaries = text_columns(first.schema)
+    with (
+        bounded_database(table.parent) as database,
+        pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
+    ):
+        for piece in chain([first], rows):
+            writer.write_table(piece)
+            states.update(piece["state"].to_pylist())
+            # Rows whose rank is at most the number of rows of the text
+            before = piece["rank"][0].as_py() - 1
+            if before < csv_rows:
+                _append_csv(database, piece.slice(0, csv_rows - before), text, header=before == 0)
+    return states
 
 
 def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:
@@ -135,6 +143,7 @@ def _append_csv(
     database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path, header: bool
 ) -> None:
     """Append rows to a CSV file, the first of them with the header."""
+    # The database writes a file of its own, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", rows)
     try:
@@ -167,9 +176,3 @@ def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[R
     """
     with pq.ParquetFile(path) as file:
         yield RankedTable(file, None if columns is None else list(columns))
-
-
-def ranked(path: Path, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:
-    """Yield the risk table in pieces, worst pair first; all columns or some."""
-    with ranked_table(path, columns) as table:
-        yield from table.pieces()

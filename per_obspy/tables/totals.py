@@ -113,6 +113,7 @@ def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTota
         return RegionTotals(table, None)
     if settings.h3 is not None:
         return RegionTotals(table, hexagon_outlines(table["area"]))
+    # Outlines of all cells that a piece has
     boxes: dict[str, FloatArray] = {}
     for piece in counted:
         boxes |= piece.boxes
