@@ -11,7 +11,7 @@ import pytest
 from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import scenario_event
