@@ -1,4 +1,4 @@
-"""Fetching from a real HTTP server on loopback that fails on demand: nothing lost, nothing fetched twice."""
+"""Fetch from an HTTP server on loopback that fails on demand: nothing lost or fetched twice."""
 
 import json
 import os
@@ -316,9 +316,11 @@ def test_routers_name_the_services(server: FdsnServer, ask: Ask, monkeypatch, ro
     _, *rest = providers.ROUTERS[router]
     monkeypatch.setitem(providers.ROUTERS, router, (f"{server.url}/route", *rest))
     server.extra["/route"] = (
-        f"DATACENTER=A,http://a\nSTATIONSERVICE={server.url}/fdsnws/station/1/\nXX S001 -- HNE 1990 2000\n"
+        f"DATACENTER=A,http://a\nSTATIONSERVICE={server.url}/fdsnws/station/1/\n"
+        "XX S001 -- HNE 1990 2000\n"
         if router == "earthscope-federator"
-        else f"{server.url}/fdsnws/station/1/query\nXX * * * 1990-01-01T00:00:00 2000-01-01T00:00:00\n"
+        else f"{server.url}/fdsnws/station/1/query\n"
+        "XX * * * 1990-01-01T00:00:00 2000-01-01T00:00:00\n"
     ).encode()
     assert names(ask(providers=(router,))) == STATIONS
     (asked,) = [one.parameters for one in server.requests if one.service == "/route"]
@@ -371,7 +373,8 @@ def test_a_window_that_is_not_over_is_fetched_later(server: FdsnServer, ask: Ask
 def test_a_killed_fetch_goes_on_where_it_stopped(server: FdsnServer, ask: Ask, tmp_path: Path):
     request = request_to(server, tmp_path, connections=1, timeout=30.0)
     server.fail("dataselect", "S003", late(20.0))
-    code = "import sys; from per_obspy.config import Fdsn; from per_obspy.records.fdsn.cache import fetch\n"
+    code = "import sys; from per_obspy.config import Fdsn\n"
+    code += "from per_obspy.records.fdsn.cache import fetch\n"
     code += "fetch(Fdsn.model_validate_json(sys.argv[1]))"
     process = subprocess.Popen([sys.executable, "-c", code, request.model_dump_json()])
     while not server.asked("dataselect", "S003"):
