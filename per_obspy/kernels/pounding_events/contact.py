@@ -139,7 +139,7 @@ def free_acceleration(row, i, acceleration):
 
 
 @lean
-def may_stay_in_contact(row, j, acceleration):
+def is_lingering(row, j, acceleration):
     """Return whether a touching pair separates so slowly that it may stay in contact."""
     separation = row[j + 1, V] - row[j, V]
     if separation <= row[0, STICKING_SPEED] or row[0, BOUNCES] >= row[0, BOUNCE_LIMIT]:
@@ -228,7 +228,7 @@ def resolve_contact(row, log, segment, elapsed, hit):
         if j == hit or is_touching(row, j):
             row[j, CLEARANCE_ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
             row[j, IN_CONTACT] = 0.0
-            row[j, LINGERING] = may_stay_in_contact(row, j, acceleration)
+            row[j, LINGERING] = is_lingering(row, j, acceleration)
             lingering |= row[j, LINGERING] != 0.0
     if lingering:
         close_pressed_interfaces(row, acceleration, segment.slope, segment.duration)

@@ -12,7 +12,7 @@ from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import value_and_slope
 from per_obspy.kernels.pounding_events.contact import (
     apply_impact,
-    may_stay_in_contact,
+    is_lingering,
     resolve_contact,
 )
 from per_obspy.kernels.pounding_events.motion import (
@@ -230,7 +230,7 @@ def set_states(pair, left, right):
     pair[STRUCTURE_ROWS + VELOCITY] = right[1]
 
 
-@lean
+@inlined
 def _states_after_impact(pair, row, log, left, right, segment, elapsed):
     """Apply an impact to a pair in these states, after a share of the step; return its states."""
     # impact, on the row
@@ -322,7 +322,7 @@ def run_free_impacts(pair, row, log, left, right, next_left, next_right, segment
         # the impact, and the states at the end of the step after it
         elapsed += share
         left, right = _states_after_impact(pair, row, log, next_left, next_right, segment, elapsed)
-        if may_stay_in_contact(row, 0, segment.acceleration + elapsed * change):
+        if is_lingering(row, 0, segment.acceleration + elapsed * change):
             break
         next_left = state_inside_step(pair, row, 0, left, change, 1.0 - elapsed)
         next_right = state_inside_step(pair, row, 1, right, change, 1.0 - elapsed)

@@ -106,9 +106,9 @@ class TestEndOfBounces:
         row = touching_row((1.0, 1.0), (0.0, 0.5e-3), 0.5)
         row[1, motion.PARTICIPATION] = 0.0
         row[0, motion.STICKING_DELAY] = 1e-3
-        assert contact.may_stay_in_contact(row, 0, -1.0)  # pressed by 1 m/s²
-        assert not contact.may_stay_in_contact(row, 0, -0.4)
-        assert not contact.may_stay_in_contact(row, 0, 1.0)
+        assert contact.is_lingering(row, 0, -1.0)  # pressed by 1 m/s²
+        assert not contact.is_lingering(row, 0, -0.4)
+        assert not contact.is_lingering(row, 0, 1.0)
 
     def test_a_yielding_structure_that_is_reversed_unloads(self):
         row = touching_row((1.0, 1.0), (-0.2, 0.2), 0.5)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from per_obspy.kernels.polynomial_roots import value_and_slope
 from per_obspy.kernels.pounding_events import motion, next_event
 from per_obspy.pounding.history.tables import row_at_rest, structure_table
 from per_obspy.pounding.structure import Structure
@@ -85,6 +86,18 @@ class TestPeaks:
         squared = 0.05**2 * (1.0 + 0.3**2)
         assert_allclose(row[0, motion.LARGEST_DISPLACEMENT], math.sqrt(squared), rtol=1e-12)
         assert_allclose(row[0, motion.LARGEST_RADIUS_SQUARED], squared, rtol=1e-12)
+
+    def test_of_the_radius_lie_where_the_ground_acceleration_changes_its_sign(self):
+        # catches: roots of the velocity only; without damping u'' + omega² u = -a
+        segment = motion.Segment(0.0, 0.1, -2.0, 40.0, 22)
+        row = row_of(1.0, Structure(1.0, 0.0, 1.0))
+        row[0, motion.V] = 0.5
+        span, kind, index = next_event.find_event(row, segment, 0.0)
+        u, v = value_and_slope(row, 0, motion.TAYLOR, 22, 0.05)
+        next_event.finish_piece(row, LOG, segment, span, span, kind, index)
+        largest = row[0, motion.LARGEST_RADIUS_SQUARED]
+        assert_allclose(largest, u**2 + (v / OMEGA) ** 2, rtol=1e-12)
+        assert largest > 1.01 * (row[0, motion.U] ** 2 + (row[0, motion.V] / OMEGA) ** 2)
 
     def test_of_the_recoverable_energy_do_not_grow_while_yielding(self):
         row = row_of(1.0, Structure(1.0, 0.0, 1.0, 0.03, 0.0))

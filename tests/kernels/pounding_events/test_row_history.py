@@ -62,6 +62,12 @@ class TestFreeVibration:
         # the one with little damping gets there but for the samples
         assert_allclose(displacement[:, 1].max(), reach[1, 1], rtol=0.02)
 
+    def test_rests_where_it_has_no_force(self):
+        # catches: a reach about zero or about the plastic displacement
+        row = row_of(self.structures, 1.0)
+        row[0, motion.PLASTIC], row[0, motion.U] = 0.02, (1.0 - 0.1) * 0.02
+        assert_allclose(reach_in_free_vibration(row, 0), 0.018, rtol=1e-14)  # rounding
+
     def test_a_structure_that_can_still_yield_has_no_bound(self):
         row = row_of(self.structures, 1.0)
         row[0, motion.V] = 10.0

@@ -34,6 +34,7 @@ PHASES = {
     "yielding": {motion.PHASE: (1.0, -1.0)},
     "touching": {motion.IN_CONTACT: (1.0, 0.0), motion.U: (0.01, 0.0), motion.V: (0.1, 0.1)},
 }
+PHASES["touching after yielding"] = {**PHASES["touching"], motion.PLASTIC: (0.005, -0.003)}
 
 
 def pair_of(structures, gap=0.01, **changes):
@@ -84,7 +85,7 @@ class TestPhases:
             @ (left[0], right[0], left[1], 1.5, 1.0)
         )  # fmt: skip
         fill_displacements(row, 1.5, 0.0, 22)
-        if phase == "touching":
+        if phase.startswith("touching"):
             fill_contact_force(row, 0, 1.5, 0.0, DURATION, 22)
             expected = row[0, EVENT_FUNCTION] / 2.0  # over the mass of structure 1
         else:
