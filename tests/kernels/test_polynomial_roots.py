@@ -49,7 +49,7 @@ def test_bounds_are_never_exceeded():
         assert np.abs(bends).max() <= curvature * (1 + 1e-14)
 
 
-@pytest.mark.parametrize("roots", [(0.3, 0.4, 0.9), (0.3, 0.3 + 1e-6, 0.9), (0.05,), (-0.2, 0.6)])
+@pytest.mark.parametrize("roots", [(0.3, 0.31, 0.9), (0.3, 0.3 + 1e-6, 0.9), (0.05,), (-0.2, 0.6)])
 def test_the_first_fall_is_found(roots):
     # mutation: a step that is too long passes two close roots
     coefficients = polynomial.polyfromroots(roots)
@@ -68,6 +68,18 @@ def test_a_rise_is_no_fall():
     # no root in the interval
     assert _first_fall([1.0, -0.5], 1.0) == -1.0
     assert _first_fall([-1.0, 2.0], 1.0, sign=-1.0) == pytest.approx(0.5, abs=1e-12)
+
+
+def test_no_root_is_invented():
+    assert _first_fall([1e-9, 0.0, 0.0, 1.0], 1.0) == -1.0
+    # least 1e-7 above zero
+    assert _first_fall([0.0400001, -0.4, 1.0], 1.0) == -1.0
+
+
+@pytest.mark.parametrize("coefficients", [[0.0, 0.0, 0.0], [0.0, 1.0], [1.0]])
+def test_polynomials_without_a_fall(coefficients):
+    assert _first_fall(coefficients, 1.0) == -1.0
+    assert _first_fall(coefficients, 0.0) == -1.0
 
 
 def test_a_start_between_two_roots():

@@ -2,12 +2,12 @@ r"""
 The bilinear oscillator with kinematic hardening, exact within its linear branches.
 
 ``u'' + 2 xi z + alpha u + (1 - alpha) y = -a`` with ``z = u'``, time as phase ``omega0 * t`` and
-``a`` divided by ``omega0²`` (theory.md 6). While elastic ``y = u - p`` with a constant plastic
-displacement ``p``; while yielding ``y`` stays at plus or minus the yield displacement and ``p``
-moves. Each branch is an oscillator of stiffness 1 or ``alpha`` under a constant added to ``a``,
-whose Taylor series is exact over a short span whatever ``alpha`` and damping are. A branch ends
-where ``|u - p|`` passes the yield displacement, or where the velocity of a yielding oscillator
-vanishes; both events are located.
+``a`` divided by ``omega0²``. While elastic ``y = u - p`` with a constant plastic displacement
+``p``; while yielding ``y`` stays at plus or minus the yield displacement and ``p`` moves. Each
+branch is an oscillator of stiffness 1 or ``alpha`` under a constant added to ``a``, whose Taylor
+series is exact over a short span whatever ``alpha`` and damping are. A branch ends where ``|u -
+p|`` passes the yield displacement, or where the velocity of a yielding oscillator vanishes; both
+events are located.
 """
 
 import math
@@ -62,7 +62,7 @@ def span_coefficients(stiffness, damping, span, coefficients):
 def _raise_at(u, z, plastic, branch, yielding, hardening, largest):
     """Raise the largest values to those of one state."""
     y = u - plastic if branch == 0.0 else branch * yielding
-    # Displacement, displacement radius and energy radius (theory.md 6.6)
+    # Displacement, displacement radius and energy radius
     largest[0] = max(largest[0], abs(u))
     largest[1] = max(largest[1], u * u + z * z)
     largest[2] = max(largest[2], hardening * u * u + (1.0 - hardening) * y * y + z * z)

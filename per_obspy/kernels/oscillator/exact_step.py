@@ -5,7 +5,7 @@ The equation of motion is ``u'' + 2 xi omega u' + omega² u = -a``. The state is
 ``z = v / omega``, so that both are lengths and the radius is ``sqrt(u² + z²)``; time is counted as
 the phase ``omega * t``. With the unit impulse response ``H`` and its integrals ``I1``, ``I2``, a
 span of phase ``p`` over which the acceleration goes from ``a0`` to ``a1`` gives (Nigam & Jennings
-1969; theory.md 2)::
+1969)::
 
     u(p) = u0 (1 - I1) + z0 H  - [a0 I1 + (a1 - a0) I2 / p] / omega²
     z(p) = -u0 H + z0 H'       - [a0 H  + (a1 - a0) I1 / p] / omega²

@@ -3,11 +3,10 @@ Largest values between two samples, exact, by Taylor series and the roots of the
 
 The radius is stationary where ``z = 0`` or ``2 xi z + a = 0``, the displacement where ``z = 0``,
 the velocity where ``z' = 0``, the absolute acceleration ``-(u + 2 xi z)`` where ``z + 2 xi z' =
-0`` (theory.md 2). The second derivative of each condition solves the homogeneous equation of the
-oscillator, so that it has at most one root in a span of half a radian. That root bounds the pieces
-on which the first derivative is monotone, whose roots bound the pieces on which the condition is
-monotone: no stationary point can be missed. Displacements are counted in ``a / omega²``, time as
-phase.
+0``. The second derivative of each condition solves the homogeneous equation of the oscillator, so
+that it has at most one root in a span of half a radian. That root bounds the pieces on which the
+first derivative is monotone, whose roots bound the pieces on which the condition is monotone: no
+stationary point can be missed. Displacements are counted in ``a / omega²``, time as phase.
 """
 
 import math

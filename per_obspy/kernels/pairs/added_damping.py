@@ -1,4 +1,4 @@
-"""Least damping to add to both buildings of many pairs, from stored spectra (theory.md 9)."""
+"""Least damping to add to both buildings of many pairs, from stored spectra."""
 
 import math
 

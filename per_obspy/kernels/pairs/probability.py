@@ -1,5 +1,5 @@
 """
-Probability that a lognormal critical gap exceeds a gap (theory.md 11).
+Probability that a lognormal critical gap exceeds a gap, exact for lognormal radii.
 
 It is one integral over ``d``, the logarithm of the ratio of the two radii. Given d, the critical
 gap is lognormal; its logarithm has a narrow dip where the radii agree and their correlation is near

@@ -2,7 +2,7 @@
 Probability of pounding over quasi-random periods and dampings of both buildings of many pairs.
 
 The nodes of a pair share one row, so that every step is a loop which the compiler turns into
-vectors (theory.md 11).
+vectors.
 """
 
 import math

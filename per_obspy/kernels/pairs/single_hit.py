@@ -1,9 +1,13 @@
 """
 Single-hit estimate of many pairs: grazing state, first earlier contact, impact, and its bound.
 
-The algorithm is that of theory.md 4. Structure 1 is on the left; ``u1 - u2`` reaches the critical
-gap at the grazing state. Pairs are worked on in blocks: the iteration outside, the pairs of a block
-inside, so that the compiler puts several pairs into one instruction.
+The steps are those of Valles-Mattox & Reinhorn (1996), figure 5: (i) the grazing state, in which
+both structures lie on their energy circles with the same velocity, (ii) the motion back to the
+first contact over the actual gap, (iii) the impact, eq. (7) and (8). Structure 1 is on the left;
+``u1 - u2`` reaches the critical gap at the grazing state.
+
+Pairs are worked on in blocks: the iteration outside, the pairs of a block inside, so that the
+compiler puts several pairs into one instruction.
 """
 
 import math
@@ -178,7 +182,7 @@ def _first_contact(constants, first_contact):
     moving = True
     while moving:
         for pair in range(PAIRS):
-            # Both structures along their circles (theory.md 4, step ii)
+            # Step ii: both structures along their circles
             time = times[pair]
             square_1, product_1 = _sine_products(c[0, pair] * time)
             square_2, product_2 = _sine_products(c[1, pair] * time)
@@ -246,7 +250,7 @@ def _radii(given, fields):
             shifted = after / given[2 + body, pair]
             radius = math.sqrt(fields[1 + field, pair] ** 2 + shifted * shifted)
             resting = radius == 0.0 and given[body, pair] == 0.0
-            # Impulse J: the transfer energy is J (v + v_after) / 2 (theory.md 1)
+            # Impulse J: the transfer energy, eq. (9) and (10), is J (v + v_after) / 2
             impulse = given[6, pair] * (fields[2, pair] - fields[8, pair]) * (1.0 - 2.0 * body)
             fields[4 + field, pair] = radius
             fields[5 + field, pair] = 1.0 if resting else radius / given[body, pair]

@@ -123,7 +123,7 @@ def _drop_settled(steps, dt, block, table, moving, best):
     """Drop the pairs that cannot exceed their largest values any more; return if any remains."""
     any_moving = False
     for lane in range(PAIR_LANES):
-        # Time limit, theory.md 5
+        # Limit of the free vibration in time
         longest = 2.0 * math.pi / min(block[lane, 0], block[lane, 3])
         moving[lane] &= steps * dt < FREE_PERIODS * longest
         if moving[lane]:
