@@ -176,6 +176,7 @@ def test_the_sections_in_the_documentation_are_valid():
         for example in examples
         for name in Records(**example).model_fields_set - {"event", "stationxml"}
     ] == [
+        "columns",
         "fdsn",
         "sds",
         "asdf",
