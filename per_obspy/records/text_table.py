@@ -10,6 +10,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.formats.text.lines import LONGEST_NUMBER
 from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
@@ -233,13 +234,14 @@ def _column(path: str | Path, rows: Sequence[_Row], column: int, name: str) -> F
         if not 0 <= column < len(fields):
             problem = f"no column {column}, there are {len(fields)}"
             raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
-        # Text is refused as numbers that are not finite are
+        # Text and words too long for a number are refused as numbers that are not finite are
+        word = fields[column].strip()
         try:
-            values[index] = float(fields[column])
+            values[index] = float(word) if len(word) <= LONGEST_NUMBER else np.nan
         except ValueError:
             values[index] = np.nan
         if not np.isfinite(values[index]):
-            problem = f"{fields[column].strip()!r} is not a finite number"
+            problem = f"{word[:LONGEST_NUMBER]!r} is not a finite number"
             raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
     return values
 

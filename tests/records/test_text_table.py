@@ -81,6 +81,7 @@ def test_interval_azimuth_start_and_level_as_said(table: Path):
     [
         ("0.5", "nan", "line 3, HNE: 'nan' is not a finite number"),
         ("0.5", "x", "line 3, HNE: 'x' is not a finite number"),
+        ("0.5", "1" * 41, f"line 3, HNE: '{'1' * 40}' is not a finite number"),
         ("0.8 0.9", "0.8", "line 4: 3 values, expected 4 as on line 2"),
         ("0.8 0.9", "0.8 0.9 1", "line 4: 5 values, expected 4 as on line 2"),
         (" 0.3\n", "\n", "line 3: 4 values, expected 3 as on line 2"),

@@ -36,7 +36,6 @@ A word that a file does not hold is absent: never a guess, never zero. Coordinat
 files write for unknown.
 """
 
-import math
 import re
 from collections.abc import Mapping
 from re import Match
@@ -142,9 +141,9 @@ def _horizontal_letter(azimuth: float) -> str:
         angle = abs((azimuth - axis + 180) % 360 - 180)
         if angle <= _AXIS_TOLERANCE:
             return letter
-    # The tolerance puts 45 degrees on one side, whichever way its cosine is rounded
-    near_north_south = abs(math.cos(math.radians(azimuth))) > math.sqrt(0.5) - 1e-9
-    return "1" if near_north_south else "2"
+    # From 135 to 45 degrees through north; the tolerance keeps both ends from one letter
+    from_southeast = (azimuth + 45 - 1e-7) % 180
+    return "1" if from_southeast < 90 else "2"
 
 
 def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:

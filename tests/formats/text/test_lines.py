@@ -6,6 +6,7 @@ Covers ``per_obspy.formats.text.lines`` and the blocks built on it:
 """
 
 import io
+import re
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from sample_file import MOTION, block, film
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.text.film import film_lines, read_film
 from per_obspy.formats.text.lines import (
+    DECIMAL,
+    LONGEST_LINE,
+    LONGEST_NUMBER,
     Text,
     block_lines,
     count,
@@ -132,3 +136,46 @@ def test_a_title_announces_interval_or_rate(spacing: str):
     values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
     assert_array_equal(values, MOTION)
     assert (dt, text.lines[line]) == (0.01, "next")
+
+
+LONG = "1" * (LONGEST_NUMBER + 1)
+
+
+def test_a_line_too_long_for_any_format_is_refused_before_it_is_searched():
+    assert read_text(io.BytesIO(b"a\n" + b"1" * LONGEST_LINE)).lines[1] == "1" * LONGEST_LINE
+    with pytest.raises(RecordRejected, match=r"line 2, line: 1000000 characters, at most 2000$"):
+        read_text(io.BytesIO(b"a\n" + b"1" * 1_000_000))
+
+
+def test_a_word_too_long_for_a_number_is_refused():
+    message = f"{len(LONG)} characters, a number has at most {LONGEST_NUMBER}"
+    with pytest.raises(RecordRejected, match=f"line 2, samples: {message}"):
+        free_block(text_of(f"1 2\n{LONG}"), 0, None, 3)
+    with pytest.raises(RecordRejected, match=f"line 1, points: {message}"):
+        count(text_of(""), 0, "points", LONG)
+    # Blanks around a number do not count
+    assert count(text_of(""), 0, "points", f"{' ' * 100}7") == 7
+
+
+@pytest.mark.parametrize(("width", "per_line"), [(LONGEST_NUMBER + 1, 1), (30, 100)])
+def test_a_format_of_columns_too_wide_is_refused(width: int, per_line: int):
+    # lines padded to such a width would take thousands of times the memory of the file
+    with pytest.raises(RecordRejected, match=f"line 1, format: {per_line} numbers of {width}"):
+        fixed_block(text_of("title\n1\n2"), 1, 2 * per_line, width, per_line)
+
+
+def test_a_message_does_not_repeat_a_whole_damaged_file():
+    with pytest.raises(RecordRejected) as caught:
+        free_block(text_of("y" * 9999), 0, None, 1)
+    assert len(str(caught.value)) < 400  # the longest problem has 300 characters
+
+
+@given(st.from_regex(r"-?(\d{1,20}(\.\d{0,30})?|\.\d{1,30})", fullmatch=True))
+def test_a_decimal_number_is_found_whole(number: str):
+    assert re.fullmatch(DECIMAL, number)
+    assert re.search(f"= {DECIMAL} Hz", f"f = {number} Hz")[1] == number
+
+
+@pytest.mark.parametrize("run", ["1" * 21, "0." + "1" * 31, "." + "1" * 31])
+def test_a_run_of_digits_longer_than_a_number_is_not_cut_to_one(run: str):
+    assert re.search(f"= {DECIMAL}", f"= {run}") is None
