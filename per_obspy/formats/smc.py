@@ -63,7 +63,7 @@ def _samples(text: Text, integers: FloatArray, reals: FloatArray) -> tuple[Float
     """Return the samples in SI and their rate, Hz."""
     comments = 0 if integers[15] == _NO_INTEGER else int(integers[15])
     first = _TEXT_LINES + _NUMBER_LINES + max(comments, 0)
-    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:g}")
+    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:.17g}")
     rate = interval(text, _TEXT_LINES + _INTEGER_LINES, "sampling rate", float(reals[1]))
     # The samples end the file
     values = _CENTIMETRE * fixed_block(text, first, samples, 10, 8)
