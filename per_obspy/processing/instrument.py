@@ -45,8 +45,10 @@ def process_instrument(
     rejected : tuple of Rejection
     """
     if instrument and is_processed(instrument[0]):
-        pair, rejected = paired(instrument, settings.overlap)
-        return passed_through(pair, settings), rejected
+        # Series of velocity or displacement are no acceleration
+        physical, unfit = _in_turn(instrument, (in_acceleration,))
+        pair, rejected = paired(physical, settings.overlap)
+        return passed_through(pair, settings), (*unfit, *rejected)
     physical, unfit = _in_turn(instrument, _before(settings))
     pair, unpaired = paired(physical, settings.overlap)
     windowed = _windowed(pair, settings, source)
