@@ -69,8 +69,8 @@ def _volume_1(text: Text, first: int) -> tuple[Trace, int]:
         refuse(text, first + 11, "unit", f"{quoted(text, first + 11, 40)} is not g/10")
     samples = _promised_samples(text, first + 10)
     # Digitised film, in g/10
-    values, dt = read_film(_shifted(text), start, samples)
-    component = trace(STANDARD_GRAVITY / 10 * values, dt, words)
+    film = read_film(_shifted(text), start, samples)
+    component = trace(STANDARD_GRAVITY / 10 * film.values, film.dt, words | film.words)
     return component, start + film_lines(samples)
 
 

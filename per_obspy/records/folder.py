@@ -166,6 +166,7 @@ def _without_integrals(stream: Stream) -> tuple[Stream, list[Rejection]]:
     Agencies write the integrals of a record beside it, under the same codes.
     """
     accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
+    # Integrals without their acceleration stay
     kept, rejected = Stream(), []
     for trace in stream:
         quantity = _INTEGRALS.get(trace.stats.get("units"))

@@ -10,6 +10,7 @@ from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import Rejection
 from per_obspy.processing.copying import copied
 from per_obspy.processing.notes import is_processed, rejection, remembered
+from per_obspy.processing.station.film_interval import at_one_interval
 
 PREFERENCE = ("HN", "BN", "HH", "BH")  # accelerometers before velocity sensors, fast before slow
 
@@ -104,7 +105,7 @@ def paired(instrument: Stream, overlap: float = 0.8) -> tuple[Stream, tuple[Reje
         one too many.
     """
     horizontals = sorted(
-        filter(is_horizontal, instrument), key=lambda trace: (-_seconds(trace), trace.id)
+        filter(is_horizontal, at_one_interval(instrument)), key=lambda trace: (-_seconds(trace), trace.id)
     )
     verticals = sorted(
         (trace for trace in instrument if not is_horizontal(trace)), key=lambda trace: trace.id

@@ -1,8 +1,8 @@
 """
 Lines, number fields and blocks of text files.
 
-Covers ``per_obspy.formats.text.lines`` and the blocks built on it:
-``per_obspy.formats.text.film`` and ``per_obspy.formats.text.number_blocks``.
+Covers ``per_obspy.formats.text.lines`` and the blocks built on it in
+``per_obspy.formats.text.number_blocks``.
 """
 
 import io
@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
-from sample_file import MOTION, block, film
+from numpy.testing import assert_array_equal
+from sample_file import MOTION, block
 
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.film import film_lines, read_film
 from per_obspy.formats.text.lines import (
     DECIMAL,
     LONGEST_LINE,
@@ -109,23 +108,6 @@ def test_any_line_end_and_any_byte_can_be_read():
     ]
     assert head(io.BytesIO(b"abc"), 2) == b"ab"
     assert head("no such file", 2) == b""
-
-
-def test_film_gives_values_and_their_mean_interval():
-    text = text_of(film(MOTION, 0.02))
-    values, dt = read_film(text, 0, len(MOTION))
-    assert film_lines(len(MOTION)) == len(text.lines)
-    # times and values are written to three decimals
-    assert_allclose(values, np.round(MOTION, 3), rtol=1e-15)
-    assert dt == pytest.approx(0.02, rel=1e-12)
-
-
-@pytest.mark.parametrize("wrong", [1.0, 0.0, -0.5])
-def test_film_that_runs_back_or_away_is_refused(wrong: float):
-    # would catch a check of single steps only, or of the drift only
-    text = text_of(film(MOTION, 0.02).replace("  0.100", f"{wrong:7.3f}"))
-    with pytest.raises(RecordRejected, match=r"line 2, time [67]: .* breaks the mean interval"):
-        read_film(text, 0, len(MOTION))
 
 
 @pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
