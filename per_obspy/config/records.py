@@ -11,9 +11,9 @@ from per_obspy.config.section import Moment, RelativePath, Section
 
 
 class Columns(Section):
-    """How to read a plain table of samples (``records/columns.py``)."""
+    """How to read a plain table of samples (``records/text_table.py``)."""
 
-    file: RelativePath = Field(description="text file, one row a sample")
+    file: RelativePath = Field(description="text file of samples, all rows with as many values")
     network: str = Field("", description="SEED network code")
     station: str = Field(description="SEED station code")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
@@ -35,6 +35,32 @@ class Columns(Section):
     )
     start: str | None = Field(None, description="time of the first sample, ISO 8601, UTC")
     raw: bool = Field(False, description="not corrected yet")
+    layout: str | None = Field(
+        None,
+        pattern="^(columns|rows)$",
+        description=(
+            "order of the samples: columns (one row per sample, one column per channel) or rows "
+            "(samples of one channel, several per row, read row after row; needs dt and "
+            "channels = { CODE = 0 }; the last row may be shorter); not given: columns"
+        ),
+    )
+
+    @model_validator(mode="after")
+    def _one_interval(self) -> Self:
+        if (self.time_column is None) == (self.dt is None):
+            raise ValueError("give exactly one of time_column and dt")
+        return self
+
+    @model_validator(mode="after")
+    def _channels_fit_layout(self) -> Self:
+        if self.layout == "rows" and list(self.channels.values()) != [0]:
+            raise ValueError(
+                f'layout = "rows" holds one channel: give channels = {{ CODE = 0 }}, '
+                f"got {self.channels}"
+            )
+        if self.layout == "rows" and self.time_column is not None:
+            raise ValueError('layout = "rows" has no time_column: give dt instead')
+        return self
 
 
 class Window(Section):

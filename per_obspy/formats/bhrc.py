@@ -6,7 +6,7 @@ from typing import Any
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.formats.text.conversions import metres, signed_degrees, utc_from_words
+from per_obspy.formats.text.conversions import metres, utc_from_words
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -22,17 +22,18 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, horizontal, sensor_constants, trace
+from per_obspy.formats.text.places import decimal_angles, epicentre_place, station_place
+from per_obspy.formats.text.vocabulary import horizontal, sensor_constants, trace
 
 _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _POINTS_LINE, _UNIT_LINE, _RATE_LINE = 27, 10, 11, 21
 _WIDTH, _PER_LINE = 13, 10
 _STATION = re.compile(
-    rf"(.*?)\s+Station\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+Altitude\s*{DECIMAL})?"
+    rf"(.*?)\s+Station\s+{DECIMAL}\s*([NSEW])\s*{DECIMAL}\s*([NSEW])(?:\s+Altitude\s*{DECIMAL})?"
 )
 _AZIMUTH = re.compile(r"\b([LT])\s*(\d{1,3})\b")
 _EPICENTRE = re.compile(
-    rf"Epicenter\s+{DECIMAL}\s*([NS])\s*{DECIMAL}\s*([EW])(?:\s+FD\s*{DECIMAL})?"
+    rf"Epicenter\s+{DECIMAL}\s*([NSEW])\s*{DECIMAL}\s*([NSEW])(?:\s+FD\s*{DECIMAL})?"
 )
 _MAGNITUDE = re.compile(rf"\b(Mw|Ms|mb|ML|M)\s*{DECIMAL}")
 _TIME = re.compile(
@@ -70,7 +71,8 @@ def _component(text: Text, first: int) -> tuple[Trace, int]:
     _check_end(text, end)
     # Words of the header
     words = {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
-    words |= _station(lines) | {"event": _event(text, first, lines)}
+    event = _event(text, first, lines)
+    words |= _station(lines, event) | {"event": event}
     return trace(values, dt, words), end + 1
 
 
@@ -107,7 +109,7 @@ def _size(text: Text, first: int) -> tuple[int, float]:
     return samples, 1 / interval(text, line, "sampling rate", rate)
 
 
-def _station(lines: list[str]) -> dict[str, Any]:
+def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return code, name, coordinates, instrument and direction of a component."""
     station = _STATION.match(lines[7])
     name = station[1] if station else None
@@ -119,7 +121,7 @@ def _station(lines: list[str]) -> dict[str, Any]:
     words = {
         "station": re.sub(r"[^A-Z0-9]", "", name.upper()) if name is not None else None,
         "station_name": name,
-        "coordinates": _place(station),
+        "coordinates": _place(station, epicentre),
         "instrument": instrument,
     }
     return words | _direction(lines)
@@ -134,26 +136,25 @@ def _direction(lines: list[str]) -> dict[str, float]:
     return {"sensor_dip": -90.0} if component == "V" else {}
 
 
-def _place(found: re.Match[str] | None) -> dict[str, float | None]:
+def _place(found: re.Match[str] | None, epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return the coordinates of the station, degrees and m."""
     if found is None:
         return {}
     elevation = float(found[6]) if found[6] else None
-    latitude, longitude = signed_degrees(found, 2)
-    return coordinates(latitude, longitude, elevation)
+    return station_place(*decimal_angles(found, 2), epicentre, elevation)
 
 
 def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
     """Return origin time, hypocentre and magnitude (moment, or else the first) of the event."""
     epicentre = _EPICENTRE.match(lines[8])
-    latitude, longitude = signed_degrees(epicentre)
+    place = epicentre_place(*decimal_angles(epicentre)) if epicentre else {}
     depth = float(epicentre[5]) if epicentre and epicentre[5] else None
     # Kinds of magnitude in the order of the line
     magnitudes = {kind: float(size) for kind, size in _MAGNITUDE.findall(lines[8])}
     return {
         "time": _origin(text, first + 2, _TIME.match(lines[2])),
-        "latitude": latitude,
-        "longitude": longitude,
+        "latitude": place.get("latitude"),
+        "longitude": place.get("longitude"),
         "depth": metres(depth),
         "magnitude": magnitudes.get("Mw", next(iter(magnitudes.values()), None)),
     }

@@ -97,17 +97,18 @@ def _volume_1_channel(text: Text, first: int) -> tuple[Trace, int]:
     factor = _uncorrected_unit(text, first + 11)
     samples = _promised_samples(text, first + 10)
     # Even samples have a title; film has none
+    film: dict[str, Any] = {}
     if is_title(line_at(text, header.next_line, "samples")):
         values, dt, line = titled_block(text, header.next_line, "", 8, 9)
         if len(values) != samples:
             problem = f"{len(values)}, but {samples} on line {first + 11}"
             refuse(text, header.next_line, "number of points", problem)
     else:
-        values, dt = read_film(text, header.next_line, samples)
+        values, dt, film = read_film(text, header.next_line, samples)
         line = header.next_line + film_lines(samples)
     # The header's peak is in g, whatever the unit of the samples
     words = {"processing_level": "raw", "header_peak": _peak(header.reals[6], STANDARD_GRAVITY)}
-    return _trace(factor * values, dt, header, words), line
+    return _trace(factor * values, dt, header, words | film), line
 
 
 def _promised_samples(text: Text, line: int) -> int:

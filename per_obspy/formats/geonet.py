@@ -21,9 +21,9 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
+from per_obspy.formats.text.places import Angle, epicentre_place, station_place
 from per_obspy.formats.text.vocabulary import (
     channel_code,
-    coordinates,
     corners,
     orientation,
     sensor_constants,
@@ -134,10 +134,9 @@ def _unit(text: Text, first: int, state: str) -> float:
     return float(unit[1]) * _MILLIMETRE
 
 
-def _degrees(degrees: str, minutes: str, seconds: str, letter: str) -> float:
-    """Return signed degrees; the numeric header has lost the sign of the southern hemisphere."""
-    size = sexagesimal(degrees, minutes, seconds)
-    return -size if letter in "SW" else size
+def _angles(parts: tuple[str, ...]) -> tuple[Angle, Angle]:
+    """Return latitude and longitude; the numeric header has lost the sign of the southern side."""
+    return Angle(sexagesimal(*parts[:3]), parts[3]), Angle(sexagesimal(*parts[4:7]), parts[7])
 
 
 def _station(text: Text, first: int) -> dict[str, Any]:
@@ -147,12 +146,11 @@ def _station(text: Text, first: int) -> dict[str, Any]:
     if site is None:
         refuse(text, line, "site", f"{quoted(text, line)} has no code and coordinates")
     # Its groups are the code, then four parts of each angle
-    latitude = _degrees(*site.groups()[1:5])
-    longitude = _degrees(*site.groups()[5:9])
+    epicentre = _event(text.lines[first : first + _TEXT_LINES])
     return {
         "network": "NZ",
         "station": site[1],
-        "coordinates": coordinates(latitude, longitude),
+        "coordinates": station_place(*_angles(site.groups()[1:9]), epicentre),
         "station_name": text.lines[first + 2].strip() or None,
     }
 
@@ -174,13 +172,14 @@ def _described(lines: list[str]) -> dict[str, Any]:
 def _event(lines: list[str]) -> dict[str, Any]:
     """Return name, hypocentre and magnitude of the event."""
     epicentre = _EPICENTRE.match(lines[8])
-    parts = epicentre.groups() if epicentre else (None,) * 10
+    parts = epicentre.groups("") if epicentre else ("",) * 10
     # Groups: four parts of each angle, depth in km, magnitude
     depth = float(parts[8]) if parts[8] else None
+    place = epicentre_place(*_angles(parts[:8])) if epicentre else {}
     return {
         "name": lines[6].strip() or None,
-        "latitude": _degrees(*parts[:4]) if epicentre else None,
-        "longitude": _degrees(*parts[4:8]) if epicentre else None,
+        "latitude": place.get("latitude"),
+        "longitude": place.get("longitude"),
         "depth": metres(depth),
         "magnitude": float(parts[9]) if parts[9] else None,
     }

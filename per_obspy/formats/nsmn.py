@@ -7,7 +7,7 @@ import numpy as np
 from obspy import Stream, UTCDateTime
 
 from per_obspy.constants import GAL
-from per_obspy.formats.text.conversions import metres, signed_degrees, utc_from_words
+from per_obspy.formats.text.conversions import metres, utc_from_words
 from per_obspy.formats.text.fields import (
     Fields,
     count_field,
@@ -27,11 +27,17 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, orientation, trace
+from per_obspy.formats.text.places import (
+    Angle,
+    decimal_angles,
+    epicentre_place,
+    station_place,
+)
+from per_obspy.formats.text.vocabulary import orientation, trace
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
-_PLACE = re.compile(rf"{DECIMAL}\s*([NS])\s*-\s*{DECIMAL}\s*([EW])")
+_PLACE = re.compile(rf"{DECIMAL}\s*([NSEW])\s*-\s*{DECIMAL}\s*([NSEW])")
 _EVENT_TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _RECORD_TIME = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _PEAKS = re.compile(rf"\(([NEU]-[SWD])\)\s*{DECIMAL}")
@@ -78,20 +84,22 @@ def _peaks(fields: Fields) -> dict[str, float]:
 
 def _common_words(text: Text, fields: Fields) -> dict[str, Any]:
     """Return the words that all components share."""
-    words = _station(text, fields) | {"event": _event(text, fields)}
+    words: dict[str, Any] = {"event": _event(text, fields)}
+    words |= _station(text, fields, words["event"])
     words["starttime"] = _start(text, fields)
     return words | {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
 
 
-def _place(fields: Fields, name: str) -> tuple[float, float] | tuple[None, None]:
-    """Return latitude and longitude, degrees."""
-    return signed_degrees(_PLACE.search(text_field(fields, name) or ""))
+def _angles(fields: Fields, name: str) -> tuple[Angle, Angle] | None:
+    """Return latitude and longitude with their letters; None where there are none."""
+    found = _PLACE.search(text_field(fields, name) or "")
+    return decimal_angles(found) if found else None
 
 
-def _station(text: Text, fields: Fields) -> dict[str, Any]:
+def _station(text: Text, fields: Fields, epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return codes, name, coordinates and instrument of the station."""
     elevation = number_field(text, fields, "STATION ALTITUDE (m)")
-    latitude, longitude = _place(fields, "STATION COORDINATES")
+    angles = _angles(fields, "STATION COORDINATES")
     # The recorder, not the sensor, is what the header names
     recorder = {
         "model": text_field(fields, "RECORDER TYPE"),
@@ -101,22 +109,23 @@ def _station(text: Text, fields: Fields) -> dict[str, Any]:
         "network": "TK",
         "station": required_field(text, fields, "STATION ID").value,
         "station_name": text_field(fields, "PLACE"),
-        "coordinates": coordinates(latitude, longitude, elevation),
+        "coordinates": station_place(*angles, epicentre, elevation) if angles else {},
         "instrument": recorder,
     }
 
 
 def _event(text: Text, fields: Fields) -> dict[str, Any]:
     """Return origin time, hypocentre and magnitude of the event."""
-    latitude, longitude = _place(fields, "EPICENTER COORDINATES")
+    angles = _angles(fields, "EPICENTER COORDINATES")
+    place = epicentre_place(*angles) if angles else {}
     time = _EVENT_TIME.match(text_field(fields, "EARTHQUAKE DATE") or "")
     # Depth in km; the kind of the magnitude follows its number
     depth = number_field(text, fields, "EARTHQUAKE DEPTH (km)")
     magnitude = re.match(DECIMAL, text_field(fields, "EARTHQUAKE MAGNITUDE") or "")
     return {
         "time": _moment(text, fields, "EARTHQUAKE DATE", time.groups()) if time else None,
-        "latitude": latitude,
-        "longitude": longitude,
+        "latitude": place.get("latitude"),
+        "longitude": place.get("longitude"),
         "depth": metres(depth),
         "magnitude": float(magnitude[1]) if magnitude else None,
     }

@@ -8,6 +8,7 @@ from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.formats.text.conversions import first_known, metres
+from per_obspy.formats.text.film import Film, even_film
 from per_obspy.formats.text.lines import (
     Text,
     WaveformFile,
@@ -52,23 +53,40 @@ def read_smc(file: WaveformFile, **_unused: Any) -> Stream:
     line_at(text, _TEXT_LINES, "integers")
     integers = fixed_block(text, _TEXT_LINES, _INTEGERS, 10, 8)
     reals = fixed_block(text, _TEXT_LINES + _INTEGER_LINES, _REALS, 15, 5)
-    values, rate = _samples(text, integers, reals)
+    values, dt, film = _samples(text, integers, reals, title[1])
     # Words of the header
     words = _quantity(title[1]) | {"starttime": _start(text, integers)}
     words |= _station(text, integers, reals) | _numbers(reals) | _direction(integers)
-    return Stream([trace(values, 1 / rate, words)])
+    return Stream([trace(values, dt, words | film)])
 
 
-def _samples(text: Text, integers: FloatArray, reals: FloatArray) -> tuple[FloatArray, float]:
-    """Return the samples in SI and their rate, Hz."""
+def _samples(
+    text: Text, integers: FloatArray, reals: FloatArray, title: str
+) -> tuple[FloatArray, float, dict[str, Any]]:
+    """Return the samples in SI, their interval, s, and the words of digitised film."""
     comments = 0 if integers[15] == _NO_INTEGER else int(integers[15])
     first = _TEXT_LINES + _NUMBER_LINES + max(comments, 0)
-    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:g}")
+    samples = count(text, _TEXT_LINES + 2, "number of samples", f"{integers[16]:.17g}")
+    # Film has no rate: its samples are pairs of time and value
+    if title.startswith("UNCORRECTED") and _real(reals, 1) is None:
+        film = _film(text, first, samples)
+        return _CENTIMETRE * film.values, film.dt, film.words
     rate = interval(text, _TEXT_LINES + _INTEGER_LINES, "sampling rate", float(reals[1]))
     # The samples end the file
     values = _CENTIMETRE * fixed_block(text, first, samples, 10, 8)
     no_more(text, first + block_lines(samples, 8), samples)
-    return values, rate
+    return values, 1 / rate, {}
+
+
+def _film(text: Text, first: int, samples: int) -> Film:
+    """Return a digitised trace, whose header counts the pairs or the numbers in them."""
+    # The length of the file decides which of both it counts
+    lines = len(text.lines) - first
+    if samples % 2 == 0 and lines == block_lines(samples, 8) != block_lines(2 * samples, 8):
+        samples //= 2
+    pairs = fixed_block(text, first, 2 * samples, 10, 8).reshape(-1, 2)
+    no_more(text, first + block_lines(2 * samples, 8), samples)
+    return even_film(text, first, pairs, 4)
 
 
 def _quantity(title: str) -> dict[str, Any]:

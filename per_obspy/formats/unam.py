@@ -13,7 +13,7 @@ from obspy import Stream, UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL
-from per_obspy.formats.text.conversions import hemisphere, metres, utc
+from per_obspy.formats.text.conversions import metres, utc
 from per_obspy.formats.text.fields import (
     Fields,
     HeaderField,
@@ -35,7 +35,8 @@ from per_obspy.formats.text.lines import (
     read_text,
     refuse,
 )
-from per_obspy.formats.text.vocabulary import coordinates, orientation, trace
+from per_obspy.formats.text.places import Angle, epicentre_place, station_place
+from per_obspy.formats.text.vocabulary import orientation, trace
 
 _MARK = b"ARCHIVO ESTANDAR DE ACELERACION"
 _WIDTH = 10
@@ -58,8 +59,8 @@ _MONTHS = (
     "DICIEMBRE",
 )
 _CLOCK = re.compile(rf"(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
-_LATITUDE = re.compile(rf"{DECIMAL}\s*LAT\.?\s*([NS])")
-_LONGITUDE = re.compile(rf"{DECIMAL}\s*LONG\.?\s*([EWO])")
+_LATITUDE = re.compile(rf"{DECIMAL}\s*LAT\.?\s*([NSEWO])")
+_LONGITUDE = re.compile(rf"{DECIMAL}\s*LONG\.?\s*([NSEWO])")
 _MAGNITUDE = re.compile(rf"(M\w?)={DECIMAL}")
 _DAY, _HALF_DAY = 86400, 43200.0  # s
 
@@ -202,33 +203,33 @@ def _direction(words: str) -> dict[str, float]:
     return direction
 
 
-def _place(fields: Fields, name: str) -> tuple[float | None, float | None]:
-    """Return latitude and longitude, degrees, from the two lines of a field."""
+def _angles(fields: Fields, name: str) -> tuple[Angle, Angle] | None:
+    """Return latitude and longitude from the two lines of a field; None where one is missing."""
     latitude = _LATITUDE.match((text_field(fields, name) or "").upper())
     longitude = _LONGITUDE.match((text_field(fields, f"{name} 2") or "").upper())
     if latitude is None or longitude is None:
-        return None, None
+        return None
     # West is oeste in Spanish
-    west = longitude[2].replace("O", "W")
-    return hemisphere(latitude[1], latitude[2]), hemisphere(longitude[1], west)
+    letters = [found[2].replace("O", "W") for found in (latitude, longitude)]
+    return Angle(float(latitude[1]), letters[0]), Angle(float(longitude[1]), letters[1])
 
 
 def _common_words(text: Text, fields: Fields) -> dict[str, Any]:
     """Return the words that all channels share."""
-    words = _station(text, fields) | _times(text, fields)
+    words = _times(text, fields)
+    words |= _station(text, fields, words["event"])
     return words | {"units": "m/s2", "quantity": "acceleration", "processing_level": "raw"}
 
 
-def _station(text: Text, fields: Fields) -> dict[str, Any]:
+def _station(text: Text, fields: Fields, epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return code, name, coordinates and instrument of the station."""
-    latitude, longitude = _place(fields, "COORDENADAS DE LA ESTACION")
+    angles = _angles(fields, "COORDENADAS DE LA ESTACION")
+    elevation = number_field(text, fields, "ALTITUD (msnm)")
     # The format has no network codes
     return {
         "station": required_field(text, fields, "CLAVE DE LA ESTACION").value,
         "station_name": text_field(fields, "NOMBRE DE LA ESTACION"),
-        "coordinates": coordinates(
-            latitude, longitude, number_field(text, fields, "ALTITUD (msnm)")
-        ),
+        "coordinates": station_place(*angles, epicentre, elevation) if angles else {},
         "instrument": {
             "model": text_field(fields, "MODELO DEL ACELEROGRAFO"),
             "serial": text_field(fields, "NUMERO DE SERIE DEL ACELEROGRAFO"),
@@ -242,7 +243,8 @@ def _times(text: Text, fields: Fields) -> dict[str, Any]:
 
     The date is the event's, and the record may begin on the other side of midnight.
     """
-    latitude, longitude = _place(fields, "COORDENADAS DEL EPICENTRO")
+    angles = _angles(fields, "COORDENADAS DEL EPICENTRO")
+    place = epicentre_place(*angles) if angles else {}
     depth = _depth(text, fields)
     magnitude = _magnitude(fields)
     origin = _moment(text, fields, "HORA EPICENTRO (GMT)")
@@ -252,8 +254,8 @@ def _times(text: Text, fields: Fields) -> dict[str, Any]:
         start += _DAY if start < origin else -_DAY
     event = {
         "time": origin,
-        "latitude": latitude,
-        "longitude": longitude,
+        "latitude": place.get("latitude"),
+        "longitude": place.get("longitude"),
         "depth": depth,
         "magnitude": magnitude,
     }

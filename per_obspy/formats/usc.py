@@ -20,9 +20,9 @@ from per_obspy.formats.text.lines import (
     refuse,
 )
 from per_obspy.formats.text.number_blocks import titled_block
+from per_obspy.formats.text.places import Angle, epicentre_place, station_place
 from per_obspy.formats.text.vocabulary import (
     channel_code,
-    coordinates,
     corners,
     orientation,
     sensor_constants,
@@ -69,8 +69,8 @@ def _volume_1(text: Text, first: int) -> tuple[Trace, int]:
         refuse(text, first + 11, "unit", f"{quoted(text, first + 11, 40)} is not g/10")
     samples = _promised_samples(text, first + 10)
     # Digitised film, in g/10
-    values, dt = read_film(_shifted(text), start, samples)
-    component = trace(STANDARD_GRAVITY / 10 * values, dt, words)
+    film = read_film(_shifted(text), start, samples)
+    component = trace(STANDARD_GRAVITY / 10 * film.values, film.dt, words | film.words)
     return component, start + film_lines(samples)
 
 
@@ -122,44 +122,43 @@ def _words(text: Text, first: int) -> dict[str, Any]:
     lines = text.lines[first : first + 13]
     if not _VOLUME_1.match(lines[0]):
         refuse(text, first, "title", f"{quoted(text, first, 60)} is not that of a component")
-    # Station and instrument
-    words = {"units": "m/s2", "quantity": "acceleration"} | _station(lines)
+    # Event, and station, whose place may need the epicentre; then the instrument
+    event = _event(text, first, lines)
+    words = {"units": "m/s2", "quantity": "acceleration", "event": event}
+    words |= _station(lines, event)
     words["instrument"] = sensor_constants(_SENSOR.match(lines[9]))
-    words["event"] = _event(text, first, lines)
     direction = re.match(r"COMP\s+(\S+)", lines[6])
     return words | (orientation(direction[1]) if direction else {})
 
 
-def _station(lines: list[str]) -> dict[str, Any]:
+def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return coordinates, code and name of the station."""
     station = _STATION.match(lines[4])
     # The name ends where two blanks or a line number follow
     name = re.split(r"\s{2,}|\d+$", lines[5].strip())[0]
     return {
-        "coordinates": coordinates(*_signed_degrees(station.groups()[1:])) if station else {},
+        "coordinates": station_place(*_angles(station.groups()[1:]), epicentre) if station else {},
         "station": station[1] if station else None,
         "station_name": name or None,
     }
 
 
-def _signed_degrees(parts: tuple[str, ...]) -> tuple[float, float]:
+def _angles(parts: tuple[str, ...]) -> tuple[Angle, Angle]:
     """Return latitude and longitude from degrees, minutes, seconds and letter of each."""
-    latitude = sexagesimal(*parts[:3]) * (-1 if parts[3] == "S" else 1)
-    longitude = sexagesimal(*parts[4:7]) * (-1 if parts[7] == "W" else 1)
-    return latitude, longitude
+    return Angle(sexagesimal(*parts[:3]), parts[3]), Angle(sexagesimal(*parts[4:7]), parts[7])
 
 
 def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
     """Return name, origin time and epicentre of the event."""
     epicentre = _EPICENTRE.match(lines[8])
-    latitude, longitude = _signed_degrees(epicentre.groups()) if epicentre else (None, None)
+    place = epicentre_place(*_angles(epicentre.groups())) if epicentre else {}
     # The name ends where two blanks follow
     name = re.split(r"\s{2,}", lines[1].strip())[0]
     return {
         "name": name or None,
         "time": _origin(text, first + 2, _DATE.match(lines[2])),
-        "latitude": latitude,
-        "longitude": longitude,
+        "latitude": place.get("latitude"),
+        "longitude": place.get("longitude"),
     }
 
 

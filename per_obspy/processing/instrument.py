@@ -49,8 +49,10 @@ def process_instrument(
     rejected : tuple of Rejection
     """
     if instrument and is_processed(instrument[0]):
-        pair, rejected = paired(instrument, settings.overlap)
-        return passed_through(pair, settings), rejected
+        # Series of velocity or displacement are no acceleration
+        physical, unfit = _in_turn(instrument, _conversion_steps(settings)[1:])
+        pair, rejected = paired(physical, settings.overlap)
+        return passed_through(pair, settings), (*unfit, *rejected)
     # Each component in m/s2, then the horizontals over their common time
     physical, unfit = _in_turn(instrument, _conversion_steps(settings))
     pair, unpaired = paired(physical, settings.overlap)

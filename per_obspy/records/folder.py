@@ -31,6 +31,9 @@ _MARKS = {
     b'"shard": ': "description",
 }
 
+#: unit of a series -> its quantity, for the integrals of acceleration
+_INTEGRALS = {"m/s": "velocity", "m": "displacement"}
+
 
 class SourceContents(NamedTuple):
     """
@@ -181,7 +184,8 @@ def read_station(
         Traces in the words of ``formats/text/vocabulary.py``; the path of each one's file is in
         ``stats.source``.
     rejected : tuple of Rejection
-        Files that cannot be read and traces whose metadata is insufficient; the rest goes on.
+        Files that cannot be read, traces whose metadata is insufficient, and velocity and
+        displacement of a channel whose acceleration is read; the rest goes on.
     """
     stream, rejected = Stream(), []
     for path in paths:
@@ -199,7 +203,27 @@ def read_station(
                 stream[-1].stats.source = str(path)
             except RecordRejected as rejection:
                 rejected.append(Rejection("record", trace.id, str(path), None, rejection.reasons))
-    return stream, tuple(rejected)
+    stream, integrals = _without_integrals(stream)
+    return stream, (*rejected, *integrals)
+
+
+def _without_integrals(stream: Stream) -> tuple[Stream, list[Rejection]]:
+    """
+    Return a stream without series of velocity and displacement whose acceleration it holds too.
+
+    Agencies write the integrals of a record beside it, under the same codes.
+    """
+    accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
+    # Integrals without their acceleration stay
+    kept, rejected = Stream(), []
+    for trace in stream:
+        quantity = _INTEGRALS.get(trace.stats.get("units"))
+        if quantity is None or trace.id not in accelerations:
+            kept += trace
+            continue
+        reason = f"{quantity} series, acceleration is read instead"
+        rejected.append(Rejection("record", trace.id, trace.stats.source, None, (reason,)))
+    return kept, rejected
 
 
 def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:

@@ -37,6 +37,7 @@ STATS_WORDS = (
     "site_class",
     "vs30",
     "corners",
+    "digitised",
     "per_obspy",
     "processing",
 )

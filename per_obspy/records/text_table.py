@@ -1,4 +1,4 @@
-"""Plain tables of samples, one row per sample, whose layout the user describes."""
+"""Plain tables of samples, one or several samples per row, whose layout the user describes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,6 +10,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.formats.text.lines import LONGEST_NUMBER
 from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 #: unit of a table -> m/s2
@@ -20,6 +21,9 @@ _LETTERS = {"N": horizontal(0.0), "E": horizontal(90.0), "Z": {"sensor_dip": -90
 
 #: largest deviation of a time from even spacing, as a fraction of the interval (tables round times)
 _UNEVENNESS = 0.05
+
+#: order of the samples in a table: one row per sample, or rows that follow each other
+TABLE_LAYOUTS = ("columns", "rows")
 
 #: number of a line, and its fields
 _Row = tuple[int, list[str]]
@@ -41,6 +45,7 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     dt: float | None = None,
     start: str | None = None,
     raw: bool = False,
+    layout: str | None = None,
 ) -> Stream:
     """
     Read a plain table as one Stream in m/s2.
@@ -48,8 +53,8 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     Parameters
     ----------
     path : str or Path
-        Text file, one row per sample; empty lines at the end and everything after ``#`` are
-        ignored.
+        Text file, all rows with as many values; empty lines at the end and everything after ``#``
+        are ignored.
     station, network : str
         Codes.
     latitude, longitude : float
@@ -72,6 +77,11 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
         Time of the first sample, ISO 8601, UTC.
     raw : bool
         Whether the record still has to be corrected.
+    layout : str, optional
+        ``columns``: one row per sample, one column per channel. ``rows``: samples of the only
+        channel, packed several to a row and read one row after the other; the last row may be
+        shorter, ``channels`` names column 0 and ``dt`` is given. Not given: ``columns``, unless
+        both would fit.
 
     Returns
     -------
@@ -85,14 +95,17 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     CatalogError
         If the file cannot be read.
     RecordRejected
-        If a row lacks a column, holds no number or breaks the spacing.
+        If a row has more or fewer values than the first one, lacks a column, holds no number or
+        breaks the spacing; or if ``layout`` is not given and both layouts fit.
     """
     # Check what does not depend on the file
     _check_units_and_interval(units, time_column, dt)
+    _check_layout(layout, channels, time_column)
     site = _site(latitude, longitude)
     directions = _directions(channels, azimuths or {})
     # Read the samples and their interval
-    rows = _rows(path, separator, skip)
+    rows = _rows(path, separator, skip, layout)
+    _check_layout_is_clear(path, rows[0], layout, channels, time_column)
     if time_column is not None:
         dt = _even_spacing(path, rows, _column(path, rows, time_column, "time"))
     common = {
@@ -111,6 +124,17 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
         samples = TABLE_UNITS[units] * _column(path, rows, column, code)
         stream.append(trace(samples, step, common | directions[code] | {"channel": code}))
     return stream
+
+
+def _check_layout(layout: str | None, channels: Mapping[str, int], time_column: int | None) -> None:
+    """Refuse a layout that is unknown or that channels and time do not fit."""
+    if layout is not None and layout not in TABLE_LAYOUTS:
+        raise ValueError(f"layout must be one of {', '.join(TABLE_LAYOUTS)}, got {layout!r}")
+    # Packed samples belong to one channel and have no times
+    if layout == "rows" and time_column is not None:
+        raise ValueError(f"layout = rows needs dt and no time_column, got column {time_column}")
+    if layout == "rows" and list(channels.values()) != [0]:
+        raise ValueError(f"layout = rows needs one channel, in column 0, got {dict(channels)}")
 
 
 def _check_units_and_interval(units: str, time_column: int | None, dt: float | None) -> None:
@@ -152,8 +176,8 @@ def _directions(
     return {code: given.get(code) or _LETTERS[code[-1]] for code in channels}
 
 
-def _rows(path: str | Path, separator: str | None, skip: int) -> list[_Row]:
-    """Return the fields of every line with samples."""
+def _rows(path: str | Path, separator: str | None, skip: int, layout: str | None) -> list[_Row]:
+    """Return the fields of every line with samples; of packed samples one row per sample."""
     try:
         content = Path(path).read_text(encoding="latin-1")
     except OSError as error:
@@ -162,11 +186,45 @@ def _rows(path: str | Path, separator: str | None, skip: int) -> list[_Row]:
     # Lines are numbered from 1, the skipped ones included
     numbered = enumerate(lines[skip:], skip + 1)
     rows = [(number, line.split(separator)) for number, line in numbered if line.strip()]
+    _refuse_unequal_rows(path, rows, layout)
+    # Packed samples follow each other from row to row
+    if layout == "rows":
+        rows = [(number, [field]) for number, fields in rows for field in fields]
     if len(rows) < 2:
         raise RecordRejected(
             str(path), f"{len(rows)} rows of samples after {skip} lines, a record needs two"
         )
     return rows
+
+
+def _refuse_unequal_rows(path: str | Path, rows: Sequence[_Row], layout: str | None) -> None:
+    """Refuse the first row whose number of values is not that of the first row."""
+    for index, (line, fields) in enumerate(rows):
+        expected = len(rows[0][1])
+        is_last_of_packed = layout == "rows" and index == len(rows) - 1
+        if len(fields) == expected or (is_last_of_packed and len(fields) < expected):
+            continue
+        # Samples that are packed into rows look like a table with a short last row
+        problem = f"{len(fields)} values, expected {expected} as on line {rows[0][0]}"
+        if layout != "rows":
+            problem += '; if the samples are packed into rows, set layout = "rows"'
+        raise RecordRejected(str(path), f"line {line}: {problem}")
+
+
+def _check_layout_is_clear(
+    path: str | Path,
+    row: _Row,
+    layout: str | None,
+    channels: Mapping[str, int],
+    time_column: int | None,
+) -> None:
+    """Refuse several values per row of a single channel, which may be packed samples or not."""
+    line, fields = row
+    both_fit = layout is None and time_column is None and list(channels.values()) == [0]
+    if both_fit and len(fields) > 1:
+        problem = f"{len(fields)} values per row for one channel without a column of time"
+        mend = 'set layout = "rows" for packed samples, "columns" to read the first value alone'
+        raise RecordRejected(str(path), f"line {line}: {problem}; {mend}")
 
 
 def _column(path: str | Path, rows: Sequence[_Row], column: int, name: str) -> FloatArray:
@@ -176,13 +234,14 @@ def _column(path: str | Path, rows: Sequence[_Row], column: int, name: str) -> F
         if not 0 <= column < len(fields):
             problem = f"no column {column}, there are {len(fields)}"
             raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
-        # Text is refused as numbers that are not finite are
+        # Text and words too long for a number are refused as numbers that are not finite are
+        word = fields[column].strip()
         try:
-            values[index] = float(fields[column])
+            values[index] = float(word) if len(word) <= LONGEST_NUMBER else np.nan
         except ValueError:
             values[index] = np.nan
         if not np.isfinite(values[index]):
-            problem = f"{fields[column].strip()!r} is not a finite number"
+            problem = f"{word[:LONGEST_NUMBER]!r} is not a finite number"
             raise RecordRejected(str(path), f"line {line}, {name}: {problem}")
     return values
 

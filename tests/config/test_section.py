@@ -13,6 +13,10 @@ from per_obspy.config import Ensemble, Run, Simulation, load, screening_kind
 from per_obspy.errors import CatalogError
 
 GOOD = 'name = "x"\noutput = "out"\n[records]\nfolder = "in"\n[pairs]\nfile = "pairs.csv"\n'
+#: a table of samples without its interval
+TABLE = (
+    '{file = "a", station = "A", latitude = 1, longitude = 2, units = "g", channels = {HNN = 1}}'
+)
 CHECKOUT = Path(__file__).parents[2]
 
 
@@ -109,6 +113,18 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
             ),
             r"records\.columns\.0\.units: .*\(got 'mg'\), expected: of the samples: m/s2, "
             r"cm/s2, gal, g",
+        ),
+        (
+            GOOD.replace('folder = "in"', f"columns = [{TABLE}]"),
+            r"records\.columns\.0: give exactly one of time_column and dt",
+        ),
+        (
+            GOOD.replace('folder = "in"', f'columns = [{TABLE[:-1]}, dt = 0.1, layout = "no"}}]'),
+            r"records\.columns\.0\.layout: .*\(got 'no'\), expected: order of the samples",
+        ),
+        (
+            GOOD.replace('folder = "in"', f'columns = [{TABLE[:-1]}, dt = 0.1, layout = "rows"}}]'),
+            r"records\.columns\.0: layout = \"rows\" holds one channel.*got .*HNN.*: 1",
         ),
         (
             GOOD.replace('folder = "in"\n', ""),

@@ -274,12 +274,6 @@ def test_no_test_file_of_obspy_is_claimed():
             "title of veloc: expected points at an interval",
         ),
         (
-            "csmip_raw",
-            "  0.020  2.000",
-            "  0.009  2.000",
-            "line 28, time 3: 0.009 s breaks the mean interval of 0.01 s",
-        ),
-        (
             "renadic",
             "23  Record",
             "0  Record",
@@ -343,3 +337,50 @@ def test_a_header_that_contradicts_itself_is_refused(name: str, old: str, new: s
     assert old in sample.text
     with pytest.raises(RecordRejected, match=message):
         read(sample, sample.text.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("usc_v1", "118 22 48W  ", "118 22 48N  "),
+        ("usc_v1", "34 06 36N,", "34 06 36W,"),
+        ("csmip_v1", "123.633W", "123.633N"),
+        ("unam", "16.84851 LAT. N", "16.84851 LAT. O"),
+        ("geonet_v1a", "172 49 48E", "172 49 48S"),
+        ("bhrc", "38.474 N 47.059 E", "38.474 N 47.059 S"),
+        ("nsmn", "37.87470N-27.59223E", "37.87470E-27.59223E"),
+    ],
+)
+def test_a_wrong_letter_of_a_place_is_mended_by_the_epicentre_and_noted(
+    name: str, old: str, new: str
+):
+    sample = SAMPLES[name]
+    assert old in sample.text
+    for trace in read(sample, sample.text.replace(old, new)):
+        place = trace.stats.coordinates
+        assert (place.latitude, place.longitude) == pytest.approx(sample.coordinates, abs=1e-9)
+        assert trace.stats.processing[-1].endswith("taken, the epicentre's side")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("usc_v1", "34 06 36N, 118 22 48W", "34 06 36N, 118 72 48W"),
+        ("dyna", "STATION_LATITUDE_DEGREE: 37.6349", "STATION_LATITUDE_DEGREE: 376349"),
+        ("smc", "3.7728000E+01", "3.7728000E+04"),
+    ],
+)
+def test_a_place_out_of_range_is_unknown_and_noted(name: str, old: str, new: str):
+    sample = SAMPLES[name]
+    assert old in sample.text
+    for trace in read(sample, sample.text.replace(old, new)):
+        assert "coordinates" not in trace.stats
+        assert trace.stats.processing[-1].endswith("out of range, so the place is unknown")
+
+
+def test_a_count_of_more_than_six_digits_is_not_rounded():
+    sample = SAMPLES["smc"]
+    changed = sample.text.replace(f"{len(sample.values[0]):10d}", f"{1_000_001:10d}", 1)
+    assert changed != sample.text
+    with pytest.raises(RecordRejected, match="the header promises 1000001 on 125001 lines"):
+        read(sample, changed)

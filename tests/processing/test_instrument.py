@@ -172,3 +172,14 @@ def test_an_offset_without_quiet_ends_is_rejected(record):
 def test_an_offset_and_a_high_pass_exclude_each_other():
     with pytest.raises(ValueError, match=r"permanent_offset keeps what highpass = 0\.1 Hz removes"):
         Processing(permanent_offset=True, highpass=0.1)
+
+
+@pytest.mark.parametrize("units", ["m/s", "m"])
+def test_processed_velocity_is_not_taken_for_acceleration(record, units):
+    stream = Stream([record("HNN"), record("HNE"), record("HNZ")])
+    for trace in stream:
+        trace.stats.update({"units": units, "processing_level": "processed"})
+    done, rejected = process_station(stream, Processing())
+    assert len(done) == 0
+    assert len(rejected) == len(stream)  # one row per component
+    assert all(f"units '{units}', needs m/s2" in row.reasons[0] for row in rejected)

@@ -148,3 +148,43 @@ def test_a_cut_knet_file_is_a_reason(real_data: Path, tmp_path: Path):
     stream, rejected = read_station(contents.stations["BO.AOM001"], None)
     assert not stream
     assert rejected[0].reasons == ("the header promises 102 s, the file holds 38.64 s",)
+
+
+#: quantity and unit of the header -> ending of a PEER file
+PEER_FILES = {
+    "ACCELERATION": ("G", "AT2"),
+    "VELOCITY": ("CM/S", "VT2"),
+    "DISPLACEMENT": ("CM", "DT2"),
+}
+
+
+def write_peer(folder: Path, quantities: tuple[str, ...]) -> None:
+    """Write three components of one station, each as files of the quantities."""
+    for component in ("000", "090", "UP"):
+        for quantity in quantities:
+            unit, ending = PEER_FILES[quantity]
+            head = f"PEER\nKobe, 1/16/1995, Some Town, {component}\n{quantity} TIME SERIES IN"
+            text = f"{head} UNITS OF {unit}\nNPTS= 3, DT= .01 SEC\n1 2 3\n"
+            (folder / f"KOBE{component}.{ending}").write_text(text)
+
+
+def test_velocity_and_displacement_beside_acceleration_are_listed_and_not_read(tmp_path: Path):
+    write_peer(tmp_path, tuple(PEER_FILES))
+    (paths,) = find_stations(tmp_path).stations.values()
+    stream, rejected = read_station(paths, None)
+    assert {trace.stats.units for trace in stream} == {"m/s2"}
+    assert len(stream) == 3
+    # Every other file is a row with its reason
+    reasons = {Path(row.source).name: row.reasons for row in rejected}
+    for component in ("000", "090", "UP"):
+        for quantity, ending in (("velocity", "VT2"), ("displacement", "DT2")):
+            reason = f"{quantity} series, acceleration is read instead"
+            assert reasons.pop(f"KOBE{component}.{ending}") == (reason,)
+    assert reasons == {}
+
+
+def test_velocity_without_acceleration_is_read_as_such(tmp_path: Path):
+    write_peer(tmp_path, ("VELOCITY",))
+    (paths,) = find_stations(tmp_path).stations.values()
+    stream, rejected = read_station(paths, None)
+    assert ({trace.stats.units for trace in stream}, rejected) == ({"m/s"}, ())

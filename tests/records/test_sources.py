@@ -211,7 +211,7 @@ def test_the_sections_in_the_documentation_are_valid():
     for block in blocks:
         records = Records(**tomllib.loads(block)["records"])
         sources += records.model_fields_set - {"event", "stationxml"}
-    assert sources == ["fdsn", "sds", "asdf"]
+    assert sources == ["columns", "fdsn", "sds", "asdf"]
 
 
 def test_the_documentation_has_every_key_of_the_services():

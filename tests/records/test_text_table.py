@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.errors import CatalogError, RecordRejected
 from per_obspy.records.text_table import TABLE_UNITS, read_columns
@@ -81,7 +81,10 @@ def test_interval_azimuth_start_and_level_as_said(table: Path):
     [
         ("0.5", "nan", "line 3, HNE: 'nan' is not a finite number"),
         ("0.5", "x", "line 3, HNE: 'x' is not a finite number"),
-        ("0.8 0.9", "0.8", "line 4, HNZ: no column 3, there are 3"),
+        ("0.5", "1" * 41, f"line 3, HNE: '{'1' * 40}' is not a finite number"),
+        ("0.8 0.9", "0.8", "line 4: 3 values, expected 4 as on line 2"),
+        ("0.8 0.9", "0.8 0.9 1", "line 4: 5 values, expected 4 as on line 2"),
+        (" 0.3\n", "\n", "line 3: 4 values, expected 3 as on line 2"),
         (
             "0.06",
             "0.07",
@@ -111,6 +114,12 @@ def test_faults_of_the_file_name_line_and_channel(table: Path, old: str, new: st
         ({"latitude": 91}, "latitude must be between -90 and 90, got 91"),
         ({"channels": {}}, "channels must name at least one column"),
         ({"channels": {"HN1": 1}}, r"azimuths must tell the direction of \['HN1'\]"),
+        ({"layout": "packed"}, "layout must be one of columns, rows, got 'packed'"),
+        ({"layout": "rows"}, "layout = rows needs dt and no time_column, got column 0"),
+        (
+            {"layout": "rows", "time_column": None, "dt": 0.01},
+            "layout = rows needs one channel, in column 0",
+        ),
         ({"azimuths": {"HNX": 1}}, r"azimuths must belong to channels, got \['HNX'\]"),
     ],
 )
@@ -119,6 +128,64 @@ def test_faults_of_arguments_name_argument_and_value(
 ):
     with pytest.raises(ValueError, match=message):
         read_columns(table, **LAYOUT | change)
+
+
+PACKED = {
+    "station": "A",
+    "latitude": 1.0,
+    "longitude": 1.0,
+    "units": "m/s2",
+    "channels": {"HNN": 0},
+    "dt": 0.01,
+}
+
+
+def test_a_table_without_the_column_of_a_channel_names_it(table: Path):
+    with pytest.raises(RecordRejected, match="line 2, HNZ: no column 9, there are 4"):
+        read_columns(table, **LAYOUT | {"channels": {"HNZ": 9}})
+
+
+def test_packed_samples_are_read_one_row_after_the_other(tmp_path: Path):
+    motion = np.sin(np.arange(1.0, 19.0))
+    path = tmp_path / "packed.txt"
+    # Rows of eight, the last one shorter; repr writes every digit
+    rows = [" ".join(map(repr, motion[first : first + 8].tolist())) for first in (0, 8, 16)]
+    path.write_text("header\n" + "\n".join(rows))
+    packed = read_columns(path, **PACKED, skip=1, layout="rows")
+    assert_array_equal(packed[0].data, motion)
+    assert packed[0].stats.delta == 0.01
+
+
+@pytest.mark.parametrize("layout", [None, "columns"])
+def test_packed_samples_are_not_read_as_one_sample_per_row(tmp_path: Path, layout: str | None):
+    path = tmp_path / "packed.txt"
+    path.write_text("1 2 3 4\n5 6 7 8\n9 10\n")
+    message = 'line 3: 2 values, expected 4 as on line 1.*set layout = "rows"'
+    with pytest.raises(RecordRejected, match=message):
+        read_columns(path, **PACKED, layout=layout)
+
+
+def test_rows_of_equal_length_need_a_layout_where_both_would_fit(tmp_path: Path):
+    path = tmp_path / "packed.txt"
+    path.write_text("1 2 3 4\n5 6 7 8\n")
+    with pytest.raises(RecordRejected, match=r"line 1: 4 values per row for one channel.*layout"):
+        read_columns(path, **PACKED)
+    assert_array_equal(read_columns(path, **PACKED, layout="columns")[0].data, [1, 5])
+    assert_array_equal(read_columns(path, **PACKED, layout="rows")[0].data, np.arange(1.0, 9.0))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("1 2 3\n4 5\n6 7 8\n", "line 2: 2 values, expected 3 as on line 1$"),
+        ("1 2 3\n4 5 6\n6 7 8 9\n", "line 3: 4 values, expected 3 as on line 1$"),
+        ("1 2 3\n4 x 6\n", "line 2, HNN: 'x' is not a finite number"),
+    ],
+)
+def test_faults_of_packed_samples_name_their_line(tmp_path: Path, content: str, message: str):
+    (tmp_path / "packed.txt").write_text(content)
+    with pytest.raises(RecordRejected, match=message):
+        read_columns(tmp_path / "packed.txt", **PACKED, layout="rows")
 
 
 def test_a_missing_table_is_named(tmp_path: Path):

@@ -1,8 +1,8 @@
 """Conversions of header words to SI: years, degrees, kilometres and times in UTC."""
 
+import math
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
-from re import Match
 
 from obspy import UTCDateTime
 
@@ -24,47 +24,17 @@ def full_year(year: str) -> int:
     return int(year) + (2000 if int(year) < 33 else 1900)
 
 
-def hemisphere(degrees: str, letter: str) -> float:
-    """
-    Return signed degrees.
-
-    >>> hemisphere("117.365", "W")
-    -117.365
-    """
-    return -float(degrees) if letter.upper() in ("S", "W") else float(degrees)
-
-
-def signed_degrees(
-    found: Match[str] | None, first: int = 1
-) -> tuple[float, float] | tuple[None, None]:
-    """
-    Return latitude and longitude, degrees, of a match; both None where there is none.
-
-    Parameters
-    ----------
-    found : Match or None
-        Has four groups in turn: degrees, N or S, degrees, E or W.
-    first : int
-        Number of the first of these groups.
-
-    >>> import re
-    >>> signed_degrees(re.match(r"(.*) (S) (.*) (E)", "42.5 S 172.8 E"))
-    (-42.5, 172.8)
-    """
-    if found is None:
-        return None, None
-    latitude = hemisphere(found[first], found[first + 1])
-    longitude = hemisphere(found[first + 2], found[first + 3])
-    return latitude, longitude
-
-
 def sexagesimal(degrees: str, minutes: str, seconds: str) -> float:
     """
     Return unsigned degrees from degrees, minutes and seconds.
 
+    Minutes or seconds of 60 and more give infinity, which no place has.
+
     >>> sexagesimal("34", "30", "36")
     34.51
     """
+    if int(minutes) >= 60 or int(seconds) >= 60:
+        return math.inf
     return int(degrees) + int(minutes) / 60 + int(seconds) / 3600
 
 

@@ -8,11 +8,11 @@ from obspy import UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
-from per_obspy.formats.text.conversions import MONTHS, full_year, metres, signed_degrees, utc
+from per_obspy.formats.text.conversions import MONTHS, full_year, metres, utc
 from per_obspy.formats.text.lines import DECIMAL, Text, block_lines, fixed_block, line_at, refuse
+from per_obspy.formats.text.places import decimal_angles, epicentre_place, station_place
 from per_obspy.formats.text.vocabulary import (
     channel_code,
-    coordinates,
     orientation,
     sensor_constants,
 )
@@ -23,8 +23,11 @@ _RECORD_OF = ("RECORD OF", "RCRD OF")
 _UNKNOWN = (-999.0, 0.0)
 
 # Line 4 (from 0): station number, coordinates, recorder, channels
-_SITE = re.compile(rf"STATION (?:NO|ID)\.\s*(\S*?)\s+{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
-_MODEL = re.compile(r"[NS][,\s]\s*[\d.]+\s*[EW]\s+(\S.*?)\s*S/N\s*(\w*)")
+_LETTER = "([NSEW])"
+_SITE = re.compile(
+    rf"STATION (?:NO|ID)\.\s*(\S*?)\s+{DECIMAL}\s*{_LETTER}[,\s]\s*{DECIMAL}\s*{_LETTER}"
+)
+_MODEL = re.compile(r"[NSEW][,\s]\s*[\d.]+\s*[NSEW]\s+(\S.*?)\s*S/N\s*(\w*)")
 _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s*CHNS OF\s*(\d{1,3})")
 
 # Lines 5, 6, 9: agency; channel and direction; instrument
@@ -49,7 +52,7 @@ _RECORDED = re.compile(
 )
 
 # Line 8: hypocentre
-_EPICENTRE = re.compile(rf"{DECIMAL}\s*([NS])[,\s]\s*{DECIMAL}\s*([EW])")
+_EPICENTRE = re.compile(rf"{DECIMAL}\s*{_LETTER}[,\s]\s*{DECIMAL}\s*{_LETTER}")
 _DEPTH = re.compile(rf"\bH=\s*{DECIMAL}\s*KM")
 _MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*{DECIMAL}")
 
@@ -121,11 +124,12 @@ def read_header(text: Text, first: int, text_lines: int, reals: int) -> Header:
 
 def _words(text: Text, first: int, lines: list[str], channel: Match[str]) -> dict[str, Any]:
     """Return the words of the thirteen lines of text, in capitals."""
-    words = _station(lines) | {"instrument": _instrument(lines)} | orientation(channel[2])
+    event = _event(text, first, lines)
+    words = _station(lines, event) | {"instrument": _instrument(lines), "event": event}
+    words |= orientation(channel[2])
     # Place of the sensor, times, and the location code that separates instruments
     words["sensor_location"] = channel[4] or None
     words["starttime"] = _start(text, first, lines)
-    words["event"] = _event(text, first, lines)
     words["location"] = _location(lines[4], int(channel[1]), int(channel[3] or channel[1]))
     return words
 
@@ -155,7 +159,7 @@ def channel_name(header: Header, dt: float) -> str:
     return code if len(code) == 3 else f"{code}{header.channel % 10}"
 
 
-def _station(lines: list[str]) -> dict[str, Any]:
+def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return codes, name and coordinates of the station."""
     site = _SITE.match(lines[4].strip())
     name, *owner = re.split(r"\s{2,}|\s+S/N", lines[5].strip())
@@ -170,7 +174,7 @@ def _station(lines: list[str]) -> dict[str, Any]:
         "network": network,
         "station": code,
         "station_name": name or None,
-        "coordinates": coordinates(*signed_degrees(site, 2)),
+        "coordinates": station_place(*decimal_angles(site, 2), epicentre) if site else {},
     }
 
 
@@ -214,7 +218,8 @@ def _moment(text: Text, line: int, found: Match[str]) -> UTCDateTime | None:
 def _event(text: Text, first: int, lines: list[str]) -> dict[str, Any]:
     """Return name, origin time, hypocentre and magnitude of the event."""
     origin = _ORIGIN.search(lines[2])
-    epicentre = coordinates(*signed_degrees(_EPICENTRE.search(lines[8])))
+    found = _EPICENTRE.search(lines[8])
+    epicentre = epicentre_place(*decimal_angles(found)) if found else {}
     depth = _DEPTH.search(lines[8])
     named = not lines[1].startswith(_RECORD_OF)
     # A depth without an epicentre is a mark for unknown

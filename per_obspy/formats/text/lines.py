@@ -19,10 +19,11 @@ WaveformFile = str | Path | BinaryIO
 #: characters of a decimal number; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
-_LONGEST_LINE = 10_000  # characters; a format that promises more is damaged
+#: largest numbers of characters of a line, a number and a message; damaged files may have millions
+LONGEST_LINE, LONGEST_NUMBER, _LONGEST_MESSAGE = 2000, 40, 300
 
-#: a decimal number in a regular expression
-DECIMAL = r"(-?(?:\d+\.?\d*|\.\d+))"
+#: a decimal number in a regular expression; longer runs of digits are no number
+DECIMAL = r"(-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d))"
 
 
 class Text(NamedTuple):
@@ -59,11 +60,17 @@ def read_text(file: WaveformFile) -> Text:
     Read a file as lines.
 
     Any line end is understood. The encoding is Latin-1, which every byte is. Padding after the last
-    line is dropped.
+    line is dropped. A line of more than ``LONGEST_LINE`` characters is refused.
     """
     if hasattr(file, "read"):
-        return Text(str(getattr(file, "name", "open file")), _lines(file.read()))
-    return Text(str(file), _lines(Path(file).read_bytes()))
+        text = Text(str(getattr(file, "name", "open file")), _lines(file.read()))
+    else:
+        text = Text(str(file), _lines(Path(file).read_bytes()))
+    # Searching and padding take time and memory that grow with the longest line
+    for line, content in enumerate(text.lines):
+        if len(content) > LONGEST_LINE:
+            refuse(text, line, "line", f"{len(content)} characters, at most {LONGEST_LINE}")
+    return text
 
 
 def _lines(content: bytes) -> list[str]:
@@ -72,7 +79,9 @@ def _lines(content: bytes) -> list[str]:
 
 
 def refuse(text: Text, line: int, field: str, problem: str) -> NoReturn:
-    """Raise the error of a field."""
+    """Raise the error of a field; a problem that quotes too much of the file is cut."""
+    if len(problem) > _LONGEST_MESSAGE:
+        problem = f"{problem[:_LONGEST_MESSAGE]} ..."
     raise RecordRejected(text.name, f"line {line + 1}, {field}: {problem}")
 
 
@@ -90,6 +99,10 @@ def quoted(text: Text, line: int, length: int | None = None) -> str:
 
 def finite_number(text: Text, line: int, field: str, word: str) -> float:
     """Return a word of a line as a finite number."""
+    # A word of millions of digits takes long to convert
+    length = len(word.strip())
+    if length > LONGEST_NUMBER:
+        refuse(text, line, field, f"{length} characters, a number has at most {LONGEST_NUMBER}")
     try:
         number = float(word)
     except ValueError:
@@ -139,10 +152,13 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
         In the unit of the file.
     """
     full = width * per_line
-    if full > _LONGEST_LINE:
+    if width > LONGEST_NUMBER or full > LONGEST_LINE:
         refuse(text, start - 1, "format", f"{per_line} numbers of {width} characters a line")
     rows = _block_rows(text, start, block_lines(samples, per_line), samples)
     _refuse_long_rows(text, start, rows, full)
+    # A line that is not full lacks a number; padding many of them would fill the memory
+    if any(len(row) <= full - width for row in rows[:-1]):
+        _refuse_fixed(text, start, rows, samples, width, per_line)
     # Pad every line to its full length, so that number i begins at character i * width
     block = "".join([row.ljust(full) for row in rows]).encode("latin-1")
     values = _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
@@ -189,7 +205,9 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
     content = "\n".join(rows).encode("latin-1")
     words = content.split()
     values = None
-    if words and not content.translate(None, _NUMBER_LETTERS):
+    # An array of words takes the memory of the longest one for each of them
+    longest = max(map(len, words), default=0)
+    if 0 < longest <= LONGEST_NUMBER and not content.translate(None, _NUMBER_LETTERS):
         values = _floats(np.array(words))
     # Search for the wrong word only when there is one
     if values is None:
@@ -250,6 +268,9 @@ def _refuse_fixed(
 def _refuse_free(text: Text, start: int, rows: list[str]) -> NoReturn:
     """Refuse the first word of a free block that is no number."""
     for index, word in _words(rows):
+        if len(word) > LONGEST_NUMBER:
+            problem = f"{len(word)} characters, a number has at most {LONGEST_NUMBER}"
+            refuse(text, start + index, "samples", problem)
         if not _is_number(word):
             refuse(text, start + index, "samples", f"{word!r} is not a number")
     refuse(text, start, "samples", "none")

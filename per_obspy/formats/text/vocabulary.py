@@ -29,14 +29,17 @@ station_name
     As the header has it.
 site_class, vs30
     Of the ground as the metadata have it: any word; m/s.
+digitised
+    True where the record was digitised from film.
 header_peak
     Largest absolute value according to the header, in ``units``.
+processing
+    Notes of the reader, one line each: what was changed, what is doubtful. Later steps follow.
 
 A word that a file does not hold is absent: never a guess, never zero. Coordinates 0, 0 are what
 files write for unknown.
 """
 
-import math
 import re
 from collections.abc import Mapping
 from re import Match
@@ -142,9 +145,9 @@ def _horizontal_letter(azimuth: float) -> str:
         angle = abs((azimuth - axis + 180) % 360 - 180)
         if angle <= _AXIS_TOLERANCE:
             return letter
-    # The tolerance puts 45 degrees on one side, whichever way its cosine is rounded
-    near_north_south = abs(math.cos(math.radians(azimuth))) > math.sqrt(0.5) - 1e-9
-    return "1" if near_north_south else "2"
+    # From 135 to 45 degrees through north; the tolerance keeps both ends from one letter
+    from_southeast = (azimuth + 45 - 1e-7) % 180
+    return "1" if from_southeast < 90 else "2"
 
 
 def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
@@ -165,6 +168,7 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
         From the header.
     """
     known = {}
+    words = _with_notes(words)
     for name, word in words.items():
         group = _without_unknowns(word)
         if group is not None and group != AttribDict():
@@ -177,6 +181,18 @@ def trace(samples: FloatArray, dt: float, words: Mapping[str, Any]) -> Trace:
     return Trace(data=samples, header={"delta": dt, **known})
 
 
+def _with_notes(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return words whose notes and problem of the place are lines of ``processing``."""
+    # The problem of a place travels with its coordinates
+    place = dict(words.get("coordinates") or {})
+    notes = [*words.get("notes", ()), place.pop("problem", None)]
+    lines = [f"per_obspy: {note}" for note in notes if note]
+    changed = {name: word for name, word in words.items() if name != "notes"}
+    if "coordinates" in words:
+        changed["coordinates"] = place
+    return changed | {"processing": lines} if lines else changed
+
+
 def _without_unknowns(word: Any) -> Any:
     """Return a group of words without those that are None; any other word as it is."""
     if not isinstance(word, Mapping):
@@ -186,16 +202,18 @@ def _without_unknowns(word: Any) -> Any:
 
 def coordinates(
     latitude: float | None, longitude: float | None, elevation: float | None = None
-) -> dict[str, float | None]:
+) -> dict[str, Any]:
     """
     Return the group of coordinates, degrees and m.
 
-    It is empty where they are unknown, 0, 0 or impossible.
+    It is empty where they are unknown or 0, 0. Impossible ones are unknown too, and ``problem``
+    says so; :func:`trace` turns it into a note.
     """
     if latitude is None or longitude is None or (latitude == 0 and longitude == 0):
         return {}
-    if abs(latitude) > 90 or abs(longitude) > 180:
-        return {}
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
+        place = f"latitude {latitude:g}, longitude {longitude:g}"
+        return {"problem": f"{place}: out of range, so the place is unknown"}
     return {"latitude": latitude, "longitude": longitude, "elevation": elevation}
 
 

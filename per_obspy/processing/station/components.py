@@ -9,6 +9,7 @@ from obspy import Stream, Trace
 from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import Rejection
 from per_obspy.processing.notes import copied, is_processed, rejection, remembered
+from per_obspy.processing.station.film_interval import at_one_interval
 
 #: Band and instrument codes in order: accelerometers before velocity sensors, fast before slow.
 PREFERENCE = ("HN", "BN", "HH", "BH")
@@ -119,7 +120,7 @@ def paired(instrument: Stream, overlap: float) -> tuple[Stream, tuple[Rejection,
         too many.
     """
     # The longest horizontal first, verticals by name
-    horizontals = [trace for trace in instrument if is_horizontal(trace)]
+    horizontals = [trace for trace in at_one_interval(instrument) if is_horizontal(trace)]
     horizontals.sort(key=lambda trace: (-_seconds(trace), trace.id))
     verticals = [trace for trace in instrument if not is_horizontal(trace)]
     verticals.sort(key=lambda trace: trace.id)

@@ -33,16 +33,17 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     rejected : tuple of Rejection
         The channels that cannot be joined.
     """
-    pieces: dict[tuple[str, bool], Stream] = defaultdict(Stream)
+    pieces: dict[tuple[str, bool, str], Stream] = defaultdict(Stream)
     for trace in stream:
         pieces[_channel(trace)] += trace
     firsts = Stream([parts[0] for parts in pieces.values()])
     return surviving(lambda first: _joined(first[0].id, pieces[_channel(first[0])]), firsts)
 
 
-def _channel(trace: Trace) -> tuple[str, bool]:
-    """Return the channel of a piece; raw and processed pieces do not mix."""
-    return trace.id, is_processed(trace)
+def _channel(trace: Trace) -> tuple[str, bool, str]:
+    """Return the key of the pieces of one channel; its velocity and displacement are others."""
+    units = str(trace.stats.get("units", ""))
+    return trace.id, is_processed(trace), units if units in ("m/s", "m") else ""
 
 
 def _joined(name: str, pieces: Stream) -> Stream:

@@ -1,6 +1,6 @@
 """Years, degrees, kilometres and times, as headers write them."""
 
-import re
+import math
 
 import pytest
 from obspy import UTCDateTime
@@ -11,14 +11,12 @@ from per_obspy.formats.text.conversions import (
     full_year,
     metres,
     sexagesimal,
-    signed_degrees,
     utc,
     utc_from_words,
 )
 from per_obspy.formats.text.lines import Text
 
 TEXT = Text("some.file", ["first", "second"])
-ANGLES = r"(\S+) ([NS]) (\S+) ([EW])"
 
 
 def test_clocks_of_other_zones():
@@ -54,23 +52,13 @@ def test_impossible_dates_are_refused(date: tuple[int, ...]):
         utc(TEXT, 1, "time", date)
 
 
-@pytest.mark.parametrize(
-    ("words", "place"),
-    [
-        ("1.5 N 2.5 E", (1.5, 2.5)),
-        ("1.5 S 2.5 E", (-1.5, 2.5)),
-        ("1.5 N 2.5 W", (1.5, -2.5)),
-        ("", (None, None)),
-    ],
-)
-def test_letters_are_signs(words: str, place: tuple[float | None, float | None]):
-    assert signed_degrees(re.match(ANGLES, words)) == place
-
-
 def test_an_hour_of_arc_has_60_minutes_of_60_seconds():
     # would catch 3600 and 60 in each other's place
     assert sexagesimal("10", "30", "00") == 10.5
     assert sexagesimal("10", "00", "36") == pytest.approx(10.01, rel=1e-15)
+    # 75 minutes are a damaged header, not a quarter of a degree more
+    assert math.isinf(sexagesimal("10", "75", "00"))
+    assert math.isinf(sexagesimal("10", "00", "60"))
 
 
 def test_unknown_numbers_stay_unknown():

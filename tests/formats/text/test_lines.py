@@ -1,22 +1,25 @@
 """
 Lines, number fields and blocks of text files.
 
-Covers ``per_obspy.formats.text.lines`` and the blocks built on it:
-``per_obspy.formats.text.film`` and ``per_obspy.formats.text.number_blocks``.
+Covers ``per_obspy.formats.text.lines`` and the blocks built on it in
+``per_obspy.formats.text.number_blocks``.
 """
 
 import io
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
-from sample_file import MOTION, block, film
+from numpy.testing import assert_array_equal
+from sample_file import MOTION, block
 
 from per_obspy.errors import RecordRejected
-from per_obspy.formats.text.film import film_lines, read_film
 from per_obspy.formats.text.lines import (
+    DECIMAL,
+    LONGEST_LINE,
+    LONGEST_NUMBER,
     Text,
     block_lines,
     count,
@@ -107,23 +110,6 @@ def test_any_line_end_and_any_byte_can_be_read():
     assert head("no such file", 2) == b""
 
 
-def test_film_gives_values_and_their_mean_interval():
-    text = text_of(film(MOTION, 0.02))
-    values, dt = read_film(text, 0, len(MOTION))
-    assert film_lines(len(MOTION)) == len(text.lines)
-    # times and values are written to three decimals
-    assert_allclose(values, np.round(MOTION, 3), rtol=1e-15)
-    assert dt == pytest.approx(0.02, rel=1e-12)
-
-
-@pytest.mark.parametrize("wrong", [1.0, 0.0, -0.5])
-def test_film_that_runs_back_or_away_is_refused(wrong: float):
-    # would catch a check of single steps only, or of the drift only
-    text = text_of(film(MOTION, 0.02).replace("  0.100", f"{wrong:7.3f}"))
-    with pytest.raises(RecordRejected, match=r"line 2, time [67]: .* breaks the mean interval"):
-        read_film(text, 0, len(MOTION))
-
-
 @pytest.mark.parametrize("spacing", ["equally spaced at .010 sec", "at 100 pts/sec"])
 def test_a_title_announces_interval_or_rate(spacing: str):
     title = f" {len(MOTION)} points of accel data {spacing}, in cm/sec2. (8f10.6)"
@@ -132,3 +118,46 @@ def test_a_title_announces_interval_or_rate(spacing: str):
     values, dt, line = titled_block(text, 0, "ACCEL", 5, 7)
     assert_array_equal(values, MOTION)
     assert (dt, text.lines[line]) == (0.01, "next")
+
+
+LONG = "1" * (LONGEST_NUMBER + 1)
+
+
+def test_a_line_too_long_for_any_format_is_refused_before_it_is_searched():
+    assert read_text(io.BytesIO(b"a\n" + b"1" * LONGEST_LINE)).lines[1] == "1" * LONGEST_LINE
+    with pytest.raises(RecordRejected, match=r"line 2, line: 1000000 characters, at most 2000$"):
+        read_text(io.BytesIO(b"a\n" + b"1" * 1_000_000))
+
+
+def test_a_word_too_long_for_a_number_is_refused():
+    message = f"{len(LONG)} characters, a number has at most {LONGEST_NUMBER}"
+    with pytest.raises(RecordRejected, match=f"line 2, samples: {message}"):
+        free_block(text_of(f"1 2\n{LONG}"), 0, None, 3)
+    with pytest.raises(RecordRejected, match=f"line 1, points: {message}"):
+        count(text_of(""), 0, "points", LONG)
+    # Blanks around a number do not count
+    assert count(text_of(""), 0, "points", f"{' ' * 100}7") == 7
+
+
+@pytest.mark.parametrize(("width", "per_line"), [(LONGEST_NUMBER + 1, 1), (30, 100)])
+def test_a_format_of_columns_too_wide_is_refused(width: int, per_line: int):
+    # lines padded to such a width would take thousands of times the memory of the file
+    with pytest.raises(RecordRejected, match=f"line 1, format: {per_line} numbers of {width}"):
+        fixed_block(text_of("title\n1\n2"), 1, 2 * per_line, width, per_line)
+
+
+def test_a_message_does_not_repeat_a_whole_damaged_file():
+    with pytest.raises(RecordRejected) as caught:
+        free_block(text_of("y" * 9999), 0, None, 1)
+    assert len(str(caught.value)) < 400  # the longest problem has 300 characters
+
+
+@given(st.from_regex(r"-?(\d{1,20}(\.\d{0,30})?|\.\d{1,30})", fullmatch=True))
+def test_a_decimal_number_is_found_whole(number: str):
+    assert re.fullmatch(DECIMAL, number)
+    assert re.search(f"= {DECIMAL} Hz", f"f = {number} Hz")[1] == number
+
+
+@pytest.mark.parametrize("run", ["1" * 21, "0." + "1" * 31, "." + "1" * 31])
+def test_a_run_of_digits_longer_than_a_number_is_not_cut_to_one(run: str):
+    assert re.search(f"= {DECIMAL}", f"= {run}") is None

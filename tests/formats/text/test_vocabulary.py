@@ -82,7 +82,13 @@ def test_unknown_directions_are_absent(words: str):
     "place", [(0.0, 0.0), (None, 5.0), (5.0, None), (91.0, 0.0), (0.0, 181.0), (np.inf, 1.0)]
 )
 def test_unknown_and_impossible_coordinates_are_absent(place: tuple[float | None, float | None]):
-    assert coordinates(*place) == {}
+    words = coordinates(*place)
+    # What is impossible is noted, what is unknown is not
+    is_impossible = None not in place and place != (0.0, 0.0)
+    assert set(words) == ({"problem"} if is_impossible else set())
+    stats = trace(np.zeros(2), 0.01, {"coordinates": words}).stats
+    assert "coordinates" not in stats
+    assert len(stats.get("processing", [])) == is_impossible
 
 
 def test_words_that_are_unknown_are_left_out():

@@ -71,3 +71,11 @@ def test_inputs_stay_unchanged():
     before = stream.copy()
     merged(stream)
     assert stream == before
+
+
+def test_velocity_and_displacement_of_a_channel_are_not_pieces_of_its_acceleration():
+    acceleration = trace(units="m/s2")
+    integrals = [trace(units="m/s"), trace(units="m")]
+    whole, rejected = merged(Stream([acceleration, *integrals]))
+    assert rejected == ()
+    assert [part.stats.units for part in whole] == ["m/s2", "m/s", "m"]

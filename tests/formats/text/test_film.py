@@ -1,0 +1,102 @@
+"""Digitised film on even steps."""
+
+import io
+
+import numpy as np
+import pytest
+from format_samples import SAMPLES
+from number_samples import smc_numbers
+from numpy.testing import assert_allclose, assert_array_equal
+from sample_file import MOTION, block, film
+
+from per_obspy.errors import RecordRejected
+from per_obspy.formats.smc import read_smc
+from per_obspy.formats.text.film import even_film, film_lines, read_film
+from per_obspy.formats.text.lines import Text
+
+
+def text_of(content: str) -> Text:
+    return Text("some.file", content.split("\n"))
+
+
+def even(times: np.ndarray, values: np.ndarray):
+    return even_film(text_of(""), 0, np.column_stack((times, values)), 5)
+
+
+def test_even_film_gives_its_values_and_their_mean_interval():
+    text = text_of(film(MOTION, 0.02))
+    result = read_film(text, 0, len(MOTION))
+    assert film_lines(len(MOTION)) == len(text.lines)
+    # times and values are written to three decimals
+    assert_allclose(result.values, np.round(MOTION, 3), rtol=1e-15)
+    assert result.dt == pytest.approx(0.02, rel=1e-12)
+    assert result.words["digitised"]
+    assert len(result.words["notes"]) == 1
+
+
+def test_film_that_wanders_is_interpolated_where_its_times_are():
+    # 40 s of 100 samples a second whose times wander up to 65 ms off the mean line
+    mean = 0.01 * np.arange(4000)
+    times = np.round(mean + 0.065 * np.sin(np.pi * mean / mean[-1]), 4)
+    result = even(times, np.sin(times))
+    assert result.dt == 0.01
+    # linear interpolation of sin(t) is at most h^2 / 8 off, h being the longest step of 10.6 ms
+    assert_allclose(
+        result.values, np.sin(0.01 * np.arange(len(result.values))), rtol=0, atol=1.5e-5
+    )
+    assert "up to 0.065 s off" in result.words["notes"][0]
+    assert result.words["notes"][1] == "interpolated linearly onto steps of 0.01 s"
+
+
+def test_turning_points_are_joined_by_straight_lines():
+    # uneven times on a straight line: any place of it is known exactly
+    times = np.array([0.0, 0.03, 0.07, 0.08, 0.2, 0.21, 0.3])
+    result = even(times, 2 * times)
+    # the mean interval is 0.05 s, the longest step that is offered is 0.02 s
+    assert result.dt == 0.02
+    assert_allclose(result.values, 0.04 * np.arange(16), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("wrong", [0.0, -0.5, 0.08])
+def test_a_time_that_runs_back_is_left_out_and_noted(wrong: float):
+    times = 0.02 * np.arange(50)
+    clean = np.delete(times, 5)
+    values = np.sin(times)
+    times[5] = wrong
+    result = even(times, values)
+    expected = even(clean, np.delete(values, 5))
+    assert_array_equal(result.values, expected.values)
+    assert "1 times of the film run back and are left out" in result.words["notes"]
+
+
+def test_film_most_of_whose_times_run_back_is_refused():
+    text = text_of(film(MOTION, 0.02).replace("  0.100", "  1.000"))
+    message = "line 2, time 7: 0.12 s follows 1 s, as 17 times do"
+    with pytest.raises(RecordRejected, match=message):
+        read_film(text, 0, len(MOTION))
+
+
+def test_a_hole_in_the_film_is_refused():
+    times = 0.01 * np.arange(400)
+    times[200:] += 3.0
+    message = "line 41, time 201: 5 s follows 1.99 s, the mean interval is"
+    with pytest.raises(RecordRejected, match=message):
+        even(times, np.sin(times))
+
+
+@pytest.mark.parametrize("counts_numbers", [False, True])
+def test_smc_film_is_pairs_of_time_and_value(counts_numbers: bool):
+    motion = np.tile(MOTION, 4)
+    times = 0.02 * np.arange(len(motion))
+    pairs = np.column_stack((times, motion)).ravel()
+    # Header of a corrected record without its sampling rate
+    head = SAMPLES["smc"].text.replace("2 CORRECTED", "1 UNCORRECTED").split("\n")[:11]
+    numbers = smc_numbers(len(pairs) if counts_numbers else len(motion))
+    numbers = numbers.replace("  2.0000000E+02", "  1.7000000E+38")
+    content = "\n".join([*head, numbers, "|comment", block(pairs, "%10.3f", 8)])
+    (trace,) = read_smc(io.BytesIO(content.encode()))
+    # cm/s2 of three decimals
+    assert_allclose(trace.data, 0.01 * np.round(motion, 3), rtol=1e-14)
+    assert trace.stats.delta == pytest.approx(0.02, rel=1e-12)
+    assert (trace.stats.processing_level, trace.stats.digitised) == ("raw", True)
+    assert trace.stats.processing[0].startswith("per_obspy: digitised film, times up to")
