@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import told_apart
+from per_obspy.files import unreadable_reason
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow.
 GDAL_KINDS = {
@@ -145,7 +145,7 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
         pyogrio.errors.DataLayerError,
         UnicodeDecodeError,
     ) as error:
-        problem = told_apart(file, GDAL_KINDS[file.suffix.lower()], error)
+        problem = unreadable_reason(file, GDAL_KINDS[file.suffix.lower()], error)
         raise CatalogError(str(file), problem) from error
     columns = dict(zip(meta["fields"], fields, strict=True))
     attributes = pd.DataFrame(columns, index=range(len(geometries)))
@@ -174,7 +174,7 @@ def _read_geoparquet(file: Path) -> _Raw:
     try:
         table = pa.parquet.read_table(file)
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), told_apart(file, "Parquet table", error)) from error
+        raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     # GeoParquet is described by JSON in the metadata
     described = (table.schema.metadata or {}).get(b"geo")
     if described is None:
