@@ -194,6 +194,7 @@ def _component_spectra(
     ]
     channels = [trace.stats.channel for trace in traces.values()]
     processing = [_processing_record(trace) for trace in traces.values()]
+    # Peaks of all components: acceleration, velocity
     peaks = np.transpose([peak_motions(trace) for trace in traces.values()])
 
     # Each spectrum is an array (component, damping, period)
