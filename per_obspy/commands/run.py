@@ -235,7 +235,7 @@ def print_result(result: "Result") -> None:
 def _print_warnings(warnings: dict[str, list[str]]) -> None:
     """Print the number and the first names of the stations with each warning, on one line."""
     # The noun is written once, and only the first stations are named
-    texts = []
+    texts = list[str]()
     for flag, meaning in WARNINGS.items():
         stations = warnings.get(flag, [])
         if stations:

@@ -45,6 +45,7 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> Non
     _draw_motion(motion, station, float(pair["azimuth_used"]))
     _draw_spectrum(spectrum, station, pair)
     _draw_circles(circles, pair)
+    # Long names make titles wide
     fit_titles(figure)
     save(figure, path, station.attrs["simulated"] == "true")
 

@@ -45,7 +45,7 @@ def title_name(name: str) -> str:
 
 def fit_titles(figure: Figure) -> None:
     """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
-    figure.draw_without_rendering()  # type: ignore[no-untyped-call]
+    figure.draw_without_rendering()
     titles = [(axes.title, axes.bbox.width) for axes in figure.axes]
     # The title of the whole figure
     titles += [(heading, figure.bbox.width) for heading in figure.texts]
@@ -53,7 +53,7 @@ def fit_titles(figure: Figure) -> None:
         # Letters are whole pixels wide: a smaller font may need a little more than its share
         width, available = title.get_window_extent().width, 0.95 * room
         if width > available:
-            title.set_fontsize(title.get_fontsize() * available / width)
+            title.set_fontsize(float(title.get_fontsize()) * available / width)
 
 
 def save(figure: Figure, path: Path, simulated: bool) -> None:

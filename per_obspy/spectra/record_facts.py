@@ -31,7 +31,7 @@ Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
 def peak_motions(trace: Trace) -> tuple[float, float]:
     """Return peak acceleration, m/s2, and peak velocity, m/s, of one trace."""
     # Velocity by the trapezoidal rule, exact where acceleration is linear between samples
-    velocity = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0.0)
+    velocity = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)
     return float(np.abs(trace.data).max()), float(np.abs(velocity).max())
 
 

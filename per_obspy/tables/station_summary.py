@@ -43,8 +43,12 @@ COLUMNS: dict[str, Column] = {
     **_columns(
         "float64",
         ("vs30", "m/s", "mean shear-wave velocity of the upper 30 m; empty if unknown"),
-        ("epicentral_distance", "m", "along the great circle; empty without an epicentre"),
-        ("hypocentral_distance", "m", "straight, the Earth taken as flat; empty without a depth"),
+        ("epicentral_distance", "m", "along the great circle; empty without a hypocentre"),
+        (
+            "hypocentral_distance",
+            "m",
+            "straight, the Earth taken as flat; empty without a hypocentre",
+        ),
         ("pga", "m/s2", "peak ground acceleration of the processed horizontals, the larger one"),
         ("pgv", "m/s", "peak ground velocity of the processed horizontals, the larger one"),
         ("shortest_usable_period", "s", "of both horizontals"),
@@ -194,16 +198,13 @@ def _texts(station: xr.Dataset) -> dict[str, str]:
 
 def _distances(station: xr.Dataset, longitude: float, latitude: float) -> dict[str, float]:
     """Return the distances to epicentre and hypocentre, m, as far as these are known."""
-    source = [station.attrs.get(f"hypocentre_{name}") for name in ("longitude", "latitude")]
-    depth = station.attrs.get("hypocentre_depth")
-    # Unknown places have no distance
-    if None in source or not np.isfinite(longitude):
+    # Attributes of the hypocentre are there together or not at all
+    if "hypocentre_longitude" not in station.attrs or not np.isfinite(longitude):
         return {}
-    epicentral = float(great_circle(longitude, latitude, *source))
-    found = {"epicentral_distance": epicentral}
-    if depth is not None:
-        found["hypocentral_distance"] = float(np.hypot(epicentral, depth))
-    return found
+    east, north = station.attrs["hypocentre_longitude"], station.attrs["hypocentre_latitude"]
+    epicentral = float(great_circle(longitude, latitude, east, north))
+    hypocentral = float(np.hypot(epicentral, station.attrs["hypocentre_depth"]))
+    return {"epicentral_distance": epicentral, "hypocentral_distance": hypocentral}
 
 
 def _motion(station: xr.Dataset) -> dict[str, float]:

@@ -28,6 +28,7 @@ def finished(tmp_path_factory):
     """A run of records of which one station has a second event, another one horizontal only."""
     folder = tmp_path_factory.mktemp("warnings")
     run(write_configuration(folder), executor=InProcess())
+    # The same records, two stations changed
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     for path in sorted((folder / "records").glob("*.mseed")):
         stream = obspy.read(path)
@@ -50,17 +51,22 @@ def test_the_station_table_has_every_station_and_its_warnings(finished):
     _, result = finished
     table = _stations(result)
     assert len(table) == 3
+    # Warnings of the two stations that were changed
     assert (table["state"] == "used").all()
     assert "second_event" in table.loc[DOUBLED, "flags"].split()
     assert "another event, over the peak: 1" in table.loc[DOUBLED, "warnings"]
     assert "one_horizontal" in table.loc[ALONE, "flags"].split()
     assert table["pairs"].sum() == result.record["counts"]["pairs"]
-    assert (table["epicentral_distance"] < table["hypocentral_distance"]).all()
+    # The earthquake was simulated, but the folder of records names no event
+    first = pd.read_csv(result.folder.parent / "out" / "stations.csv")
+    assert (first["epicentral_distance"] < first["hypocentral_distance"]).all()
+    assert (table["epicentral_distance"] == "").all()
     assert {"stations.csv", "stations.columns.csv"} <= set(result.record["outputs"])
 
 
 def test_every_pair_has_the_flags_of_its_station(finished):
     _, result = finished
+    # Flags of a pair are those of its station and others
     risk, stations = pd.read_parquet(result.folder / "risk.parquet"), _stations(result)
     for name, pairs in risk.groupby("station"):
         expected = set(stations.loc[name, "flags"].split())
@@ -74,6 +80,7 @@ def test_the_console_names_the_stations(finished, capsys):
     _, result = finished
     assert DOUBLED in result.record["warnings"]["second_event"]
     assert result.record["warnings"]["one_horizontal"] == [ALONE]
+    # One line for all warnings
     print_result(result)
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "warnings:" in line]
     assert line.startswith("warnings: 1 station with a second event (XX.S001)")
@@ -96,6 +103,7 @@ def test_a_lost_station_table_is_written_again(finished, tmp_path):
     configuration, result = finished
     folder = tmp_path / "copy"
     shutil.copytree(result.folder, folder)
+    # No station is computed again for it
     (folder / "stations.csv").unlink()
     again = run(configuration, folder, executor=InProcess())
     assert not again.did_nothing

@@ -18,6 +18,7 @@ def _station(name, channels=("HNN", "HNE", "HNZ"), coordinates=True, **known):
     """Return the Dataset of a station whose acceleration is A w cos(w t), A = 0.1 m/s."""
     time = np.arange(0.0, 20.0, 0.01)
     motion = 0.1 * 2.0 * np.pi * np.cos(2.0 * np.pi * time)
+    # Corners differ by component
     traces = []
     for i, channel in enumerate(channels, start=1):
         header = {
@@ -35,6 +36,7 @@ def _station(name, channels=("HNN", "HNE", "HNZ"), coordinates=True, **known):
         if coordinates:
             header["coordinates"] = AttribDict(latitude=10.0, longitude=20.0, elevation=30.0)
         traces.append(Trace(motion / i, header))
+    # As a job of a station notes the earthquake
     dataset = per_obspy.station_spectra(Stream(traces), PERIODS)
     dataset.attrs |= {
         "hypocentre_longitude": 20.0,
@@ -110,6 +112,7 @@ def test_hostile_text_of_headers_breaks_no_table(tmp_path):
     rejected = [Rejection("station", "=1.2", "+cmd", None, ("-x\r\ny",))]
     summary = write_stations([hostile], rejected, {}, tmp_path)
     assert summary.warnings == {"second_event": ["XX.ONE"]}
+    # One line per station, and no cell that begins a formula
     rows = (tmp_path / "stations.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 3
     table = pd.read_csv(tmp_path / "stations.csv", keep_default_na=False).set_index("station")
