@@ -8,6 +8,7 @@ import typer
 
 from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.files import printable
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
@@ -29,6 +30,18 @@ SHOWN = {
     "amplification_1": "ampl. 1",
     "amplification_2": "ampl. 2",
 }
+
+#: Flags of stations that are printed, with their meanings.
+WARNINGS = {
+    "baseline_shift": "with a baseline shift",
+    "second_event": "with a second event",
+    "assumed_corners": "with assumed corners",
+    "record_warning": "with other warnings",
+    "one_horizontal": "with one horizontal",
+}
+
+#: Stations of each warning that are printed by name.
+NAMED_STATIONS = 3
 
 #: Damping of the spectra that are drawn, fraction of critical.
 PLOT_DAMPING = 0.05
@@ -209,6 +222,7 @@ def print_result(result: "Result") -> None:
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
         f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
     )
+    _print_warnings(record.get("warnings", {}))
     # Agreement with observed pounding, worst pairs, files
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
@@ -216,6 +230,21 @@ def print_result(result: "Result") -> None:
         _print_worst(folder / "risk.csv", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
+
+
+def _print_warnings(warnings: dict[str, list[str]]) -> None:
+    """Print the number and the first names of the stations with each warning, on one line."""
+    # The noun is written once, and only the first stations are named
+    texts = list[str]()
+    for flag, meaning in WARNINGS.items():
+        stations = warnings.get(flag, [])
+        if stations:
+            more = ", ..." if len(stations) > NAMED_STATIONS else ""
+            names = ", ".join(map(printable, stations[:NAMED_STATIONS]))
+            noun = "" if texts else " station" if len(stations) == 1 else " stations"
+            texts.append(f"{len(stations)}{noun} {meaning} ({names}{more})")
+    if texts:
+        print(f"warnings: {', '.join(texts)}; see stations.csv")
 
 
 def _print_evaluation(found: dict[str, Any]) -> None:

@@ -32,7 +32,7 @@ from per_obspy.jobs.output_folder import (
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.preflight import check_inputs, require_extras
 from per_obspy.pipeline.report import reported
-from per_obspy.pipeline.screening import screened
+from per_obspy.pipeline.screening import Screened, screened
 from per_obspy.pipeline.stations import (
     FoundStations,
     all_rejections,
@@ -45,6 +45,7 @@ from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records, input_files
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
 from per_obspy.screening.warmup import compile_screening
+from per_obspy.tables.station_summary import StationSummary, write_stations
 
 #: Written last.
 RECORD = "run.json"
@@ -230,14 +231,16 @@ def _later_stages(
     progress: Progress,
 ) -> dict[str, Any]:
     """Do the stages after the stations and return their part of ``run.json``."""
+    # Files of an earlier table would not agree with the stations
     seconds, usable = dict[str, float](), _usable(stations)
     # A table of an earlier run would be taken for one of this run
     for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
         (folder / name).unlink(missing_ok=True)
     with _timed(seconds, "screening"):
         found = screened(settings, folder, usable, rejected, executor, progress)
+        table = _write_stations(usable, rejected, found, folder)
     with _timed(seconds, "report"):
-        outputs = [*found.outputs, *reported(settings, folder, usable, progress)]
+        outputs = [*found.outputs, *table.files, *reported(settings, folder, usable, progress)]
 
     # Rejections make a result partial
     counts = found.counts
@@ -248,11 +251,23 @@ def _later_stages(
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": any(rejections),
         "simulated": settings.simulation is not None,
+        "warnings": table.warnings,
         "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,
     }
+
+
+def _write_stations(
+    usable: Sequence[FinishedStation],
+    rejected: Sequence[Rejection],
+    found: Screened,
+    folder: Path,
+) -> StationSummary:
+    """Write the table of the stations with the pairs that each serves."""
+    spectra = [station.spectra for station in usable if station.spectra is not None]
+    return write_stations(spectra, [*rejected, *found.unplaced], found.served, folder)
 
 
 def _finished(file: Path) -> dict[str, Any]:

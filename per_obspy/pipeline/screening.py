@@ -33,10 +33,16 @@ class Screened(NamedTuple):
         The files.
     counts : dict
         Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
+    served : Counter
+        Number of pairs for which the record of each station is used.
+    unplaced : tuple of Rejection
+        Stations that serve no pair because their place is unknown.
     """
 
     outputs: list[Path]
     counts: dict[str, int]
+    served: Counter[str]
+    unplaced: tuple[Rejection, ...]
 
 
 def screened(
@@ -75,6 +81,7 @@ def screened(
     # Pairs need a station or a map
     has_motion = bool(stations or maps)
     parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
+    served = Counter[str]()
     outputs, states = [folder / "rejected.csv"], Counter[str]()
     kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
     # The parts of the chunks become one table, worst pair first
@@ -84,8 +91,9 @@ def screened(
         facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
         risk = write_risk(tables, folder, facts, settings.csv_rows)
         outputs, states = [*outputs, *risk.files], risk.states
+        served = risk.stations
         progress("ranking", 1, 1)
-    return Screened(outputs, _counts(states, kinds, parts))
+    return Screened(outputs, _counts(states, kinds, parts), served, unplaced)
 
 
 def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:

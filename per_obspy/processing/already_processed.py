@@ -6,6 +6,7 @@ from per_obspy.config import Processing
 from per_obspy.processing.filter.butterworth import tapered
 from per_obspy.processing.filter.corners import (
     LOWPASS_OF_NYQUIST,
+    SILENT_HEADER,
     Corner,
     clean_corner,
     lowest_highpass,
@@ -15,6 +16,7 @@ from per_obspy.processing.notes import noted, remembered
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import judged
 from per_obspy.processing.quality.raw_checks import header_findings
+from per_obspy.processing.quality.record_flags import flags_noted
 
 
 def passed_through(stream: Stream, settings: Processing) -> Stream:
@@ -42,7 +44,7 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
         limited = _with_corners(trace, settings)
         found = (*header_findings(trace, settings.checks), *final_findings(trace, settings.checks))
         out += judged(limited, [finding._replace(level="warn") for finding in found])
-    return usable_periods_noted(out, settings.usable)
+    return flags_noted(usable_periods_noted(out, settings.usable))
 
 
 def _with_corners(trace: Trace, settings: Processing) -> Trace:
@@ -56,7 +58,7 @@ def _with_corners(trace: Trace, settings: Processing) -> Trace:
         highpass = _limiting_highpass(trace, settings)
     # Corners like 999 Hz mean none
     nyquist = trace.stats.sampling_rate / 2
-    lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, "0.75 Nyquist, the header is silent")
+    lowpass = Corner(LOWPASS_OF_NYQUIST * nyquist, f"0.75 Nyquist, {SILENT_HEADER}")
     if 0 < header.get("lowpass", 0) < nyquist:
         lowpass = Corner(header["lowpass"], "header")
     remembered(out, highpass=float(highpass.frequency), highpass_source=highpass.reason)
@@ -70,5 +72,5 @@ def _limiting_highpass(trace: Trace, settings: Processing) -> Corner:
     highest = settings.highpass_range[1]
     clean = clean_corner(shape, lowest_highpass(trace), highest, settings.drift, settings.order)
     if clean is None:
-        return Corner(highest, "displacement drifts at any corner, the header is silent")
-    return Corner(clean.frequency, f"{clean.reason}, the header is silent")
+        return Corner(highest, f"displacement drifts at any corner, {SILENT_HEADER}")
+    return Corner(clean.frequency, f"{clean.reason}, {SILENT_HEADER}")

@@ -22,6 +22,7 @@ from per_obspy.processing.notes import is_processed
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import Finding, judged, surviving
 from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
+from per_obspy.processing.quality.record_flags import flags_noted
 from per_obspy.processing.station.components import is_horizontal, paired
 
 #: A step takes a Stream and returns a new one.
@@ -62,7 +63,7 @@ def process_instrument(
     horizontals = corners_shared(Stream([trace for trace in ready if is_horizontal(trace)]))
     verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
     done, restless = _in_turn(horizontals + verticals, _filter_steps(settings))
-    return done, (*unfit, *unpaired, *undecided, *restless)
+    return flags_noted(done), (*unfit, *unpaired, *undecided, *restless)
 
 
 def _in_turn(stream: Stream, steps: Iterable[Step]) -> tuple[Stream, tuple[Rejection, ...]]:

@@ -134,7 +134,7 @@ def _content(path: Path) -> bytes:
 
 
 def _kind(content: bytes) -> str:
-    """Return whether a file is a record, an inventory, an event or a description, by its start."""
+    """Return the kind of a file by its start: inventory, event, description, or else record."""
     start = content[:1000]
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 

@@ -17,7 +17,9 @@ from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
     STATE_COLOURS,
+    fit_titles,
     save,
+    title_name,
 )
 from per_obspy.screening.values import components
 
@@ -43,6 +45,8 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> Non
     _draw_motion(motion, station, float(pair["azimuth_used"]))
     _draw_spectrum(spectrum, station, pair)
     _draw_circles(circles, pair)
+    # Long names make titles wide
+    fit_titles(figure)
     save(figure, path, station.attrs["simulated"] == "true")
 
 
@@ -64,7 +68,8 @@ def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
     axes.set_xlim(start - 5.0, end + 5.0)
     along = "" if np.isnan(azimuth) else f", along {azimuth:.0f}°"
     axes.set(xlabel="time (s)", ylabel="ground acceleration (m/s²)")
-    axes.set_title(f"1  record {station['station'].item()}{along}", fontsize=11)
+    name = title_name(station["station"].item())
+    axes.set_title(f"1  record {name}{along}", fontsize=11, parse_math=False)
 
 
 def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
@@ -100,7 +105,8 @@ def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="displacement at contact height (m)", ylabel="velocity / frequency (m)")
     verdict = f"gap {100 * pair['gap']:.0f} cm, needed {100 * pair['demand']:.0f} cm"
-    axes.set_title(f"3  pair {pair['pair_id']}: {verdict}", fontsize=11)
+    name = title_name(str(pair["pair_id"]))
+    axes.set_title(f"3  pair {name}\n{verdict}", fontsize=11, parse_math=False)
     axes.legend(fontsize=8, loc="upper right")
 
 
@@ -134,7 +140,8 @@ def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Pa
     place, gaps = figure.subplots(1, 2)
     _draw_map(place, table, spectra)
     _draw_gaps(gaps, table)
-    figure.suptitle(title)
+    figure.suptitle(title_name(title), parse_math=False)
+    fit_titles(figure)
     save(figure, path, spectra.attrs.get("simulated") == "true")
 
 

@@ -1,10 +1,11 @@
 """Colours of all figures, and writing them as PNG."""
 
 from pathlib import Path
+from textwrap import wrap
 
 from matplotlib.figure import Figure
 
-from per_obspy.files import written_whole
+from per_obspy.files import printable, written_whole
 
 #: State of a pair -> colour (Okabe & Ito 2008, distinct for colour-blind readers too).
 STATE_COLOURS = {"yes": "#D55E00", "possible": "#E69F00", "no": "#009E73"}
@@ -15,6 +16,44 @@ MOTION_COLOUR = "#444444"
 FAINT_COLOUR = "#BBBBBB"
 
 DOTS_PER_INCH = 130
+
+
+#: Longest name in a title, characters; the middle of a longer one is left out.
+LONGEST_NAME = 80
+
+#: Characters per line of a name in a title.
+LINE_WIDTH = 40
+
+
+def title_name(name: str) -> str:
+    """
+    Return a name for a title: one or two lines, without control characters.
+
+    Examples
+    --------
+    >>> title_name("P7")
+    'P7'
+    >>> len(title_name(200 * "A"))
+    81
+    """
+    text = printable(name)
+    if len(text) > LONGEST_NAME:
+        half = LONGEST_NAME // 2
+        text = f"{text[:half]}…{text[1 - half :]}"
+    return "\n".join(wrap(text, LINE_WIDTH))
+
+
+def fit_titles(figure: Figure) -> None:
+    """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
+    figure.draw_without_rendering()
+    titles = [(axes.title, axes.bbox.width) for axes in figure.axes]
+    # The title of the whole figure
+    titles += [(heading, figure.bbox.width) for heading in figure.texts]
+    for title, room in titles:
+        # Letters are whole pixels wide: a smaller font may need a little more than its share
+        width, available = title.get_window_extent().width, 0.95 * room
+        if width > available:
+            title.set_fontsize(float(title.get_fontsize()) * available / width)
 
 
 def save(figure: Figure, path: Path, simulated: bool) -> None:

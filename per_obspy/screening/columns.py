@@ -160,6 +160,9 @@ ORDER = (
     "derived",
 )  # fmt: skip
 
+#: Flags that the processing raises for a record, which every pair of its station has.
+RECORD_FLAGS = ("baseline_shift", "second_event", "assumed_corners", "record_warning")
+
 #: Flags of a pair and the meaning of each.
 FLAGS: dict[str, str] = {
     "touching": "gap 0: the single hit is outside its reliable range",
@@ -201,6 +204,16 @@ FLAGS: dict[str, str] = {
     ),
     "shakemap_assumed_deviation": (
         "the ShakeMap tells no deviation: the configured one is assumed"
+    ),
+    "baseline_shift": (
+        "the baseline of the station's record shifted during the shaking: long periods are doubtful"
+    ),
+    "second_event": ("the station's record holds another event: its demand may be that of both"),
+    "assumed_corners": (
+        "a filter corner of the station's record is assumed: neither noise nor header gives it"
+    ),
+    "record_warning": (
+        "the station's record failed another check that only warns: see stations.csv"
     ),
     "simulated": "the ground motion is simulated",
 }

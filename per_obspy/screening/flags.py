@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from per_obspy.config import Screening
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.columns import FLAGS, RECORD_FLAGS
 from per_obspy.screening.values import Table, both, number, values
 
 #: Below this gap / critical gap several impacts are likely and the single hit is no longer safe: it
@@ -50,7 +50,10 @@ def raised_by_record(
     # Only tables with motion between stations have this column
     name = "motion_from_other_site_class"
     other_class = np.asarray(table[name], dtype=bool) if name in table else ~every
+    noted = record_flags(station)
+    of_record = {flag: every & (flag in noted) for flag in RECORD_FLAGS}
     return {
+        **of_record,
         "outside_usable_periods": _outside_usable_periods(table, station),
         "per_far_above_sd": _per_far_above_sd(table, screening.per_to_sd),
         "record_from_other_site_class": np.asarray(table["other_site_class"], dtype=bool),
@@ -63,6 +66,12 @@ def raised_by_record(
         name: other_class,
         "simulated": every & (station.attrs["simulated"] == "true"),
     }
+
+
+def record_flags(station: xr.Dataset) -> list[str]:
+    """Return the flags that the processing raised for the horizontals of a station's Dataset."""
+    noted = str(station["record_flags"].item()).split() if "record_flags" in station else []
+    return [flag for flag in RECORD_FLAGS if flag in noted]
 
 
 def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.bool_]:

@@ -34,6 +34,7 @@ from per_obspy.spectra.azimuthal import (
 )
 from per_obspy.spectra.elastic import response_spectra
 from per_obspy.spectra.horizontals import north_and_east
+from per_obspy.spectra.record_facts import Variable, peak_motions, record_facts
 
 #: Attributes of the coordinates of a station, as CF asks for them.
 COORDINATES = {
@@ -54,9 +55,6 @@ COORDINATES = {
         "positive": "up",
     },
 }
-
-#: Dimensions, values and attributes of a variable of a Dataset.
-Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
 
 
 def station_spectra(
@@ -106,6 +104,7 @@ def station_spectra(
         _azimuthal_spectra(motion, horizontals[0].stats.delta, grid, damping, azimuth_step),
         _motion(motion, azimuths, horizontals[0]),
         _usable(horizontals, grid),
+        record_facts(stream, horizontals),
     ]
     dataset = xr.merge(parts)
     for variable in dataset.data_vars.values():
@@ -195,6 +194,8 @@ def _component_spectra(
     ]
     channels = [trace.stats.channel for trace in traces.values()]
     processing = [_processing_record(trace) for trace in traces.values()]
+    # Peaks of all components: acceleration, velocity
+    peaks = np.transpose([peak_motions(trace) for trace in traces.values()])
 
     # Each spectrum is an array (component, damping, period)
     per = [spectrum.per for spectrum in spectra]
@@ -204,6 +205,8 @@ def _component_spectra(
         "per": _by_component(per, "m", "pseudo energy radius"),
         "sd": _by_component(sd, "m", "spectral displacement"),
         "sa": _by_component(sa, "m s-2", "absolute spectral acceleration"),
+        "pga": ("component", peaks[0], {"units": "m s-2", "long_name": "peak ground acceleration"}),
+        "pgv": ("component", peaks[1], {"units": "m s-1", "long_name": "peak ground velocity"}),
         "channel": ("component", channels, {"long_name": "SEED channel code"}),
         "processing": (
             "component",

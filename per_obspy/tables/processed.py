@@ -55,6 +55,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "",
         "names in the configuration of the checks that warn, separated by spaces",
     ),
+    "record_flags": (
+        "",
+        "names of the flags that pairs with this record have, separated by spaces",
+    ),
     "warnings": ("", "failed checks that do not reject, with figure and threshold"),
     "notes": ("", "the same, without consequence"),
 }

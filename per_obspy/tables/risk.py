@@ -39,10 +39,13 @@ class RiskFiles(NamedTuple):
         ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``.
     states : Counter
         Number of pairs in each state.
+    stations : Counter
+        Number of pairs for which the record of each station is used.
     """
 
     files: list[Path]
     states: Counter[str]
+    stations: Counter[str]
 
 
 class RankedTable(NamedTuple):
@@ -107,14 +110,16 @@ def write_risk(
     statement = json.dumps({"version": version("per_obspy"), **facts})
     whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
     with written_whole(table) as part, written_whole(text) as lines:
-        states = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
+        states, stations = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
     write_columns(whole.names, columns)
-    return RiskFiles(files, states)
+    return RiskFiles(files, states, stations)
 
 
-def _write_rows(rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int) -> Counter[str]:
-    """Write ranked rows as Parquet, the worst of them as CSV too, and count their states."""
-    states, first = Counter[str](), next(rows)
+def _write_rows(
+    rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int
+) -> tuple[Counter[str], Counter[str]]:
+    """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
+    states, stations, first = Counter[str](), Counter[str](), next(rows)
     dictionaries = text_columns(first.schema)
     with (
         bounded_database(table.parent) as database,
@@ -123,11 +128,12 @@ def _write_rows(rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int
         for piece in chain([first], rows):
             writer.write_table(piece)
             states.update(piece["state"].to_pylist())
+            stations.update(piece["station"].to_pylist())
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
                 _append_csv(database, piece.slice(0, csv_rows - before), text, header=before == 0)
-    return states
+    return states, stations
 
 
 def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:

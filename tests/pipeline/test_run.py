@@ -44,6 +44,8 @@ def test_every_result_is_there(finished):
         "risk.columns.csv",
         "spectra.nc",
         "rejected.csv",
+        "stations.csv",
+        "stations.columns.csv",
         "totals.csv",
         "figures/overview.png",
         "figures/worst_pair.png",

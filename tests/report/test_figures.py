@@ -1,9 +1,13 @@
 """Figures of a run: the data that they show and the labels that they carry."""
 
+from contextlib import nullcontext
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.testing import assert_allclose
 from screening_samples import make_station
@@ -89,7 +93,7 @@ def test_the_circles_are_the_radii_at_contact_height_a_gap_from_each_other(stati
     for line, radius, centre in ((first, 1.2 * 0.2, 0.0), (second, 0.9 * 0.1, 0.05)):
         x, y = line.get_xydata().T
         assert_allclose(np.hypot(x - centre, y), radius, rtol=1e-12)
-    assert circles.get_title() == "3  pair P7: gap 5 cm, needed 12 cm"
+    assert circles.get_title() == "3  pair P7\ngap 5 cm, needed 12 cm"
     assert circles.get_aspect() == 1.0
     assert circles.get_xlabel() == "displacement at contact height (m)"
 
@@ -168,3 +172,32 @@ def test_the_file_is_a_picture_of_some_content(station, tmp_path):
     picture = imread(tmp_path / "walk.png")[..., :3]
     assert picture.shape[1] > 1500
     assert 0.01 < (picture.min(axis=2) < 0.9).mean() < 0.5  # ink on white paper
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["P7", "OSM-way-123456789/OSM-way-987654321-facing-street", "W" * 300, "a $b_{c", "x\ny"],
+)
+@pytest.mark.parametrize("simulated", ["true", "false"])
+def test_no_title_is_clipped(station, tmp_path, monkeypatch, name, simulated):
+    figures = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr("per_obspy.report.style.written_whole", nullcontext)
+    marked = station.assign_attrs(simulated=simulated)
+    draw_record_to_pair(marked, pd.Series(PAIR | {"pair_id": name}), tmp_path / "walk.png")
+    draw_overview(TABLE, region([marked]), name, tmp_path / "overview.png")
+    for figure in figures:
+        figure.draw_without_rendering()
+        titles = [axes.title for axes in figure.axes]
+        # one pixel: extents are rounded outwards
+        for title in [*titles, *figure.texts]:
+            box = title.get_window_extent()
+            assert -1.0 <= box.x0 <= box.x1 <= figure.bbox.width + 1.0
+            assert -1.0 <= box.y0 <= box.y1 <= figure.bbox.height + 1.0
+    assert len(figures) == 2
+
+
+def test_neighbouring_titles_do_not_overlap(station, drawn):
+    panels = _panels(station, drawn, pair_id="W" * 300)
+    boxes = [axes.title.get_window_extent() for axes in panels]
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))

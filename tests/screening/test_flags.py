@@ -42,13 +42,14 @@ def _table(**changes):
     return table
 
 
-def _station(horizontals=2, simulated="false"):
+def _station(horizontals=2, simulated="false", flags=""):
     """Return a station whose record supports 0.1 to 5 s."""
     return xr.Dataset(
         {
             "acceleration": (("horizontal", "time"), np.zeros((horizontals, 3))),
             "shortest_usable_period": 0.1,
             "longest_usable_period": 5.0,
+            "record_flags": flags,
         },
         attrs={"simulated": simulated},
     )
@@ -123,3 +124,10 @@ def test_names_are_joined_in_one_order():
 def test_a_period_is_derived_only_if_it_is_named():
     derived = np.array(["", "period_1", "damping_1 period_2", "mass_1"], dtype=object)
     assert period_is_derived({"derived": derived}).tolist() == [False, True, True, False]
+
+
+def test_every_pair_has_the_flags_of_its_record():
+    raised = raised_by_record(_table(), _station(flags="second_event unknown"), Screening())
+    assert _raised(raised) == [{"second_event"}, {"second_event"}]
+    # rows of several stations are joined: a flag that is not raised is False, not missing
+    assert not raised["baseline_shift"].any()

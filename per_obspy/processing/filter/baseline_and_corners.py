@@ -8,6 +8,7 @@ from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.filter.butterworth import tapered
 from per_obspy.processing.filter.corners import (
+    SHIFTED_BASELINE,
     Corner,
     clean_corner,
     fallback_highpass,
@@ -167,7 +168,7 @@ def _clean_baseline(stream: Stream, lowest: Corner, settings: Processing) -> tup
         reason = f"displacement drifts with every baseline and the corner at {highest:g} Hz"
         raise RecordRejected(stream[0].id, reason)
     record, corner = min(clean, key=lambda cleaned: cleaned[1].frequency)
-    reason = "highest allowed: the baseline shifts during the shaking"
+    reason = f"highest allowed: {SHIFTED_BASELINE}"
     return record, max(corner, Corner(highest, reason))
 
 

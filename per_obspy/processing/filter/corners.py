@@ -23,6 +23,13 @@ FEWEST_NOISE_SAMPLES = 4
 #: Sampling intervals in the shortest usable period.
 SAMPLES_PER_PERIOD = 5
 
+#: Parts of the reasons of corners that neither the noise of the record nor its header gives.
+SILENT_HEADER, FROM_TABLE, FROM_CONSTANT = "the header is silent", "table: no noise", "constant: "
+ASSUMED_REASONS = (SILENT_HEADER, FROM_TABLE, FROM_CONSTANT)
+
+#: Part of the reason of a corner that was raised as far as allowed.
+SHIFTED_BASELINE = "the baseline shifts during the shaking"
+
 
 class Corner(NamedTuple):
     """A corner, Hz, and the reason for it."""
@@ -68,11 +75,12 @@ def fallback_highpass(
     0.1
     """
     if magnitude is None:
-        return Corner(unknown, "constant: neither noise nor magnitude known")
+        return Corner(unknown, f"{FROM_CONSTANT}neither noise nor magnitude known")
     reached = [size for size in by_magnitude if magnitude >= size]
     if not reached:
-        return Corner(unknown, f"constant: magnitude {magnitude:g} is below the table")
-    return Corner(by_magnitude[max(reached)], f"table: no noise recorded, magnitude {magnitude:g}")
+        return Corner(unknown, f"{FROM_CONSTANT}magnitude {magnitude:g} is below the table")
+    reason = f"{FROM_TABLE} recorded, magnitude {magnitude:g}"
+    return Corner(by_magnitude[max(reached)], reason)
 
 
 def lowest_highpass(trace: Trace) -> Corner:

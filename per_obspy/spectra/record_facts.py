@@ -1,0 +1,97 @@
+"""Facts of the records behind the spectra of a station: peaks, sources, warnings and flags."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from obspy import Stream, Trace
+from scipy.integrate import cumulative_trapezoid
+
+from per_obspy.files import printable
+
+#: Part of the step in ``stats.processing`` of records processed by others.
+PASSED_THROUGH = "passed through"
+
+#: Texts about the records of a station, with their meanings.
+MEANINGS = {
+    "source_files": "names of the files of the records",
+    "instrument": "location code, band and model; empty if unknown",
+    "record_level": "level of the records as they were read",
+    "record_flags": "flags of the horizontals, separated by spaces",
+    "warnings": "failed checks that do not reject",
+    "notes": "failed checks without consequence",
+}
+
+#: Dimensions, values and attributes of a variable of a Dataset.
+Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
+
+
+def peak_motions(trace: Trace) -> tuple[float, float]:
+    """Return peak acceleration, m/s2, and peak velocity, m/s, of one trace."""
+    # Velocity by the trapezoidal rule, exact where acceleration is linear between samples
+    velocity = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)
+    return float(np.abs(trace.data).max()), float(np.abs(velocity).max())
+
+
+def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
+    """
+    Describe the records of a station by texts: sources, instrument, level, warnings and flags.
+
+    Parameters
+    ----------
+    stream : Stream
+        Processed records of one station.
+    horizontals : list of Trace
+        Those of them that move the pairs of buildings.
+
+    Returns
+    -------
+    Dataset
+        Scalar texts without control characters, empty where nothing is known.
+    """
+    # Level and files as they were read
+    is_final = any(PASSED_THROUGH in step for step in horizontals[0].stats.get("processing", []))
+    sources = [Path(str(trace.stats.get("source", ""))).name for trace in stream]
+    # Flags concern the motion of the pairs, warnings every component
+    flags = " ".join(_noted(trace, "record_flags") for trace in horizontals).split()
+    texts = {
+        "source_files": _listed(sources),
+        "instrument": _listed(map(_instrument, stream)),
+        "record_level": "processed by others" if is_final else "raw",
+        "record_flags": " ".join(sorted(set(flags))),
+        "warnings": _remarks(stream, "warnings"),
+        "notes": _remarks(stream, "notes"),
+    }
+    variables: dict[str, Variable] = {}
+    for name, text in texts.items():
+        variables[name] = ((), printable(text), {"long_name": MEANINGS[name]})
+    return xr.Dataset(variables)
+
+
+def _noted(trace: Trace, name: str) -> str:
+    """Return a text that the processing noted on a trace, empty if there is none."""
+    return str(trace.stats.get("per_obspy", {}).get(name) or "")
+
+
+def _listed(texts: Iterable[str]) -> str:
+    """Return different texts in their order, separated by commas."""
+    return ", ".join(sorted(set(texts) - {""}))
+
+
+def _instrument(trace: Trace) -> str:
+    """Return location code, band and instrument code, and the model if the header names it."""
+    model = trace.stats.get("instrument", {}).get("model") or ""
+    code = trace.stats.channel[:2] if len(trace.stats.channel) == 3 else ""
+    return " ".join(filter(None, (trace.stats.location, code, str(model))))
+
+
+def _remarks(stream: Stream, name: str) -> str:
+    """Return the warnings or notes of all components, each with its channel."""
+    remarks = []
+    for trace in stream:
+        text = _noted(trace, name)
+        if text:
+            remarks.append(f"{trace.stats.channel}: {text}")
+    return "; ".join(remarks)

@@ -1,0 +1,232 @@
+"""Table of the stations of a run: place, motion, corners, sources, warnings, pairs served."""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from per_obspy.errors import Rejection
+from per_obspy.inventory.schema import Column
+from per_obspy.screening.flags import record_flags
+from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.tables.table_files import write_csv, write_described
+
+
+def _columns(dtype: str, *described: tuple[str, str, str]) -> dict[str, Column]:
+    """Return columns of one type by name: name, unit and meaning of each."""
+    return {name: Column(name, dtype, unit, meaning) for name, unit, meaning in described}
+
+
+#: Columns of ``stations.csv`` in their order.
+COLUMNS: dict[str, Column] = {
+    **_columns(
+        "str",
+        ("station", "", "network and station code"),
+        ("state", "", "used: its record serves the pairs near it; rejected: it serves none"),
+        ("rejected", "", "what was left out of the station, with every reason"),
+        ("flags", "", "flags that every pair of the station has, separated by spaces"),
+        ("warnings", "", "failed checks of its records that do not reject, with channel"),
+        ("notes", "", "failed checks of its records without consequence, with channel"),
+    ),
+    **_columns("int64", ("pairs", "1", "number of pairs for which the record is used")),
+    **_columns(
+        "float64",
+        ("longitude", "degrees", "of the station, east"),
+        ("latitude", "degrees", "of the station, north"),
+        ("elevation", "m", "of the station"),
+    ),
+    **_columns("str", ("site_class", "", "of the ground; empty if unknown")),
+    **_columns(
+        "float64",
+        ("vs30", "m/s", "mean shear-wave velocity of the upper 30 m; empty if unknown"),
+        ("epicentral_distance", "m", "along the great circle; empty without a hypocentre"),
+        (
+            "hypocentral_distance",
+            "m",
+            "straight, the Earth taken as flat; empty without a hypocentre",
+        ),
+        ("pga", "m/s2", "peak ground acceleration of the processed horizontals, the larger one"),
+        ("pgv", "m/s", "peak ground velocity of the processed horizontals, the larger one"),
+        ("shortest_usable_period", "s", "of both horizontals"),
+        ("longest_usable_period", "s", "of both horizontals"),
+        ("highpass", "Hz", "corner of the horizontals, the higher one"),
+        ("lowpass", "Hz", "corner of the horizontals, the lower one"),
+    ),
+    **_columns(
+        "str",
+        ("highpass_source", "", "reasons for the high-pass corners of the horizontals"),
+        ("lowpass_source", "", "reasons for the low-pass corners of the horizontals"),
+        ("components", "", "channels that are used"),
+        ("instrument", "", "location code, band and model; empty if unknown"),
+        ("record_level", "", "raw, or processed by others, as the records were read"),
+        ("source_files", "", "files of the records"),
+    ),
+}
+
+#: Flag of a station with a single horizontal.
+ONE_HORIZONTAL = "one_horizontal"
+
+
+class StationSummary(NamedTuple):
+    """
+    Files of the station table, and the stations of each warning.
+
+    Attributes
+    ----------
+    files : list of Path
+        ``stations.csv`` and ``stations.columns.csv``.
+    warnings : dict
+        Flag -> names of the used stations that have it.
+    """
+
+    files: list[Path]
+    warnings: dict[str, list[str]]
+
+
+def write_stations(
+    spectra: Iterable[xr.Dataset],
+    rejected: Iterable[Rejection],
+    pairs: Mapping[str, int],
+    folder: Path,
+) -> StationSummary:
+    """
+    Write ``stations.csv`` and ``stations.columns.csv``; see :func:`station_table`.
+
+    Parameters
+    ----------
+    spectra, rejected, pairs
+        As for :func:`station_table`.
+    folder : Path
+        Where to.
+    """
+    table = station_table(spectra, rejected, pairs)
+    text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
+    write_csv(table, text)
+    write_described(COLUMNS.values(), columns)
+    # Stations of each flag, in the order of the table
+    warnings: dict[str, list[str]] = {}
+    used = table[table["state"] == "used"]
+    for name, flags in zip(used["station"], used["flags"], strict=True):
+        for flag in flags.split():
+            warnings.setdefault(flag, []).append(name)
+    return StationSummary(files, warnings)
+
+
+def station_table(
+    spectra: Iterable[xr.Dataset], rejected: Iterable[Rejection], pairs: Mapping[str, int]
+) -> pd.DataFrame:
+    """
+    Return one row per station, sorted by name.
+
+    Parameters
+    ----------
+    spectra : iterable of Dataset
+        Of the stations with usable records, from :func:`per_obspy.station_spectra`; the motion is
+        not needed.
+    rejected : iterable of Rejection
+        What was left out; files, services and pairs among it are passed over.
+    pairs : mapping
+        Station -> number of pairs for which its record is used.
+
+    Returns
+    -------
+    DataFrame
+        With the columns of ``COLUMNS``.
+    """
+    reasons = _reasons(rejected)
+    rows = {name: _row(station, pairs) for name, station in _named(spectra).items()}
+    for name, texts in reasons.items():
+        row = rows.setdefault(name, {"station": name, "state": "rejected", "pairs": 0})
+        row["rejected"] = "; ".join(texts)
+    # Text is empty where it is unknown, numbers are missing
+    words = [name for name, column in COLUMNS.items() if column.dtype == "str"]
+    unknown = dict.fromkeys(words, "")
+    return pd.DataFrame([unknown | rows[name] for name in sorted(rows)], columns=list(COLUMNS))
+
+
+def _named(spectra: Iterable[xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return the Datasets by the name of their station."""
+    return {str(station["station"].item()): station for station in spectra}
+
+
+def _reasons(rejected: Iterable[Rejection]) -> dict[str, list[str]]:
+    """Return what was left out of each station, with reasons."""
+    found: dict[str, list[str]] = {}
+    for rejection in rejected:
+        if rejection.kind not in ("station", "record"):
+            continue
+        # NET.STA, or NET.STA.LOC.CHA of a trace
+        name = ".".join(rejection.name.split(".")[:2])
+        rest = rejection.name[len(name) :].strip(".")
+        text = "; ".join(rejection.reasons)
+        found.setdefault(name, []).append(f"{rest}: {text}" if rest else text)
+    return found
+
+
+def _row(station: xr.Dataset, pairs: Mapping[str, int]) -> dict[str, Any]:
+    """Return the row of a station with usable records; it serves pairs if its place is known."""
+    # Place, and flags that every pair has
+    name = str(station["station"].item())
+    place = {key: float(station[key]) for key in ("longitude", "latitude", "elevation")}
+    flags = record_flags(station)
+    if station.attrs["horizontals"] == 1:
+        flags.append(ONE_HORIZONTAL)
+    return {
+        "station": name,
+        "state": "used" if np.isfinite(place["longitude"]) else "rejected",
+        "flags": " ".join(flags),
+        "pairs": pairs.get(name, 0),
+        **place,
+        "vs30": float(station["vs30"]),
+        **_distances(station, place["longitude"], place["latitude"]),
+        **_motion(station),
+        **_corners(station),
+        **_texts(station),
+    }
+
+
+def _texts(station: xr.Dataset) -> dict[str, str]:
+    """Return the facts of a station that are text."""
+    known = ("site_class", "warnings", "notes", "instrument", "record_level", "source_files")
+    texts = {name: str(station[name].item()) for name in known if name in station}
+    return {**texts, "components": " ".join(map(str, station["channel"].values))}
+
+
+def _distances(station: xr.Dataset, longitude: float, latitude: float) -> dict[str, float]:
+    """Return the distances to epicentre and hypocentre, m, as far as these are known."""
+    # Attributes of the hypocentre are there together or not at all
+    if "hypocentre_longitude" not in station.attrs or not np.isfinite(longitude):
+        return {}
+    east, north = station.attrs["hypocentre_longitude"], station.attrs["hypocentre_latitude"]
+    epicentral = float(great_circle(longitude, latitude, east, north))
+    hypocentral = float(np.hypot(epicentral, station.attrs["hypocentre_depth"]))
+    return {"epicentral_distance": epicentral, "hypocentral_distance": hypocentral}
+
+
+def _motion(station: xr.Dataset) -> dict[str, float]:
+    """Return the peaks of the horizontals and the usable periods."""
+    count = int(station.attrs["horizontals"])
+    # Horizontals come before the vertical
+    found = {name: float(station[name][:count].max()) for name in ("pga", "pgv") if name in station}
+    for name in ("shortest_usable_period", "longest_usable_period"):
+        value = float(station[name])
+        found[name] = value if np.isfinite(value) else np.nan
+    return found
+
+
+def _corners(station: xr.Dataset) -> dict[str, Any]:
+    """Return the narrower corners of the horizontals and the reasons for them."""
+    count = int(station.attrs["horizontals"])
+    records = [json.loads(str(text)) for text in station["processing"].values[:count]]
+    # The narrower band of both; records without corners have none
+    found: dict[str, Any] = {}
+    for name, narrower in (("highpass", max), ("lowpass", min)):
+        corners = [float(record[name]) for record in records if name in record]
+        found[name] = narrower(corners, default=np.nan)
+        reasons = {str(record.get(f"{name}_source", "")) for record in records} - {""}
+        found[f"{name}_source"] = "; ".join(sorted(reasons))
+    return found

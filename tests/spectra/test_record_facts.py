@@ -1,0 +1,57 @@
+"""Facts of the records of a station: peaks of a known motion, sources, warnings and flags."""
+
+import numpy as np
+import pytest
+from obspy import Stream, Trace
+from obspy.core import AttribDict
+
+from per_obspy.spectra.record_facts import peak_motions, record_facts
+
+
+def _trace(channel, source="", **known):
+    header = {
+        "network": "XX",
+        "station": "ONE",
+        "location": "00",
+        "channel": channel,
+        "source": source,
+        "instrument": AttribDict(model="K2"),
+        "per_obspy": AttribDict(known),
+    }
+    return Trace(np.zeros(3), header)
+
+
+def test_peaks_are_those_of_a_sine():
+    # a = A w cos(w t): v = A sin(w t)
+    time = np.arange(0.0, 2.0, 0.001)
+    trace = Trace(0.3 * 5.0 * np.cos(5.0 * time), {"delta": 0.001})
+    # step 0.001 s: the trapezoidal rule is off by (w dt)^2 / 12 = 2e-6
+    assert peak_motions(trace) == pytest.approx((1.5, 0.3), rel=1e-5)
+
+
+def test_facts_are_text():
+    stream = Stream(
+        [
+            _trace("HNN", "a/one.evt", record_flags="second_event", warnings="another event: 0.5"),
+            _trace("HNE", "a/one.evt", record_flags="baseline_shift"),
+            _trace("HNZ", "b/two\udcff\n.evt", warnings="late trigger: 0.2", notes="short"),
+        ]
+    )
+    found = record_facts(stream, list(stream[:2]))
+    facts = {name: str(found[name].item()) for name in found}
+    # control characters and bytes that are no UTF-8 would stop netCDF or break a table
+    assert facts == {
+        "source_files": "one.evt, two? .evt",
+        "instrument": "00 HN K2",
+        "record_level": "raw",
+        # flags of the horizontals, warnings of all
+        "record_flags": "baseline_shift second_event",
+        "warnings": "HNN: another event: 0.5; HNZ: late trigger: 0.2",
+        "notes": "HNZ: short",
+    }
+
+
+def test_records_processed_by_others_are_marked():
+    trace = _trace("HNN")
+    trace.stats.processing = ["per_obspy: processed already, passed through"]
+    assert record_facts(Stream([trace]), [trace])["record_level"].item() == "processed by others"
