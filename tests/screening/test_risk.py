@@ -119,7 +119,8 @@ def test_touching_pairs_are_always_answered(station):
 
 def test_equal_given_buildings_need_no_gap_and_have_no_ratio(station):
     same = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
-    table = _table(station, same)
+    # dampings are given: assumed ones would be sampled
+    table = _table(station, {**same, "damping_1": 0.05, "damping_2": 0.05})
     assert table.loc["P0", "demand"] == 0.0
     assert np.isnan(table.loc["P0", "demand_ratio"])
     assert table.loc["P0", "state"] == "no"

@@ -126,6 +126,11 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     }
 
 
+def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+    """Return the largest relative displacement of 1 towards 2, as in :func:`exact_outcome`, m."""
+    return _without_contact(station, table, azimuth).towards
+
+
 def no_outcome(count: int) -> Columns:
     """Return ``EXACT_COLUMNS``, all empty, for a number of pairs."""
     return {name: np.full(count, np.nan) for name in EXACT_COLUMNS}
