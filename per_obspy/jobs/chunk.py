@@ -7,12 +7,12 @@ out on the way, as the shards of stations are. Where that still holds, nothing i
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,9 +28,9 @@ from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
 from per_obspy.screening.ground_motion.site_motion import (
-    Hypocentre,
     RegionalMotion,
     StationField,
+    hypocentre_of,
     prepared_field,
 )
 from per_obspy.screening.ranking import in_order
@@ -40,9 +40,6 @@ from per_obspy.tables.parts import write_part
 
 #: Rows of a chunk: a worker needs about 10 kB for each.
 CHUNK = 100_000
-
-#: Attributes of a station's Dataset that tell where the earthquake started.
-HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
 STATIONS_KEPT = 200
@@ -155,7 +152,7 @@ def ground_files(
     shards: Iterable[Path], shakemap: tuple[Path, ...], settings: Interpolation
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """Return what is known of the ground motion, and the stations that have no coordinates."""
-    files, nowhere, source = list[StationFile](), list[Rejection](), list[Hypocentre]()
+    files, nowhere, attributes = list[StationFile](), list[Rejection](), list[dict[Hashable, Any]]()
     for shard in shards:
         station = read_spectra(shard)
         name, longitude, latitude = (
@@ -167,16 +164,13 @@ def ground_files(
                     name, longitude, latitude, site_class_of(station), shard, file_hash(shard)
                 )
             )
-            source = (
-                [Hypocentre(*(station.attrs[one] for one in HYPOCENTRE))]
-                if HYPOCENTRE[0] in station.attrs
-                else []
-            )
+            attributes.append(station.attrs)
         else:
             reason = "its coordinates are unknown: it serves no pair"
             nowhere.append(Rejection("station", name, "", None, (reason,)))
+    source = hypocentre_of(attributes)
     field = (
-        prepared_field((read_spectra(one.shard) for one in files), settings, *source)
+        prepared_field((read_spectra(one.shard) for one in files), settings, source)
         if files
         else None
     )

@@ -8,7 +8,11 @@ import xarray as xr
 from per_obspy.config import Building, Screening
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion, prepared_field
+from per_obspy.screening.ground_motion.site_motion import (
+    RegionalMotion,
+    hypocentre_of,
+    prepared_field,
+)
 from per_obspy.screening.ranking import worst_first
 from per_obspy.screening.rows import risk_rows
 
@@ -47,7 +51,8 @@ def risk_table(
     stations, unlocated = stations_of(datasets)
     located = [stations.read(index) for index in range(stations.names.size)]
     # motion between the stations, for pairs at a distance from theirs
-    field = prepared_field(located, screening.interpolation) if located else None
+    source = hypocentre_of(station.attrs for station in located)
+    field = prepared_field(located, screening.interpolation, source) if located else None
     rows, unreached = risk_rows(pairs, RegionalMotion(stations, field, None), building, screening)
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
