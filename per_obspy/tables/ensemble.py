@@ -15,6 +15,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import written_whole
 from per_obspy.screening.region.ensemble import (
     SAME,
+    SEVERITY,
     ensemble_columns,
     ensemble_rejections,
     ensemble_rows,
@@ -45,11 +46,31 @@ class Scenarios(NamedTuple):
     yearly: bool
 
 
+#: Severity of a pair in a risk table: the impact velocity that ranks it, the larger amplification.
+_SEVERITY = """
+    greatest(
+        coalesce(nullif(impact_velocity_exact, 'NaN'::DOUBLE), 0.0),
+        CASE WHEN demand_rule = 'exact' THEN 0.0
+        ELSE coalesce(nullif(impact_velocity, 'NaN'::DOUBLE), 0.0) END
+    ) AS impact_velocity,
+    greatest(
+        1.0,
+        nullif(amplification_exact_1, 'NaN'::DOUBLE),
+        nullif(amplification_exact_2, 'NaN'::DOUBLE),
+        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_1, 'NaN'::DOUBLE) END,
+        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_2, 'NaN'::DOUBLE) END
+    ) AS amplification
+"""
+
 #: The rows in their order, with the rank before the other columns.
 _ORDERED = f"""
     COPY (
         SELECT row_number() OVER () AS rank, *
-        FROM (SELECT * FROM read_parquet($rows) ORDER BY probability DESC, pair_id)
+        FROM (
+            SELECT * FROM read_parquet($rows)
+            ORDER BY probability DESC, expected_impact_velocity DESC, expected_amplification DESC,
+                pair_id
+        )
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $said}})
 """
 
@@ -100,16 +121,19 @@ def write_ensemble(
 def _join(scenarios: Scenarios, path: Path) -> None:
     """Write one row for each name of a pair, as :func:`per_obspy.screening.region.ensemble.ensemble_rows` takes them."""
     tables = list(scenarios.tables.values())
-    nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME))
+    nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
     parts = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
+    same_columns = ", ".join(SAME)
     parts += [
-        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)} FROM read_parquet($table{number})"
+        f"SELECT {number} AS scenario, pair_id, probability, {same_columns}, {_SEVERITY} "
+        f"FROM read_parquet($table{number})"
         for number, table in enumerate(tables)
         if table
     ]
     each = [
-        f"max(probability) FILTER (scenario = {number}) AS probability_{number}"
+        f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
         for number in range(len(tables))
+        for name in ("probability", *SEVERITY)
     ]
     same = [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
     query = f"""
@@ -125,10 +149,10 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 
 def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
     """Give the joined rows in pieces, with the names of the scenarios."""
-    names = {
-        f"probability_{number}": f"probability_{name}"
-        for number, name in enumerate(scenarios.tables)
-    }
+    names = {}
+    for number, name in enumerate(scenarios.tables):
+        for column in ("probability", *SEVERITY):
+            names[f"{column}_{number}"] = f"{column}_{name}"
     with pq.ParquetFile(joined) as table:
         for batch in table.iter_batches(ROWS):
             piece: pd.DataFrame = batch.to_pandas().rename(columns=names)
