@@ -107,7 +107,11 @@ RESULTS: dict[str, Column] = {
             "exact largest relative displacement of 1 towards 2; unknown azimuth: worse side",
         ),
         _number("demand_two_sided", "m", "the same in either order of the buildings, for design"),
-        _whole_number("impacts", "1", "in the exact history with this record and gap"),
+        _whole_number(
+            "impacts",
+            "1",
+            "all in the exact history with this record and gap, slow chatter included",
+        ),
         _number("impact_velocity_exact", "m/s", "largest approach velocity in that history"),
         *_per_building(
             "amplification_exact", "1", "largest radius with pounding / without, in that history"

@@ -62,6 +62,7 @@ def risk_table(
     source = hypocentre_of(station.attrs for station in located)
     field = prepared_field(located, screening.interpolation, source) if located else None
     rows, unreached = risk_rows(pairs, RegionalMotion(stations, field, None), building, screening)
+    # ranked as the tables of a run are
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *unlocated, *unreached)

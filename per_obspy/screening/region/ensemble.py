@@ -120,7 +120,7 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
     # The scenarios' own columns follow the joined ones
     columns = [
-        Column("rank", "int64", "", "1 is the likeliest to pound"),
+        Column("rank", "int64", "", "1 is the likeliest to pound; ties by expected severity"),
         Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
         Column(
             "probability",
