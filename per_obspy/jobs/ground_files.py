@@ -15,15 +15,12 @@ from per_obspy.jobs.station import FinishedStation
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
 from per_obspy.screening.ground_motion.site_motion import (
-    Hypocentre,
     RegionalMotion,
     StationField,
+    hypocentre_of,
     prepared_field,
 )
 from per_obspy.spectra.storage import read_spectra
-
-#: Attributes of a station's Dataset with the place where the earthquake started.
-HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
 
 #: Stations that a worker keeps in memory, each of about 2 MB.
 STATIONS_KEPT = 200
@@ -110,8 +107,8 @@ def ground_files(
             rejected.append(Rejection("station", file.name, "", None, (reason,)))
 
     # Motion between the stations, which recorded the same earthquake
-    hypocentre = _hypocentre(spectra[-1]) if spectra else []
-    field = prepared_field(spectra, settings, *hypocentre) if spectra else None
+    hypocentre = hypocentre_of([dataset.attrs for dataset in spectra])
+    field = prepared_field(spectra, settings, hypocentre) if spectra else None
     # Everything that decides the motion at a pair
     contents = [(file.name, file.hash) for file in files]
     known = [*contents, *map(file_hash, shakemap), hypocentre]
@@ -129,13 +126,6 @@ def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
     )
     site_class = site_class_of(spectra)
     return StationFile(name, longitude, latitude, site_class, shard, station.hash), spectra
-
-
-def _hypocentre(spectra: xr.Dataset) -> list[Hypocentre]:
-    """Return the place where the earthquake started, in a list that is empty if it is unknown."""
-    if HYPOCENTRE[0] not in spectra.attrs:
-        return []
-    return [Hypocentre(*(spectra.attrs[name] for name in HYPOCENTRE))]
 
 
 def read_ground(files: GroundFiles) -> RegionalMotion:

@@ -101,9 +101,17 @@ RESULTS: dict[str, Column] = {
         ),
         _number("critical_gap_sd", "m", "eq. (15) from SD and eq. (16), at contact height"),
         _number("srss_gap", "m", "root of the sum of the squared PER, at contact height"),
-        _number("demand_exact", "m", "exact largest relative displacement of 1 towards 2"),
+        _number(
+            "demand_exact",
+            "m",
+            "exact largest relative displacement of 1 towards 2; unknown azimuth: worse side",
+        ),
         _number("demand_two_sided", "m", "the same in either order of the buildings, for design"),
-        _whole_number("impacts", "1", "in the exact history with this record and gap"),
+        _whole_number(
+            "impacts",
+            "1",
+            "all in the exact history with this record and gap, slow chatter included",
+        ),
         _number("impact_velocity_exact", "m/s", "largest approach velocity in that history"),
         *_per_building(
             "amplification_exact", "1", "largest radius with pounding / without, in that history"

@@ -4,8 +4,9 @@ Measures that would have kept a pair from pounding or from harm: gap, damping, o
 Added damping and bumpers are estimates. The critical gap, eq. (15) and (16), follows the added
 damping on the station's stored spectra, scaled to the pair's own radii, and above the stored
 dampings on their last slope; it is scaled to the demand that decides, so that a pair whose gap is
-enough needs no measure. A bumper is assessed by the single hit. A building that yields is its
-equivalent linear one, whose period and damping are not followed as damping is added.
+enough needs no measure. A bumper is assessed by the single hit. Where the gap of equivalent linear
+buildings governs, these take the place of the elastic ones; their periods and dampings are not
+followed as damping is added.
 """
 
 import numpy as np
@@ -18,8 +19,8 @@ from per_obspy.pounding.critical_gap import critical_gap, srss_gap
 from per_obspy.pounding.mitigation.bumpers import required_restitution
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import stored_log
-from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import Columns, Table, at_contact, both, chosen, values
+from per_obspy.screening.by_record.yielding import governing, governing_radii
+from per_obspy.screening.values import Columns, Table, both, chosen, values
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4
@@ -77,9 +78,9 @@ def mitigation_columns(
 
 def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
     """Return the least damping to add to both buildings of a pair; NaN where none is enough."""
-    period_1, period_2 = both(table, "equivalent_period")
-    damping_1, damping_2 = both(table, "equivalent_damping")
-    radius_1, radius_2 = at_contact(table, "equivalent_per")
+    period_1, period_2 = governing(table, "period")
+    damping_1, damping_2 = governing(table, "damping")
+    radius_1, radius_2 = governing_radii(table)
     uncorrelated, estimate = _estimated_gap(table)
     log_ratio = np.where(uncorrelated, np.nan, np.log(period_1 / period_2))
     # one row per pair, in the order of the kernel; the gap is that of the estimate in proportion
@@ -105,10 +106,10 @@ def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
 
 def _estimated_gap(table: Table) -> tuple[NDArray[np.bool_], FloatArray]:
     """Return which pairs count as uncorrelated, and the critical gap of eq. (15) or by SRSS, m."""
-    period_1, period_2 = both(table, "equivalent_period")
-    damping_1, damping_2 = both(table, "equivalent_damping")
-    radii = at_contact(table, "equivalent_per")
-    # eq. (16) of the equivalent oscillators
+    period_1, period_2 = governing(table, "period")
+    damping_1, damping_2 = governing(table, "damping")
+    radii = governing_radii(table)
+    # eq. (16) of the oscillators whose gap governs
     correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
     correlated = critical_gap(*radii, correlation)
     in_step = correlated <= ROUND_OFF * np.add(*radii)
@@ -128,16 +129,12 @@ def _bumper_restitution(table: Table, target_amplification: float) -> FloatArray
     Return the largest restitution with which pairs that pound stay within the target amplification.
 
     The critical gap of the single hit is the larger of the estimated demand and the one that
-    decides.
+    decides; the oscillators are those of the estimate.
     """
-    names = ("demand", "critical_gap_per", "critical_gap_record", "critical_gap_linearized")
-    largest = np.max([values(table, name) for name in names], axis=0)
-    # derived periods are uncorrelated
-    at_least_srss = np.maximum(largest, values(table, "srss_gap"))
-    critical = np.where(period_is_derived(table), at_least_srss, largest)
+    critical = np.maximum(values(table, "demand_estimated"), values(table, "demand"))
     return required_restitution(
-        *at_contact(table, "equivalent_per"),
-        *both(table, "equivalent_period"),
+        *governing_radii(table),
+        *governing(table, "period"),
         *both(table, "contact_mass"),
         critical,
         values(table, "gap"),

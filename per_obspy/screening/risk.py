@@ -1,6 +1,6 @@
 """Risk table of an inventory that fits in memory: one row per pair, worst first."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import pandas as pd
 import xarray as xr
@@ -8,7 +8,11 @@ import xarray as xr
 from per_obspy.config import Building, Screening
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import stations_of
-from per_obspy.screening.ground_motion.site_motion import RegionalMotion, prepared_field
+from per_obspy.screening.ground_motion.site_motion import (
+    RegionalMotion,
+    hypocentre_of,
+    prepared_field,
+)
 from per_obspy.screening.ranking import worst_first
 from per_obspy.screening.rows import risk_rows
 
@@ -42,14 +46,44 @@ def risk_table(
         Columns in the order of ``screening.columns.ORDER``, then the other columns of the pair
         table. ``attrs["rejected"]`` holds a :class:`~per_obspy.errors.Rejection` for every pair
         without a station in reach.
+
+    Raises
+    ------
+    TypeError
+        If an argument is of another type.
     """
-    datasets = [spectra] if isinstance(spectra, xr.Dataset) else list(spectra)
+    datasets = _datasets(spectra)
+    _require("pairs", pairs, pd.DataFrame, "a DataFrame from read_pairs")
+    _require("building", building, Building, "a Building")
+    _require("screening", screening, Screening, "a Screening")
     stations, unlocated = stations_of(datasets)
     located = [stations.read(index) for index in range(stations.names.size)]
     # motion between the stations, for pairs at a distance from theirs
-    field = prepared_field(located, screening.interpolation) if located else None
+    source = hypocentre_of(station.attrs for station in located)
+    field = prepared_field(located, screening.interpolation, source) if located else None
     rows, unreached = risk_rows(pairs, RegionalMotion(stations, field, None), building, screening)
+    # ranked as the tables of a run are
     table = worst_first(rows, impact_velocity_that_counts(rows))
     table = table[["rank", *(name for name in table if name != "rank")]]
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *unlocated, *unreached)
     return table
+
+
+def _datasets(spectra: object) -> list[xr.Dataset]:
+    """Return the stations as a list."""
+    expected = "a Dataset from station_spectra, or a sequence of such"
+    if isinstance(spectra, xr.Dataset):
+        return [spectra]
+    # text and tables are iterable too, but hold no stations
+    if not isinstance(spectra, Iterable) or isinstance(spectra, (str, pd.DataFrame, xr.DataArray)):
+        raise TypeError(f"spectra must be {expected}, got {type(spectra).__name__}")
+    stations = list(spectra)
+    for index, station in enumerate(stations):
+        _require(f"spectra[{index}]", station, xr.Dataset, "a Dataset from station_spectra")
+    return stations
+
+
+def _require(name: str, value: object, kind: type, expected: str) -> None:
+    """Raise TypeError if an argument is of another type."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be {expected}, got {type(value).__name__}")

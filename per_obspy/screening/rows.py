@@ -38,8 +38,7 @@ from per_obspy.screening.ground_motion.assignment import assigned
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion_at_pairs
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, risk_class
-from per_obspy.screening.uncertainty.probability import pair_probability
-from per_obspy.screening.uncertainty.record_motion import record_motion
+from per_obspy.screening.uncertainty.exact_demand import record_probability
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -135,8 +134,7 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     # measures, flags and probability follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
     raised = raised_by_record(table, dataset, screening)
-    motion_and_doubt = record_motion(station, table, screening)
-    table["probability"] = pair_probability(motion_and_doubt, station.per, table)
+    table["probability"] = record_probability(station, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in pairs}
 

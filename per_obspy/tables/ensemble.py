@@ -14,6 +14,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.region.ensemble import (
     SAME,
+    SEVERITY,
     ensemble_columns,
     ensemble_rejections,
     ensemble_rows,
@@ -44,11 +45,31 @@ class Scenarios(NamedTuple):
     yearly: bool
 
 
+#: Severity of a pair in a risk table: the impact velocity that ranks it, the larger amplification.
+_SEVERITY = """
+    greatest(
+        coalesce(nullif(impact_velocity_exact, 'NaN'::DOUBLE), 0.0),
+        CASE WHEN demand_rule = 'exact' THEN 0.0
+        ELSE coalesce(nullif(impact_velocity, 'NaN'::DOUBLE), 0.0) END
+    ) AS impact_velocity,
+    greatest(
+        1.0,
+        nullif(amplification_exact_1, 'NaN'::DOUBLE),
+        nullif(amplification_exact_2, 'NaN'::DOUBLE),
+        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_1, 'NaN'::DOUBLE) END,
+        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_2, 'NaN'::DOUBLE) END
+    ) AS amplification
+"""
+
 #: The rows in their order, with the rank before the other columns.
 _ORDERED = f"""
     COPY (
         SELECT row_number() OVER () AS rank, *
-        FROM (SELECT * FROM read_parquet($rows) ORDER BY probability DESC, pair_id)
+        FROM (
+            SELECT * FROM read_parquet($rows)
+            ORDER BY probability DESC, expected_impact_velocity DESC, expected_amplification DESC,
+                pair_id
+        )
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $statement}})
 """
 
@@ -112,18 +133,19 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 def _join_query(tables: list[Path | None]) -> str:
     """Return the query that joins risk tables by pair; ``$table0`` and so on are their files."""
     # Without any table there is still a header
-    nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME))
+    nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
     rows += [
-        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)}"
+        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)}, {_SEVERITY}"
         f" FROM read_parquet($table{number})"
         for number, table in enumerate(tables)
         if table
     ]
-    # One column of probabilities per scenario, and the extremes of what should be the same
+    # One column of probabilities and of each severity per scenario, and the extremes of what should be the same
     columns = [
-        f"max(probability) FILTER (scenario = {number}) AS probability_{number}"
+        f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
         for number in range(len(tables))
+        for name in ("probability", *SEVERITY)
     ]
     columns += [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
     return f"""
@@ -136,10 +158,10 @@ def _join_query(tables: list[Path | None]) -> str:
 
 def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
     """Yield the joined rows in pieces, with the names of the scenarios."""
-    names = {
-        f"probability_{number}": f"probability_{name}"
-        for number, name in enumerate(scenarios.tables)
-    }
+    names = {}
+    for number, name in enumerate(scenarios.tables):
+        for column in ("probability", *SEVERITY):
+            names[f"{column}_{number}"] = f"{column}_{name}"
     with pq.ParquetFile(joined) as table:
         for batch in table.iter_batches(ROWS):
             piece: pd.DataFrame = batch.to_pandas().rename(columns=names)

@@ -3,12 +3,17 @@
 import re
 import shutil
 
+import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
 
+from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
 from per_obspy.pipeline.run import run, screen
+from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
+from per_obspy.spectra.storage import read_spectra
 
 from .small_run import SPECTRA, InProcess, write_configuration
 
@@ -47,6 +52,23 @@ def results(folder):
         name: re.sub(rb"[^,\n]*/pairs.csv", b"", (folder / "out" / name).read_bytes())
         for name in RESULTS
     }
+
+
+def test_the_function_gives_the_table_of_the_run(finished):
+    # would catch: a hypocentre that only the run knows
+    folder, _ = finished
+    shards = sorted((folder / "out" / "stations").rglob("*.nc"))
+    spectra = [read_spectra(shard) for shard in shards]
+    assert len(spectra) == 3
+    assert all(HYPOCENTRE[0] in station.attrs for station in spectra)
+    table = risk_table(spectra, read_pairs(folder / "pairs.csv")).set_index("pair_id")
+    ran = pd.read_csv(folder / "out" / "risk.csv").set_index("pair_id")
+    assert table.index.tolist() == ran.index.tolist()
+    numbers = [name for name in ran if pd.api.types.is_numeric_dtype(ran[name])]
+    assert "probability" in numbers
+    # risk.csv has nine digits
+    expected = table[numbers].to_numpy(np.float64)
+    assert_allclose(ran[numbers].to_numpy(np.float64), expected, rtol=1e-8, atol=1e-12)
 
 
 @pytest.mark.parametrize("size", [1, 7, 25])

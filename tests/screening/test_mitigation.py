@@ -144,9 +144,9 @@ def test_a_yielding_pair_is_followed_as_its_equivalent_one(record, table):
     # catches: elastic periods and dampings of buildings that yield
     weak = table.assign(yield_displacement_1=table["sd_1"] / 1.5, hardening_1=0.05)
     weak = weak.assign(**linearized_columns(record, weak))
-    weak = weak.assign(
-        demand=weak["critical_gap_linearized"], gap=0.8 * weak["critical_gap_linearized"]
-    )
+    linearized = weak["critical_gap_linearized"]
+    # the equivalent buildings govern
+    weak = weak.assign(demand=linearized, gap=0.8 * linearized, estimate_rule="linearized")
     found = mitigation_columns(record, weak, TARGET)["supplemental_damping"]
     elastic = weak.drop(columns=["yield_displacement_1"]).assign(yield_displacement_1=np.inf)
     elastic = elastic.assign(**linearized_columns(record, elastic))
@@ -171,6 +171,26 @@ def test_the_bumper_keeps_the_single_hit_within_the_target(record, table):
     usual = np.where(within, found, 0.5)
     assert_allclose(amplification(usual)[within], 1.5, rtol=1e-9)
     assert np.all(amplification(np.minimum(usual + 0.01, 1.0))[within] > 1.5)
+
+
+def test_where_the_elastic_gap_governs_elastic_buildings_do(station, record):
+    # catches: equivalent linear buildings with the critical gap of the elastic ones
+    strong = {"period_1": 0.45, "period_2": 1.23}
+    weak = {**strong, "yield_displacement_1": 0.104}
+    pairs = table_of(station, [strong, weak])
+    elastic, yielding = (pairs.iloc[[i]].reset_index(drop=True) for i in (0, 1))
+    assert yielding["estimate_rule"][0] != "linearized"
+    assert yielding["ductility_1"][0] > 1.0
+    # the same demand and gap: only the buildings could differ
+    demand = float(elastic["demand_estimated"][0])
+    same = {"demand": demand, "gap": 0.97 * demand, "demand_rule": elastic["estimate_rule"]}
+    expected = mitigation_columns(record, elastic.assign(**same), TARGET)
+    # neither measure is trivial
+    assert expected["supplemental_damping"][0] > 0.0
+    assert expected["bumper_restitution"][0] < 1.0
+    found = mitigation_columns(record, yielding.assign(**same), TARGET)
+    for name, column in expected.items():
+        assert_array_equal(found[name], column, err_msg=name)
 
 
 def test_a_row_does_not_depend_on_the_others(record, table):

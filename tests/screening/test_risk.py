@@ -119,7 +119,8 @@ def test_touching_pairs_are_always_answered(station):
 
 def test_equal_given_buildings_need_no_gap_and_have_no_ratio(station):
     same = {"period_2": 1.0, "height_2": 30.0, "storeys_2": 10.0}
-    table = _table(station, same)
+    # dampings are given: assumed ones would be sampled
+    table = _table(station, {**same, "damping_1": 0.05, "damping_2": 0.05})
     assert table.loc["P0", "demand"] == 0.0
     assert np.isnan(table.loc["P0", "demand_ratio"])
     assert table.loc["P0", "state"] == "no"
@@ -149,7 +150,10 @@ def test_turning_a_pair_round_exchanges_its_buildings(station):
 def test_one_horizontal_serves_with_a_flag_and_without_the_exact_rung():
     table = _table(make_station(channels=("HNE",)), {}, {"azimuth": np.nan})
     assert table["azimuth_rule"].tolist() == ["station", "station"]
-    assert table["azimuth_used"].tolist() == [90.0, 90.0]
+    # of an unknown azimuth the worse side of the sensor's axis
+    assert (table["azimuth_used"] % 180.0).tolist() == [90.0, 90.0]
+    assert table.loc["P0", "azimuth_used"] == 90.0
+    assert table.loc["P1", "demand_exact"] == table.loc["P1", "demand_two_sided"]
     assert not (table["demand_rule"] == "exact").any()
     assert table["flags"].str.contains("one_horizontal").all()
 
@@ -210,3 +214,21 @@ def test_a_radius_far_above_the_displacement_is_flagged():
     table = _table(station, {"period_1": 15.0, "damping_1": 0.9, "azimuth": 0.0})
     assert table.loc["P0", "per_1"] > 1.5 * table.loc["P0", "sd_1"]
     assert "per_far_above_sd" in table.loc["P0", "flags"].split()
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "message"),
+    [
+        ("pairs", None, "pairs must be a DataFrame from read_pairs, got NoneType"),
+        ("pairs", [{}], "pairs must be a DataFrame from read_pairs, got list"),
+        ("spectra", None, "spectra must be a Dataset from station_spectra, or a sequence"),
+        ("spectra", "spectra.nc", "or a sequence of such, got str"),
+        ("spectra", [None], r"spectra\[0\] must be a Dataset from station_spectra, got NoneType"),
+        ("building", Screening(), "building must be a Building, got Screening"),
+        ("screening", {}, "screening must be a Screening, got dict"),
+    ],
+)
+def test_an_argument_of_another_type_is_named(station, argument, value, message):
+    arguments = {"spectra": station, "pairs": make_pairs([{}])} | {argument: value}
+    with pytest.raises(TypeError, match=message):
+        per_obspy.risk_table(**arguments)

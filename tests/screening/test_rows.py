@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from screening_samples import make_pairs, make_station
 from shakemap_samples import make_map
 
@@ -47,6 +47,27 @@ def test_the_azimuth_is_found_by_three_rules(station):
     # a whole degree only where every one was tried
     assert table["azimuth_used"].iloc[1] % 1.0 != 0.0
     assert table["azimuth_used"].iloc[2] % 1.0 == 0.0
+
+
+@pytest.mark.parametrize("way", [{"period_1": np.nan}, {"yield_displacement_1": 0.3}])
+def test_of_an_unknown_azimuth_the_worse_side_counts(station, way):
+    # would catch: demand and history of one side only, where the other demands up to twice as much
+    rows = [{**way, "period_2": period, "gap": 0.1} for period in np.linspace(0.4, 2.5, 8)]
+    unknown, _ = _rows(make_pairs([{**row, "azimuth": np.nan} for row in rows]), station)
+    assert set(unknown["azimuth_rule"]) == {"worst"}
+    assert "exact" not in set(unknown["demand_rule"])
+    # estimates know a half circle, sides the whole one
+    assert (unknown["azimuth_used"] >= 180.0).any()
+    assert_array_equal(unknown["demand_exact"], unknown["demand_two_sided"])
+    # the same azimuth as a given one has the same demand and history
+    given = [
+        {**row, "azimuth": azimuth}
+        for row, azimuth in zip(rows, unknown["azimuth_used"], strict=True)
+    ]
+    along, _ = _rows(make_pairs(given), station)
+    for name in ("demand_exact", "impact_velocity_exact", "amplification_exact_1"):
+        # cosines of an angle and of the opposite one differ in the last bit; impacts amplify that
+        assert_allclose(unknown[name], along[name], rtol=1e-6, err_msg=name)
 
 
 def test_a_row_does_not_depend_on_the_others(station, monkeypatch):

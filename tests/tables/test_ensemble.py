@@ -26,6 +26,10 @@ def tables():
             "latitude": random.uniform(10, 11, COUNT),
         }
     )
+    pairs = pairs.assign(
+        demand_rule="exact", impact_velocity=np.nan, impact_velocity_exact=0.5, amplification_1=np.nan,
+        amplification_2=np.nan, amplification_exact_1=1.2, amplification_exact_2=1.1,
+    )  # fmt: skip
     # Each lacks a pair of the other
     near = pairs.assign(probability=random.uniform(0, 1, COUNT))
     far = pairs.assign(probability=random.uniform(0, 0.2, COUNT))
@@ -64,6 +68,26 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     )
     gaps = tables["near"].set_index("pair_id")["gap"].reindex(table["pair_id"])
     assert_allclose(table["gap"], gaps, rtol=0)
+
+
+def test_ties_go_to_the_expected_severity_and_then_to_the_name(tables, tmp_path):
+    # would catch: certain pairs in the order of their names; velocities of the single hit where the
+    # exact demand decides
+    for table in tables.values():
+        table["probability"] = 1.0
+    near = tables["near"].set_index("pair_id", drop=False)
+    near.loc["p100", "impact_velocity_exact"] = 3.0
+    near.loc["p200", "amplification_exact_2"] = 4.0
+    near.loc["p300", ["demand_rule", "impact_velocity"]] = ["srss", 2.0]
+    near.loc["p400", "impact_velocity"] = 9.0
+    near.loc["p450", "impact_velocity_exact"] = np.nan
+    _written({**tables, "near": near}, tmp_path)
+    table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
+    assert table["pair_id"].tolist()[:5] == ["p100", "p300", "p200", "p000", "p001"]
+    assert table["pair_id"].iloc[-1] == "p450"
+    # two thirds of the weight are near's, all pairs pound in both
+    assert_allclose(table["expected_impact_velocity"][0], (2 * 3.0 + 0.5) / 3)
+    assert_allclose(table["expected_amplification"][2], (2 * 3.0 + 0.2) / 3)
 
 
 def test_every_file_is_written_and_every_column_described(tables, tmp_path):

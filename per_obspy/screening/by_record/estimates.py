@@ -8,9 +8,13 @@ from per_obspy.screening.by_record.demand import GapEstimates, gap_estimates, go
 from per_obspy.screening.by_record.exact import exact_decides, exact_outcome, no_outcome
 from per_obspy.screening.by_record.pair_radii import PairMotion
 from per_obspy.screening.by_record.station_motion import StationMotion
-from per_obspy.screening.by_record.yielding import linearized_columns
+from per_obspy.screening.by_record.yielding import (
+    governing,
+    governing_radii,
+    linearized_columns,
+)
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.values import Columns, Table, at_contact, both, values
+from per_obspy.screening.values import Columns, Table, both, values
 
 #: Demand / sum of the radii below which two oscillators move as one: the difference of equal
 #: numbers.
@@ -156,11 +160,10 @@ def _estimates(motion: PairMotion, pairs: Table) -> GapEstimates:
 
 def _single_hits(table: Table) -> Columns:
     """Return the single hit of every pair; its critical gap is the estimated demand."""
-    radii = at_contact(table, "equivalent_per")
-    periods = both(table, "equivalent_period")
+    # oscillators of the model whose gap governs: of yielding buildings maybe the equivalent ones
+    radii, periods = governing_radii(table), governing(table, "period")
     masses = both(table, "contact_mass")
     restitution, demand = values(table, "restitution"), values(table, "demand")
-    # oscillators of yielding buildings are their equivalent linear ones
     hit = single_hit(*radii, *periods, *masses, restitution, demand, values(table, "gap"))
     return {
         "single_hit_status": hit.status,

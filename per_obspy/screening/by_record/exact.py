@@ -44,14 +44,14 @@ class _WithoutContact(NamedTuple):
 
     Attributes
     ----------
-    towards, either_way : ndarray
-        Largest relative displacement of 1 towards 2, and in either direction.
+    towards, away : ndarray
+        Largest relative displacement of 1 towards 2, and with the buildings in the other order.
     per_1, per_2 : ndarray
         Pseudo energy radii.
     """
 
     towards: FloatArray
-    either_way: FloatArray
+    away: FloatArray
     per_1: FloatArray
     per_2: FloatArray
 
@@ -104,26 +104,36 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     station : StationMotion
         The record.
     table : Table
-        Completed pairs with their radii along the azimuth.
+        Completed pairs with their radii along the azimuth, and ``azimuth_used``.
     azimuth : (n_pairs,) ndarray
-        Of the axis from 1 to 2, degrees; 0 where the station has one horizontal.
+        Of the axis from 1 to 2, degrees; 0 where the station has one horizontal. Pairs whose own
+        azimuth is unknown are turned by 180 degrees where the demand is larger there.
 
     Returns
     -------
     dict of (n_pairs,) ndarray
-        ``EXACT_COLUMNS``, see ``columns.RESULTS``.
+        ``EXACT_COLUMNS`` and ``azimuth_used``, see ``columns.RESULTS``.
     """
-    history = _pounding_maxima(station, table, azimuth)
     free = _without_contact(station, table, azimuth)
+    # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one
+    turned = np.isnan(values(table, "azimuth")) & (free.away > free.towards)
+    history = _pounding_maxima(station, table, np.where(turned, azimuth + 180.0, azimuth))
+    axis = values(table, "azimuth_used")
     # impacts amplify the radius that the same oscillator has without contact
     return {
-        "demand_exact": free.towards,
-        "demand_two_sided": free.either_way,
+        "azimuth_used": np.where(turned, (axis + 180.0) % 360.0, axis),
+        "demand_exact": np.where(turned, free.away, free.towards),
+        "demand_two_sided": np.maximum(free.towards, free.away),
         "impacts": history.impacts,
         "impact_velocity_exact": history.impact_velocity,
         "amplification_exact_1": _ratio(history.per[0], free.per_1),
         "amplification_exact_2": _ratio(history.per[1], free.per_2),
     }
+
+
+def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+    """Return the largest relative displacement of 1 towards 2, as in :func:`exact_outcome`, m."""
+    return _without_contact(station, table, azimuth).towards
 
 
 def no_outcome(count: int) -> Columns:
@@ -163,9 +173,9 @@ def _pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) 
 
 def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> _WithoutContact:
     """Return the response of pairs that do not touch; linear pairs take the shorter computation."""
-    towards, either_way = np.empty((2, azimuth.size))
+    towards, away = np.empty((2, azimuth.size))
     per_1, per_2 = at_contact(table, "per")
-    free = _WithoutContact(towards, either_way, per_1.copy(), per_2.copy())
+    free = _WithoutContact(towards, away, per_1.copy(), per_2.copy())
     yields = can_yield(table)
     if not yields.all():
         # linear: the radii are those of the table
@@ -173,12 +183,12 @@ def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) 
         motion = station.north, station.east, station.dt
         linear = directional_relative_displacement(*motion, *oscillators)
         free.towards[~yields] = linear.one_before_two
-        free.either_way[~yields] = linear.largest
+        free.away[~yields] = linear.two_before_one
     if yields.any():
         # bilinear: the radii are those of the yielding oscillators
         bilinear = _bilinear(station, chosen(table, yields), azimuth[yields])
         free.towards[yields] = bilinear.one_before_two
-        free.either_way[yields] = bilinear.largest
+        free.away[yields] = bilinear.two_before_one
         free.per_1[yields], free.per_2[yields] = bilinear.per
     return free
 

@@ -115,6 +115,36 @@ def linearized_columns(station: StationMotion, table: Table) -> Columns:
     return columns
 
 
+def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
+    """
+    Return a property of the oscillators 1 and 2 whose critical gap is the estimated demand.
+
+    Parameters
+    ----------
+    table : Table
+        Rows with ``estimate_rule`` and the columns of :func:`linearized_columns`.
+    name : str
+        One of ``EQUIVALENT``.
+
+    Returns
+    -------
+    first, second : (n_pairs,) ndarray
+        Of the equivalent linear buildings where their gap governs, else of the elastic ones.
+    """
+    linearized = np.asarray(table["estimate_rule"] == "linearized")
+    equivalent_1, equivalent_2 = both(table, f"equivalent_{name}")
+    elastic_1, elastic_2 = both(table, name)
+    first = np.where(linearized, equivalent_1, elastic_1)
+    return first, np.where(linearized, equivalent_2, elastic_2)
+
+
+def governing_radii(table: Table) -> tuple[FloatArray, FloatArray]:
+    """Return the PER of the oscillators of :func:`governing` at contact height, m."""
+    radius_1, radius_2 = governing(table, "per")
+    share_1, share_2 = both(table, "participation")
+    return share_1 * radius_1, share_2 * radius_2
+
+
 def _elastic_columns(table: Table) -> Columns:
     """Return the columns of pairs that stay elastic."""
     columns: Columns = {

@@ -8,8 +8,8 @@ the only one; its ratio serves every damping and azimuth. The spatial correlatio
 spectral acceleration.
 """
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -36,6 +36,10 @@ class Hypocentre(NamedTuple):
     longitude: float
     latitude: float
     depth: float
+
+
+#: Attributes of a station's Dataset that hold the hypocentre.
+HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
 
 
 class StationField(NamedTuple):
@@ -74,6 +78,28 @@ class RegionalMotion(NamedTuple):
     stations: Stations
     field: StationField | None
     shakemap: xr.Dataset | None
+
+
+def hypocentre_of(attributes: Iterable[Mapping[Hashable, Any]]) -> Hypocentre | None:
+    """
+    Return the hypocentre of the earthquake that stations recorded.
+
+    Parameters
+    ----------
+    attributes : iterable of mapping
+        Attributes of the stations' Datasets; ``hypocentre_longitude``, ``hypocentre_latitude`` and
+        ``hypocentre_depth`` (degrees, m) where they are known.
+
+    Returns
+    -------
+    Hypocentre or None
+        None if no station knows it, or if stations recorded different earthquakes.
+    """
+    sources = set()
+    for known in attributes:
+        if HYPOCENTRE[0] in known:
+            sources.add(Hypocentre(*(float(known[name]) for name in HYPOCENTRE)))
+    return sources.pop() if len(sources) == 1 else None
 
 
 def prepared_field(

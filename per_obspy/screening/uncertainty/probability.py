@@ -6,7 +6,7 @@ record or from a ShakeMap. A period that was derived from a height is resampled,
 damping: both buildings independently, at quasi-random nodes, with radii from spectra scaled to the
 median radius. So two buildings of equal height are never certain to move as one. Where both periods
 are given the exact integral is used. An uncertain gap and the error of the estimate widen the
-comparison.
+comparison. Pairs whose exact demand decides are sampled in ``exact_demand.py``.
 
 A design spectrum is certain: only periods are resampled, at the nodes of a Gauss-Hermite rule.
 """
@@ -124,8 +124,8 @@ def pair_probability(motion: UncertainMotion, spectra: LogSpectra, pairs: Table)
     Returns
     -------
     probability : (n_pairs,) ndarray
-        From 0 to 1. Where the exact demand decides it is that of the demand; only motion, gap and
-        dampings are uncertain then.
+        From 0 to 1. Where the exact demand decides it is that of the demand; only motion and gap
+        are uncertain then, and :mod:`.exact_demand` has the pairs of uncertain buildings.
     """
     exact = ~np.isnan(motion.exact_demand)
     resampled = ~exact & period_is_uncertain(pairs)
@@ -191,6 +191,12 @@ def period_is_uncertain(pairs: Table) -> NDArray[np.bool_]:
     return np.asarray(np.maximum(*both(pairs, "period_log_std")) > 0)
 
 
+def building_is_uncertain(pairs: Table) -> NDArray[np.bool_]:
+    """Return which pairs have a building whose period or damping has a log-standard deviation."""
+    damping_is_uncertain = np.maximum(*both(pairs, "damping_log_std")) > 0
+    return np.asarray(period_is_uncertain(pairs) | damping_is_uncertain)
+
+
 def gap_dispersion(pairs: Table) -> FloatArray:
     """Return the log-standard deviation of a lognormal gap; 0 of pairs that touch."""
     gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
@@ -223,8 +229,7 @@ def _rows(motion: UncertainMotion, mask: NDArray[np.bool_]) -> UncertainMotion:
 
 def _of_demand(motion: UncertainMotion, pairs: Table) -> FloatArray:
     """Return the probability that an uncertain exact demand exceeds an uncertain gap."""
-    damping = np.maximum(motion.first.damping_log_std, motion.second.damping_log_std)
-    dispersion = np.hypot(np.hypot(damping, gap_dispersion(pairs)), motion.pair_log_std)
+    dispersion = np.hypot(gap_dispersion(pairs), motion.pair_log_std)
     return demand_probability(motion.exact_demand, median_gap(pairs), dispersion)
 
 

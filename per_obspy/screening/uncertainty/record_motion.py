@@ -41,16 +41,12 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     Returns
     -------
     UncertainMotion
-        Its rows are those of the stored PER of the station.
+        Its rows are those of the stored PER of the station. The exact demand is that of certain
+        buildings; :mod:`.exact_demand` samples it where they are uncertain.
     """
     first, second = (_radius(station, table, i, screening) for i in (1, 2))
     # the exact demand and its deviation change with the motion of both buildings at the site
-    pair_ln_ratio, pair_log_std = pair_motion(
-        at_contact(table, "per"),
-        (first.ln_ratio, second.ln_ratio),
-        (first.motion_log_std, second.motion_log_std),
-        both(table, "period"),
-    )
+    pair_ln_ratio, pair_log_std = pair_at_site(table)
     at_site = values(table, "demand_exact") * np.exp(pair_ln_ratio)
     deviations = screening.linearized_dispersion, screening.model_dispersion
     return UncertainMotion(
@@ -59,9 +55,29 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
         correlation=_governing_correlation(table),
         pair_log_std=pair_log_std,
         model_log_std=np.where(_linearized(table), *deviations),
-        exact_demand=np.where(_is_exact(table), at_site, np.nan),
+        exact_demand=np.where(is_exact(table), at_site, np.nan),
         row=nearest_azimuth(station, table),
     )
+
+
+def pair_at_site(table: Table) -> tuple[FloatArray, FloatArray]:
+    """
+    Return ln of the exact demand at the site over that of the record, and its deviation.
+
+    Parameters
+    ----------
+    table : Table
+        As of :func:`record_motion`.
+    """
+    ln_ratio_1, log_std_1 = _site_motion(table, 1)
+    ln_ratio_2, log_std_2 = _site_motion(table, 2)
+    ratios, log_stds = (ln_ratio_1, ln_ratio_2), (log_std_1, log_std_2)
+    return pair_motion(at_contact(table, "per"), ratios, log_stds, both(table, "period"))
+
+
+def is_exact(table: Table) -> NDArray[np.bool_]:
+    """Return where the exact demand decides."""
+    return np.asarray(table["demand_rule"] == "exact")
 
 
 def _radius(station: StationMotion, table: Table, i: int, screening: Screening) -> UncertainRadius:
@@ -77,11 +93,6 @@ def _radius(station: StationMotion, table: Table, i: int, screening: Screening) 
         period=_deciding(table, f"period_{i}"),
         damping=_deciding(table, f"damping_{i}"),
     )
-
-
-def _is_exact(table: Table) -> NDArray[np.bool_]:
-    """Return where the exact demand decides."""
-    return np.asarray(table["demand_rule"] == "exact")
 
 
 def _linearized(table: Table) -> NDArray[np.bool_]:
@@ -113,7 +124,7 @@ def _site_motion(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
 
 def _damping_dispersion(station: StationMotion, table: Table, i: int) -> FloatArray:
     """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
-    single = _is_exact(table) | ~period_is_uncertain(table)
+    single = ~is_exact(table) & ~period_is_uncertain(table)
     row = nearest_azimuth(station, table)[single]
     period, damping = log_oscillator(table, i)
     period, damping = period[single], damping[single]

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from screening_samples import make_pairs, table_of
 
+import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.screening.by_record.estimates import demand_columns, impact_velocity_that_counts
@@ -13,7 +14,7 @@ from per_obspy.screening.by_record.pair_radii import motion_along_every_azimuth
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.rows import INTERMEDIATE
-from per_obspy.screening.values import values
+from per_obspy.screening.values import at_contact, both, values
 
 
 def _estimated(record, rows):
@@ -77,6 +78,32 @@ def test_the_larger_of_elastic_and_linearized_demand_is_the_estimate(station, re
     assert_array_equal(table["demand_estimated"], np.maximum(elastic, linearized))
     assert table["estimate_rule"].iloc[0] == "linearized"
     assert table["estimate_rule"].iloc[1] != "linearized"
+
+
+def test_the_single_hit_is_that_of_the_model_whose_gap_governs(station):
+    # recomputed from the row's own columns; would catch equivalent radii with an elastic gap
+    rows = [
+        {"period_1": 0.45, "period_2": 1.23, "yield_displacement_1": 0.104},
+        {"period_1": 0.44, "period_2": 0.62, "yield_displacement_2": 0.272},
+        {"period_1": 0.2, "period_2": 0.3, "yield_displacement_1": 2e-4},
+    ]
+    table = table_of(station, rows)
+    linearized = table["estimate_rule"] == "linearized"
+    assert linearized.tolist() == [False, False, True]
+    # a building yields in every row
+    assert (table[["ductility_1", "ductility_2"]].max(axis=1) > 1.0).all()
+    for kind, prefix in ((linearized, "equivalent_"), (~linearized, "")):
+        part = table[kind]
+        hit = per_obspy.single_hit(
+            *at_contact(part, f"{prefix}per"),
+            *both(part, f"{prefix}period"),
+            *both(part, "contact_mass"),
+            part["restitution"],
+            part["demand_estimated"],
+            part["gap"],
+        )
+        assert_array_equal(hit.status, part["single_hit_status"])
+        assert_array_equal(hit.impact_velocity, part["impact_velocity"])
 
 
 def test_equal_buildings_have_a_demand_of_zero(station):

@@ -11,6 +11,7 @@ from screening_samples import make_station
 from per_obspy.config import Interpolation
 from per_obspy.screening.ground_motion.site_motion import (
     Hypocentre,
+    hypocentre_of,
     motion_at_pairs,
     prepared_field,
 )
@@ -37,6 +38,14 @@ def _pairs(longitude, latitude, period_1=1.0, period_2=0.6, **columns):
     return pd.DataFrame(
         {**places, "period_1": period_1.ravel(), "period_2": period_2.ravel(), **columns}
     )
+
+
+def test_the_hypocentre_is_that_on_which_stations_agree():
+    one = {"hypocentre_longitude": 20.0, "hypocentre_latitude": 10.0, "hypocentre_depth": 8e3}
+    assert hypocentre_of([{}, one, {}, one]) == Hypocentre(20.0, 10.0, 8e3)
+    # unknown, or of two earthquakes: no distance can be measured
+    assert hypocentre_of([{}]) is None
+    assert hypocentre_of([one, {**one, "hypocentre_depth": 9e3}]) is None
 
 
 def test_at_a_station_its_record_is_the_motion(stations):

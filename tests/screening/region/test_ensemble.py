@@ -56,6 +56,9 @@ def _joined(*rows):
     """Return pairs at one place whose scenarios were joined, from name and probabilities."""
     table = pd.DataFrame(rows, columns=["pair_id", "probability_near", "probability_far"])
     same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
+    # the same severity in both
+    for name in ("near", "far"):
+        table = table.assign(**{f"impact_velocity_{name}": 0.5, f"amplification_{name}": np.nan})
     return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
 
 
@@ -67,6 +70,14 @@ def test_every_pair_has_its_probabilities_and_its_worst_scenario():
         name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"
     ]
     assert "annual_probability" not in table
+
+
+def test_the_expected_severity_is_that_of_the_scenarios_in_which_a_pair_pounds():
+    joined = _joined(("a", 0.5, 0.0)).assign(impact_velocity_far=8.0, amplification_near=1.6)
+    table = ensemble_rows(joined, WEIGHTS, yearly=False)
+    # three quarters of the weight, half a chance; an unknown amplification is 1
+    assert_allclose(table["expected_impact_velocity"], 0.75 * 0.5 * 0.5)
+    assert_allclose(table["expected_amplification"], 0.75 * 0.5 * 0.6)
 
 
 def test_rates_give_a_probability_in_a_year_too():

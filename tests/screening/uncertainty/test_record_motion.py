@@ -74,11 +74,14 @@ def test_dampings_widen_radii_only_where_they_are_not_resampled(station, record,
     # at a stored period, azimuth and dampings 0.02, 0.05, 0.1 the change is that of the spectrum
     motion = record_motion(record, table, Screening())
     resampled = (table["period_log_std_1"] > 0) | (table["period_log_std_2"] > 0)
+    # of an exact demand the buildings are sampled
+    resampled |= table["demand_rule"] == "exact"
     assert_array_equal(motion.first.damping_log_std > 0, ~resampled)
     period = float(station["period"][30])
     # one deviation of the damping is from 0.0447 to either of these
     stored = table.assign(period_1=period, azimuth_used=40.0, damping_1=np.sqrt(0.02 * 0.1))
     stored = stored.assign(damping_log_std_1=np.log(5.0) / 2.0, period_log_std_1=0.0)
+    stored = stored.assign(demand_rule="per_record")
     found = record_motion(record, stored, Screening()).first.damping_log_std[EXACT]
     spectrum = station["per_azimuthal"].sel(azimuth=40.0, period=period)
     low, high = spectrum.sel(damping=[0.02, 0.1]).to_numpy()
