@@ -1,4 +1,4 @@
-"""How long work tells where it is: a function that is called with a stage's name, what is done of it, and its size."""
+"""Progress callback: ``progress(stage, done, total)``."""
 
 from collections.abc import Callable
 
@@ -6,4 +6,4 @@ Progress = Callable[[str, int, int], None]
 
 
 def silent(stage: str, done: int, total: int) -> None:
-    """Tell nobody."""
+    """Report no progress."""

@@ -1,12 +1,24 @@
-"""A file appears whole or not at all."""
+"""Atomic writes, part files of killed processes, and hashes."""
 
 import errno
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
+from per_obspy import files
 from per_obspy.errors import CatalogError
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import (
+    bytes_hash,
+    content_hash,
+    file_hash,
+    is_part,
+    remove_dead_parts,
+    temporary_folder,
+    written_whole,
+)
 
 
 def test_the_final_name_appears_only_at_the_end(tmp_path):
@@ -34,13 +46,14 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     assert list(tmp_path.iterdir()) == [final]
 
 
-def test_what_cannot_be_written_is_said_in_one_line(tmp_path):
+def test_a_folder_that_cannot_be_made_is_named_in_one_line(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(
-        CatalogError, match=r"risk\.csv: cannot be written: .*file: (File exists|Not a directory)"
-    ):
+    reason = r"risk\.csv: cannot be written: .*file: (File exists|Not a directory)"
+    with pytest.raises(CatalogError, match=reason):
         written_whole(tmp_path / "file" / "risk.csv").__enter__()
 
+
+def test_a_full_disk_is_named_in_one_line(tmp_path):
     def fill():
         with written_whole(tmp_path / "risk.csv") as part:
             part.write_text("half")
@@ -48,10 +61,71 @@ def test_what_cannot_be_written_is_said_in_one_line(tmp_path):
 
     with pytest.raises(CatalogError, match=r"risk\.csv: cannot be written: No space left"):
         fill()
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def ended_process():
+    """Return the number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_part_files_of_ended_processes_are_removed(tmp_path, ended_process):
+    # would catch a pattern that does not know a name that written_whole gives
+    with written_whole(tmp_path / "chunks" / "000004.json") as part:
+        part.write_text("{}")
+        name = part.name.replace(str(os.getpid()), str(ended_process))
+    left = [tmp_path / "chunks" / name, tmp_path / f".XX.S001.{ended_process}.part.mseed"]
+    for path in left:
+        path.write_bytes(b"half")
+        assert is_part(path)
+    (tmp_path / f".spill.{ended_process}.part").mkdir()
+    (tmp_path / f".spill.{ended_process}.part" / "block").write_bytes(b"half")
+    remove_dead_parts(tmp_path)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["000004.json", "chunks"]
+
+
+def test_part_files_that_may_still_be_written_stay(tmp_path, ended_process):
+    with written_whole(tmp_path / "risk.csv") as own, temporary_folder(tmp_path) as room:
+        own.write_text("half")
+        elsewhere = tmp_path / f".risk.{ended_process}@another-machine.part.csv"
+        elsewhere.write_text("half")
+        remove_dead_parts(tmp_path)
+        assert own.exists()
+        assert room.exists()
+        assert elsewhere.exists()
+    assert not room.exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["run.json", ".holder.json", "part.csv", "S001.part.mseed", ".S001.part", "1.part.csv"]
+)
+def test_other_files_are_no_part_files(tmp_path, name):
+    (tmp_path / name).write_text("whole")
+    assert not is_part(Path(name))
+    remove_dead_parts(tmp_path)
+    assert (tmp_path / name).exists()
+
+
+def test_without_posix_every_process_counts_as_running(ended_process, monkeypatch):
+    # on Windows the same call would end the process
+    with monkeypatch.context() as patch:
+        patch.setattr(files.os, "name", "nt")
+        running = files._is_running(ended_process, None)
+    assert running
+    assert not files._is_running(ended_process, None)
 
 
 def test_hash_is_sha256(tmp_path):
     file = tmp_path / "abc"
     file.write_bytes(b"abc")  # the first example of FIPS 180-2
-    assert file_hash(file) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert file_hash(file) == bytes_hash(b"abc") == expected
+
+
+def test_the_hash_of_values_depends_on_them_and_not_on_their_order():
+    content = {"a": 1, "b": [1.5, None]}
+    assert content_hash(content) == content_hash(dict(reversed(content.items())))
+    assert content_hash(content) != content_hash(content | {"a": 2})

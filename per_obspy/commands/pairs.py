@@ -74,7 +74,7 @@ def find_pairs(
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     from per_obspy.inventory.files.writing import write_pairs
     from per_obspy.inventory.footprints.pairs import pairs_from_footprints
-    from per_obspy.tables.writing import write_rejected
+    from per_obspy.tables.table_files import write_rejected
 
     # Find the pairs and write them with their rejections
     table = pairs_from_footprints(footprints, distance, layer, gap_std)

@@ -12,7 +12,7 @@ from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
     from per_obspy.errors import Rejection
-    from per_obspy.records.events import EventRow
+    from per_obspy.records.fdsn.event_list import EventRow
     from per_obspy.records.summary import RecordInfo
 
 #: What the table of records shows of each; JSON has everything.
@@ -43,7 +43,7 @@ def events(
 
     Example: per-obspy events USGS --start 2019-07-06 --end 2019-07-07 --magnitude 5
     """
-    from per_obspy.records.events import find_events
+    from per_obspy.records.fdsn.event_list import find_events
 
     # Ask by the parameters of FDSN event services
     query = {"starttime": start, "endtime": end, "minmagnitude": magnitude}
@@ -72,7 +72,7 @@ def fetch(
 
     Example: per-obspy fetch run.toml
     """
-    from per_obspy.records.fdsn.fetch import fetch_configured
+    from per_obspy.pipeline.fetch import fetch_configured
 
     with shown_progress() as progress:
         folder, stations, rejected = fetch_configured(configuration, again, progress)

@@ -1,99 +1,36 @@
 """
-The work of one chunk of the inventory, from raw rows to its part of the risk table; chunks do not know of each other.
+Work on one chunk of the inventory, from raw rows to its part of the risk table.
 
-A part is a Parquet file beside a small JSON file that tells what it was made from and what was left
-out on the way, as the shards of stations are. Where that still holds, nothing is done again.
+Chunks are independent of each other. A part is a Parquet file with a status file
+(:mod:`per_obspy.resume`) of its name, which also holds what was left out. A chunk whose status and
+part are whole is not done again.
 """
 
 import hashlib
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
-import xarray as xr
 
-from per_obspy.config import Building, Interpolation, Screening
+from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import file_hash
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
+from per_obspy.jobs.ground_files import GroundFiles, read_ground
 from per_obspy.jobs.parallel import results
-from per_obspy.records.shakemap import read_shakemap
+from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
-from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
-from per_obspy.screening.ground_motion.site_motion import (
-    Hypocentre,
-    RegionalMotion,
-    StationField,
-    prepared_field,
-)
+from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
-from per_obspy.spectra.storage import read_spectra
 from per_obspy.tables.parts import write_part
 
 #: Rows of a chunk: a worker needs about 10 kB for each.
 CHUNK = 100_000
-
-#: Attributes of a station's Dataset that tell where the earthquake started.
-HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
-
-#: Stations that a worker keeps in memory, each of about 2 MB.
-STATIONS_KEPT = 200
-
-
-class StationFile(NamedTuple):
-    """
-    A station that can serve pairs.
-
-    Attributes
-    ----------
-    name : str
-        ``NETWORK.STATION``.
-    longitude, latitude : float
-        Degrees east and north.
-    site_class : str
-        Of the ground, empty if unknown.
-    shard : Path
-        Its Dataset.
-    hash : str
-        Of the shard.
-    """
-
-    name: str
-    longitude: float
-    latitude: float
-    site_class: str
-    shard: Path
-    hash: str
-
-
-class GroundFiles(NamedTuple):
-    """
-    What is known of the ground motion, for other processes to read.
-
-    Attributes
-    ----------
-    stations : tuple of StationFile
-        Stations that can serve pairs.
-    field : StationField or None
-        The motion between them; None if there are none.
-    shakemap : tuple of Path
-        ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
-    key : str
-        Hash of all their contents.
-    """
-
-    stations: tuple[StationFile, ...]
-    field: StationField | None
-    shakemap: tuple[Path, ...]
-    key: str
 
 
 class ChunkJob(NamedTuple):
@@ -102,6 +39,8 @@ class ChunkJob(NamedTuple):
 
     Attributes
     ----------
+    number : int
+        Place of the chunk in the inventory.
     chunk : PairChunk
         Raw rows.
     ground : GroundFiles
@@ -110,18 +49,22 @@ class ChunkJob(NamedTuple):
         Settings.
     part : Path
         Where its rows go.
+    key : str
+        Hash of everything on which the part depends; :func:`do_chunks` computes it.
     """
 
+    number: int
     chunk: PairChunk
     ground: GroundFiles
     building: Building
     screening: Screening
     part: Path
+    key: str = ""
 
 
 class Part(NamedTuple):
     """
-    What became of a chunk.
+    Result of a chunk.
 
     Attributes
     ----------
@@ -131,8 +74,8 @@ class Part(NamedTuple):
         Number of rows of the inventory that it held.
     path : Path or None
         Rows of the risk table, and the keys of their order; None if no pair was left.
-    note : Path
-        What was left out, see :func:`rejections`.
+    status : Path
+        Status file with what was left out, see :func:`rejections`.
     resumed : bool
         Whether an earlier run had done it.
     """
@@ -140,151 +83,108 @@ class Part(NamedTuple):
     number: int
     rows: int
     path: Path | None
-    note: Path
+    status: Path
     resumed: bool
 
 
 def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
-    """Give what was left out of some parts; they are read one by one."""
+    """Yield what was left out of some parts, which are read one after the other."""
     for part in parts:
-        for one in json.loads(part.note.read_text(encoding="utf-8"))["rejected"]:
-            yield Rejection.stored(one)
-
-
-def ground_files(
-    shards: Iterable[Path], shakemap: tuple[Path, ...], settings: Interpolation
-) -> tuple[GroundFiles, tuple[Rejection, ...]]:
-    """Return what is known of the ground motion, and the stations that have no coordinates."""
-    files, nowhere, source = list[StationFile](), list[Rejection](), list[Hypocentre]()
-    for shard in shards:
-        station = read_spectra(shard)
-        name, longitude, latitude = (
-            station[key].item() for key in ("station", "longitude", "latitude")
-        )
-        if np.isfinite(longitude):
-            files.append(
-                StationFile(
-                    name, longitude, latitude, site_class_of(station), shard, file_hash(shard)
-                )
-            )
-            source = (
-                [Hypocentre(*(station.attrs[one] for one in HYPOCENTRE))]
-                if HYPOCENTRE[0] in station.attrs
-                else []
-            )
-        else:
-            reason = "its coordinates are unknown: it serves no pair"
-            nowhere.append(Rejection("station", name, "", None, (reason,)))
-    field = (
-        prepared_field((read_spectra(one.shard) for one in files), settings, *source)
-        if files
-        else None
-    )
-    known = [*((one.name, one.hash) for one in files), *map(file_hash, shakemap), source]
-    key = hashlib.sha256(repr(known).encode()).hexdigest()
-    return GroundFiles(tuple(files), field, shakemap, key), tuple(nowhere)
+        yield from map(Rejection.stored, read_status(part.status)["rejected"])
 
 
 def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
-    """Give every part as it is finished, in parallel; what an earlier run did is not done again."""
-    waiting = list[Part]()
+    """
+    Yield every part as it is finished, in parallel; what an earlier run did is not done again.
 
-    def new() -> Iterator[ChunkJob]:
+    Parameters
+    ----------
+    jobs : iterable of ChunkJob
+        What to do; asked for while the work goes on.
+    workers : int
+        Number of processes.
+    executor : Executor or None
+        Where to work instead.
+    """
+    resumed = list[Part]()
+
+    def missing() -> Iterator[ChunkJob]:
+        """Yield the jobs that have to be done; the others are resumed on the way."""
         for job in jobs:
-            if earlier := _earlier(job):
-                waiting.append(earlier)
+            keyed = job._replace(key=_key(job))
+            earlier = _earlier(keyed)
+            if earlier is None:
+                yield keyed
             else:
-                yield job
+                resumed.append(earlier)
 
-    for part in results(new(), do_chunk, _lost, workers, executor):
-        yield from waiting
-        waiting.clear()
+    for part in results(missing(), do_chunk, _failed, workers, executor):
+        yield from resumed
+        resumed.clear()
         yield part
-    yield from waiting
+    yield from resumed
 
 
 def do_chunk(job: ChunkJob) -> Part:
-    """Return the finished part, its rows and the note that tells what they were made from on disk."""
+    """Write the rows of a chunk and their status, and return the finished part."""
     job.part.unlink(missing_ok=True)
     pairs = checked_chunk(job.chunk)
-    rows, rejected = _surviving(pairs, _ground(job.ground), job)
-    rejected = (
-        *pairs.attrs["rejected"],
-        *(one._replace(source=job.chunk.rows.source) for one in rejected),
-    )
+    rows, uncomputed = _computed_rows(pairs, read_ground(job.ground), job)
+    # Rows that cannot be computed belong to the file of the chunk
+    rejected = [row._replace(source=job.chunk.rows.source) for row in uncomputed]
     if len(rows):
-        write_part(in_order(rows, impact_velocity_that_counts(rows)), _number(job), job.part)
-    return _noted(job, _key(job), job.part if len(rows) else None, rejected)
+        ordered = in_order(rows, impact_velocity_that_counts(rows))
+        write_part(ordered, job.number, job.part)
+    has_part = len(rows) > 0
+    return _recorded(job, job.key, has_part, [*pairs.attrs["rejected"], *rejected])
 
 
-def _noted(job: ChunkJob, key: str, part: Path | None, rejected: Sequence[Rejection]) -> Part:
-    """Write the note of a part."""
-    content = {"key": key, "part": part and file_hash(part), "rejected": rejected}
-    with written_whole(_note(job)) as note:
-        note.write_text(json.dumps(content), encoding="utf-8")
-    return Part(_number(job), len(job.chunk.repeated), part, _note(job), resumed=False)
+def _recorded(job: ChunkJob, key: str, has_part: bool, rejected: Sequence[Rejection]) -> Part:
+    """Write the status of a part, after the part, and return the part."""
+    outputs = {job.part.name: file_hash(job.part)} if has_part else {}
+    write_status(_status_file(job), key, outputs, {"rejected": rejected})
+    return _part(job, has_part, resumed=False)
 
 
-def _note(job: ChunkJob) -> Path:
+def _part(job: ChunkJob, has_part: bool, resumed: bool) -> Part:
+    """Return the part of a chunk."""
+    path = job.part if has_part else None
+    return Part(job.number, len(job.chunk.repeated), path, _status_file(job), resumed)
+
+
+def _status_file(job: ChunkJob) -> Path:
+    """Return the status file of a chunk."""
     return job.part.with_suffix(".json")
 
 
-def _surviving(
+def _computed_rows(
     pairs: pd.DataFrame, ground: RegionalMotion, job: ChunkJob
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
-    """Return the rows of all pairs but those that cannot be computed, which are found by halving."""
+    """Compute the rows of all pairs but those that fail, which are found by halving."""
     try:
         return risk_rows(pairs, ground, job.building, job.screening)
     except (ValueError, ArithmeticError) as error:
         if len(pairs) == 1:
-            return pairs.iloc[:0], (
-                Rejection("pair", pairs["pair_id"].iloc[0], "", None, (str(error),)),
-            )
-        middle = len(pairs) // 2
-        halves = [
-            _surviving(some, ground, job) for some in (pairs.iloc[:middle], pairs.iloc[middle:])
-        ]
-        kept = [rows for rows, _ in halves if len(rows)]
-        return pd.concat(kept) if kept else pairs.iloc[:0], tuple(
-            one for _, lost in halves for one in lost
-        )
+            name = pairs["pair_id"].iloc[0]
+            return pairs.iloc[:0], (Rejection("pair", name, "", None, (str(error),)),)
 
-
-def _ground(files: GroundFiles) -> RegionalMotion:
-    longitude, latitude = (
-        np.array([(one.longitude, one.latitude) for one in files.stations]).reshape(-1, 2).T
-    )
-    names, ground = (
-        np.array([getattr(one, name) for one in files.stations], dtype=object)
-        for name in ("name", "site_class")
-    )
-    shards = [(one.shard, one.hash) for one in files.stations]
-    stations = Stations(names, longitude, latitude, ground, lambda index: _station(*shards[index]))
-    return RegionalMotion(
-        stations, files.field, _shakemap(files.shakemap, files.key) if files.shakemap else None
-    )
-
-
-@lru_cache(1)
-def _shakemap(files: tuple[Path, ...], content: str) -> xr.Dataset:
-    del content
-    return read_shakemap(*files)
-
-
-@lru_cache(STATIONS_KEPT)
-def _station(shard: Path, content: str) -> xr.Dataset:
-    """Return a station's Dataset; its hash tells a changed one from what is kept."""
-    del content
-    return read_spectra(shard)
+    # A pair among several fails: each half is computed alone
+    middle = len(pairs) // 2
+    first, rejected_first = _computed_rows(pairs.iloc[:middle], ground, job)
+    second, rejected_second = _computed_rows(pairs.iloc[middle:], ground, job)
+    tables = [rows for rows in (first, second) if len(rows)]
+    joined = pd.concat(tables) if tables else pairs.iloc[:0]
+    return joined, (*rejected_first, *rejected_second)
 
 
 def _key(job: ChunkJob) -> str:
-    """Return the hash of everything that the part depends on."""
+    """Return the hash of everything on which the part depends."""
     rows, digest = job.chunk.rows, hashlib.sha256()
+    # Program, settings and ground motion
     settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
-    digest.update(
-        "\n".join([version("per_obspy"), rows.source, *settings, job.ground.key]).encode()
-    )
+    parts = [version("per_obspy"), rows.source, *settings, job.ground.key]
+    digest.update("\n".join(parts).encode())
+    # Raw rows: broken lines, cells, places in their file, and names that came before
     digest.update(repr(rows.broken).encode())
     content = pa.BufferOutputStream()
     with pa.ipc.new_stream(content, rows.table.schema) as stream:
@@ -294,30 +194,20 @@ def _key(job: ChunkJob) -> str:
     return digest.hexdigest()
 
 
-def _number(job: ChunkJob) -> int:
-    return int(job.part.stem)
-
-
 def _earlier(job: ChunkJob) -> Part | None:
-    """Return the part as an earlier run left it, if it was made from the same and is undamaged."""
-    try:
-        note = json.loads(_note(job).read_text(encoding="utf-8"))
-        part = file_hash(job.part) if job.part.exists() else None
-        if note["key"] != _key(job) or note["part"] != part:
-            return None
-    except (OSError, ValueError, KeyError, TypeError):
+    """Return the part as an earlier run left it, if it did the same and the part is whole."""
+    status = earlier_status(_status_file(job), job.key)
+    if status is None or "rejected" not in status:
         return None
-    return Part(
-        _number(job), len(job.chunk.repeated), job.part if part else None, _note(job), resumed=True
-    )
+    return _part(job, bool(status["outputs"]), resumed=True)
 
 
-def _lost(job: ChunkJob, reason: str) -> Part:
-    """Return a part of nothing but rejections; the next run does it again."""
+def _failed(job: ChunkJob, reason: str) -> Part:
+    """Return a part that holds only rejections, because its work failed; the next run does it."""
     rows = job.chunk.rows
     names = rows.table["pair_id"].cast(pa.string()).to_pylist()
-    lost = [
+    rejected = [
         Rejection("pair", name or "", rows.source, line, (reason,))
         for name, line in zip(names, rows.lines.tolist(), strict=True)
     ]
-    return _noted(job, "", None, [*rows.broken, *lost])
+    return _recorded(job, "", False, [*rows.broken, *rejected])

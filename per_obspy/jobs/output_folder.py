@@ -1,7 +1,8 @@
 """
-The output folder of a run: held by one run at a time, and the JSON file that says what stands in it.
+Output folder of a run: locked by one run at a time, and described by one JSON file.
 
-That file is written last: where it stands, the results beside it are complete.
+That file is a status file (:mod:`per_obspy.resume`) and written last: where it is, the results
+beside it are complete.
 """
 
 import json
@@ -17,7 +18,8 @@ from typing import Any, NamedTuple
 from filelock import FileLock, Timeout
 
 from per_obspy.errors import CatalogError
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import file_hash, remove_dead_parts
+from per_obspy.resume import write_status
 
 #: Libraries whose versions a result may depend on.
 LIBRARIES = (
@@ -36,7 +38,7 @@ LIBRARIES = (
 
 class Result(NamedTuple):
     """
-    What a run has done.
+    Result of a run.
 
     Attributes
     ----------
@@ -54,22 +56,10 @@ class Result(NamedTuple):
 
 
 def recorded(file: Path, record: dict[str, Any]) -> Result:
-    """Write the record, after everything else."""
-    with written_whole(file) as part:
-        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
-    return Result(file.parent, record, did_nothing=False)
-
-
-def earlier_record(file: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of an earlier run, if it did the same and its outputs are as it left them."""
-    try:
-        record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        intact = all(
-            file_hash(file.parent / name) == known for name, known in record["outputs"].items()
-        )
-    except (OSError, ValueError, KeyError):
-        return None
-    return record if intact and record["key"] == key else None
+    """Write the record of a run with its key and outputs, after everything else."""
+    facts = {name: value for name, value in record.items() if name not in ("key", "outputs")}
+    written = write_status(file, record["key"], record["outputs"], facts, indent=1)
+    return Result(file.parent, written, did_nothing=False)
 
 
 def file_hashes(folder: Path, files: Sequence[Path]) -> dict[str, str]:
@@ -88,33 +78,39 @@ def now() -> str:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Hold the output folder; a second run is told who has it."""
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Lock an output folder and clear it of dead part files; an error names who holds the lock."""
     holder = folder / ".holder.json"
+    lock = _acquired_lock(folder, holder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(str(folder / ".lock"), timeout=0)
-        lock.acquire()
-    except Timeout as error:
-        raise CatalogError(
-            str(folder), f"another run holds this folder: {_holder(holder)}"
-        ) from error
-    except OSError as error:
-        raise CatalogError(
-            str(folder), f"cannot be used as output folder: {error.strerror}"
-        ) from error
-    try:
-        said = {"process": os.getpid(), "host": platform.node(), "since": now()}
-        holder.write_text(json.dumps(said), encoding="utf-8")
+        owner = {"process": os.getpid(), "host": platform.node(), "since": now()}
+        holder.write_text(json.dumps(owner), encoding="utf-8")
+        remove_dead_parts(folder)
         yield
     finally:
         holder.unlink(missing_ok=True)
         lock.release()
 
 
-def _holder(path: Path) -> str:
+def _acquired_lock(folder: Path, holder: Path) -> FileLock:
+    """Make the output folder if need be and acquire its lock at once."""
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(str(folder / ".lock"), timeout=0)
+        lock.acquire()
+    except Timeout as error:
+        reason = f"another run holds this folder: {_holder(holder)}"
+        raise CatalogError(str(folder), reason) from error
+    except OSError as error:
+        reason = f"cannot be used as output folder: {error.strerror}"
+        raise CatalogError(str(folder), reason) from error
+    return lock
+
+
+def _holder(path: Path) -> str:
+    """Return process, host and start of the run that holds an output folder."""
+    try:
+        owner = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return "it does not say which"
-    return f"process {said['process']} on {said['host']} since {said['since']}"
+    return f"process {owner['process']} on {owner['host']} since {owner['since']}"

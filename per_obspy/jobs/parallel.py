@@ -25,66 +25,68 @@ Result = TypeVar("Result")
 #: Return the result of a task; other processes must be able to import the function.
 Do = Callable[[Task], Result]
 
-#: Return what stands for the result of a task that failed, given the reason.
-Lost = Callable[[Task, str], Result]
+#: Return the substitute for the result of a task that failed, given the reason.
+Failed = Callable[[Task, str], Result]
 
 #: Tasks submitted ahead, for each worker: one at work and one waiting.
 AHEAD = 2
 
-#: Tasks submitted ahead to an executor whose size nobody knows.
+#: Tasks submitted ahead to an executor of unknown size.
 AHEAD_ELSEWHERE = 64
 
 
 def results(
     tasks: Iterable[Task],
     do: Do[Task, Result],
-    lost: Lost[Task, Result],
+    failed: Failed[Task, Result],
     workers: int,
     executor: Executor | None,
 ) -> Iterator[Result]:
     """
-    Give the result of every task as it is finished.
+    Yield the result of every task as it is finished.
 
     Parameters
     ----------
     tasks : iterable
         What to do; asked for while the work goes on.
-    do, lost : callable
-        What is done, and what stands for a failure.
+    do, failed : callable
+        Work of a task, and the substitute for its result if it fails.
     workers : int
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
         Where to work instead.
     """
     if executor is not None:
-        unfinished = yield from _on(executor, tasks, do, lost, AHEAD_ELSEWHERE)
-        yield from (lost(task, "its worker process died") for task in unfinished)
+        unfinished = yield from _on(executor, tasks, do, failed, AHEAD_ELSEWHERE)
+        yield from (failed(task, "its worker process died") for task in unfinished)
         return
-    waiting = iter(tasks)
-    first = list(islice(waiting, 2))
+    remaining = iter(tasks)
+    first = list(islice(remaining, 2))
     if min(workers, len(first)) <= 1:
-        yield from (_caught(task, partial(do, task), lost) for task in chain(first, waiting))
+        yield from (_caught(task, partial(do, task), failed) for task in chain(first, remaining))
         return
-    waiting = chain(first, waiting)
-    for head in waiting:  # a pool, and another one after each worker that died
+    remaining = chain(first, remaining)
+    for head in remaining:  # a pool, and another one after each worker that died
         with _pool(workers) as pool:
-            unfinished = yield from _on(pool, chain([head], waiting), do, lost, AHEAD * workers)
+            unfinished = yield from _on(pool, chain([head], remaining), do, failed, AHEAD * workers)
         for task in unfinished:
-            yield _alone(task, do, lost)
+            yield _alone(task, do, failed)
 
 
 def _on(
     executor: Executor,
     tasks: Iterable[Task],
     do: Do[Task, Result],
-    lost: Lost[Task, Result],
+    failed: Failed[Task, Result],
     ahead: int,
 ) -> Generator[Result, None, list[Task]]:
-    """Give results until all tasks are done or the executor is broken; return what it was doing then."""
-    waiting, unfinished = iter(tasks), list[Task]()
+    """Yield results until all tasks are done or the executor is broken; return its tasks then."""
+    remaining, unfinished = iter(tasks), list[Task]()
     pending: dict[Future[Result], Task] = {}
     while True:
-        for task in islice(waiting, 0 if unfinished else ahead - len(pending)):
+        # Keep the executor busy, but only a few tasks ahead of the results
+        room = 0 if unfinished else ahead - len(pending)
+        for task in islice(remaining, room):
             try:
                 pending[executor.submit(do, task)] = task
             except BrokenProcessPool:
@@ -92,21 +94,22 @@ def _on(
                 break
         if not pending:
             return unfinished
+        # A broken executor fails all its tasks: they are done again elsewhere
         for future in wait(pending, return_when=FIRST_COMPLETED).done:
             task = pending.pop(future)
             try:
-                yield _caught(task, future.result, lost)
+                yield _caught(task, future.result, failed)
             except BrokenProcessPool:
                 unfinished.append(task)
 
 
-def _alone(task: Task, do: Do[Task, Result], lost: Lost[Task, Result]) -> Result:
+def _alone(task: Task, do: Do[Task, Result], failed: Failed[Task, Result]) -> Result:
     """Return the result of a task that has a process of its own."""
     try:
         with _pool(1) as pool:
-            return _caught(task, pool.submit(do, task).result, lost)
+            return _caught(task, pool.submit(do, task).result, failed)
     except BrokenProcessPool:
-        return lost(task, "its worker process died")
+        return failed(task, "its worker process died")
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
@@ -121,7 +124,7 @@ def _begin_worker() -> None:
 
 
 def _end_with_parent() -> None:
-    """Let this process end when the one that started it has, even if that was killed: else it would wait for ever."""
+    """End this process when the one that started it has ended, even if that was killed."""
     parent = parent_process()
     assert parent is not None  # a pool starts this process
 
@@ -132,13 +135,13 @@ def _end_with_parent() -> None:
     Thread(target=watch, daemon=True).start()
 
 
-def _caught(task: Task, work: Callable[[], Result], lost: Lost[Task, Result]) -> Result:
+def _caught(task: Task, work: Callable[[], Result], failed: Failed[Task, Result]) -> Result:
     """Return the result; whatever is raised becomes a reason, so that no task stops the others."""
     try:
         return work()
     except BrokenProcessPool:
         raise
     except PerError as error:
-        return lost(task, str(error))
+        return failed(task, str(error))
     except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
-        return lost(task, f"{type(error).__name__}: {error}")
+        return failed(task, f"{type(error).__name__}: {error}")

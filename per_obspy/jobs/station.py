@@ -1,54 +1,74 @@
 """
-The work of one station, from its files to its shard; stations do not know of each other.
+Work on one station, from its files to its shard; stations are independent of each other.
 
-A shard is a netCDF file beside a small JSON file that tells what it was made from and what was left
-out on the way. Where that still holds, nothing is done again.
+A shard is a netCDF file with a status file (:mod:`per_obspy.resume`) of its name, which also holds
+what was left out. A station whose status and shard are whole is not done again.
 """
 
-import hashlib
-import json
-from collections.abc import Callable, Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError, PerError, Rejection
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import bytes_hash, file_hash
 from per_obspy.jobs.parallel import results
 from per_obspy.processing.chain import process_station
-from per_obspy.records.archives import open_file
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
+from per_obspy.resume import Status, StatusError, changed_outputs, read_status, write_status
 from per_obspy.spectra.station import station_spectra
-from per_obspy.spectra.storage import write_spectra
+from per_obspy.spectra.storage import read_spectra, without_motion, write_spectra
 
 if TYPE_CHECKING:
     from obspy import Inventory, Stream
     from obspy.core.event import Event
 
-#: What the note of a shard tells of it beside its origin.
-Facts = dict[str, object]
+#: Suffix of a shard of spectra.
+SPECTRA = ".nc"
 
 
-def spectra_shard(
-    job: "Job", stream: "Stream", event: "Event | None"
-) -> tuple[tuple[Rejection, ...], Facts]:
-    """Write the spectra of a station as its shard if any record is usable; return what was left out."""
+class Products(NamedTuple):
+    """
+    Files made of the records of a station.
+
+    Attributes
+    ----------
+    rejected : tuple of Rejection
+        What was left out, with every reason.
+    files : tuple of Path
+        The shard and what was written with it; empty if nothing usable was left.
+    facts : mapping
+        Plain values that the status file holds besides.
+    """
+
+    rejected: tuple[Rejection, ...]
+    files: tuple[Path, ...] = ()
+    facts: Mapping[str, object] = MappingProxyType({})
+
+
+def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") -> Products:
+    """Write the spectra of a station as its shard if any record is usable."""
     clean, unfit = process_station(stream, job.processing, event)
-    if clean:
-        grid = job.spectra
-        periods = np.geomspace(grid.shortest, grid.longest, grid.count)
-        dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
-        dataset.attrs["simulated"] = str(job.simulated).lower()
-        dataset.attrs |= _hypocentre(event)
-        write_spectra(dataset, job.shard)
-    return unfit, {}
+    if not clean:
+        return Products(unfit)
+    # Spectra at periods in equal steps of their logarithm
+    grid = job.spectra
+    periods = np.geomspace(grid.shortest, grid.longest, grid.count)
+    dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
+    dataset.attrs["simulated"] = str(job.simulated).lower()
+    dataset.attrs |= _hypocentre(event)
+    write_spectra(dataset, job.shard)
+    return Products(unfit, (job.shard,))
 
 
 def _hypocentre(event: "Event | None") -> dict[str, float]:
@@ -61,7 +81,7 @@ def _hypocentre(event: "Event | None") -> dict[str, float]:
     }
 
 
-class Job(NamedTuple):
+class StationJob(NamedTuple):
     """
     One station to do.
 
@@ -73,37 +93,41 @@ class Job(NamedTuple):
         Its waveform files.
     inventory : Inventory or None
         Its metadata.
-    event : Path or None
-        QuakeML file or ASDF workspace.
+    event : EventFile or None
+        The earthquake.
     processing, spectra : Processing, Spectra
         Settings.
     shard : Path
         Where its Dataset goes.
     simulated : bool
         Whether the motion was made by a scenario.
+    hashes : tuple of str
+        Of the waveform files.
     reader : partial
         How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
     product : callable
         What is made of the records that were read: see :func:`spectra_shard`.
+    key : str
+        Hash of everything on which the shard depends; :func:`do_stations` computes it.
     """
 
     station: str
     source: tuple[Path, ...]
     inventory: "Inventory | None"
-    event: Path | None
+    event: EventFile | None
     processing: Processing
     spectra: Spectra
     shard: Path
     simulated: bool
+    hashes: tuple[str, ...] = ()
     reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
-    product: "Callable[[Job, Stream, Event | None], tuple[tuple[Rejection, ...], Facts]]" = (
-        spectra_shard
-    )
+    product: "Callable[[StationJob, Stream, Event | None], Products]" = spectra_shard
+    key: str = ""
 
 
-class Done(NamedTuple):
+class FinishedStation(NamedTuple):
     """
-    What became of a station.
+    Result of a station.
 
     Attributes
     ----------
@@ -115,121 +139,187 @@ class Done(NamedTuple):
         What was left out, with every reason.
     resumed : bool
         Whether an earlier run had done it.
+    hash : str
+        Of the shard; empty if there is none.
+    spectra : Dataset or None
+        Content of a shard of spectra without the motion, so that no later stage reads it again.
     """
 
     station: str
     shard: Path | None
     rejected: tuple[Rejection, ...]
     resumed: bool
-
-
-def do_station(job: Job) -> Done:
-    """Return the finished station, its shard and the note that tells what it was made from on disk."""
-    job.shard.unlink(missing_ok=True)
-    rejected, facts = _make_shard(job)
-    shard = job.shard if job.shard.exists() else None
-    note = {"key": _key(job), "shard": shard and file_hash(shard), "rejected": rejected, **facts}
-    with written_whole(job.shard.with_suffix(".json")) as part:
-        part.write_text(json.dumps(note), encoding="utf-8")
-    return Done(job.station, shard, rejected, resumed=False)
-
-
-def _make_shard(job: Job) -> tuple[tuple[Rejection, ...], Facts]:
-    """Write the shard if anything usable is left; return what was left out, and what its note is to tell."""
-    source = ", ".join(path.name for path in job.source)
-    try:
-        stream, unread = job.reader(job.source, job.inventory, job.station)
-        event = read_event(job.event) if job.event else None
-        unfit, facts = job.product(job, stream, event)
-    except PerError as error:
-        reasons = getattr(error, "reasons", None) or (str(error),)
-        return (Rejection("station", job.station, source, None, tuple(reasons)),), {}
-    return (*unread, *(one._replace(source=one.source or source) for one in unfit)), facts
-
-
-def _key(job: Job) -> str:
-    """Return the hash of everything the shard depends on."""
-    parts = [
-        version("per_obspy"),
-        job.processing.model_dump_json(),
-        job.spectra.model_dump_json(),
-        job.simulated,
-    ]
-    parts += [
-        f"{path.name} {_content_hash(path)}"
-        for path in (*job.source, *([job.event] if job.event else []))
-    ]
-    parts += [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
-    parts += [metadata_text(job.inventory)] if job.inventory else []
-    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
-
-
-def _content_hash(path: Path) -> str:
-    """Return the hash of a file, or of a member of an archive."""
-    with open_file(path) as file:
-        return hashlib.sha256(file.read()).hexdigest()
-
-
-def _earlier(job: Job) -> Done | None:
-    """Return the station as an earlier run left it, if it was made from the same and is undamaged."""
-    try:
-        note = json.loads(job.shard.with_suffix(".json").read_text(encoding="utf-8"))
-        shard = file_hash(job.shard) if job.shard.exists() else None
-        if note["key"] != _key(job) or note["shard"] != shard:
-            return None
-        rejected = tuple(Rejection.stored(one) for one in note["rejected"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return Done(job.station, job.shard if shard else None, rejected, resumed=True)
-
-
-def earlier_done(note: Path) -> Done:
-    """
-    Return a station as an earlier run left it, given its note; whether its source has changed is not asked.
-
-    Raises
-    ------
-    CatalogError
-        If the note cannot be read or its shard is not as it was left.
-    """
-    try:
-        known = json.loads(note.read_text(encoding="utf-8"))
-        rejected = tuple(Rejection.stored(one) for one in known["rejected"])
-        shard = note.with_suffix(".nc") if known["shard"] else None
-        intact = shard is None or file_hash(shard) == known["shard"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CatalogError(str(note), f"not the note of a station: {error}") from error
-    if not intact:
-        raise CatalogError(str(shard), "damaged: not as the run left it")
-    return Done(note.stem, shard, rejected, resumed=True)
+    hash: str = ""
+    spectra: xr.Dataset | None = None
 
 
 def do_stations(
-    jobs: Sequence[Job], workers: int, executor: Executor | None = None
-) -> Iterator[Done]:
+    jobs: Sequence[StationJob], workers: int, executor: Executor | None = None
+) -> Iterator[FinishedStation]:
     """
-    Give every station as it is finished, in parallel; what an earlier run did is not done again.
+    Yield every station as it is finished, in parallel; what an earlier run did is not done again.
 
     Parameters
     ----------
-    jobs : sequence of Job
+    jobs : sequence of StationJob
         What to do.
     workers : int
         Number of processes; one, or a single job, needs none but this.
     executor : Executor, optional
         Where to work instead, a cluster for example.
     """
-    earlier = [_earlier(job) for job in jobs]
-    yield from filter(None, earlier)
-    new = [job for job, done in zip(jobs, earlier, strict=True) if not done]
-    yield from results(new, do_station, _lost, workers, executor)
+    missing = list[StationJob]()
+    # A key that cannot be computed costs its own station only
+    for job in results(jobs, _prepared, _failed, 1, None):
+        if isinstance(job, FinishedStation):
+            yield job
+            continue
+        earlier = _earlier(job)
+        if earlier is None:
+            missing.append(job)
+        else:
+            yield earlier
+    yield from results(missing, do_station, _failed, workers, executor)
 
 
-def _lost(job: Job, reason: str) -> Done:
-    source = ", ".join(path.name for path in job.source)
-    return Done(
-        job.station,
-        None,
-        (Rejection("station", job.station, source, None, (reason,)),),
-        resumed=False,
-    )
+def _prepared(job: StationJob) -> StationJob | FinishedStation:
+    """Return a job with its key, and with an event that can be sent to other processes."""
+    event = job.event and portable(job.event)
+    return job._replace(key=_key(job), event=event)
+
+
+def do_station(job: StationJob) -> FinishedStation:
+    """Write the shard of a station and its status, and return the finished station."""
+    job.shard.unlink(missing_ok=True)
+    products = _products(job)
+    has_shard = job.shard in products.files
+    digest, spectra = _read_shard(job.shard) if has_shard else ("", None)
+    # The status comes last: it is valid for whole files only
+    others = [file for file in products.files if file != job.shard]
+    outputs = {_from_status(job.shard, file): file_hash(file) for file in others}
+    outputs |= {job.shard.name: digest} if has_shard else {}
+    facts = {"shard": digest or None, "rejected": products.rejected, **products.facts}
+    write_status(_status_file(job.shard), job.key, outputs, facts)
+    shard = job.shard if has_shard else None
+    return FinishedStation(job.station, shard, products.rejected, False, digest, spectra)
+
+
+def _products(job: StationJob) -> Products:
+    """Read the records of a station and make its products; an unusable station is a rejection."""
+    source = _file_names(job)
+    try:
+        stream, unread = job.reader(job.source, job.inventory, job.station)
+        products = job.product(job, stream, job.event.event if job.event else None)
+    except PerError as error:
+        reasons = getattr(error, "reasons", None) or (str(error),)
+        return Products((Rejection("station", job.station, source, None, tuple(reasons)),))
+    # Records that name no file came from all files of the station
+    unfit = [row if row.source else row._replace(source=source) for row in products.rejected]
+    return products._replace(rejected=(*unread, *unfit))
+
+
+def _file_names(job: StationJob) -> str:
+    """Return the names of a station's files, as rejections give them."""
+    return ", ".join(path.name for path in job.source)
+
+
+def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Dataset | None]:
+    """Return hash and spectra of a shard, opened once; no spectra if it is not as expected."""
+    if shard.suffix != SPECTRA:
+        return file_hash(shard), None
+    content = shard.read_bytes()
+    digest = bytes_hash(content)
+    if digest != (expected or digest):
+        return digest, None
+    return digest, without_motion(read_spectra(shard, content))
+
+
+def _status_file(shard: Path) -> Path:
+    """Return the status file of a shard."""
+    return shard.with_suffix(".json")
+
+
+def _from_status(shard: Path, file: Path) -> str:
+    """Return the path of an output seen from the folder of the status file."""
+    return Path(os.path.relpath(file, shard.parent)).as_posix()
+
+
+def _key(job: StationJob) -> str:
+    """Return the hash of everything on which the products of a station depend."""
+    settings = [job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
+    files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
+    files += [f"{job.event.path.name} {job.event.hash}"] if job.event else []
+    # Reader and product are known by name, so that other processes find the same
+    steps = [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
+    metadata = [metadata_text(job.inventory)] if job.inventory else []
+    parts = [version("per_obspy"), *settings, *files, *steps, *metadata]
+    return bytes_hash("\n".join(map(str, parts)).encode())
+
+
+def _earlier(job: StationJob) -> FinishedStation | None:
+    """Return the station as an earlier run left it, if it did the same and its files are whole."""
+    try:
+        status = read_status(_status_file(job.shard))
+        rejected = _stored_rejections(status)
+    except StatusError:
+        return None
+    if status["key"] != job.key:
+        return None
+    return _whole_station(FinishedStation(job.station, job.shard, rejected, True), status)
+
+
+def _whole_station(station: FinishedStation, status: Status) -> FinishedStation | None:
+    """Return a resumed station with its shard's hash and spectra; None if an output has changed."""
+    assert station.shard is not None  # where it would be
+    outputs = dict(status["outputs"])
+    known = outputs.pop(station.shard.name, "")
+    if changed_outputs(_status_file(station.shard), {**status, "outputs": outputs}):
+        return None
+    if not known:
+        return station._replace(shard=None)
+    # The shard is opened once: for its hash, and for its spectra if it has not changed
+    try:
+        digest, spectra = _read_shard(station.shard, known)
+    except OSError:
+        return None
+    return station._replace(hash=digest, spectra=spectra) if digest == known else None
+
+
+def _stored_rejections(status: Status) -> tuple[Rejection, ...]:
+    """Return the rejections that a status holds; raise ``StatusError`` if it is no station's."""
+    try:
+        return tuple(map(Rejection.stored, status["rejected"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise StatusError(f"{type(error).__name__}: {error}") from error
+
+
+def earlier_station(status_file: Path) -> FinishedStation:
+    """
+    Return a station as an earlier run left it, even if its source has changed since.
+
+    Parameters
+    ----------
+    status_file : Path
+        Beside its shard of spectra.
+
+    Raises
+    ------
+    CatalogError
+        If the status cannot be read or its shard is not as it was left.
+    """
+    try:
+        status = read_status(status_file)
+        rejected = _stored_rejections(status)
+    except StatusError as error:
+        raise CatalogError(str(status_file), f"not the note of a station: {error}") from error
+    shard = status_file.with_suffix(SPECTRA)
+    station = _whole_station(FinishedStation(status_file.stem, shard, rejected, True), status)
+    if station is None:
+        raise CatalogError(str(shard), "damaged: not as the run left it")
+    return station
+
+
+def _failed(job: StationJob, reason: str) -> FinishedStation:
+    """Return a station whose work failed; the next run does it again."""
+    rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
+    return FinishedStation(job.station, None, (rejection,), resumed=False)

@@ -1,5 +1,5 @@
 """
-The stages of a run: stations from records, the risk table from stations and pairs, the report from the risk table.
+Stages of a run: stations from records, the risk table from stations and pairs, then the report.
 
-Each stands on what the one before left in the output folder, so that it can be done again alone.
+Each needs only what the one before left in the output folder, so that it can be done again alone.
 """

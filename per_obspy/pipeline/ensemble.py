@@ -1,5 +1,5 @@
 """
-An ensemble of scenarios: each a run of its own, then the probability of every pair in all of them together.
+Ensemble of scenarios: a run each, then the probability of every pair in all of them together.
 
 A run that is done is not done again, and neither is the ensemble, whose ``ensemble.json`` is
 written last.
@@ -7,6 +7,7 @@ written last.
 
 import json
 import os
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
@@ -14,18 +15,18 @@ from typing import Any
 
 from per_obspy.config import Ensemble, EnsembleScenario, Run, load
 from per_obspy.errors import CatalogError
+from per_obspy.files import content_hash
 from per_obspy.jobs.output_folder import (
     Result,
-    earlier_record,
     file_hashes,
-    held,
+    locked_folder,
     now,
     recorded,
     software_versions,
 )
 from per_obspy.pipeline.run import run
-from per_obspy.pipeline.stations import content_hash
 from per_obspy.progress import Progress, silent
+from per_obspy.resume import earlier_status
 from per_obspy.tables.ensemble import Scenarios, write_ensemble
 
 #: Written last.
@@ -51,7 +52,7 @@ def screen_scenarios(
     executor : Executor, optional
         Where stations and chunks are processed; processes of this machine if not given.
     progress : callable
-        Told of every stage: scenario and name, done, total.
+        Called for every stage: scenario and name, done, total.
 
     Returns
     -------
@@ -72,46 +73,56 @@ def screen_scenarios(
     _check_folders(settings, configuration, folder)
     started = now()
     runs = {
-        one.name: run(one.run, None, executor, _prefixed(one.name, progress))
-        for one in settings.scenario
+        scenario.name: run(scenario.run, None, executor, _prefixed(scenario.name, progress))
+        for scenario in settings.scenario
     }
-    with held(folder):
+    with locked_folder(folder):
         head = _head(settings, configuration, runs)
-        if known := earlier_record(folder / RECORD, head["key"]):
+        # The same runs with the same weights were joined before
+        known = earlier_status(folder / RECORD, head["key"])
+        if known is not None:
             return Result(folder, known, did_nothing=True)
         (folder / RECORD).unlink(missing_ok=True)
         progress("joining scenarios", 0, 1)
-        facts = {"name": settings.name, "simulated": str(head["simulated"]).lower()}
-        tables = {name: _risk_table(one) for name, one in runs.items()}
-        scenarios = Scenarios(tables, settings.weights, settings.yearly)
-        files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
+        found = _joined(settings, folder, runs, head["simulated"])
         progress("joining scenarios", 1, 1)
-        found = {
-            "state": "complete" if counts["pairs"] else "nothing_usable",
-            "partial": counts["rejected_pair"] > 0
-            or any(one.record["partial"] for one in runs.values()),
-            "counts": counts,
-            "outputs": file_hashes(folder, files),
-            "versions": software_versions(),
-        }
-        return recorded(
-            folder / RECORD, {"name": settings.name, **found, "started": started, **head}
-        )
+        record = {"name": settings.name, **found, "started": started, **head}
+        return recorded(folder / RECORD, record)
+
+
+def _joined(
+    settings: Ensemble, folder: Path, runs: Mapping[str, Result], simulated: bool
+) -> dict[str, Any]:
+    """Join the risk tables of the runs and return the results' part of ``ensemble.json``."""
+    facts = {"name": settings.name, "simulated": str(simulated).lower()}
+    tables = {name: _risk_table(result) for name, result in runs.items()}
+    scenarios = Scenarios(tables, settings.weights, settings.yearly)
+    files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
+    # Rejections make a result partial, those of a run too
+    is_partial = any(result.record["partial"] for result in runs.values())
+    return {
+        "state": "complete" if counts["pairs"] else "nothing_usable",
+        "partial": counts["rejected_pair"] > 0 or is_partial,
+        "counts": counts,
+        "outputs": file_hashes(folder, files),
+        "versions": software_versions(),
+    }
 
 
 def _check_folders(settings: Ensemble, configuration: Path, folder: Path) -> None:
     """Check that no run writes where another one or the ensemble does."""
     owners = {folder: "the ensemble"}
-    for one in settings.scenario:
-        place = load(one.run, Run).output.resolve()
+    for scenario in settings.scenario:
+        place = load(scenario.run, Run).output.resolve()
+        name = f"scenario {scenario.name!r}"
         if place in owners:
-            reason = f"scenario {one.name!r} has the output folder of {owners[place]}, {place}"
+            reason = f"{name} has the output folder of {owners[place]}, {place}"
             raise CatalogError(str(configuration), reason)
-        owners[place] = f"scenario {one.name!r}"
+        owners[place] = name
 
 
 def _prefixed(name: str, progress: Progress) -> Progress:
-    """Return what tells of a run's stages under the name of its scenario."""
+    """Return a progress callback that reports a run's stages under the name of its scenario."""
     return lambda stage, done, total: progress(f"{name}: {stage}", done, total)
 
 
@@ -120,19 +131,20 @@ def _risk_table(result: Result) -> Path | None:
     return result.folder / "risk.parquet" if "risk.parquet" in result.record["outputs"] else None
 
 
-def _head(settings: Ensemble, configuration: Path, runs: dict[str, Result]) -> dict[str, Any]:
-    """Return what the ensemble stands on, and the key that tells whether the same was done before."""
-    said = json.loads(settings.model_dump_json(context={"folder": configuration.parent}))
-    scenarios = [_said(one, runs[one.name], configuration.parent) for one in settings.scenario]
-    key = content_hash(
-        {"version": version("per_obspy"), "configuration": said, "scenarios": scenarios}
-    )
-    simulated = any(one["simulated"] for one in scenarios)
-    return {"key": key, "configuration": said, "scenarios": scenarios, "simulated": simulated}
+def _head(settings: Ensemble, configuration: Path, runs: Mapping[str, Result]) -> dict[str, Any]:
+    """Return key, configuration and scenarios of an ensemble."""
+    folder = configuration.parent
+    values = json.loads(settings.model_dump_json(context={"folder": folder}))
+    scenarios = [_facts(scenario, runs[scenario.name], folder) for scenario in settings.scenario]
+    content = {"configuration": values, "scenarios": scenarios}
+    key = content_hash({"version": version("per_obspy"), **content})
+    # One simulated scenario makes the ensemble simulated
+    simulated = any(scenario["simulated"] for scenario in scenarios)
+    return {"key": key, **content, "simulated": simulated}
 
 
-def _said(scenario: EnsembleScenario, result: Result, folder: Path) -> dict[str, Any]:
-    """Return what the record says of a scenario; paths are seen from the folder of the configuration."""
+def _facts(scenario: EnsembleScenario, result: Result, folder: Path) -> dict[str, Any]:
+    """Return the facts of a scenario; paths are seen from the folder of the configuration."""
     record = result.record
     return {
         "name": scenario.name,

@@ -1,4 +1,4 @@
-"""Which files hold the pairs of a run: a given table, stored inventories, or simulated pairs written first."""
+"""Files with the pairs of a run: a given table, stored inventories, or simulated pairs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from per_obspy.inventory.catalogue import (
     verified_file,
 )
 from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.jobs.chunk import StationFile
+from per_obspy.jobs.ground_files import StationFile
 from per_obspy.screening.ground_motion.assignment import nearest_station
 
 
@@ -43,6 +43,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
     pairs = settings.pairs
     if pairs and pairs.file:
         return [pairs.file]
+    # Everything else is found around the stations
     if not stations:
         raise CatalogError(
             "pairs", "no station has coordinates: pairs are neither found nor simulated around them"
@@ -50,11 +51,11 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
     if pairs and pairs.catalog:
         return _stored(pairs, pairs.catalog, stations, settings.screening.largest_distance)
     with written_whole(folder / "pairs.csv") as part:
-        _simulated(_wanted(settings), stations).to_csv(part, index=False)
+        _simulated(_simulation(settings), stations).to_csv(part, index=False)
     return [folder / "pairs.csv"]
 
 
-def _wanted(settings: Run) -> SimulatedPairs:
+def _simulation(settings: Run) -> SimulatedPairs:
     """Return how the pairs are to be simulated, in the run or in the simulation that it names."""
     if settings.pairs and settings.pairs.simulated:
         return settings.pairs.simulated
@@ -68,13 +69,12 @@ def _stored(
     """Return the files of stored inventories, by name or by region, each compared with its hash."""
     if pairs.names:
         return named_files(pairs.names, catalog)
-    region = region_around(
-        [one.longitude for one in stations], [one.latitude for one in stations], reach
-    )
-    found = find_inventories(catalog, region)
+    longitude = [station.longitude for station in stations]
+    latitude = [station.latitude for station in stations]
+    found = find_inventories(catalog, region_around(longitude, latitude, reach))
     if not found:
         raise CatalogError(str(catalog), "no stored inventory touches the region of the stations")
-    return [verified_file(one) for one in found]
+    return [verified_file(entry) for entry in found]
 
 
 def named_files(names: Sequence[str], catalog: Path) -> list[Path]:
@@ -86,25 +86,23 @@ def named_files(names: Sequence[str], catalog: Path) -> list[Path]:
     CatalogError
         If a name is not stored or a file has changed.
     """
-    entries = {one.name: one for one in stored_inventories(catalog)}
-    if unknown := [name for name in names if name not in entries]:
-        raise CatalogError(
-            str(catalog),
-            f"names: {unknown[0]!r} is not stored here{did_you_mean(unknown[0], entries)}",
-        )
+    entries = {entry.name: entry for entry in stored_inventories(catalog)}
+    unknown = [name for name in names if name not in entries]
+    if unknown:
+        reason = f"{unknown[0]!r} is not stored here{did_you_mean(unknown[0], entries)}"
+        raise CatalogError(str(catalog), f"names: {reason}")
     return [verified_file(entries[name]) for name in names]
 
 
-def _simulated(wanted: SimulatedPairs, stations: Sequence[StationFile]) -> pd.DataFrame:
-    """Return simulated pairs; they stand on the ground of the nearest station, where stations know theirs."""
-    east, north = (
-        np.array([getattr(one, name) for one in stations]) for name in ("longitude", "latitude")
-    )
-    table = simulated_pairs(east, north, **wanted.model_dump())
-    ground = np.array([one.site_class for one in stations], dtype=object)
-    if not ground.any():
+def _simulated(simulation: SimulatedPairs, stations: Sequence[StationFile]) -> pd.DataFrame:
+    """Return simulated pairs, on the ground of the nearest station if its site class is known."""
+    longitude = np.array([station.longitude for station in stations])
+    latitude = np.array([station.latitude for station in stations])
+    table = simulated_pairs(longitude, latitude, **simulation.model_dump())
+    classes = np.array([station.site_class for station in stations], dtype=object)
+    if not classes.any():
         return table
-    nearest, _ = nearest_station(
-        table["longitude_1"].to_numpy(), table["latitude_1"].to_numpy(), east, north
-    )
-    return table.assign(site_class=ground[nearest])
+    # Buildings stand on the ground of the station next to them
+    east, north = table["longitude_1"].to_numpy(), table["latitude_1"].to_numpy()
+    nearest, _ = nearest_station(east, north, longitude, latitude)
+    return table.assign(site_class=classes[nearest])

@@ -1,10 +1,26 @@
-"""What later stages need is looked at before the first record is read, which may take hours."""
+"""Checks of everything that later stages need, before the first record is read."""
 
 from per_obspy.config import Run
+from per_obspy.errors import require_extra
 from per_obspy.inventory.checking import check_columns
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.pipeline.pairs import named_files
 from per_obspy.records.shakemap import read_shakemap
+
+
+def require_extras(settings: Run) -> None:
+    """
+    Check that the optional libraries of a run are installed, before anything is computed.
+
+    Raises
+    ------
+    MissingExtra
+        If one is not.
+    """
+    if settings.geopackage:
+        require_extra("gis", "pyogrio", "shapely")
+    if settings.totals.h3 is not None:
+        require_extra("gis", "h3")
 
 
 def check_inputs(settings: Run) -> None:

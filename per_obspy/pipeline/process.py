@@ -1,4 +1,4 @@
-"""The processed records of some sources as files: MiniSEED, the table of their corners, a page a record."""
+"""Processed records of some sources as files: MiniSEED, the table of corners, a page per record."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,28 +9,30 @@ from obspy.core.event import Event
 
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import Rejection
-from per_obspy.jobs.station import Done, Facts, Job
-from per_obspy.pipeline.spectra import all_done, jobs_of
+from per_obspy.files import remove_dead_parts
+from per_obspy.jobs.station import FinishedStation, Products, StationJob
+from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
 from per_obspy.processing.station.structures import kept_apart
 from per_obspy.processing.unprocessed import before_processing
 from per_obspy.progress import Progress
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import read_event_file
 from per_obspy.records.processed_files import read_descriptions, write_description, write_processed
+from per_obspy.records.sources import find_path_sources
 from per_obspy.report.records import draw_records
 from per_obspy.tables.processed import write_processed_table
-from per_obspy.tables.writing import write_rejected
+from per_obspy.tables.table_files import write_rejected
 
 STATIONS, STRUCTURES = "stations", "structures"
 
 
 class Processed(NamedTuple):
     """
-    What became of the records.
+    Processed records of some sources.
 
     Attributes
     ----------
-    done : list of Done
+    done : list of FinishedStation
         Every station, sorted by name.
     rejected : tuple of Rejection
         What was left out.
@@ -38,7 +40,7 @@ class Processed(NamedTuple):
         Every file for the user to read.
     """
 
-    done: list[Done]
+    done: list[FinishedStation]
     rejected: tuple[Rejection, ...]
     files: tuple[Path, ...]
 
@@ -67,9 +69,9 @@ def process_records(
     event : Path or None
         QuakeML file.
     report : bool
-        Whether to draw ``stations/NET.STA.pdf`` as well, one page a record.
+        Whether to draw ``stations/NET.STA.pdf`` as well, one page per record.
     run : (int, callable)
-        Number of processes, and what is told of every station.
+        Number of processes, and the function that is called for every station.
 
     Returns
     -------
@@ -80,65 +82,78 @@ def process_records(
     CatalogError
         If a source is missing or holds no record, or the event cannot be read.
     """
-    if event:
-        read_event(event)  # a wrong file stops everything here, not every station
-    jobs, unread = jobs_of(sources, folder / STATIONS, settings, Spectra())
+    # A wrong event stops everything here, not every station
+    earthquake = read_event_file(event) if event else None
+    remove_dead_parts(folder)
+    found = find_path_sources(sources)
     product = drawn_records_shard if report else records_shard
     jobs = [
-        job._replace(event=event, shard=job.shard.with_suffix(".mseed"), product=product)
-        for job in jobs
+        job._replace(shard=job.shard.with_suffix(".mseed"), product=product)
+        for job in station_jobs(
+            found.stations, folder / STATIONS, settings, Spectra(), event=earthquake
+        )
     ]
-    for job in jobs:
-        if report and not job.shard.with_suffix(".pdf").exists():
-            job.shard.with_suffix(".json").unlink(missing_ok=True)  # its station is not whole
-    done, rejected = all_done(jobs, unread, *run)
+    workers, progress = run
+    done = finished_stations(jobs, workers, None, progress)
+
+    # Tables of all records
+    rejected = all_rejections(found.rejected, done)
     records = _records(jobs)
-    told = {path.relative_to(folder).as_posix(): read_descriptions(path) or [] for path in records}
-    write_processed_table(told, folder)
+    descriptions = {
+        path.relative_to(folder).as_posix(): read_descriptions(path) or [] for path in records
+    }
+    write_processed_table(descriptions, folder)
     write_rejected(rejected, folder / "rejected.csv")
     tables = [folder / name for name in ("processed.csv", "processed.columns.csv", "rejected.csv")]
-    return Processed(done, rejected, (*tables, *records))
+    return Processed(done, tuple(rejected), (*tables, *records))
 
 
-def _records(jobs: Sequence[Job]) -> list[Path]:
+def _records(jobs: Sequence[StationJob]) -> list[Path]:
     """Return the MiniSEED files that these jobs left, those of structures last."""
-    places = [job.shard for job in jobs], [_structure(job) for job in jobs]
-    return [path for paths in places for path in paths if path.exists()]
+    paths = [job.shard for job in jobs] + [_structure(job) for job in jobs]
+    return [path for path in paths if path.exists()]
 
 
-def _structure(job: Job) -> Path:
+def _structure(job: StationJob) -> Path:
     """Return where the records of a station's sensors in structures go."""
     return job.shard.parent.with_name(STRUCTURES) / job.shard.name
 
 
-def records_shard(
-    job: Job, stream: Stream, event: Event | None
-) -> tuple[tuple[Rejection, ...], Facts]:
-    """Write the processed records of a station as its shard, and those of structures beside; see `spectra_shard`."""
+def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
+    """Write the processed records of a station as its shard, and those of structures apart."""
     clean, unfit = process_station(stream, job.processing, event)
-    return (*unfit, *_write_structure(job, stream, event)), _write_shard(job, clean)
+    return _write_records(job, clean, unfit, _write_structure(job, stream, event))
 
 
-def drawn_records_shard(
-    job: Job, stream: Stream, event: Event | None
-) -> tuple[tuple[Rejection, ...], Facts]:
-    """Do as :func:`records_shard`, and draw a page a record."""
+def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
+    """Do as :func:`records_shard`, and draw a page per record."""
     clean, unfit = process_station(stream, job.processing, event)
+    pages = job.shard.with_suffix(".pdf")
     if clean:
-        pages = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
-        draw_records(pages, job.shard.with_suffix(".pdf"))
-    return (*unfit, *_write_structure(job, stream, event)), _write_shard(job, clean)
+        traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
+        draw_records(traces, pages)
+    products = _write_records(job, clean, unfit, _write_structure(job, stream, event))
+    return products._replace(files=(*products.files, pages)) if clean else products
 
 
-def _write_shard(job: Job, clean: Stream) -> Facts:
-    return write_processed(clean, job.shard) if clean else {}
+def _write_records(
+    job: StationJob, clean: Stream, unfit: Sequence[Rejection], structure: Products
+) -> Products:
+    """Write the usable records of a station as its shard; return all products of the station."""
+    rejected = (*unfit, *structure.rejected)
+    if not clean:
+        return Products(rejected, structure.files)
+    facts = write_processed(clean, job.shard)
+    return Products(rejected, (job.shard, *structure.files), facts)
 
 
-def _write_structure(job: Job, stream: Stream, event: Event | None) -> tuple[Rejection, ...]:
-    """Write what the sensors in structures recorded, every instrument; return what of it was left out."""
+def _write_structure(job: StationJob, stream: Stream, event: Event | None) -> Products:
+    """Write the records of the sensors in structures, every instrument, with their description."""
     path = _structure(job)
     path.unlink(missing_ok=True)
-    apart, lost = process_instruments(kept_apart(stream)[1], job.processing, event)
-    if built := Stream([trace for traces in apart for trace in traces]):
-        write_description(path, write_processed(built, path))
-    return lost
+    instruments, rejected = process_instruments(kept_apart(stream)[1], job.processing, event)
+    built = Stream([trace for traces in instruments for trace in traces])
+    if not built:
+        return Products(rejected)
+    write_description(path, write_processed(built, path))
+    return Products(rejected, (path, path.with_suffix(".json")))

@@ -1,100 +1,188 @@
-"""The last stage: the risk table and the spectra become totals, figures and layers for a map."""
+"""Last stage: the risk table and the spectra become totals, figures and layers for a map."""
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
-import pyarrow.parquet as pq
+import xarray as xr
 
 from per_obspy.config import Run
-from per_obspy.errors import require_extra
+from per_obspy.jobs.ground_files import read_station_once
+from per_obspy.jobs.station import FinishedStation
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.figures import draw_overview, draw_record_to_pair
-from per_obspy.spectra.storage import read_spectra, region, write_spectra
-from per_obspy.tables.risk import ranked
-from per_obspy.tables.totals import RegionTotals, region_totals, write_totals
+from per_obspy.spectra.storage import region, write_spectra
+from per_obspy.tables.risk import RankedTable, ranked_table
+from per_obspy.tables.totals import (
+    PieceTotals,
+    RegionTotals,
+    piece_totals,
+    region_totals,
+    totals_columns,
+    write_totals,
+)
 
 #: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
 SHOWN = 20_000
 
+#: Columns of the pairs that a figure shows.
+SHOWN_COLUMNS = ["rank", "state", "longitude", "latitude", "demand", "gap"]
 
-def require_extras(settings: Run) -> None:
+#: Columns of the pairs whose pounding was observed.
+OBSERVED_COLUMNS = ["observed", "state", "probability"]
+
+
+class RiskSummary(NamedTuple):
     """
-    Check that the optional libraries that the report needs are installed, before anything is computed.
+    Everything that the report takes from the risk table, in one pass.
 
-    Raises
-    ------
-    MissingExtra
-        If one is not.
+    Attributes
+    ----------
+    worst : Series or None
+        The worst pair that has a record; None if no pair has one.
+    shown : DataFrame
+        Pairs that a figure shows: all of a small table, every tenth or so of a large one.
+    observed : DataFrame
+        Pairs whose pounding was observed.
+    totals : RegionTotals
+        By area.
     """
-    if settings.geopackage:
-        require_extra("gis", "pyogrio", "shapely")
-    if settings.totals.h3 is not None:
-        require_extra("gis", "h3")
+
+    worst: pd.Series | None
+    shown: pd.DataFrame
+    observed: pd.DataFrame
+    totals: RegionTotals
 
 
-def reported(settings: Run, folder: Path, shards: Sequence[Path], progress: Progress) -> list[Path]:
+class _Pieces(NamedTuple):
+    """Summaries of the pieces of a risk table, in their order."""
+
+    first_named: list[int]
+    shown: list[pd.DataFrame]
+    observed: list[pd.DataFrame]
+    totals: list[PieceTotals]
+
+
+def reported(
+    settings: Run, folder: Path, stations: Sequence[FinishedStation], progress: Progress
+) -> list[Path]:
     """
-    Write the report of what stands in the output folder, and return its files.
+    Write the report of the results in the output folder, and return its files.
 
     Parameters
     ----------
     settings : Run
         What to do.
     folder : Path
-        Of the results; without a risk table nothing but the spectra can be reported.
-    shards : sequence of Path
-        Stations.
+        Of the results; without a risk table only the spectra can be reported.
+    stations : sequence of FinishedStation
+        With shards.
     progress : callable
-        Told when it begins and ends.
+        Called when it begins and ends.
     """
     progress("report", 0, 1)
     outputs, risk = list[Path](), folder / "risk.parquet"
-    if shards:
-        write_spectra(region(read_spectra(shard) for shard in shards), folder / "spectra.nc")
+    spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
+    if spectra is not None:
         outputs.append(folder / "spectra.nc")
     if risk.exists():
-        outputs += _figures(settings, risk, shards, folder) if shards else []
-        totals = region_totals(risk, settings.totals, list(settings.screening.classes))
-        write_totals(totals.table, folder / "totals.csv")
-        outputs += [
-            folder / "totals.csv",
-            *write_evaluation(risk, folder, settings.simulation is not None),
-        ]
+        summary = _summary(settings, risk, folder)
+        if spectra is not None:
+            outputs += _draw_figures(settings, summary, spectra, stations, folder)
+        # Totals, layers and the comparison with observations need no record
+        write_totals(summary.totals.table, folder / "totals.csv")
+        outputs.append(folder / "totals.csv")
+        simulated = settings.simulation is not None
+        outputs += write_evaluation(summary.observed, folder, simulated)
         if settings.geopackage:
-            outputs += _write_layers(settings, risk, totals, folder)
+            _write_totals_layer(settings, summary.totals, folder / "totals.gpkg")
+            outputs += [folder / "risk.gpkg", folder / "totals.gpkg"]
     progress("report", 1, 1)
     return outputs
 
 
-def _figures(settings: Run, risk: Path, shards: Sequence[Path], folder: Path) -> list[Path]:
-    """Draw the worst pair that a record was given to, and the region."""
+def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Dataset:
+    """Write the spectra of all stations, and return them."""
+    spectra = region(station.spectra for station in stations if station.spectra is not None)
+    write_spectra(spectra, path)
+    return spectra
+
+
+def _summary(settings: Run, risk: Path, folder: Path) -> RiskSummary:
+    """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
+    needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
+    columns = None if settings.geopackage else list(dict.fromkeys(needed))
+    pieces = _Pieces([], [], [], [])
+    with ranked_table(risk, columns) as table:
+        noted = _noted(table, settings, pieces)
+        if settings.geopackage:
+            _write_pairs_layer(settings, noted, folder / "risk.gpkg")
+        else:
+            deque(noted, maxlen=0)
+        worst = table.row(pieces.first_named[0]) if pieces.first_named else None
+    return RiskSummary(
+        worst,
+        pd.concat(pieces.shown, ignore_index=True),
+        pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
+        region_totals(pieces.totals, settings.totals),
+    )
+
+
+def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.DataFrame]:
+    """Yield the pieces of a risk table, and note what the report takes of each."""
+    step = -(-table.pairs // SHOWN)
+    classes = list(settings.screening.classes)
+    for piece in table.pieces():
+        rank = piece["rank"].to_numpy()
+        # Rows with a record; ranks count from 1, rows from 0
+        named = rank[(piece["station"] != "").to_numpy()] - 1
+        found.first_named.extend(named[:1].tolist())
+        found.shown.append(piece.loc[rank % step == 1 % step, SHOWN_COLUMNS])
+        if "observed" in piece:
+            observed = piece["observed"].notna()
+            found.observed.append(piece.loc[observed, OBSERVED_COLUMNS])
+        found.totals.append(piece_totals(piece, settings.totals, classes))
+        yield piece
+
+
+def _draw_figures(
+    settings: Run,
+    summary: RiskSummary,
+    spectra: xr.Dataset,
+    stations: Sequence[FinishedStation],
+    folder: Path,
+) -> list[Path]:
+    """Draw the worst pair that has a record, and the region."""
     walk, overview = (folder / "figures" / name for name in ("worst_pair.png", "overview.png"))
-    named = (piece[piece["station"] != ""] for piece in ranked(risk))
-    worst = next((piece.iloc[0] for piece in named if len(piece)), None)
-    draw_overview(_shown(risk), read_spectra(folder / "spectra.nc"), settings.name, overview)
+    draw_overview(summary.shown, spectra, settings.name, overview)
+    worst = summary.worst
     if worst is None:
         return [overview]
-    (shard,) = (one for one in shards if one.stem == worst["station"].strip("."))
-    draw_record_to_pair(read_spectra(shard), worst, walk)
+    # Only here a station's motion is needed again
+    name = worst["station"].strip(".")
+    (station,) = (station for station in stations if station.shard and station.shard.stem == name)
+    assert station.shard is not None  # chosen so
+    draw_record_to_pair(read_station_once(station.shard, station.hash), worst, walk)
     return [walk, overview]
 
 
-def _shown(risk: Path) -> pd.DataFrame:
-    """Return the pairs that a figure shows: every one of a small table, every tenth or so of a large one."""
-    step = -(-pq.read_metadata(risk).num_rows // SHOWN)
-    columns = ["rank", "state", "longitude", "latitude", "demand", "gap"]
-    pieces = [piece[piece["rank"].to_numpy() % step == 1 % step] for piece in ranked(risk, columns)]
-    shown: pd.DataFrame = pd.concat(pieces, ignore_index=True)
-    return shown
+def _facts(settings: Run) -> dict[str, str]:
+    """Return the facts of the whole table that layers state."""
+    return {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
 
 
-def _write_layers(settings: Run, risk: Path, totals: RegionTotals, folder: Path) -> list[Path]:
-    """Write the layers for QGIS with the optional libraries."""
-    from per_obspy.report.gis import write_pairs_layer, write_totals_layer
+def _write_pairs_layer(settings: Run, pieces: Iterator[pd.DataFrame], path: Path) -> None:
+    """Write the pairs as a layer for QGIS with the optional libraries."""
+    from per_obspy.report.gis import write_pairs_layer
 
-    facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
-    write_pairs_layer(ranked(risk), list(settings.screening.classes), folder / "risk.gpkg", facts)
-    write_totals_layer(*totals, folder / "totals.gpkg", facts)
-    return [folder / "risk.gpkg", folder / "totals.gpkg"]
+    write_pairs_layer(pieces, list(settings.screening.classes), path, _facts(settings))
+
+
+def _write_totals_layer(settings: Run, totals: RegionTotals, path: Path) -> None:
+    """Write the totals as a layer for QGIS with the optional libraries."""
+    from per_obspy.report.gis import write_totals_layer
+
+    write_totals_layer(*totals, path, _facts(settings))

@@ -2,47 +2,47 @@
 One run, from records to report, or one of its stages alone.
 
 Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
-``run.json`` is removed first and written last: where it stands, the results beside it are complete,
+``run.json`` is removed first and written last: where it is, the results beside it are complete,
 and a run of the same inputs does nothing.
 """
 
 import json
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
-from typing import Any, NamedTuple
+from typing import Any
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import file_hash
+from per_obspy.files import content_hash, file_hash
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.jobs.output_folder import (
     Result,
-    earlier_record,
     file_hashes,
-    held,
+    locked_folder,
     now,
     recorded,
     software_versions,
 )
-from per_obspy.jobs.station import Done
-from per_obspy.pipeline.preflight import check_inputs
-from per_obspy.pipeline.report import reported, require_extras
+from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.preflight import check_inputs, require_extras
+from per_obspy.pipeline.report import reported
 from per_obspy.pipeline.screening import screened
 from per_obspy.pipeline.stations import (
-    content_hash,
+    all_rejections,
+    find_station_jobs,
     finished_stations,
-    station_jobs,
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records, input_files
+from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
 from per_obspy.screening.warmup import compile_screening
 
 #: Written last.
@@ -67,7 +67,7 @@ def run(
     executor : Executor, optional
         Where stations are processed; processes of this machine if not given.
     progress : callable
-        Told of every stage: name, done, total.
+        Called for every stage: name, done, total.
 
     Returns
     -------
@@ -85,23 +85,29 @@ def run(
     configuration = configuration.resolve()
     settings = _settings(configuration)
     folder = (output or settings.output).resolve()
-    with held(folder):
+    with locked_folder(folder):
         fetched = fetched_records(settings.records, progress)
-        head = _head(settings, configuration, fetched)
-        if known := earlier_record(folder / RECORD, head["key"]):
-            return Result(folder, known, did_nothing=True)
+        # Inputs are read only to compare them with those of a finished run
+        head = None
+        if (folder / RECORD).is_file():
+            head = _head(settings, configuration, fetched, {})
+            known = earlier_status(folder / RECORD, head["key"])
+            if known is not None:
+                return Result(folder, known, did_nothing=True)
         check_inputs(settings)
         (folder / RECORD).unlink(missing_ok=True)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
-            jobs, rejected = station_jobs(settings, folder, fetched, progress)
+            found = find_station_jobs(settings, folder, fetched, progress)
+            # Otherwise they have been hashed while their headers were read
+            head = head or _head(settings, configuration, fetched, found.hashes)
         with _timed(seconds, "stations"), _compiling(progress):
-            done = finished_stations(jobs, settings.workers, executor, progress)
-        found = _screened_and_reported(
-            settings, folder, _after_stations(done, rejected), executor, progress
-        )
-        found["seconds"] = seconds | found["seconds"]
-        return recorded(folder / RECORD, {**found, "started": started, **head})
+            progress("stations", 0, len(found.jobs))
+            stations = finished_stations(found.jobs, settings.workers, executor, progress)
+        rejected = all_rejections(found.rejected, stations)
+        record = _screened_and_reported(settings, folder, stations, rejected, executor, progress)
+        record["seconds"] = seconds | record["seconds"]
+        return recorded(folder / RECORD, {**record, "started": started, **head})
 
 
 def screen(
@@ -119,19 +125,20 @@ def screen(
     configuration = configuration.resolve()
     settings = _settings(configuration)
     folder = (output or settings.output).resolve()
-    with held(folder):
-        done = stations_of_earlier_run(folder)
+    with locked_folder(folder):
+        stations = stations_of_earlier_run(folder)
         check_inputs(settings)
         (folder / RECORD).unlink(missing_ok=True)
         started = now()
-        head = _head(settings, configuration, None) | {
-            "key": f"screening of stations as they were at {started}"
-        }
+        # A later run does everything that has changed since, whatever is recorded here
+        head = _head(settings, configuration, None, {})
+        head["key"] = f"screening of stations as they were at {started}"
+        rejected = all_rejections([], stations)
         with _compiling(progress):
-            found = _screened_and_reported(
-                settings, folder, _after_stations(done, []), executor, progress
+            record = _screened_and_reported(
+                settings, folder, stations, rejected, executor, progress
             )
-        return recorded(folder / RECORD, {**found, "started": started, **head})
+        return recorded(folder / RECORD, {**record, "started": started, **head})
 
 
 def report(configuration: Path, output: Path | None = None, progress: Progress = silent) -> Result:
@@ -145,17 +152,11 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
     """
     settings = _settings(configuration.resolve())
     folder = (output or settings.output).resolve()
-    with held(folder):
-        record = _finished(folder)
-        needed = [name for name in record["outputs"] if name in ("risk.parquet", "spectra.nc")]
-        for name in needed:
-            if not (folder / name).is_file() or file_hash(folder / name) != record["outputs"][name]:
-                raise CatalogError(str(folder / name), "not as the run left it: run again")
-        shards = [one.shard for one in stations_of_earlier_run(folder) if one.shard]
-        outputs = reported(settings, folder, shards, progress)
-        return recorded(
-            folder / RECORD, {**record, "outputs": record["outputs"] | file_hashes(folder, outputs)}
-        )
+    with locked_folder(folder):
+        record = _finished(folder / RECORD)
+        stations = _usable(stations_of_earlier_run(folder))
+        outputs = file_hashes(folder, reported(settings, folder, stations, progress))
+        return recorded(folder / RECORD, {**record, "outputs": record["outputs"] | outputs})
 
 
 def _settings(configuration: Path) -> Run:
@@ -165,68 +166,28 @@ def _settings(configuration: Path) -> Run:
     return settings
 
 
-def _head(settings: Run, configuration: Path, fetched: Fetched | None) -> dict[str, Any]:
-    """Return what a run stands on, and the key that tells whether the same was done before."""
-    inputs = _input_hashes(settings, fetched, configuration)
-    said = json.loads(settings.model_dump_json(context={"folder": configuration.parent}))
-    key = content_hash(
-        {"version": version("per_obspy"), "configuration": {**said, "workers": 0}, "inputs": inputs}
-    )
-    return {"key": key, "configuration": said, "inputs": inputs}
-
-
-class _Stations(NamedTuple):
-    """What the first stage has left: shards, everything that was left out so far, stations that were done before."""
-
-    shards: list[Path]
-    rejected: list[Rejection]
-    resumed: int
-
-
-def _after_stations(done: Sequence[Done], rejected: Sequence[Rejection]) -> _Stations:
-    left_out = [*rejected, *(row for one in done for row in one.rejected)]
-    return _Stations(
-        [one.shard for one in done if one.shard], left_out, sum(one.resumed for one in done)
-    )
-
-
-def _screened_and_reported(
-    settings: Run, folder: Path, stations: _Stations, executor: Executor | None, progress: Progress
+def _head(
+    settings: Run, configuration: Path, fetched: Fetched | None, hashes: Mapping[Path, str]
 ) -> dict[str, Any]:
-    """Do the stages after the stations and return what ``run.json`` will say of them."""
-    seconds = dict[str, float]()
-    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        (folder / name).unlink(missing_ok=True)
-    with _timed(seconds, "screening"):
-        found = screened(settings, folder, stations.shards, stations.rejected, executor, progress)
-    with _timed(seconds, "report"):
-        outputs = [*found.outputs, *reported(settings, folder, stations.shards, progress)]
-    return {
-        "name": settings.name,
-        "state": "complete" if found.counts["pairs"] else "nothing_usable",
-        "partial": any(
-            count for name, count in found.counts.items() if name.startswith("rejected_")
-        ),
-        "simulated": settings.simulation is not None,
-        "counts": {
-            "stations": len(stations.shards),
-            "stations_resumed": stations.resumed,
-            **found.counts,
-        },
-        "outputs": file_hashes(folder, outputs),
-        "versions": software_versions(),
-        "seconds": seconds,
+    """Return key, configuration and inputs of a run; files with a known hash are not read."""
+    files = _input_files(settings, fetched)
+    inputs = {
+        os.path.relpath(path, configuration.parent): hashes.get(path) or file_hash(path)
+        for path in files
     }
+    text = settings.model_dump_json(context={"folder": configuration.parent})
+    values = json.loads(text)
+    # The number of processes changes no result
+    content = {"configuration": {**values, "workers": 0}, "inputs": inputs}
+    key = content_hash({"version": version("per_obspy"), **content})
+    return {"key": key, "configuration": values, "inputs": inputs}
 
 
-def _input_hashes(settings: Run, fetched: Fetched | None, configuration: Path) -> dict[str, str]:
-    """Return the hash of every input file by its path relative to the configuration."""
+def _input_files(settings: Run, fetched: Fetched | None) -> list[Path]:
+    """Return every input file of a run: records and their metadata, scenario and inventory."""
     given = [settings.simulation, *_inventory_files(settings)]
-    files = [
-        *input_files(settings.records, fetched),
-        *(path for path in given if path and path.is_file()),
-    ]
-    return {os.path.relpath(path, configuration.parent): file_hash(path) for path in files}
+    files = [path for path in given if path and path.is_file()]
+    return [*input_files(settings.records, fetched), *files]
 
 
 def _inventory_files(settings: Run) -> list[Path]:
@@ -236,28 +197,66 @@ def _inventory_files(settings: Run) -> list[Path]:
         return []
     if pairs.catalog is None:
         return [pairs.file] if pairs.file else []
-    stored = [
-        one
-        for one in stored_inventories(pairs.catalog)
-        if not pairs.names or one.name in pairs.names
-    ]
-    return [pairs.catalog, *(one.file for one in stored)]
+    stored = stored_inventories(pairs.catalog)
+    chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]
+    return [pairs.catalog, *chosen]
 
 
-def _finished(folder: Path) -> dict[str, Any]:
-    """Return the record of the run that left its results here."""
+def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
+    """Return the stations of which usable records were left."""
+    return [station for station in stations if station.shard is not None]
+
+
+def _screened_and_reported(
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    rejected: Sequence[Rejection],
+    executor: Executor | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Do the stages after the stations and return their part of ``run.json``."""
+    seconds, usable = dict[str, float](), _usable(stations)
+    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
+        (folder / name).unlink(missing_ok=True)
+    with _timed(seconds, "screening"):
+        found = screened(settings, folder, usable, rejected, executor, progress)
+    with _timed(seconds, "report"):
+        outputs = [*found.outputs, *reported(settings, folder, usable, progress)]
+
+    # Rejections make a result partial
+    counts = found.counts
+    rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
+    resumed = sum(station.resumed for station in stations)
+    return {
+        "name": settings.name,
+        "state": "complete" if counts["pairs"] else "nothing_usable",
+        "partial": any(rejections),
+        "simulated": settings.simulation is not None,
+        "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
+        "outputs": file_hashes(folder, outputs),
+        "versions": software_versions(),
+        "seconds": seconds,
+    }
+
+
+def _finished(file: Path) -> dict[str, Any]:
+    """Return the record of a finished run whose risk table and spectra are as it left them."""
     try:
-        record: dict[str, Any] = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        return record | {"outputs": dict(record["outputs"])}
-    except (OSError, ValueError, KeyError) as error:
-        raise CatalogError(
-            str(folder / RECORD), "no finished run here: a whole run comes first"
-        ) from error
+        record = read_status(file)
+    except StatusError as error:
+        raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+    names = ("risk.parquet", "spectra.nc")
+    needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
+    changed = changed_outputs(file, {**record, "outputs": needed})
+    if changed:
+        raise CatalogError(str(changed[0]), "not as the run left it: run again")
+    return record
 
 
 @contextmanager
 def _compiling(progress: Progress) -> Iterator[None]:
-    """Compile the kernels of screening beside the stations, which work in other processes; later runs load them."""
+    """Compile the kernels of screening in a thread, while other processes do the stations."""
     thread = Thread(target=compile_screening)
     thread.start()
     yield
@@ -268,6 +267,7 @@ def _compiling(progress: Progress) -> Iterator[None]:
 
 @contextmanager
 def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add the duration of a stage, s."""
     start = time.perf_counter()
     yield
     seconds[stage] = round(time.perf_counter() - start, 3)

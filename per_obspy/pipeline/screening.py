@@ -1,7 +1,7 @@
-"""The second stage: pairs and the shards of stations become the risk table, chunk by chunk."""
+"""Second stage: pairs and the stations become the risk table, chunk by chunk."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from itertools import chain
 from pathlib import Path
@@ -10,19 +10,13 @@ from typing import NamedTuple
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.reading import PairInventory
-from per_obspy.jobs.chunk import (
-    CHUNK,
-    ChunkJob,
-    GroundFiles,
-    Part,
-    do_chunks,
-    ground_files,
-    rejections,
-)
+from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
+from per_obspy.jobs.ground_files import GroundFiles, ground_files
+from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.progress import Progress
-from per_obspy.tables.risk import ranked, write_risk
-from per_obspy.tables.writing import write_rejected
+from per_obspy.tables.risk import write_risk
+from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
 KINDS = ("file", "record", "station", "service", "pair")
@@ -31,7 +25,7 @@ STATES = ("yes", "possible", "no")
 
 class Screened(NamedTuple):
     """
-    What screening has left.
+    Result of the screening.
 
     Attributes
     ----------
@@ -48,13 +42,13 @@ class Screened(NamedTuple):
 def screened(
     settings: Run,
     folder: Path,
-    shards: Sequence[Path],
-    rejected: Sequence[Rejection],
+    stations: Sequence[FinishedStation],
+    rejected: Iterable[Rejection],
     executor: Executor | None,
     progress: Progress,
 ) -> Screened:
     """
-    Write the risk table and what was left out, whatever the size of the inventory.
+    Write the risk table and what was left out, for an inventory of any size.
 
     Parameters
     ----------
@@ -62,14 +56,14 @@ def screened(
         What to do.
     folder : Path
         Of the results.
-    shards : sequence of Path
-        Stations; if there is none, only ``rejected.csv`` is written.
-    rejected : sequence of Rejection
+    stations : sequence of FinishedStation
+        With shards; if there is none and no ShakeMap, only ``rejected.csv`` is written.
+    rejected : iterable of Rejection
         What was left out before.
     executor : Executor, optional
         Where to work instead of processes of this machine.
     progress : callable
-        Told of every chunk.
+        Called for every chunk.
 
     Raises
     ------
@@ -77,49 +71,49 @@ def screened(
         If the inventory is wrong as a whole.
     """
     maps = _maps(settings)
-    ground, nowhere = ground_files(shards, maps, settings.screening.interpolation)
-    parts = _parts(settings, folder, ground, executor, progress) if shards or maps else []
-    kinds = write_rejected(chain(rejected, nowhere, rejections(parts)), folder / "rejected.csv")
+    ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
+    has_motion = bool(stations or maps)
+    parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
     outputs, states = [folder / "rejected.csv"], Counter[str]()
-    if tables := [part.path for part in parts if part.path]:
+    kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
+    # The parts of the chunks become one table, worst pair first
+    tables = [part.path for part in parts if part.path]
+    if tables:
         progress("ranking", 0, 1)
         facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
-        outputs += write_risk(tables, folder, facts, settings.csv_rows)
-        for piece in ranked(folder / "risk.parquet", ["state"]):
-            states.update(piece["state"])
+        risk = write_risk(tables, folder, facts, settings.csv_rows)
+        outputs, states = [*outputs, *risk.files], risk.states
         progress("ranking", 1, 1)
+    return Screened(outputs, _counts(states, kinds, parts))
+
+
+def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
+    """Return the numbers of pairs, of rejections of each kind and of chunks."""
     counts = {"pairs": states.total(), **{state: states[state] for state in STATES}}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
-    return Screened(
-        outputs,
-        counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)},
-    )
+    return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
 
 
 def _maps(settings: Run) -> tuple[Path, ...]:
     """Return the files of the ShakeMap, none if there is no map."""
     records = settings.records
-    return (
-        tuple(one for one in (records.shakemap, records.shakemap_uncertainty) if one)
-        if records
-        else ()
-    )
+    maps = (records.shakemap, records.shakemap_uncertainty) if records else ()
+    return tuple(path for path in maps if path)
 
 
 def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
 ) -> list[Part]:
-    """Return the part of every chunk, in the order of the inventory; parts of a longer one before are removed."""
+    """Do the chunks and return their parts in the order of the inventory; remove other parts."""
     inventory = PairInventory(pair_files(settings, folder, ground.stations))
-    if settings.totals.area and settings.totals.area not in inventory.names:
-        raise CatalogError("totals", f"area: the pair table has no column {settings.totals.area!r}")
+    area = settings.totals.area
+    if area and area not in inventory.names:
+        raise CatalogError("totals", f"area: the pair table has no column {area!r}")
     progress("screening", 0, inventory.count)
+    # Rows are counted as chunks are finished, in whichever order
     parts, rows = list[Part](), 0
-    jobs, workers = (
-        _jobs(settings, folder, ground, inventory),
-        settings.workers or usable_processors(),
-    )
-    for part in do_chunks(jobs, workers, executor):
+    jobs = _jobs(settings, folder, ground, inventory)
+    for part in do_chunks(jobs, settings.workers or usable_processors(), executor):
         parts.append(part)
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
@@ -128,19 +122,22 @@ def _parts(
 
 
 def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
-    known = {part.number for part in parts}
-    for note in [one for one in folder.glob("*.json") if int(one.stem) not in known]:
-        note.with_suffix(".parquet").unlink(missing_ok=True)
-        note.unlink()
+    """Remove everything but these parts: those of a longer inventory, and half written ones."""
+    known = {part.status for part in parts} | {part.path for part in parts}
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path not in known and path.is_file():
+            path.unlink()
 
 
 def _jobs(
     settings: Run, folder: Path, ground: GroundFiles, inventory: PairInventory
 ) -> Iterator[ChunkJob]:
+    """Yield one job per chunk of the inventory."""
     for number, chunk in enumerate(inventory.chunks(CHUNK)):
         part = _chunk_folder(folder) / f"{number:06}.parquet"
-        yield ChunkJob(chunk, ground, settings.building, settings.screening, part)
+        yield ChunkJob(number, chunk, ground, settings.building, settings.screening, part)
 
 
 def _chunk_folder(folder: Path) -> Path:
+    """Return the folder of the parts."""
     return folder / "chunks"

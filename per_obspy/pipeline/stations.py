@@ -1,68 +1,148 @@
-"""The first stage: records, found or simulated, become one shard of spectra a station."""
+"""First stage: records, found or simulated, become one shard of spectra per station."""
 
-import hashlib
-import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-from per_obspy.config import Records, Run, Simulation, load
+from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spectra, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import written_whole
-from per_obspy.jobs.station import Done, Job, do_stations, earlier_done
+from per_obspy.files import content_hash, is_part
+from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
 from per_obspy.progress import Progress
+from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
-from per_obspy.records.sources import find_sources
+from per_obspy.records.sources import StationSource, find_sources
+from per_obspy.resume import earlier_status, write_status
 from per_obspy.threads import usable_processors
 
 
-def content_hash(content: dict[str, Any]) -> str:
-    """Return the hash of plain values."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+class FoundStations(NamedTuple):
+    """
+    Stations of the configured sources, not done yet.
+
+    Attributes
+    ----------
+    jobs : list of StationJob
+        One per station.
+    rejected : list of Rejection
+        What cannot be used of the sources.
+    hashes : dict
+        Hash of every file that was read on the way.
+    """
+
+    jobs: list[StationJob]
+    rejected: list[Rejection]
+    hashes: dict[Path, str]
+
+
+def find_station_jobs(
+    settings: Run, folder: Path, fetched: Fetched | None, progress: Progress
+) -> FoundStations:
+    """
+    Find the stations of a run; simulated records are written into the output folder first.
+
+    Parameters
+    ----------
+    settings : Run
+        What to do.
+    folder : Path
+        Of the results.
+    fetched : Fetched or None
+        Records of FDSN services in their cache.
+    progress : callable
+        Called when simulating and finding begin and end.
+
+    Raises
+    ------
+    CatalogError
+        If a source of records is wrong as a whole.
+    """
+    scenario = load(settings.simulation, Simulation).scenario if settings.simulation else None
+    if scenario:
+        _write_simulated_records(scenario, folder, progress)
+        target = folder / "simulated"
+        records = Records(folder=target, event=target / "event.xml")
+    else:
+        assert settings.records is not None  # Run demands records or a simulation
+        records = settings.records
+    progress("finding records", 0, 1)
+    found = find_sources(records, fetched)
+    if scenario:
+        _note_simulation(scenario, folder, found.hashes)
+    progress("finding records", 1, 1)
+
+    # One job per station, which knows whether its motion was simulated
+    jobs = station_jobs(
+        found.stations, _shards(folder), settings.processing, settings.spectra, found.event
+    )
+    jobs = [job._replace(simulated=scenario is not None) for job in jobs]
+    return FoundStations(jobs, list(found.rejected), found.hashes)
 
 
 def station_jobs(
-    settings: Run, folder: Path, fetched: Fetched | None, progress: Progress
-) -> tuple[list[Job], list[Rejection]]:
-    """Return one job a station, and what cannot be used of the sources."""
-    records = settings.records or _simulated_records(settings, folder, progress)
-    progress("finding records", 0, 1)
-    found = find_sources(records, fetched)
-    progress("finding records", 1, 1)
-    jobs = [
-        Job(
+    stations: Mapping[str, StationSource],
+    shards: Path,
+    processing: Processing,
+    spectra: Spectra,
+    event: EventFile | None = None,
+) -> list[StationJob]:
+    """
+    Return one job per station, sorted by name, which makes a shard of spectra.
+
+    Parameters
+    ----------
+    stations : mapping
+        ``"NET.STA"`` -> files, metadata and reader.
+    shards : Path
+        Folder of the shards.
+    processing, spectra : Processing, Spectra
+        Settings.
+    event : EventFile, optional
+        The earthquake.
+    """
+    return [
+        StationJob(
             station=name,
             source=source.files,
             inventory=source.inventory,
-            event=found.event,
-            processing=settings.processing,
-            spectra=settings.spectra,
-            shard=_shards(folder) / f"{name.strip('.')}.nc",
-            simulated=settings.simulation is not None,
+            event=event,
+            processing=processing,
+            spectra=spectra,
+            shard=shards / f"{name.strip('.')}.nc",
+            simulated=False,
+            hashes=source.hashes,
             reader=source.reader,
         )
-        for name, source in sorted(found.stations.items())
+        for name, source in sorted(stations.items())
     ]
-    return jobs, list(found.rejected)
 
 
 def finished_stations(
-    jobs: Sequence[Job], workers: int, executor: Executor | None, progress: Progress
-) -> list[Done]:
+    jobs: Sequence[StationJob], workers: int, executor: Executor | None, progress: Progress
+) -> list[FinishedStation]:
     """Do the jobs and return every station, sorted by name."""
-    progress("stations", 0, len(jobs))
     finished = []
-    for done in do_stations(jobs, workers or usable_processors(), executor):
-        finished.append(done)
+    for station in do_stations(jobs, workers or usable_processors(), executor):
+        finished.append(station)
         progress("stations", len(finished), len(jobs))
-    return sorted(finished, key=lambda one: one.station)
+    return sorted(finished, key=lambda station: station.station)
 
 
-def stations_of_earlier_run(folder: Path) -> list[Done]:
+def all_rejections(
+    found: Sequence[Rejection], stations: Sequence[FinishedStation]
+) -> list[Rejection]:
+    """Return what was left out of the sources and then of every station."""
+    rejected = list(found)
+    for station in stations:
+        rejected += station.rejected
+    return rejected
+
+
+def stations_of_earlier_run(folder: Path) -> list[FinishedStation]:
     """
     Return the stations as the latest run left them in its output folder.
 
@@ -71,30 +151,42 @@ def stations_of_earlier_run(folder: Path) -> list[Done]:
     CatalogError
         If there is none, or one is damaged.
     """
-    found = [earlier_done(note) for note in sorted(_shards(folder).glob("*.json"))]
+    statuses = sorted(path for path in _shards(folder).glob("*.json") if not is_part(path))
+    found = [earlier_station(status) for status in statuses]
     if not found:
         raise CatalogError(str(_shards(folder)), "no stations here: a whole run comes first")
     return found
 
 
 def _shards(folder: Path) -> Path:
+    """Return the folder of the shards of a run."""
     return folder / "stations"
 
 
-def _simulated_records(settings: Run, folder: Path, progress: Progress) -> Records:
-    """Write the records of the scenario, unless they stand there, and return where they are."""
-    assert settings.simulation is not None  # Run demands records or a simulation
-    target = folder / "simulated"
-    scenario = load(settings.simulation, Simulation).scenario
-    key = content_hash(
-        {"version": version("per_obspy"), "scenario": scenario.model_dump(mode="json")}
-    )
-    mark = folder / "simulated.json"
-    if not mark.is_file() or json.loads(mark.read_text(encoding="utf-8"))["key"] != key:
-        progress("simulating records", 0, 1)
-        shutil.rmtree(target, ignore_errors=True)
-        write_simulation(simulate(scenario), target)
-        with written_whole(mark) as part:
-            part.write_text(json.dumps({"key": key}), encoding="utf-8")
-        progress("simulating records", 1, 1)
-    return Records(folder=target, event=target / "event.xml")
+def _write_simulated_records(scenario: Scenario, folder: Path, progress: Progress) -> None:
+    """Write the records of a scenario, unless an earlier run has left them whole."""
+    if earlier_status(_simulation_status(folder), _simulation_key(scenario)) is not None:
+        return
+    progress("simulating records", 0, 1)
+    # Files of another scenario, or of a killed run, would be taken for records of this one
+    _simulation_status(folder).unlink(missing_ok=True)
+    shutil.rmtree(folder / "simulated", ignore_errors=True)
+    write_simulation(simulate(scenario), folder / "simulated")
+    progress("simulating records", 1, 1)
+
+
+def _note_simulation(scenario: Scenario, folder: Path, hashes: Mapping[Path, str]) -> None:
+    """Write the status of the simulated records with the hashes of the files as they were read."""
+    outputs = {path.relative_to(folder).as_posix(): digest for path, digest in hashes.items()}
+    write_status(_simulation_status(folder), _simulation_key(scenario), outputs, {})
+
+
+def _simulation_status(folder: Path) -> Path:
+    """Return the status file of the simulated records of a run."""
+    return folder / "simulated.json"
+
+
+def _simulation_key(scenario: Scenario) -> str:
+    """Return the hash of the scenario of an earthquake and of the program."""
+    content = {"version": version("per_obspy"), "scenario": scenario.model_dump(mode="json")}
+    return content_hash(content)

@@ -21,12 +21,15 @@ from obspy.core.event import Event
 
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
-from per_obspy.records.folder import FolderContents, merged_inventory
+from per_obspy.records.folder import SourceContents, merged_inventory
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 #: unit of the samples according to the provenance -> m/s2
 _UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
+
+#: First bytes of an HDF5 file, which every ASDF file is.
+ASDF_MARK = b"\x89HDF\r\n\x1a\n"
 
 _OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]*>([^<]+)<")
 
@@ -37,10 +40,10 @@ _PROCESSED = "corrected physical"
 def is_asdf(path: Path) -> bool:
     """Check from its first bytes whether a file is HDF5; opening it shows whether it is ASDF."""
     with path.open("rb") as file:
-        return file.read(8) == b"\x89HDF\r\n\x1a\n"
+        return file.read(len(ASDF_MARK)) == ASDF_MARK
 
 
-def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> FolderContents:
+def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> SourceContents:
     """
     Find the stations that have waveforms of a tag.
 
@@ -72,7 +75,7 @@ def find_asdf_stations(path: str | Path, tag: str = "*_unprocessed") -> FolderCo
                 inventories += _inventories(groups[name], f"{path}/{name}")
             except RecordRejected as rejection:
                 rejected.append(Rejection("file", name, str(path), None, rejection.reasons))
-    return FolderContents(stations, merged_inventory(inventories), tuple(rejected))
+    return SourceContents(stations, merged_inventory(inventories), tuple(rejected))
 
 
 def _no_waveform(groups: dict[str, Any], tag: str) -> str:

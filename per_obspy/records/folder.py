@@ -5,20 +5,21 @@ StationXML may be in the same folder or elsewhere.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import add
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
-from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.files import bytes_hash, is_part
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_with_obspy
+from per_obspy.records.obspy_readers import read_content, read_with_obspy
 from per_obspy.records.processed_files import described
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
@@ -31,9 +32,9 @@ _MARKS = {
 }
 
 
-class FolderContents(NamedTuple):
+class SourceContents(NamedTuple):
     """
-    Contents of a folder.
+    Stations, metadata and unusable files of a source of records.
 
     Attributes
     ----------
@@ -44,14 +45,17 @@ class FolderContents(NamedTuple):
         All StationXML, merged; None if there is none.
     rejected : tuple of Rejection
         Files that are neither records nor metadata, each with its reason.
+    hashes : mapping of Path to str
+        Hash of every file that was read on the way.
     """
 
     stations: dict[str, tuple[Path, ...]]
     inventory: Inventory | None
     rejected: tuple[Rejection, ...]
+    hashes: Mapping[Path, str] = MappingProxyType({})
 
 
-def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> FolderContents:
+def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> SourceContents:
     """
     Find the stations that have records in a folder and its subfolders, from headers only.
 
@@ -71,30 +75,71 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
         read.
     """
     files, rejected = _files(Path(folder))
-    kinds = {path: _kind(path) for path in files}
-    # Headers of the records
+    found = [_read_file(path) for path in files]
     stations: dict[str, list[Path]] = defaultdict(list)
-    for path in (path for path in files if kinds[path] == "record"):
-        try:
-            for station in _station_names(path):
-                stations[station].append(path)
-        except RecordRejected as rejection:
-            rejected.append(_rejected_file(path, rejection))
-    # Metadata from elsewhere, then from the folder
+    for file in found:
+        for station in file.stations:
+            stations[station].append(file.path)
+    # Metadata that is named comes before that of the folder
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
-    for path in (path for path in files if kinds[path] == "inventory"):
-        try:
-            inventories.append(_read_inventory(path))
-        except RecordRejected as rejection:
-            rejected.append(_rejected_file(path, rejection))
+    inventories += [file.inventory for file in found if file.inventory is not None]
+    # Unusable records come before unusable metadata
+    for kind in ("record", "inventory"):
+        rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
     if not stations:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
-    return FolderContents(_sorted(stations), merged_inventory(inventories), tuple(rejected))
+    return SourceContents(
+        {station: tuple(paths) for station, paths in sorted(stations.items())},
+        merged_inventory(inventories),
+        tuple(rejected),
+        {file.path: file.hash for file in found if file.hash},
+    )
 
 
-def _station_names(path: Path) -> list[str]:
-    """Return the stations of a file, sorted."""
-    return sorted({station_name(trace) for trace in _read(path, headonly=True)})
+class _File(NamedTuple):
+    """A file of a folder: hash, kind, and its stations, its metadata or the reason for neither."""
+
+    path: Path
+    hash: str = ""
+    kind: str = "record"
+    stations: tuple[str, ...] = ()
+    inventory: Inventory | None = None
+    rejection: Rejection | None = None
+
+
+def _read_file(path: Path) -> _File:
+    """Open a file of a folder once for its hash, and for headers of records or metadata."""
+    file = _File(path)
+    try:
+        content = _content(path)
+        file = file._replace(hash=bytes_hash(content), kind=_kind(content))
+        if file.kind == "record":
+            return file._replace(stations=_stations(_traces(path, content, headonly=True)))
+        if file.kind == "inventory":
+            inventory = read_content(obspy.read_inventory, content, path)
+            return file._replace(inventory=inventory)
+    except RecordRejected as rejection:
+        return file._replace(rejection=_rejected_file(path, rejection))
+    return file
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a file or of a member of an archive."""
+    with open_file(path) as file:
+        return file.read()
+
+
+def _kind(content: bytes) -> str:
+    """Return whether a file is a record, an inventory, an event or a description, by its start."""
+    start = content[:1000]
+    return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
+
+
+def _traces(path: Path, content: bytes, **options: Any) -> Stream:
+    """Return the traces of a file that has been opened already."""
+    if not content:
+        raise RecordRejected(str(path), "the file is empty")
+    return described(read_content(obspy.read, content, path, **options), path, content)
 
 
 def station_name(trace: Trace) -> str:
@@ -102,8 +147,9 @@ def station_name(trace: Trace) -> str:
     return f"{trace.stats.network}.{trace.stats.station}"
 
 
-def _sorted(stations: dict[str, list[Path]]) -> dict[str, tuple[Path, ...]]:
-    return {station: tuple(paths) for station, paths in sorted(stations.items())}
+def _stations(stream: Stream) -> tuple[str, ...]:
+    """Return the stations of some traces, ``"NET.STA"``, sorted and each once."""
+    return tuple(sorted({station_name(trace) for trace in stream}))
 
 
 def read_station(
@@ -119,9 +165,9 @@ def read_station(
     Parameters
     ----------
     paths : iterable of Path
-        From ``FolderContents.stations``.
+        From ``SourceContents.stations``.
     inventory : Inventory or None
-        From ``FolderContents.inventory``.
+        From ``SourceContents.inventory``.
     station : str, optional
         ``"NET.STA"``: keep only its traces, for files that hold several stations.
     start, end : UTCDateTime, optional
@@ -138,7 +184,7 @@ def read_station(
     stream, rejected = Stream(), []
     for path in paths:
         try:
-            traces = _read(path, headonly=False, starttime=start, endtime=end)
+            traces = _traces(path, _content(path), headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
             continue
@@ -154,31 +200,6 @@ def read_station(
     return stream, tuple(rejected)
 
 
-def read_event(path: str | Path) -> Event:
-    """
-    Read the one event of a QuakeML file.
-
-    Raises
-    ------
-    CatalogError
-        If the file cannot be read or does not hold exactly one event with an origin.
-    """
-    try:
-        events = read_with_obspy(obspy.read_events, Path(path))
-    except RecordRejected as rejection:
-        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
-    if len(events) != 1:
-        raise CatalogError(str(path), f"must hold one event, holds {len(events)}")
-    # Windows and distances need an origin with its time
-    event = events[0]
-    if not event.origins:
-        raise CatalogError(str(path), f"the event {event.resource_id} has no origin")
-    if (event.preferred_origin() or event.origins[0]).time is None:
-        problem = f"the event {event.resource_id} has an origin without time"
-        raise CatalogError(str(path), problem)
-    return event
-
-
 def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     """Return all files, those in archives included, and the archives that cannot be read."""
     if not folder.exists():
@@ -187,7 +208,7 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     if folder.is_file():
         paths = [folder]
     else:
-        paths = sorted(path for path in folder.rglob("*") if path.is_file())
+        paths = sorted(path for path in folder.rglob("*") if path.is_file() and not is_part(path))
     files, rejected = [], []
     for path in paths:
         try:
@@ -197,24 +218,6 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     if not files and not rejected:
         raise CatalogError(str(folder), "the folder is empty")
     return files, rejected
-
-
-def _kind(path: Path) -> str:
-    """Return the kind of a file: inventory, event, description, or else record."""
-    try:
-        with open_file(path) as file:
-            start = file.read(1000)
-    except RecordRejected:
-        return "record"  # reading it gives the reason why it cannot be read
-    return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
-
-
-def _read(path: Path, **options: Any) -> Stream:
-    """Read a file of records; one that this package processed gets its description."""
-    with open_file(path) as file:
-        if not file.read(1):
-            raise RecordRejected(str(path), "the file is empty")
-    return described(read_with_obspy(obspy.read, path, **options), path)
 
 
 def _read_inventory(path: Path) -> Inventory:

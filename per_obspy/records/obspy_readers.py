@@ -1,6 +1,7 @@
 """The one place where errors of ObsPy's readers, which have no common class, become a rejection."""
 
 import glob
+import tarfile
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -8,6 +9,12 @@ from typing import Any
 
 from per_obspy.errors import PerError, RecordRejected
 from per_obspy.records.archives import open_file
+
+#: Reason of a rejection where no format plugin knows a file.
+UNKNOWN_FORMAT = "its format is unknown"
+
+#: How files begin that ObsPy unpacks: gzip, bzip2 and zip.
+_COMPRESSED = (b"\x1f\x8b", b"BZh", b"PK\x03\x04", b"PK\x05\x06")
 
 
 def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
@@ -32,6 +39,41 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
         return _called(reader, glob.escape(str(path)), str(path), options)
     with open_file(path) as file:
         return _called(reader, file, str(path), options)
+
+
+def read_content(reader: Callable[..., Any], content: bytes, path: Path, **options: Any) -> Any:
+    """
+    Call a reader of ObsPy on the bytes of a file, so that the file itself is opened only once.
+
+    Parameters
+    ----------
+    reader, **options
+        As for :func:`read_with_obspy`.
+    content : bytes
+        Content of the file.
+    path : Path
+        File, or a member of an archive as ``records.archives.members`` names it.
+
+    Raises
+    ------
+    RecordRejected
+        Whatever the reader raises.
+    """
+    # ObsPy unpacks compressed files only by their path
+    if path.is_file() and _is_compressed(content):
+        return read_with_obspy(reader, path, **options)
+    try:
+        return _called(reader, BytesIO(content), str(path), options)
+    except RecordRejected as rejection:
+        if UNKNOWN_FORMAT in rejection.reasons[0]:
+            raise
+        # Some formats keep their samples in files beside, which only a path leads to
+        return read_with_obspy(reader, path, **options)
+
+
+def _is_compressed(content: bytes) -> bool:
+    """Return whether bytes are those of an archive or of a compressed file."""
+    return content.startswith(_COMPRESSED) or tarfile.is_tarfile(BytesIO(content))
 
 
 def read_bytes_with_obspy(
@@ -75,5 +117,5 @@ def _reason(error: Exception) -> str:
     """
     reason = " ".join(str(error).split())
     if reason.startswith("Unknown format"):
-        return "its format is unknown"
+        return UNKNOWN_FORMAT
     return f"{type(error).__name__}: {reason}"

@@ -17,7 +17,7 @@ from obspy import Stream, Trace
 from obspy.core import AttribDict
 
 from per_obspy.errors import RecordRejected
-from per_obspy.files import file_hash, written_whole
+from per_obspy.files import bytes_hash, file_hash, written_whole
 
 #: words of ``trace.stats`` that a description has where the trace has them
 STATS_WORDS = (
@@ -71,9 +71,16 @@ def write_description(path: Path, facts: dict[str, Any]) -> None:
         part.write_text(json.dumps({"shard": file_hash(path), **facts}), encoding="utf-8")
 
 
-def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
+def read_descriptions(path: Path, content: bytes | None = None) -> list[dict[str, Any]] | None:
     """
     Read the descriptions of the traces of a MiniSEED file; None where there is no JSON of its name.
+
+    Parameters
+    ----------
+    path : Path
+        MiniSEED file.
+    content : bytes, optional
+        Its bytes, where it has been read already.
 
     Raises
     ------
@@ -86,24 +93,34 @@ def read_descriptions(path: Path) -> list[dict[str, Any]] | None:
         described_hash = note["shard"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
+    found = file_hash(path) if content is None else bytes_hash(content)
     # A file that changed after its description was written
-    if described_hash != file_hash(path):
+    if described_hash != found:
         raise RecordRejected(
             str(path), f"{path.with_suffix('.json').name} describes another file of this name"
         )
     return descriptions
 
 
-def described(stream: Stream, path: Path) -> Stream:
+def described(stream: Stream, path: Path, content: bytes | None = None) -> Stream:
     """
     Return traces just read from a file with the words of its JSON; unchanged where there is none.
+
+    Parameters
+    ----------
+    stream : Stream
+        Traces of the file.
+    path : Path
+        MiniSEED file.
+    content : bytes, optional
+        Its bytes, where it has been read already.
 
     Raises
     ------
     RecordRejected
         If the JSON describes another file, or other traces.
     """
-    descriptions = read_descriptions(path)
+    descriptions = read_descriptions(path, content)
     if descriptions is None:
         return stream
     _require_same_lengths(stream, descriptions, path)

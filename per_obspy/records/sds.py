@@ -8,7 +8,7 @@ from obspy import Inventory, Stream, UTCDateTime
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.records.folder import (
-    FolderContents,
+    SourceContents,
     merged_inventory,
     read_inventories,
     read_station,
@@ -19,7 +19,7 @@ _DAY = 86400.0  # s
 
 def find_sds_stations(
     archive: str | Path, start: UTCDateTime, end: UTCDateTime, stationxml: str | Path | None = None
-) -> FolderContents:
+) -> SourceContents:
     """
     Find the stations of an SDS archive that have day files in a time window.
 
@@ -58,7 +58,7 @@ def find_sds_stations(
     # Metadata are outside the archive
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     stations = {name: tuple(paths) for name, paths in sorted(files.items())}
-    return FolderContents(stations, merged_inventory(inventories), ())
+    return SourceContents(stations, merged_inventory(inventories), ())
 
 
 def _day_files(folder: Path, start: UTCDateTime, end: UTCDateTime) -> list[Path]:

@@ -1,74 +1,84 @@
-"""All sources of a configuration under one contract: the stations, their files, and how these are read."""
+"""All sources of a configuration under one contract: stations, their files, and their readers."""
 
 import os
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial, reduce
+from operator import add
 from pathlib import Path
 from typing import NamedTuple
 
 from obspy import Inventory, Stream
+from obspy.core.event import Event
 
 from per_obspy import config
-from per_obspy.errors import Rejection
+from per_obspy.errors import RecordRejected, Rejection
+from per_obspy.files import opened_hash
 from per_obspy.progress import Progress, silent
+from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import EventFile, read_event, read_event_file
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
-from per_obspy.records.folder import FolderContents, find_stations, read_station
+from per_obspy.records.folder import SourceContents, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
 
-#: reads a station from its files, metadata and name, as ``records.folder.read_station`` does
+#: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
 Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
 
 
-class Source(NamedTuple):
+class StationSource(NamedTuple):
     """
-    Where one station comes from.
+    Files and reader of one station.
 
     Attributes
     ----------
     files : tuple of Path
         Everything that is read.
+    hashes : tuple of str
+        Of the files; empty for one that cannot be read.
     inventory : Inventory or None
-        What StationXML says of the station.
+        StationXML of the station.
     reader : partial
-        How they are read; its function's name and keywords tell all that matters.
+        Reads the files; its function's name and keywords identify it.
     """
 
     files: tuple[Path, ...]
+    hashes: tuple[str, ...]
     inventory: Inventory | None
     reader: Reader
 
 
 class Sources(NamedTuple):
     """
-    What all sources of a configuration have.
+    Stations and event of all sources of a configuration.
 
     Attributes
     ----------
     stations : dict
-        ``"NET.STA"`` -> :class:`Source`.
-    event : Path or None
+        ``"NET.STA"`` -> :class:`StationSource`.
+    event : EventFile or None
         QuakeML file or ASDF workspace with the event.
     rejected : tuple of Rejection
         What cannot be used, with every reason.
+    hashes : dict
+        Hash of every file that was read on the way.
     """
 
-    stations: dict[str, Source]
-    event: Path | None
+    stations: dict[str, StationSource]
+    event: EventFile | None
     rejected: tuple[Rejection, ...]
+    hashes: dict[Path, str]
 
 
 def fetched_records(records: config.Records | None, progress: Progress = silent) -> Fetched | None:
-    """Bring the configured FDSN records into their cache; None if there are none. See ``records.fdsn.fetch``."""
+    """Bring the configured FDSN records into their cache, None if there are none."""
     return fetch(records.fdsn, records.event, progress) if records and records.fdsn else None
 
 
 def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     """
-    Find the stations of all configured sources; one that several sources have is taken from the first.
+    Find the stations of all configured sources; the first source that has a station serves it.
 
     Parameters
     ----------
@@ -82,67 +92,132 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     CatalogError
         If a source is missing or empty, or the event cannot be read.
     """
+    # A wrong event stops the run here, not every station
     event = _event(records, fetched)
-    if event:
-        read_event(event)  # a wrong file stops the run here, not every station
-    stations: dict[str, Source] = {}
+    hashes = {event.path: event.hash} if event else {}
+    stations: dict[str, StationSource] = {}
     rejected: list[Rejection] = []
-    for found, reader in _contents(records, fetched, event):
+    for found, reader in _contents(records, fetched, event and event.event):
         rejected += found.rejected
+        hashes |= found.hashes
         for name, paths in found.stations.items():
             if name in stations:
-                reason = f"is also in {os.path.commonpath(stations[name].files)}, which comes first"
-                rejected.append(
-                    Rejection("station", name, os.path.commonpath(paths), None, (reason,))
-                )
+                rejected.append(_second_source(name, paths, stations[name].files))
                 continue
-            stations[name] = Source(paths, _known(found.inventory, name), reader)
-    return Sources(stations, event, tuple(rejected))
+            inventory = _selected(found.inventory, name)
+            stations[name] = StationSource(paths, _hashes(paths, hashes), inventory, reader)
+    return Sources(stations, event, tuple(rejected), hashes)
+
+
+def find_path_sources(paths: Sequence[Path]) -> Sources:
+    """
+    Find the stations of some files and folders; files of a station in several of them are joined.
+
+    Raises
+    ------
+    CatalogError
+        If a path is missing or holds no record.
+    """
+    found = [find_stations(path) for path in paths]
+    files: dict[str, tuple[Path, ...]] = {}
+    hashes: dict[Path, str] = {}
+    for contents in found:
+        hashes |= contents.hashes
+        for name, station_files in contents.stations.items():
+            files[name] = (*files.get(name, ()), *station_files)
+
+    # Metadata beside one of the paths serves stations of all
+    inventories = [contents.inventory for contents in found if contents.inventory]
+    inventory = reduce(add, inventories) if inventories else None
+    stations = {
+        name: StationSource(
+            station_files,
+            _hashes(station_files, hashes),
+            _selected(inventory, name),
+            partial(read_station),
+        )
+        for name, station_files in files.items()
+    }
+    rejected = [rejection for contents in found for rejection in contents.rejected]
+    return Sources(stations, None, tuple(rejected), hashes)
 
 
 def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:
-    """Return every file that the result may depend on; of an SDS archive the day files of the window."""
+    """Return every file on which the result may depend; of an SDS archive those of the window."""
     if records is None:
         return []
-    given = [
-        records.folder,
-        records.stationxml,
-        records.event,
-        *(table.file for table in records.columns),
-    ]
-    given += [fetched.folder, fetched.event] if fetched else []
-    given += [records.asdf.file] if records.asdf else []
-    given += [records.shakemap, records.shakemap_uncertainty]
-    files = [
-        path for one in given if one for path in (sorted(one.rglob("*")) if one.is_dir() else [one])
-    ]
+    named = [records.folder, records.stationxml, records.event]
+    named += [table.file for table in records.columns]
+    if fetched:
+        named += [fetched.folder, fetched.event.path if fetched.event else None]
+    named += [records.asdf.file] if records.asdf else []
+    named += [records.shakemap, records.shakemap_uncertainty]
+    files = [path for place in named if place for path in _files_below(place)]
     if records.sds:
-        found, _ = _sds(records, records.sds, records.event)
-        files += [path for paths in found.stations.values() for path in paths]
+        event = read_event(records.event) if records.event else None
+        contents, _ = _sds(records, records.sds, event)
+        # Day files of the window
+        for paths in contents.stations.values():
+            files += paths
     return [path for path in files if path.is_file()]
 
 
-def _event(records: config.Records, fetched: Fetched | None) -> Path | None:
-    in_workspace = records.asdf.file if records.asdf and has_event(records.asdf.file) else None
-    return records.event or (fetched and fetched.event) or in_workspace
+def _files_below(place: Path) -> list[Path]:
+    """Return a file, or everything below a folder, sorted."""
+    return sorted(place.rglob("*")) if place.is_dir() else [place]
 
 
-def _known(inventory: Inventory | None, name: str) -> Inventory | None:
+def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None:
+    """Return the event: that of the configuration, else the fetched one, else the workspace's."""
+    if fetched and fetched.event:  # which is that of the configuration if there is one
+        return fetched.event
+    if records.event:
+        return read_event_file(records.event)
+    workspace = records.asdf.file if records.asdf else None
+    return read_event_file(workspace) if workspace and has_event(workspace) else None
+
+
+def _selected(inventory: Inventory | None, name: str) -> Inventory | None:
+    """Return the metadata of one station."""
     network, station = name.split(".", 1)
     return inventory and inventory.select(network=network, station=station)
 
 
+def _second_source(name: str, paths: Iterable[Path], first: Iterable[Path]) -> Rejection:
+    """Return the rejection of a station that an earlier source has already."""
+    reason = f"is also in {os.path.commonpath(first)}, which comes first"
+    return Rejection("station", name, os.path.commonpath(paths), None, (reason,))
+
+
+def _hashes(paths: Iterable[Path], known: dict[Path, str]) -> tuple[str, ...]:
+    """Return the hashes of files; each file is read once, and its hash added to the known ones."""
+    for path in paths:
+        if path not in known:
+            known[path] = _hash_if_readable(path)
+    return tuple(known[path] for path in paths)
+
+
+def _hash_if_readable(path: Path) -> str:
+    """Return the hash of a file or of a member of an archive, empty if it cannot be read."""
+    try:
+        with open_file(path) as file:
+            return opened_hash(file)
+    except (OSError, RecordRejected):
+        return ""  # reading the station gives the reason
+
+
 def _contents(
-    records: config.Records, fetched: Fetched | None, event: Path | None
-) -> Iterator[tuple[FolderContents, Reader]]:
-    """Give what each source has, and how it is read."""
+    records: config.Records, fetched: Fetched | None, event: Event | None
+) -> Iterator[tuple[SourceContents, Reader]]:
+    """Yield the contents of each source with the reader of its stations."""
     for table in records.columns:
         name = f"{table.network}.{table.station}"
-        yield FolderContents({name: (table.file,)}, None, ()), partial(read_table, table=table)
+        yield SourceContents({name: (table.file,)}, None, ()), partial(read_table, table=table)
     if records.folder:
         yield find_stations(records.folder, records.stationxml), partial(read_station)
     if records.sds:
         yield _sds(records, records.sds, event)
+    # What others processed, and what services have, comes last
     if records.asdf:
         found = find_asdf_stations(records.asdf.file, records.asdf.tag)
         yield found, partial(read_asdf_station, tag=records.asdf.tag)
@@ -151,14 +226,15 @@ def _contents(
 
 
 def _sds(
-    records: config.Records, sds: config.Sds, event: Path | None
-) -> tuple[FolderContents, Reader]:
-    start, end = window(sds, read_event(event) if event else None)
+    records: config.Records, sds: config.Sds, event: Event | None
+) -> tuple[SourceContents, Reader]:
+    """Return the stations of an SDS archive in its window, and their reader."""
+    start, end = window(sds, event)
     found = find_sds_stations(sds.folder, start, end, records.stationxml)
     return found, partial(read_sds_station, start=start, end=end)
 
 
 def read_table(*_: object, table: config.Columns) -> tuple[Stream, tuple[Rejection, ...]]:
-    """Read a plain table of samples; files, metadata and name, which other readers need, are in its description."""
+    """Read a plain table of samples; file, metadata and name are in its description."""
     described = table.model_dump()
     return read_columns(described.pop("file"), **described), ()

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pyarrow.parquet as pq
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binom
@@ -14,10 +13,9 @@ from scipy.stats import binom
 from per_obspy.files import written_whole
 from per_obspy.report.style import BUILDING_COLOURS, FAINT_COLOUR, MOTION_COLOUR, save
 from per_obspy.screening.region.evaluation import Evaluation, evaluation
-from per_obspy.tables.risk import ranked
 
 
-def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
+def write_evaluation(risk: pd.DataFrame, folder: Path, simulated: bool) -> list[Path]:
     """
     Compare the observed pairs with the prediction and write the comparison.
 
@@ -25,8 +23,9 @@ def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
 
     Parameters
     ----------
-    risk : Path
-        Parquet file of the risk table; observations are in its column ``observed``, if any.
+    risk : DataFrame
+        Risk table, or its observed pairs; only with a column ``observed`` there is something to
+        compare.
     folder : Path
         Folder of ``evaluation.json`` and, where there are probabilities,
         ``figures/reliability.png``.
@@ -41,28 +40,17 @@ def write_evaluation(risk: Path, folder: Path, simulated: bool) -> list[Path]:
     table, figure = folder / "evaluation.json", folder / "figures" / "reliability.png"
     for earlier in (table, figure):
         earlier.unlink(missing_ok=True)
-    observed = _observed(risk)
-    if observed.empty:
+    if "observed" not in risk or risk["observed"].isna().all():
         return []
 
     # The diagram needs probabilities, the numbers do not
-    found = evaluation(observed)
+    found = evaluation(risk)
     with written_whole(table) as part:
         part.write_text(json.dumps(_plain(found), indent=1, allow_nan=False), encoding="utf-8")
     if found.reliability.empty:
         return [table]
     draw_reliability(found, figure, simulated)
     return [table, figure]
-
-
-def _observed(risk: Path) -> pd.DataFrame:
-    """Return the pairs with an observation."""
-    names = ["observed", "state", "probability"]
-    if "observed" not in pq.read_schema(risk).names:
-        return pd.DataFrame(columns=names)
-    return pd.concat(
-        [piece[piece["observed"].notna()] for piece in ranked(risk, names)], ignore_index=True
-    )
 
 
 def _plain(found: Evaluation) -> dict[str, Any]:

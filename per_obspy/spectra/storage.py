@@ -8,6 +8,7 @@ region contains the spectra of all stations along the dimension ``station`` with
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 
+import netCDF4
 import xarray as xr
 
 from per_obspy.errors import CatalogError
@@ -39,7 +40,7 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
         dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 
-def read_spectra(path: Path) -> xr.Dataset:
+def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
     """
     Read a Dataset that :func:`write_spectra` wrote, identical to the one written.
 
@@ -47,6 +48,8 @@ def read_spectra(path: Path) -> xr.Dataset:
     ----------
     path : Path
         netCDF file.
+    content : bytes, optional
+        Its bytes, where it has been read already.
 
     Raises
     ------
@@ -55,7 +58,10 @@ def read_spectra(path: Path) -> xr.Dataset:
     """
     try:
         dataset = xr.load_dataset(
-            path, engine="netcdf4", decode_times=False, decode_timedelta=False
+            path if content is None else _in_memory(path, content),
+            engine="netcdf4" if content is None else None,
+            decode_times=False,
+            decode_timedelta=False,
         )
     except (OSError, ValueError) as error:
         raise CatalogError(str(path), f"cannot be read as netCDF: {error}") from error
@@ -64,6 +70,16 @@ def read_spectra(path: Path) -> xr.Dataset:
             str(path), f"has no variable 'per', only {sorted(map(str, dataset.variables))}"
         )
     return dataset
+
+
+def _in_memory(path: Path, content: bytes) -> xr.backends.NetCDF4DataStore:
+    """Open the bytes of a netCDF file; an error names the file."""
+    try:
+        # A name that exists would be opened too
+        file = netCDF4.Dataset(f"{path.name} in memory", memory=content)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    return xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
 
 
 def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
@@ -86,7 +102,7 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
         If the stations' periods, dampings or azimuths differ.
     """
     ordered = sorted(stations, key=lambda station: str(station["station"].item()))
-    spectra = [_without_motion(station) for station in ordered]
+    spectra = [_for_region(station) for station in ordered]
     joined = xr.concat(
         spectra,
         dim="station",
@@ -110,9 +126,14 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     return named.assign_attrs(_box(named))
 
 
-def _without_motion(station: xr.Dataset) -> xr.Dataset:
+def without_motion(station: xr.Dataset) -> xr.Dataset:
+    """Return the Dataset of a station without its motion, sample by sample; the spectra stay."""
+    return station.drop_vars([*MOTION, "time"], errors="ignore")
+
+
+def _for_region(station: xr.Dataset) -> xr.Dataset:
     """Return the spectra, with names and numbers that differ by station as variables."""
-    spectra = station.drop_vars([*MOTION, "time"]).rename(station="station_name").drop_encoding()
+    spectra = without_motion(station).rename(station="station_name").drop_encoding()
     # Components are joined by their names
     spectra = spectra.assign_coords(component=spectra["component_name"].values)
     spectra = spectra.drop_vars("component_name")

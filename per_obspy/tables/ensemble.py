@@ -1,10 +1,9 @@
-"""The files of several scenarios together; risk tables are joined pair by pair, without ever being in memory."""
+"""Files of several scenarios together: risk tables joined pair by pair, on disk."""
 
 import json
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import pandas as pd
@@ -12,16 +11,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.errors import Rejection
-from per_obspy.files import written_whole
+from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.region.ensemble import (
     SAME,
     ensemble_columns,
     ensemble_rejections,
     ensemble_rows,
 )
-from per_obspy.tables.database import bounded_database, write_worst
-from per_obspy.tables.risk import ROWS
-from per_obspy.tables.writing import write_described, write_rejected
+from per_obspy.tables.parts import bounded_database
+from per_obspy.tables.risk import ROWS, write_worst
+from per_obspy.tables.table_files import write_described, write_rejected
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
@@ -50,7 +49,7 @@ _ORDERED = f"""
     COPY (
         SELECT row_number() OVER () AS rank, *
         FROM (SELECT * FROM read_parquet($rows) ORDER BY probability DESC, pair_id)
-    ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $said}})
+    ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $statement}})
 """
 
 
@@ -67,7 +66,7 @@ def write_ensemble(
     folder : Path
         Where to.
     facts : mapping of str to str
-        What the Parquet file says of the whole table.
+        Facts of the whole table that the Parquet file states.
     csv_rows : int
         How many rows ``ensemble.csv`` holds, the worst ones.
 
@@ -78,53 +77,65 @@ def write_ensemble(
     counts : dict
         Number of pairs, and of rejected ones.
     """
-    ends = (".parquet", ".csv", ".columns.csv")
-    table, text, columns = (folder / f"ensemble{end}" for end in ends)
-    rejected = folder / "rejected.csv"
-    with TemporaryDirectory(dir=folder) as room:
-        joined, rows = Path(room) / "joined.parquet", Path(room) / "rows.parquet"
+    names = ("ensemble.parquet", "ensemble.csv", "ensemble.columns.csv", "rejected.csv")
+    table, text, columns, rejected = files = [folder / name for name in names]
+    statement = json.dumps({"version": version("per_obspy"), **facts})
+    with temporary_folder(folder) as room:
+        joined, rows = room / "joined.parquet", room / "rows.parquet"
+        # Join by pair, compute the probabilities, and order by them
         _join(scenarios, joined)
         _write_rows(scenarios, joined, rows)
-        said = json.dumps({"version": version("per_obspy"), **facts})
-        with bounded_database(Path(room)) as database, written_whole(table) as part:
-            database.execute(_ORDERED, {"rows": str(rows), "path": str(part), "said": said})
+        with bounded_database(room) as database, written_whole(table) as part:
+            paths = {"rows": str(rows), "path": str(part)}
+            database.execute(_ORDERED, {**paths, "statement": statement})
         kinds = write_rejected(_rejections(scenarios, joined), rejected)
+    # The worst rows as text, and the meaning of every column
     write_worst(table, csv_rows, text)
-    write_described(ensemble_columns(scenarios.weights, scenarios.yearly).values(), columns)
-    return [table, text, columns, rejected], {
-        "pairs": pq.read_metadata(table).num_rows,
-        "rejected_pair": kinds["pair"],
-    }
+    described = ensemble_columns(scenarios.weights, scenarios.yearly)
+    write_described(described.values(), columns)
+    counts = {"pairs": pq.read_metadata(table).num_rows, "rejected_pair": kinds["pair"]}
+    return files, counts
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
-    """Write one row for each name of a pair, as :func:`per_obspy.screening.region.ensemble.ensemble_rows` takes them."""
-    tables = list(scenarios.tables.values())
+    """Write one row for each name of a pair, as ``ensemble_rows`` of the screening takes them."""
+    tables = {
+        f"table{number}": str(table)
+        for number, table in enumerate(scenarios.tables.values())
+        if table is not None
+    }
+    with bounded_database(path.parent) as database:
+        query = _join_query(list(scenarios.tables.values()))
+        database.execute(query, {**tables, "path": str(path)})
+
+
+def _join_query(tables: list[Path | None]) -> str:
+    """Return the query that joins risk tables by pair; ``$table0`` and so on are their files."""
+    # Without any table there is still a header
     nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME))
-    parts = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
-    parts += [
-        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)} FROM read_parquet($table{number})"
+    rows = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
+    rows += [
+        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)}"
+        f" FROM read_parquet($table{number})"
         for number, table in enumerate(tables)
         if table
     ]
-    each = [
+    # One column of probabilities per scenario, and the extremes of what should be the same
+    columns = [
         f"max(probability) FILTER (scenario = {number}) AS probability_{number}"
         for number in range(len(tables))
     ]
-    same = [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
-    query = f"""
+    columns += [f"min({name}) AS {name}, max({name}) AS {name}_largest" for name in SAME]
+    return f"""
         COPY (
-            SELECT pair_id, {", ".join([*each, *same])} FROM ({" UNION ALL ".join(parts)})
+            SELECT pair_id, {", ".join(columns)} FROM ({" UNION ALL ".join(rows)})
             GROUP BY pair_id ORDER BY pair_id
         ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS})
     """
-    files = {f"table{number}": str(table) for number, table in enumerate(tables) if table}
-    with bounded_database(path.parent) as database:
-        database.execute(query, {**files, "path": str(path)})
 
 
 def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
-    """Give the joined rows in pieces, with the names of the scenarios."""
+    """Yield the joined rows in pieces, with the names of the scenarios."""
     names = {
         f"probability_{number}": f"probability_{name}"
         for number, name in enumerate(scenarios.tables)
@@ -132,16 +143,16 @@ def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
     with pq.ParquetFile(joined) as table:
         for batch in table.iter_batches(ROWS):
             piece: pd.DataFrame = batch.to_pandas().rename(columns=names)
-            yield piece.astype(
-                dict.fromkeys(names.values(), "float64")
-            )  # a batch of empty cells has no type
+            # A batch of empty cells has no type
+            yield piece.astype(dict.fromkeys(names.values(), "float64"))
 
 
 def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
+    """Write the rows of the ensemble, not in order yet."""
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
-    schema = pa.schema(
-        [(name, _TYPES[one.dtype]) for name, one in described.items() if name != "rank"]
-    )
+    # The rank is known when the rows are in order
+    fields = [(name, _TYPES[column.dtype]) for name, column in described.items() if name != "rank"]
+    schema = pa.schema(fields)
     with pq.ParquetWriter(path, schema) as writer:
         for piece in _pieces(scenarios, joined):
             rows = ensemble_rows(piece, scenarios.weights, scenarios.yearly)
@@ -149,5 +160,6 @@ def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
 
 
 def _rejections(scenarios: Scenarios, joined: Path) -> Iterator[Rejection]:
+    """Yield the pairs that not every scenario has, or that differ between them."""
     for piece in _pieces(scenarios, joined):
         yield from ensemble_rejections(piece, scenarios.weights)

@@ -1,32 +1,55 @@
 """
 Parts of the risk table on disk, each in its order, and their rows joined in the order of the whole.
 
-Only the columns of the order are sorted as a whole, by DuckDB. As every part is in that order
-already, the next rows of the whole are always the next rows of the parts: they are read once, and
-only some thousands of each part at a time.
+Only the columns of the order are sorted as a whole, by DuckDB, whose memory is bounded and which
+leaves to the disk what does not fit. As every part is in that order already, the next rows of the
+whole are always the next rows of the parts: they are read once, and only some thousands of each
+part at a time.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
+import duckdb
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from per_obspy.files import written_whole
+from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.ranking import KEYS
-from per_obspy.tables.database import bounded_database
-from per_obspy.tables.writing import as_arrow
+from per_obspy.tables.table_files import as_arrow
+
+#: Memory of the database for ordering.
+MEMORY = "1GB"
 
 #: Rows of a part that are read together: of a hundred parts they need about 800 MB.
 TOGETHER = 10_000
 
-#: In which part a row stands.
+#: Column with the number of the part to which a row belongs.
 _PART = "order_part"
 
-_ORDER = f"SELECT {_PART} FROM read_parquet($parts, union_by_name=true) ORDER BY {', '.join(KEYS)}, pair_id"
+_ORDER = (
+    f"SELECT {_PART} FROM read_parquet($parts, union_by_name=true)"
+    f" ORDER BY {', '.join(KEYS)}, pair_id"
+)
+
+
+@contextmanager
+def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Give a database of bounded memory, which leaves the rest to a temporary folder inside."""
+    with temporary_folder(folder) as room:
+        settings: dict[str, str | bool | int | float | list[str]] = {
+            "memory_limit": MEMORY,
+            "temp_directory": str(room),
+        }
+        with duckdb.connect(config=settings) as database:
+            # Otherwise columns without empty cells are marked so when there is one part, and not
+            # when there are two
+            database.execute("SET disabled_optimizers = 'statistics_propagation'")
+            yield database
 
 
 def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
@@ -43,30 +66,29 @@ def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
         Where to.
     """
     table = as_arrow(rows.assign(**{_PART: number}))
+    dictionaries = text_columns(table.schema)
     with written_whole(path) as part:
-        pq.write_table(
-            table, part, row_group_size=TOGETHER, use_dictionary=text_columns(table.schema)
-        )
+        pq.write_table(table, part, row_group_size=TOGETHER, use_dictionary=dictionaries)
 
 
 def text_columns(schema: pa.Schema) -> list[str]:
-    """Return the columns that gain from a dictionary; in numbers, which hardly repeat, it would be sought in vain."""
+    """Return the columns that gain from a dictionary: text, as numbers hardly repeat."""
     return [field.name for field in schema if pa.types.is_string(field.type)]
 
 
 def joined_schema(parts: Sequence[Path]) -> pa.Schema:
-    """Return every column of the parts but those of the order; where types differ it is number or text."""
-    found: dict[str, set[pa.DataType]] = {}
+    """Return every column of the parts but those of the order; differing types are joined."""
+    types: dict[str, set[pa.DataType]] = {}
     for part in parts:
         for field in pq.read_schema(part):
-            found.setdefault(field.name, set()).add(field.type)
+            types.setdefault(field.name, set()).add(field.type)
     order = {*KEYS, _PART}
-    return pa.schema([(name, _common(types)) for name, types in found.items() if name not in order])
+    return pa.schema([(name, _common(kinds)) for name, kinds in types.items() if name not in order])
 
 
 def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
     """
-    Give the rows of all parts in their order, so many at a time.
+    Yield the rows of all parts in their order, so many at a time.
 
     Parameters
     ----------
@@ -77,6 +99,7 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
     size : int
         How many rows.
     """
+    # Order of the whole: for each row the part in which it is the next one
     with bounded_database(parts[0].parent) as database:
         found = database.execute(_ORDER, {"parts": [str(part) for part in parts]}).fetchnumpy()
     order = np.asarray(found[_PART], dtype=np.int64)
@@ -86,11 +109,11 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
 
 
 def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
+    """Take the next rows of each part and return them in the order of the whole."""
     numbers, counts = np.unique(order, return_counts=True)
-    pieces = [
-        rows[number].take(count)
-        for number, count in zip(numbers.tolist(), counts.tolist(), strict=True)
-    ]
+    taken = zip(numbers.tolist(), counts.tolist(), strict=True)
+    pieces = [rows[number].take(count) for number, count in taken]
+    # Row i of the whole is row place[i] of the pieces one after the other
     place = np.empty(order.size, dtype=np.int64)
     place[np.argsort(order, kind="stable")] = np.arange(order.size)
     return pa.concat_tables(pieces).take(place)
@@ -112,6 +135,7 @@ class _Rows:
 
 
 def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
+    """Yield the row groups of a part with the columns of the whole."""
     for index in range(pq.read_metadata(part).num_row_groups):
         with pq.ParquetFile(part) as file:
             table = file.read_row_group(index, use_threads=False)
@@ -120,24 +144,26 @@ def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
 
 
 def _conforming(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    columns = [
-        table[one.name].cast(one.type)
-        if one.name in table.column_names
-        else pa.nulls(table.num_rows, one.type)
-        for one in schema
-    ]
+    """Return a table with the columns and types of a schema; missing columns are empty."""
+    columns = []
+    for field in schema:
+        if field.name in table.column_names:
+            columns.append(table[field.name].cast(field.type))
+        else:
+            columns.append(pa.nulls(table.num_rows, field.type))
     return pa.table(columns, schema=schema)
 
 
 def _number(part: Path) -> int:
+    """Return the number of a part."""
     with pq.ParquetFile(part) as file:
         number: int = file.read_row_group(0, columns=[_PART])[_PART][0].as_py()
     return number
 
 
 def _common(types: set[pa.DataType]) -> pa.DataType:
-    """Return a type that holds values of all these."""
+    """Return a type that holds values of all these: their own, a number, or text."""
     if len(types) == 1:
         return next(iter(types))
-    numbers = all(pa.types.is_integer(one) or pa.types.is_floating(one) for one in types)
+    numbers = all(pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in types)
     return pa.float64() if numbers else pa.string()

@@ -1,4 +1,4 @@
-"""The table of processed records: corners, windows and why they are what they are, one row a record."""
+"""Table of processed records: corners, windows and their reasons, one row per record."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from per_obspy.files import written_whole
+from per_obspy.tables.table_files import write_csv
 
-#: column -> (unit, meaning), in the order of the table; every number of ``stats.per_obspy`` that
-#: one can ask for
+#: Column -> (unit, meaning), in the order of the table; every useful number of
+#: ``stats.per_obspy``.
 COLUMNS: dict[str, tuple[str, str]] = {
     "id": ("", "network.station.location.channel"),
     "file": ("", "MiniSEED file with the processed samples, m/s2, pads included"),
@@ -62,12 +62,13 @@ COLUMNS: dict[str, tuple[str, str]] = {
 
 def processed_table(descriptions: Mapping[str, Iterable[Mapping[str, Any]]]) -> pd.DataFrame:
     """
-    Return one row a record.
+    Return one row per record.
 
     Parameters
     ----------
     descriptions : mapping
-        Name of the file -> what it is told to hold, from ``records.processed.read_descriptions``.
+        Name of the file -> descriptions of its traces, from
+        ``records.processed_files.read_descriptions``.
 
     Returns
     -------
@@ -75,9 +76,9 @@ def processed_table(descriptions: Mapping[str, Iterable[Mapping[str, Any]]]) -> 
         With the columns of ``COLUMNS``; empty where a record has nothing.
     """
     rows = [
-        {**one, **one.get("coordinates", {}), **one.get("per_obspy", {}), "file": name}
+        {**trace, **trace.get("coordinates", {}), **trace.get("per_obspy", {}), "file": name}
         for name, traces in descriptions.items()
-        for one in traces
+        for trace in traces
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
@@ -86,8 +87,7 @@ def write_processed_table(
     descriptions: Mapping[str, Iterable[Mapping[str, Any]]], folder: Path
 ) -> None:
     """Write ``processed.csv`` and ``processed.columns.csv``; see :func:`processed_table`."""
-    with written_whole(folder / "processed.csv") as part:
-        processed_table(descriptions).to_csv(part, index=False)
+    write_csv(processed_table(descriptions), folder / "processed.csv")
     rows = [(name, *meaning) for name, meaning in COLUMNS.items()]
-    with written_whole(folder / "processed.columns.csv") as part:
-        pd.DataFrame(rows, columns=["name", "unit", "meaning"]).to_csv(part, index=False)
+    described = pd.DataFrame(rows, columns=["name", "unit", "meaning"])
+    write_csv(described, folder / "processed.columns.csv")

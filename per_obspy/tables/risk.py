@@ -1,29 +1,92 @@
-"""The risk table on disk: parts of an inventory joined, worst first, without ever being in memory as a whole."""
+"""Risk table on disk: parts of an inventory joined, worst first, never in memory as a whole."""
 
 import json
+import shutil
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
+import duckdb
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
-from per_obspy.tables.database import write_worst
-from per_obspy.tables.parts import joined_rows, joined_schema, text_columns
-from per_obspy.tables.writing import write_columns
+from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, text_columns
+from per_obspy.tables.table_files import write_columns
 
 #: Rows that are read and written together.
 ROWS = 50_000
 
+_WORST = (
+    "COPY (SELECT * FROM read_parquet($table) WHERE rank <= $rows ORDER BY rank)"
+    " TO $path (FORMAT csv, HEADER)"
+)
+
+
+class RiskFiles(NamedTuple):
+    """
+    Files of a risk table.
+
+    Attributes
+    ----------
+    files : list of Path
+        ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``.
+    states : Counter
+        Number of pairs in each state.
+    """
+
+    files: list[Path]
+    states: Counter[str]
+
+
+class RankedTable(NamedTuple):
+    """
+    A risk table that is open for one pass, worst pair first.
+
+    Attributes
+    ----------
+    file : ParquetFile
+        The open file.
+    columns : list of str or None
+        Columns that are read; None: all.
+    """
+
+    file: pq.ParquetFile
+    columns: list[str] | None
+
+    @property
+    def pairs(self) -> int:
+        """Return the number of pairs."""
+        return int(self.file.metadata.num_rows)
+
+    def pieces(self) -> Iterator[pd.DataFrame]:
+        """Yield the rows in pieces; columns that the table lacks are left out."""
+        for batch in self.file.iter_batches(ROWS, columns=self.columns):
+            yield batch.to_pandas()
+
+    def row(self, index: int) -> pd.Series:
+        """Return one row, counted from 0, with all columns."""
+        for group in range(self.file.num_row_groups):
+            count = self.file.metadata.row_group(group).num_rows
+            if index < count:
+                rows = self.file.read_row_group(group).slice(index, 1)
+                row: pd.Series = rows.to_pandas().iloc[0]
+                return row
+            index -= count
+        raise IndexError(f"the table has no row {index} more")
+
 
 def write_risk(
     parts: Sequence[Path], folder: Path, facts: Mapping[str, str], csv_rows: int
-) -> list[Path]:
+) -> RiskFiles:
     """
-    Write ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``, and return their paths.
+    Write ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``, in one pass over the parts.
 
     Parameters
     ----------
@@ -32,33 +95,84 @@ def write_risk(
     folder : Path
         Where to.
     facts : mapping of str to str
-        What the Parquet file says of the whole table, for example whether the motion is simulated.
+        Facts of the whole table that the Parquet file states, for example whether the motion is
+        simulated.
     csv_rows : int
         How many rows ``risk.csv`` holds, the worst ones.
     """
-    said = json.dumps({"version": version("per_obspy"), **facts})
-    table, text, columns = (
-        folder / name for name in ("risk.parquet", "risk.csv", "risk.columns.csv")
-    )
-    with written_whole(table) as part:
-        _write_ranked(parts, part, said)
-    write_worst(table, csv_rows, text)
-    write_columns(pq.read_schema(table).names, columns)
-    return [table, text, columns]
+    names = ("risk.parquet", "risk.csv", "risk.columns.csv")
+    table, text, columns = files = [folder / name for name in names]
+    # Schema of the whole, with the rank before the other columns
+    schema = joined_schema(parts)
+    statement = json.dumps({"version": version("per_obspy"), **facts})
+    whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
+    with written_whole(table) as part, written_whole(text) as lines:
+        states = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
+    write_columns(whole.names, columns)
+    return RiskFiles(files, states)
 
 
-def _write_ranked(parts: Sequence[Path], path: Path, said: str) -> None:
-    schema, before = joined_schema(parts), 0
-    whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": said})
-    with pq.ParquetWriter(path, whole, use_dictionary=text_columns(whole)) as table:
-        for rows in joined_rows(parts, schema, ROWS):
-            rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
-            table.write_table(pa.table([rank, *rows.columns], schema=whole))
-            before += rows.num_rows
+def _write_rows(rows: Iterator[pa.Table], table: Path, text: Path, csv_rows: int) -> Counter[str]:
+    """Write ranked rows as Parquet, the worst of them as CSV too, and count their states."""
+    states, first = Counter[str](), next(rows)
+    dictionaries = text_columns(first.schema)
+    with (
+        bounded_database(table.parent) as database,
+        pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
+    ):
+        for piece in chain([first], rows):
+            writer.write_table(piece)
+            states.update(piece["state"].to_pylist())
+            # Rows whose rank is at most the number of rows of the text
+            before = piece["rank"][0].as_py() - 1
+            if before < csv_rows:
+                _append_csv(database, piece.slice(0, csv_rows - before), text, header=before == 0)
+    return states
 
 
-def ranked(path: Path, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:
-    """Give the risk table in pieces, worst pair first; all columns or some."""
-    with pq.ParquetFile(path) as table:
-        for batch in table.iter_batches(ROWS, columns=columns):
-            yield batch.to_pandas()
+def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:
+    """Yield the rows of all parts, worst first, with their rank from 1."""
+    before = 0
+    for rows in joined_rows(parts, schema, ROWS):
+        rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
+        yield pa.table([rank, *rows.columns], schema=whole)
+        before += rows.num_rows
+
+
+def _append_csv(
+    database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path, header: bool
+) -> None:
+    """Append rows to a CSV file, the first of them with the header."""
+    # The database writes a file of its own, which is appended to the others
+    piece = path.with_suffix(".piece")
+    database.register("piece", rows)
+    try:
+        query = f"COPY piece TO $path (FORMAT csv, HEADER {str(header).lower()})"
+        database.execute(query, {"path": str(piece)})
+        with path.open("ab") as whole, piece.open("rb") as lines:
+            shutil.copyfileobj(lines, whole)
+    finally:
+        database.unregister("piece")
+        piece.unlink(missing_ok=True)
+
+
+def write_worst(table: Path, rows: int, path: Path) -> None:
+    """Write the rows of a ranked Parquet table up to a rank as CSV."""
+    with bounded_database(path.parent) as database, written_whole(path) as part:
+        database.execute(_WORST, {"table": str(table), "rows": rows, "path": str(part)})
+
+
+@contextmanager
+def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[RankedTable]:
+    """
+    Open a risk table for one pass.
+
+    Parameters
+    ----------
+    path : Path
+        Parquet file of the risk table.
+    columns : sequence of str, optional
+        Columns that are read, all if not given; those that the table lacks are left out.
+    """
+    with pq.ParquetFile(path) as file:
+        yield RankedTable(file, None if columns is None else list(columns))

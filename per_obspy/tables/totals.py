@@ -1,21 +1,25 @@
-"""What a region adds up to, as files: totals by area."""
+"""Totals of a region by area, from a risk table that is read in pieces."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
-from per_obspy.files import written_whole
 from per_obspy.screening.region.outlines import box_outlines, hexagon_outlines, hexagons
-from per_obspy.screening.region.totals import grid_cells, joined_totals, partial_totals
-from per_obspy.tables.risk import ranked
+from per_obspy.screening.region.totals import (
+    PartialTotals,
+    grid_cells,
+    joined_totals,
+    partial_totals,
+)
+from per_obspy.tables.table_files import write_csv
 
+#: Columns of the risk table that totals need.
 COLUMNS = (
     "rank",
     "pair_id",
@@ -35,66 +39,87 @@ class RegionTotals(NamedTuple):
     Attributes
     ----------
     table : DataFrame
-        One row an area: see :func:`per_obspy.screening.region.totals.totals`.
+        One row per area: see :func:`per_obspy.screening.region.totals.totals`.
     outlines : list of ndarray or None
         Corners of each area in the order of the rows, (n_corners, 2), degrees east and north; None
-        if nobody gave any.
+        for named areas, whose outline is unknown.
     """
 
     table: pd.DataFrame
     outlines: list[FloatArray] | None
 
 
-def region_totals(risk: Path, settings: Totals, classes: Sequence[str]) -> RegionTotals:
+class PieceTotals(NamedTuple):
     """
-    Count the pairs of every area.
+    Totals of a piece of the risk table.
+
+    Attributes
+    ----------
+    totals : PartialTotals
+        By area.
+    boxes : mapping of str to ndarray
+        Corners of the grid's cells; empty for other areas.
+    """
+
+    totals: PartialTotals
+    boxes: Mapping[str, FloatArray] = MappingProxyType({})
+
+
+def totals_columns(settings: Totals) -> list[str]:
+    """Return the columns of the risk table that totals of these areas need."""
+    return [*COLUMNS, *([settings.area] if settings.area else [])]
+
+
+def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) -> PieceTotals:
+    """
+    Count the pairs of every area in a piece of the risk table.
 
     Parameters
     ----------
-    risk : Path
-        Parquet file of the risk table, at least one row; it is read in pieces.
+    piece : DataFrame
+        With the columns of :func:`totals_columns`.
     settings : Totals
-        Column of the pair table that names the area, or else what cells there are.
+        Column of the pair table that names the area, or else the kind of cells.
     classes : sequence of str
         Risk classes, each of which has a column even if no pair is of it.
     """
-    counted = partial(_counted, risk, classes)
+    longitude, latitude = piece["longitude"], piece["latitude"]
     if settings.area:
-        return RegionTotals(
-            counted(settings.area, lambda piece: _named(piece, str(settings.area))), None
-        )
+        area = np.asarray(piece[settings.area].fillna("").astype(str), dtype=object)
+        return PieceTotals(partial_totals(piece, area, classes))
     if settings.h3 is not None:
-        resolution = settings.h3
-        table = counted(
-            None, lambda piece: hexagons(piece["longitude"], piece["latitude"], resolution)
-        )
+        area = hexagons(longitude, latitude, settings.h3)
+        return PieceTotals(partial_totals(piece, area, classes))
+    # Cells of a grid, whose outlines are known
+    cells = grid_cells(longitude, latitude, settings.cell)
+    boxes = dict(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
+    return PieceTotals(partial_totals(piece, cells.cell, classes), boxes)
+
+
+def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTotals:
+    """
+    Join the totals of the pieces of a risk table.
+
+    Parameters
+    ----------
+    pieces : iterable of PieceTotals
+        From :func:`piece_totals`, at least one.
+    settings : Totals
+        The same as of the pieces.
+    """
+    counted = list(pieces)
+    table = joined_totals([piece.totals for piece in counted])
+    if settings.area:
+        return RegionTotals(table, None)
+    if settings.h3 is not None:
         return RegionTotals(table, hexagon_outlines(table["area"]))
+    # Outlines of all cells that a piece has
     boxes: dict[str, FloatArray] = {}
-
-    def in_grid(piece: pd.DataFrame) -> NDArray[np.object_]:
-        cells = grid_cells(piece["longitude"], piece["latitude"], settings.cell)
-        boxes.update(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
-        return cells.cell
-
-    table = counted(None, in_grid)
+    for piece in counted:
+        boxes |= piece.boxes
     return RegionTotals(table, [boxes[name] for name in table["area"]])
-
-
-def _counted(
-    risk: Path,
-    classes: Sequence[str],
-    column: str | None,
-    area: Callable[[pd.DataFrame], NDArray[np.object_]],
-) -> pd.DataFrame:
-    pieces = ranked(risk, [*COLUMNS, *([column] if column else [])])
-    return joined_totals([partial_totals(piece, area(piece), classes) for piece in pieces])
-
-
-def _named(piece: pd.DataFrame, column: str) -> NDArray[np.object_]:
-    return np.asarray(piece[column].fillna("").astype(str), dtype=object)
 
 
 def write_totals(table: pd.DataFrame, path: Path) -> None:
     """Write the totals as CSV."""
-    with written_whole(path) as part:
-        table.to_csv(part, index=False)
+    write_csv(table, path)

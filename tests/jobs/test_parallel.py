@@ -1,4 +1,4 @@
-"""Tasks on processes: nothing is lost, none stops the others, and few are ahead of the results."""
+"""Tasks on processes: none is lost or stops the others, and few are ahead of the results."""
 
 import os
 import subprocess
@@ -17,12 +17,12 @@ from per_obspy.jobs.parallel import AHEAD, results
 DIES = "__import__('os')._exit(9)"
 
 
-def lost(number, reason):
+def failed(number, reason):
     return f"{number}: {reason}"
 
 
-class Here(Executor):
-    """Do the work at once, in this process."""
+class InProcess(Executor):
+    """Do the work at once in this process."""
 
     def submit(self, function, /, *arguments):
         future = Future()
@@ -35,7 +35,7 @@ class Here(Executor):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_task_has_a_result_or_a_reason(workers):
-    found = list(results(iter([1, -2, 9, 16]), isqrt, lost, workers, None))
+    found = list(results(iter([1, -2, 9, 16]), isqrt, failed, workers, None))
     assert sorted(map(str, found)) == sorted(
         ["1", "-2: ValueError: isqrt() argument must be nonnegative", "3", "4"]
     )
@@ -45,25 +45,26 @@ def _refused(number):
     raise CatalogError("pairs.csv", f"row {number} is no row")
 
 
-def test_what_the_user_got_wrong_is_no_error_of_the_program():
-    assert list(results([7], _refused, lost, 1, None)) == ["7: pairs.csv: row 7 is no row"]
+def test_wrong_input_is_no_error_of_the_program():
+    assert list(results([7], _refused, failed, 1, None)) == ["7: pairs.csv: row 7 is no row"]
 
 
 def test_a_worker_that_dies_takes_only_its_task_with_it():
     # would catch tasks that waited behind the guilty one and were forgotten, or a pool that is not
     # replaced
-    tasks = [DIES if number == 3 else str(number) for number in range(12)]
-    found = list(results(tasks, eval, lost, 2, None))
+    numbers = list(range(12))
+    tasks = [DIES if number == 3 else str(number) for number in numbers]
+    found = list(results(tasks, eval, failed, 2, None))
     assert f"{DIES}: its worker process died" in found
-    assert sorted(one for one in found if isinstance(one, int)) == [
-        number for number in range(12) if number != 3
-    ]
+    numbers.remove(3)
+    assert sorted(result for result in found if isinstance(result, int)) == numbers
 
 
 SLEEPS = """
 import os, sys, time
 from per_obspy.jobs.parallel import results
-task = f"open({sys.argv[1]!r} + str(__import__('os').getpid()), 'w').close() or __import__('time').sleep(100)"
+notes = f"open({sys.argv[1]!r} + str(__import__('os').getpid()), 'w').close()"
+task = f"{notes} or __import__('time').sleep(100)"
 if __name__ == "__main__":
     list(results([task, task], eval, lambda *_: None, 2, None))
 """
@@ -100,7 +101,7 @@ def test_workers_end_when_the_run_is_killed(tmp_path):
 
 
 def test_an_executor_that_was_given_does_the_work():
-    assert sorted(results([1, 4, 9], isqrt, lost, 1, Here())) == [1, 2, 3]
+    assert sorted(results([1, 4, 9], isqrt, failed, 1, InProcess())) == [1, 2, 3]
 
 
 def test_few_tasks_are_ahead_of_their_results():
@@ -111,7 +112,7 @@ def test_few_tasks_are_ahead_of_their_results():
             asked.append(number)
             yield number
 
-    found = results(tasks(), isqrt, lost, 2, None)
+    found = results(tasks(), isqrt, failed, 2, None)
     for done in range(1, 20):
         next(found)
         assert len(asked) <= done + 2 * AHEAD  # would catch a pool that takes all tasks at once
@@ -120,4 +121,4 @@ def test_few_tasks_are_ahead_of_their_results():
 
 
 def test_nothing_to_do_is_done():
-    assert list(results([], isqrt, lost, 2, None)) == []
+    assert list(results([], isqrt, failed, 2, None)) == []

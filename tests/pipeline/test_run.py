@@ -1,10 +1,12 @@
-"""A whole run: from a small simulated earthquake to its tables, again, after a change, after a crash, and at once."""
+"""
+A whole run: from a small simulated earthquake to its tables, again, after a change, after a crash.
+
+Covers per_obspy.progress too: every stage of a run counts up to its size.
+"""
 
 import json
-import os
 import shutil
-from concurrent.futures import Executor, Future
-from pathlib import Path
+from collections import defaultdict
 
 import netCDF4
 import numpy as np
@@ -14,40 +16,17 @@ import pytest
 from filelock import FileLock
 from pyarrow import parquet
 
-from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import station as jobs
 from per_obspy.pipeline.run import run
 
-SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
-SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
-
-
-class Here(Executor):
-    """Do the work at once in this process: no test needs more, but the one of the pool."""
-
-    def submit(self, function, /, *arguments):
-        future = Future()
-        try:
-            future.set_result(function(*arguments))
-        except Exception as error:  # noqa: BLE001 - whatever it is, its result raises it
-            future.set_exception(error)
-        return future
-
-
-def _configuration(folder: Path, text: str = "") -> Path:
-    (folder / "scenario.toml").write_text(SCENARIO)
-    file = folder / "run.toml"
-    file.write_text(
-        f'name = "small"\noutput = "out"\nsimulation = "scenario.toml"\n{text}{SPECTRA}'
-    )
-    return file
+from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    return folder, run(_configuration(folder), executor=Here())
+    return folder, run(write_configuration(folder), executor=InProcess())
 
 
 @pytest.fixture
@@ -90,9 +69,8 @@ def test_csv_and_parquet_hold_the_same(finished):
     )
     assert csv.columns.tolist() == parquet.columns.tolist()
     numbers = parquet.select_dtypes("number").columns
-    pd.testing.assert_frame_equal(
-        csv[numbers], parquet[numbers], check_dtype=False, rtol=1e-12
-    )  # decimal round trip
+    # decimal round trip
+    pd.testing.assert_frame_equal(csv[numbers], parquet[numbers], check_dtype=False, rtol=1e-12)
 
 
 def test_every_column_is_explained(finished):
@@ -102,20 +80,39 @@ def test_every_column_is_explained(finished):
     assert explained["meaning"].str.len().min() > 5
 
 
-def test_simulated_motion_is_said_everywhere(finished):
+def test_simulated_motion_is_marked_everywhere(finished):
     _, result = finished
     assert result.record["simulated"] is True
     table = pd.read_parquet(result.folder / "risk.parquet")
     assert table["flags"].str.contains("simulated").all()
     with netCDF4.Dataset(result.folder / "spectra.nc") as spectra:
         assert spectra.simulated == "true"
-    said = json.loads(parquet.read_schema(result.folder / "risk.parquet").metadata[b"per_obspy"])
-    assert said["simulated"] == "true"
+    # facts of the whole table
+    metadata = parquet.read_schema(result.folder / "risk.parquet").metadata
+    assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
+
+
+def test_every_stage_counts_up_to_its_size(tmp_path):
+    # would catch a stage that ends before its size, or begins after its first step
+    calls = defaultdict(list)
+    run(
+        write_configuration(tmp_path),
+        executor=InProcess(),
+        progress=lambda stage, done, total: calls[stage].append((done, total)),
+    )
+    assert {"simulating records", "finding records", "stations", "screening"} < set(calls)
+    for steps in calls.values():
+        done, totals = zip(*steps, strict=True)
+        assert done[0] == 0
+        assert sorted(done) == list(done)
+        assert set(totals) == {done[-1]}
 
 
 def test_the_same_again_does_nothing(copied):
     progress = []
-    result = run(copied / "run.toml", executor=Here(), progress=lambda *told: progress.append(told))
+    result = run(
+        copied / "run.toml", executor=InProcess(), progress=lambda *step: progress.append(step)
+    )
     assert result.did_nothing
     assert not progress
 
@@ -123,17 +120,18 @@ def test_the_same_again_does_nothing(copied):
 def test_a_damaged_result_is_made_again(copied):
     before = (copied / "out" / "risk.csv").read_bytes()
     (copied / "out" / "risk.csv").write_bytes(before[:-20])
-    result = run(copied / "run.toml", executor=Here())
+    result = run(copied / "run.toml", executor=InProcess())
     assert not result.did_nothing
     assert (copied / "out" / "risk.csv").read_bytes() == before
     assert result.record["counts"]["stations_resumed"] == 3
 
 
 def test_results_do_not_depend_on_the_day(copied):
-    before = {name: (copied / "out" / name).read_bytes() for name in ("risk.csv", "risk.parquet")}
+    names = ("risk.csv", "risk.parquet", "spectra.nc", "totals.csv")
+    before = {name: (copied / "out" / name).read_bytes() for name in names}
     shutil.rmtree(copied / "out")
-    run(copied / "run.toml", executor=Here())
-    assert {name: (copied / "out" / name).read_bytes() for name in before} == before
+    run(copied / "run.toml", executor=InProcess())
+    assert {name: (copied / "out" / name).read_bytes() for name in names} == before
 
 
 def test_a_killed_run_goes_on_where_it_stopped(copied, monkeypatch):
@@ -147,35 +145,51 @@ def test_a_killed_run_goes_on_where_it_stopped(copied, monkeypatch):
         done.append(job.station)
         return work(job)
 
+    # the run is interrupted, then goes on with two stations done
     work = jobs.do_station
     monkeypatch.setattr(jobs, "do_station", dies_at_the_third)
     with pytest.raises(KeyboardInterrupt):
-        run(copied / "run.toml", executor=Here())
+        run(copied / "run.toml", executor=InProcess())
     assert not (copied / "out" / "run.json").exists()
     monkeypatch.undo()
-    assert run(copied / "run.toml", executor=Here()).record["counts"]["stations_resumed"] == 2
+    result = run(copied / "run.toml", executor=InProcess())
+    assert result.record["counts"]["stations_resumed"] == 2
+
+
+def test_part_files_of_a_killed_run_do_not_hinder_the_next(copied):
+    # would catch names of files that are parsed, and part files that are taken for stations
+    out = copied / "out"
+    left = [out / "chunks" / ".000004.4194305.part.json", out / "stations" / ".S.4194305.part.json"]
+    left += [out / "simulated" / ".XX.S001.4194305.part.mseed", out / ".risk.4194305.part.csv"]
+    for path in left:
+        path.write_bytes(b"{half")
+    (out / "run.json").unlink()
+    counts = run(copied / "run.toml", executor=InProcess()).record["counts"]
+    assert (counts["stations_resumed"], counts["chunks_resumed"]) == (3, 1)
+    # no process has a number above the largest of Linux, 2 ** 22
+    assert not any(path.exists() for path in left)
 
 
 def test_changed_settings_are_not_resumed(copied):
-    _configuration(copied, "[processing]\nhighpass = 0.2\n")
-    assert run(copied / "run.toml", executor=Here()).record["counts"]["stations_resumed"] == 0
+    write_configuration(copied, "[processing]\nhighpass = 0.2\n")
+    result = run(copied / "run.toml", executor=InProcess())
+    assert result.record["counts"]["stations_resumed"] == 0
 
 
-def test_one_bad_record_does_not_stop_the_others(copied):
+def test_an_unusable_record_does_not_stop_the_others(copied):
     records = copied / "records"
     shutil.copytree(copied / "out" / "simulated", records)
+    # one station without motion, and a file that is no record
     victim = sorted(records.glob("*.mseed"))[0]
     stream = obspy.read(victim)
     for trace in stream:
         trace.data = np.zeros_like(trace.data)
     stream.write(victim, format="MSEED")
     (records / "notes.txt").write_text("not a record")
-    file = copied / "folder.toml"
-    file.write_text(
-        f'name = "folder"\noutput = "out2"\n[records]\nfolder = "records"\n[pairs]\nfile = "out/pairs.csv"\n{SPECTRA}'
-    )
-    result = run(file, executor=Here())
+    file = write_folder_configuration(copied, "out2", SPECTRA)
+    result = run(file, executor=InProcess())
     assert result.record["counts"]["stations"] == 2
+    # each thing that was left out has a row with a reason
     rejected = pd.read_csv(result.folder / "rejected.csv")
     assert {"file", "record"} <= set(rejected["kind"])
     assert rejected["reasons"].str.len().min() > 5
@@ -185,67 +199,19 @@ def test_one_bad_record_does_not_stop_the_others(copied):
 def test_nothing_usable_ends_with_reasons(copied):
     records = copied / "records"
     records.mkdir()
-    trace = obspy.Trace(
-        np.zeros(4000, dtype=np.int32), {"station": "DEAD", "network": "XX", "channel": "HNE"}
-    )
+    header = {"station": "DEAD", "network": "XX", "channel": "HNE"}
+    trace = obspy.Trace(np.zeros(4000, dtype=np.int32), header)
     trace.write(str(records / "dead.mseed"), format="MSEED")
-    file = copied / "folder.toml"
-    file.write_text(
-        'name = "x"\noutput = "out3"\n[records]\nfolder = "records"\n[pairs]\nfile = "out/pairs.csv"\n'
-    )
-    result = run(file, executor=Here())
+    # neither coordinates nor motion
+    result = run(write_folder_configuration(copied, "out3"), executor=InProcess())
     assert result.record["state"] == "nothing_usable"
     assert len(pd.read_csv(result.folder / "rejected.csv"))
     assert not (result.folder / "risk.csv").exists()
 
 
-def test_a_second_run_in_the_same_folder_is_told_who_holds_it(copied):
-    (copied / "out" / ".holder.json").write_text(
-        '{"process": 4711, "host": "quake", "since": "2026-01-01"}'
-    )
-    with (
-        FileLock(copied / "out" / ".lock"),
-        pytest.raises(
-            CatalogError,
-            match=r"another run holds this folder: process 4711 on quake since 2026-01-01",
-        ),
-    ):
-        run(copied / "run.toml", executor=Here())
-
-
-class Poison:
-    """Ends the process that unpickles it, as the kernel does with one that takes too much memory."""
-
-    def __reduce__(self):
-        return os._exit, (9,)
-
-
-def _job(station, folder, inventory=None):
-    return jobs.Job(
-        station,
-        (),
-        inventory,
-        None,
-        Processing(),
-        Spectra(),
-        folder / f"{station}.nc",
-        simulated=False,
-    )
-
-
-def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
-    some = [_job(f"XX.S{i}", tmp_path, Poison() if i == 2 else None) for i in range(4)]
-    done = {one.station: one for one in jobs.do_stations(some, workers=2)}
-    assert set(done) == {job.station for job in some}
-    assert done["XX.S2"].rejected[0].reasons == ("its worker process died",)
-    assert all("died" not in str(one.rejected) for name, one in done.items() if name != "XX.S2")
-
-
-def _raises(job):
-    raise RuntimeError(f"no luck with {job.station}")
-
-
-def test_whatever_a_worker_raises_becomes_a_reason(monkeypatch, tmp_path):
-    monkeypatch.setattr(jobs, "do_station", _raises)
-    (done,) = jobs.do_stations([_job("XX.S1", tmp_path)], workers=2)
-    assert done.rejected[0].reasons == ("RuntimeError: no luck with XX.S1",)
+def test_a_second_run_in_the_same_folder_names_the_holder(copied):
+    holder = '{"process": 4711, "host": "quake", "since": "2026-01-01"}'
+    (copied / "out" / ".holder.json").write_text(holder)
+    reason = r"another run holds this folder: process 4711 on quake since 2026-01-01"
+    with FileLock(copied / "out" / ".lock"), pytest.raises(CatalogError, match=reason):
+        run(copied / "run.toml", executor=InProcess())

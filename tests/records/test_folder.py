@@ -10,7 +10,8 @@ from obspy.core.event import Catalog, Event, Origin
 from station_files import START, read_all, record, write_records
 
 from per_obspy.errors import CatalogError
-from per_obspy.records.folder import find_stations, read_event, read_station
+from per_obspy.records.event_file import read_event
+from per_obspy.records.folder import find_stations, read_station
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import scenario_event
@@ -161,7 +161,7 @@ def test_readers_travel_to_other_processes_by_name(folder: Path):
 def test_a_workspace_brings_its_event(real_data: Path):
     path = real_data / "records" / "asdf" / "nc72282711_workspace.h5"
     found = find_sources(Records(asdf=Asdf(file=path, tag="*_default")), None)
-    assert found.event == path
+    assert found.event is not None and found.event.path == path
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
 

@@ -12,25 +12,22 @@ from per_obspy.screening.region.evaluation import evaluation
 
 
 @pytest.fixture
-def risk(tmp_path):
-    """Return a function that writes a risk table and returns its path."""
+def risk():
+    """Return a risk table with these observations, and probabilities if there are any."""
 
     def risk(observed, probability):
-        rank = range(1, len(probability) + 1)
         state = np.where(np.nan_to_num(probability) > 0.5, "yes", "no")
-        table = pd.DataFrame({"rank": rank, "state": state, "probability": probability})
-        # Without observations there is no column
-        if observed is not None:
-            table = table.assign(observed=observed)
-        table.to_parquet(tmp_path / "risk.parquet")
-        return tmp_path / "risk.parquet"
+        table = pd.DataFrame(
+            {"rank": range(1, len(probability) + 1), "state": state, "probability": probability}
+        )
+        return table if observed is None else table.assign(observed=observed)
 
     return risk
 
 
 def test_only_pairs_that_were_looked_at_count(risk, tmp_path):
-    path = risk([1.0, np.nan, 0.0, 1.0], [0.9, 0.9, 0.1, 0.2])
-    files = write_evaluation(path, tmp_path, simulated=True)
+    table = risk([1.0, np.nan, 0.0, 1.0], [0.9, 0.9, 0.1, 0.2])
+    files = write_evaluation(table, tmp_path, simulated=True)
     assert [file.relative_to(tmp_path).as_posix() for file in files] == [
         "evaluation.json",
         "figures/reliability.png",

@@ -16,7 +16,7 @@ COUNT = 500
 
 @pytest.fixture
 def tables():
-    """Two risk tables of the same inventory in different orders; two pairs stand in one of them only."""
+    """Two risk tables of the same inventory in different orders; two pairs are in one of them."""
     random = np.random.default_rng(3)
     pairs = pd.DataFrame(
         {
@@ -26,6 +26,7 @@ def tables():
             "latitude": random.uniform(10, 11, COUNT),
         }
     )
+    # Each lacks a pair of the other
     near = pairs.assign(probability=random.uniform(0, 1, COUNT))
     far = pairs.assign(probability=random.uniform(0, 0.2, COUNT))
     return {
@@ -38,6 +39,7 @@ def _written(tables, folder, csv_rows=1000, yearly=True):
     for number, table in enumerate(tables.values()):
         table.to_parquet(folder / f"{number}.parquet", index=False)
     files = {name: folder / f"{number}.parquet" for number, name in enumerate(tables)}
+    # Rates, of which that of the first is twice the other
     scenarios = Scenarios(files, dict.fromkeys(tables, 0.01) | {"near": 0.02}, yearly)
     (folder / "out").mkdir()
     return write_ensemble(scenarios, folder / "out", {"simulated": "true"}, csv_rows)
@@ -52,7 +54,8 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     # joined by pandas instead: would catch rows joined by position, or scenarios that changed
     # places
     near, far = (
-        one.set_index("pair_id")["probability"].reindex(table["pair_id"]) for one in tables.values()
+        risk.set_index("pair_id")["probability"].reindex(table["pair_id"])
+        for risk in tables.values()
     )
     assert_allclose(table["probability_near"], near)
     assert_allclose(table["probability_Far, far away"], far)
@@ -65,24 +68,22 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
 
 def test_every_file_is_written_and_every_column_described(tables, tmp_path):
     files, _ = _written(tables, tmp_path, csv_rows=5)
-    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == sorted(
-        file.name for file in files
-    )
+    assert set((tmp_path / "out").iterdir()) == set(files)
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     worst = pd.read_csv(tmp_path / "out" / "ensemble.csv")
-    pd.testing.assert_frame_equal(
-        worst, table.head(5), check_dtype=False
-    )  # text is of another type
+    # text is of another type
+    pd.testing.assert_frame_equal(worst, table.head(5), check_dtype=False)
     columns = pd.read_csv(tmp_path / "out" / "ensemble.columns.csv")
     assert columns["name"].tolist() == list(table)
     assert columns["meaning"].str.len().min() > 5
-    said = parquet.read_schema(tmp_path / "out" / "ensemble.parquet").metadata[b"per_obspy"]
-    assert json.loads(said)["simulated"] == "true"
+    metadata = parquet.read_schema(tmp_path / "out" / "ensemble.parquet").metadata
+    assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
 
 
 def test_pairs_that_one_scenario_lacks_are_rejected_by_its_name(tables, tmp_path):
     tables["near"].loc[11, "probability"] = np.nan
     _written(tables, tmp_path)
+    # a probability that is missing, or the whole pair
     rejected = pd.read_csv(tmp_path / "out" / "rejected.csv").set_index("name")["reasons"]
     assert rejected.index.tolist() == ["p007", "p009", "p011"]
     assert rejected["p007"].startswith("no probability in near:")
@@ -112,5 +113,6 @@ def test_a_scenario_without_a_result_leaves_no_pair(tables, tmp_path):
         "rejected_pair": COUNT - 1,
     }
     assert len(pd.read_parquet(tmp_path / "ensemble.parquet")) == 0
+    # no scenario has a result
     nothing = Scenarios({"near": None, "far": None}, {"near": 1.0, "far": 1.0}, yearly=False)
     assert write_ensemble(nothing, tmp_path, {}, 10)[1] == {"pairs": 0, "rejected_pair": 0}

@@ -14,13 +14,13 @@ from per_obspy.tables.parts import joined_rows, joined_schema, write_part
 
 
 def table(count, seed, first=0):
-    """Return rows of which many are equally bad, so that only their names tell them apart."""
+    """Return rows of which many are equally bad, so that only their names differ."""
     draw = np.random.default_rng(seed)
+    numbers = draw.permutation(np.arange(first, first + count))
+    # Few different values in each column of the order
     return pd.DataFrame(
         {
-            "pair_id": [
-                f"pair {number}" for number in draw.permutation(np.arange(first, first + count))
-            ],
+            "pair_id": [f"pair {number}" for number in numbers],
             "state": draw.choice(["yes", "possible", "no"], count),
             "probability": draw.choice([0.0, 0.5, 1.0], count),
             "demand_ratio": draw.choice([0.0, 0.5, np.nan], count),
@@ -57,7 +57,7 @@ def test_the_whole_is_in_order(tmp_path, monkeypatch, size, cuts):
 
 
 def test_parts_with_other_columns_and_types(tmp_path):
-    # Mutation: the first part tells the columns of all.
+    # Mutation: the first part decides the columns of all.
     first, second = (
         table(20, seed=2).assign(note=1, only_here="a"),
         table(20, seed=3, first=20).assign(note="x"),

@@ -1,4 +1,4 @@
-"""Totals of a risk table on disk: the same in pieces, by each kind of area."""
+"""Totals of a risk table: the same in pieces, by each kind of area."""
 
 import numpy as np
 import pandas as pd
@@ -6,55 +6,84 @@ import pytest
 import shapely
 
 from per_obspy.config import Totals
-from per_obspy.tables import risk as ranked
-from per_obspy.tables.totals import region_totals
+from per_obspy.tables.totals import (
+    piece_totals,
+    region_totals,
+    totals_columns,
+    write_totals,
+)
 
 COUNT = 300
 CLASSES = ["severe", "moderate", "low"]
+KINDS = [{}, {"cell": 300.0}, {"area": "ward"}, {"h3": 9}]
 
 
-@pytest.fixture
-def risk(tmp_path):
+@pytest.fixture(scope="module")
+def risk():
+    """A risk table of a small region, with the names of its wards."""
     random = np.random.default_rng(5)
-    table = pd.DataFrame(
-        {
-            "rank": np.arange(1, COUNT + 1),
-            "pair_id": [f"p{i}" for i in range(COUNT)],
-            "state": random.choice(["yes", "possible", "no"], COUNT),
-            "risk_class": random.choice(["severe", "low"], COUNT),
-            "probability": random.uniform(0, 1, COUNT),
-            "demand_ratio": random.uniform(0, 2, COUNT),
-            "longitude": random.uniform(-67.96, -67.94, COUNT),
-            "latitude": random.uniform(-20.36, -20.34, COUNT),
-            "ward": random.choice(["north", "south", None], COUNT),
-        }
-    )
-    table.to_parquet(tmp_path / "risk.parquet")
-    return tmp_path / "risk.parquet"
+    # A region of two kilometres; no pair is of the class moderate
+    columns = {
+        "rank": np.arange(1, COUNT + 1),
+        "pair_id": [f"p{i}" for i in range(COUNT)],
+        "state": random.choice(["yes", "possible", "no"], COUNT),
+        "risk_class": random.choice(["severe", "low"], COUNT),
+        "probability": random.uniform(0, 1, COUNT),
+        "demand_ratio": random.uniform(0, 2, COUNT),
+        "longitude": random.uniform(-67.96, -67.94, COUNT),
+        "latitude": random.uniform(-20.36, -20.34, COUNT),
+        "ward": random.choice(["north", "south", None], COUNT),
+    }
+    return pd.DataFrame(columns)
 
 
-@pytest.mark.parametrize("kind", [{}, {"cell": 300.0}, {"area": "ward"}, {"h3": 9}])
-def test_pieces_do_not_change_totals(risk, monkeypatch, kind):
-    # would catch outlines of the last piece only
-    whole = region_totals(risk, Totals(**kind), CLASSES)
-    monkeypatch.setattr(ranked, "ROWS", 11)
-    pieces = region_totals(risk, Totals(**kind), CLASSES)
+def totals(risk, kind, size):
+    """Return the totals of a table in pieces of some rows."""
+    settings = Totals(**kind)
+    table = risk[totals_columns(settings)]
+    pieces = [table.iloc[first : first + size] for first in range(0, COUNT, size)]
+    return region_totals((piece_totals(piece, settings, CLASSES) for piece in pieces), settings)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pieces_do_not_change_totals(risk, kind):
+    whole, pieces = totals(risk, kind, COUNT), totals(risk, kind, 11)
     pd.testing.assert_frame_equal(pieces.table, whole.table, rtol=1e-12)  # sums in another order
     assert whole.table["pairs"].sum() == COUNT
+    # would catch outlines of the last piece only
+    assert (pieces.outlines is None) == (whole.outlines is None)
+    for first, second in zip(pieces.outlines or (), whole.outlines or (), strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_class_has_a_column(risk, kind):
     # would catch columns that come and go with what a region happens to hold, and zeros where a
     # piece lacks a class
-    counts = whole.table[[f"class_{name}" for name in CLASSES]].sum()
+    table = totals(risk, kind, 11).table
+    counts = table[[f"class_{name}" for name in CLASSES]].sum()
     assert counts["class_moderate"] == 0
     assert counts.sum() == COUNT
-    if "area" in kind:
-        assert whole.outlines is None
-        assert whole.table["area"].tolist() == ["", "north", "south"]
-        return
-    assert len(whole.table) > 3
-    assert all(np.array_equal(a, b) for a, b in zip(pieces.outlines, whole.outlines, strict=True))
+
+
+def test_named_areas_have_no_outline(risk):
+    found = totals(risk, {"area": "ward"}, COUNT)
+    assert found.outlines is None
+    assert found.table["area"].tolist() == ["", "north", "south"]
+
+
+@pytest.mark.parametrize("kind", [{}, {"cell": 300.0}, {"h3": 9}])
+def test_cells_contain_their_pairs(risk, kind):
     # the middle of its pairs lies in each cell: these are convex, and small enough to be flat
-    places = shapely.points(whole.table["longitude"], whole.table["latitude"])
-    assert all(
-        shapely.Polygon(corners).contains(place)
-        for corners, place in zip(whole.outlines, places, strict=True)
-    )
+    found = totals(risk, kind, COUNT)
+    assert len(found.table) > 3
+    places = shapely.points(found.table["longitude"], found.table["latitude"])
+    for corners, place in zip(found.outlines, places, strict=True):
+        assert shapely.Polygon(corners).contains(place)
+
+
+def test_totals_as_text_are_the_totals(risk, tmp_path):
+    table = totals(risk, {"area": "ward"}, COUNT).table
+    write_totals(table, tmp_path / "totals.csv")
+    read = pd.read_csv(tmp_path / "totals.csv", keep_default_na=False)
+    pd.testing.assert_frame_equal(read, table, check_dtype=False, rtol=1e-12)

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from per_obspy.errors import CatalogError
-from per_obspy.files import told_apart
+from per_obspy.files import unreadable_reason
 from per_obspy.inventory.files.csv_rows import CsvFile
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
 from per_obspy.inventory.schema import COLUMNS
@@ -50,7 +50,7 @@ class ParquetFile:
             yield
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise CatalogError(
-                str(self.file), told_apart(self.file, "Parquet table", error)
+                str(self.file), unreadable_reason(self.file, "Parquet table", error)
             ) from error
 
 

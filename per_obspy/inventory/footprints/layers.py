@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import told_apart
+from per_obspy.files import unreadable_reason
 
 #: Files that GDAL reads for us; GeoParquet is read by pyarrow.
 GDAL_KINDS = {
@@ -135,7 +135,7 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
         UnicodeDecodeError,
     ) as error:
         raise CatalogError(
-            str(file), told_apart(file, GDAL_KINDS[file.suffix.lower()], error)
+            str(file), unreadable_reason(file, GDAL_KINDS[file.suffix.lower()], error)
         ) from error
     attributes = pd.DataFrame(
         dict(zip(meta["fields"], fields, strict=True)), index=range(len(geometries))
@@ -164,7 +164,7 @@ def _read_geoparquet(file: Path) -> _Raw:
     try:
         table = pa.parquet.read_table(file)
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), told_apart(file, "Parquet table", error)) from error
+        raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     described = (table.schema.metadata or {}).get(b"geo")
     if described is None:
         raise CatalogError(

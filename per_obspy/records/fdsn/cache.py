@@ -4,10 +4,10 @@ Records from FDSN web services, kept in a folder that any later run reads withou
 A cache holds ``event-ID.xml`` and one folder for each window and choice of channels, with
 ``NET.STA.mseed`` and ``NET.STA.xml`` of every station. Files appear whole or not at all and are
 never asked for again, so that a killed fetch goes on where it stopped; what it left half written
-(``.….part.…``) is passed over. ``complete-….json`` says that a request has nothing left to ask for.
+(``.….part.…``) is passed over and removed. ``complete-….json``, a status file of
+:mod:`per_obspy.resume`, is written when a request has nothing left to ask for.
 """
 
-import json
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -19,10 +19,11 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
-from per_obspy.files import written_whole
+from per_obspy.files import remove_dead_parts
 from per_obspy.progress import Progress, silent
-from per_obspy.records.events import fetched_event, read_event
+from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
+from per_obspy.records.fdsn.event_list import fetched_event
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
     Wanted,
@@ -33,20 +34,21 @@ from per_obspy.records.fdsn.request import (
     wanted_around,
 )
 from per_obspy.records.fdsn.web import answer, host, web_pool
-from per_obspy.records.folder import FolderContents, find_stations
+from per_obspy.records.folder import SourceContents, find_stations
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
+from per_obspy.resume import earlier_status, write_status
 
 
 class Fetched(NamedTuple):
     """
-    What a cache holds of a request.
+    Content of a cache for a request.
 
     Attributes
     ----------
     folder : Path
         With MiniSEED and StationXML of every station.
-    event : Path or None
-        QuakeML file.
+    event : EventFile or None
+        QuakeML file and its event.
     wanted : Wanted
         What was asked for.
     rejected : tuple of Rejection
@@ -54,7 +56,7 @@ class Fetched(NamedTuple):
     """
 
     folder: Path
-    event: Path | None
+    event: EventFile | None
     wanted: Wanted
     rejected: tuple[Rejection, ...]
 
@@ -75,7 +77,7 @@ def fetch(
     event : Path, optional
         QuakeML file, instead of the event that the request names.
     progress : callable
-        Told of every station: stage, done, total.
+        Called for every station: stage, done, total.
     again : bool
         Whether to ask again for stations of which every service had no data.
 
@@ -89,47 +91,66 @@ def fetch(
     pool = web_pool(request.timeout, request.retries, request.wait)
     if event is None and request.event_id:
         event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
-    wanted = wanted_around(request, read_event(event) if event else None)
-    folder = request.cache / folder_name(wanted)
-    mark = request.cache / f"complete-{digest((wanted, request.providers))}.json"
-    if mark.is_file() and not again:
-        return Fetched(folder, event, wanted, _noted(mark))
+    origin = read_event_file(event) if event else None
+    wanted = wanted_around(request, origin.event if origin else None)
+    fetched = Fetched(request.cache / folder_name(wanted), origin, wanted, ())
+
+    # A complete request is answered from the cache
+    key = digest((wanted, request.providers))
+    status_file = request.cache / f"complete-{key}.json"
+    status = None if again else earlier_status(status_file, key)
+    if status is not None:
+        return fetched._replace(rejected=tuple(map(Rejection.stored, status["rejected"])))
+
+    # Everything else needs the services
     if wanted.end > UTCDateTime():
         raise ServiceError(
             f"the wanted window lasts until {wanted.end}, which is still to come: fetch after it"
         )
-    bases, rejected = base_urls(pool, request.providers, station_parameters(wanted))
-    offers, unlisted = _offers(pool, bases, wanted)
-    rejected += unlisted
-    outcomes = _stations(pool, wanted, folder, offers, request.connections, progress)
-    complete = not rejected and all(outcome.lasting for outcome in outcomes)
-    rejected += [
-        Rejection("station", one.station, "FDSN", None, one.reasons)
-        for one in outcomes
-        if one.reasons
-    ]
+    remove_dead_parts(request.cache)
+    rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
-        rejected += [] if offers else _nobody(bases, wanted)
-        with written_whole(mark) as part:
-            part.write_text(json.dumps(rejected), encoding="utf-8")
-    fetched = Fetched(folder, event, wanted, tuple(rejected))
+        write_status(status_file, key, {}, {"rejected": rejected})
+    fetched = fetched._replace(rejected=tuple(rejected))
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
 
 
-def fetched_stations(fetched: Fetched) -> FolderContents:
-    """Return what the cache holds of a request, in the words of ``records.folder.find_stations``."""
+def _fetch_missing(
+    pool: urllib3.PoolManager, request: config.Fdsn, fetched: Fetched, progress: Progress
+) -> tuple[list[Rejection], bool]:
+    """Fetch what the cache lacks; return what failed, and whether nothing is left to ask for."""
+    wanted = fetched.wanted
+    bases, rejected = base_urls(pool, request.providers, station_parameters(wanted))
+    offers, unlisted = _offers(pool, bases, wanted)
+    rejected += unlisted
+    outcomes = _stations(pool, fetched, offers, request.connections, progress)
+    complete = not rejected and all(outcome.lasting for outcome in outcomes)
+    # Stations without a reason are in the cache
+    rejected += [
+        Rejection("station", outcome.station, "FDSN", None, outcome.reasons)
+        for outcome in outcomes
+        if outcome.reasons
+    ]
+    if complete and not offers:
+        rejected += _no_station(bases, wanted)
+    return rejected, complete
+
+
+def fetched_stations(fetched: Fetched) -> SourceContents:
+    """Return the cached stations of a request, as ``records.folder.find_stations`` does."""
     if not any(fetched.folder.glob("*.mseed")):
-        return FolderContents({}, None, fetched.rejected)
+        return SourceContents({}, None, fetched.rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
-    whole = {
-        name: tuple(path for path in paths if path.stem == name)
-        for name, paths in found.stations.items()
-    }
-    stations = {name: paths for name, paths in whole.items() if paths and name in inside}
-    return FolderContents(stations, found.inventory, fetched.rejected)
+    stations = {}
+    for name, paths in found.stations.items():
+        # Half a file of a killed fetch has another stem
+        whole = tuple(path for path in paths if path.stem == name)
+        if whole and name in inside:
+            stations[name] = whole
+    return SourceContents(stations, found.inventory, fetched.rejected, found.hashes)
 
 
 def _offers(
@@ -140,6 +161,7 @@ def _offers(
     rejected = []
     for base in bases:
         url = f"{base}/fdsnws/station/1/query"
+        # A service that fails costs its own stations only
         try:
             listed = _listed(pool, url, wanted)
         except (ServiceError, RecordRejected) as fault:
@@ -151,6 +173,7 @@ def _offers(
 
 
 def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:
+    """Return the channels that a service has of a request."""
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
         return Inventory()
@@ -161,35 +184,31 @@ def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:
 
 
 def _channels(inventory: Inventory, station: str) -> tuple[tuple[str, str], ...]:
+    """Return location and channel codes of a station, sorted and each once."""
     network, code = station.split(".", 1)
-    selected = inventory.select(network=network, station=code)
-    return tuple(
-        sorted(
-            {
-                (channel.location_code, channel.code)
-                for network in selected
-                for place in network
-                for channel in place
-            }
-        )
-    )
+    codes = {
+        (channel.location_code, channel.code)
+        for selected in inventory.select(network=network, station=code)
+        for place in selected
+        for channel in place
+    }
+    return tuple(sorted(codes))
 
 
 def _stations(
     pool: urllib3.PoolManager,
-    wanted: Wanted,
-    folder: Path,
+    fetched: Fetched,
     offers: dict[str, list[Offer]],
     connections: int,
     progress: Progress,
 ) -> list[Outcome]:
-    """Fetch several stations at the same time; when interrupted, leave the rest for the next time."""
+    """Fetch several stations at the same time; when interrupted, leave the rest for later."""
     threads = ThreadPoolExecutor(connections)
     outcomes = []
     try:
         futures = [
-            threads.submit(fetch_station, pool, wanted, folder, name, each)
-            for name, each in offers.items()
+            threads.submit(fetch_station, pool, fetched.wanted, fetched.folder, name, services)
+            for name, services in offers.items()
         ]
         for future in as_completed(futures):
             outcomes.append(future.result())
@@ -199,15 +218,9 @@ def _stations(
     return sorted(outcomes)
 
 
-def _nobody(bases: list[str], wanted: Wanted) -> list[Rejection]:
-    said = f"no station within {wanted.radius:.3g} degrees of {wanted.latitude:g}, {wanted.longitude:g}"
-    reason = f"{said} has channels {','.join(wanted.channels)} from {wanted.start} to {wanted.end}"
+def _no_station(bases: list[str], wanted: Wanted) -> list[Rejection]:
+    """Return one row per service that has no station inside the circle."""
+    place = f"{wanted.radius:.3g} degrees of {wanted.latitude:g}, {wanted.longitude:g}"
+    channels = f"channels {','.join(wanted.channels)} from {wanted.start} to {wanted.end}"
+    reason = f"no station within {place} has {channels}"
     return [Rejection("service", host(base), base, None, (reason,)) for base in bases]
-
-
-def _noted(mark: Path) -> tuple[Rejection, ...]:
-    """Return the rejections that a complete fetch has noted."""
-    return tuple(
-        Rejection(kind, name, source, row, tuple(reasons))
-        for kind, name, source, row, reasons in json.loads(mark.read_text(encoding="utf-8"))
-    )

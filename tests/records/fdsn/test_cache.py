@@ -27,7 +27,7 @@ from obspy import UTCDateTime
 
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.records.events import read_event
+from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn import providers
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.folder import read_station

@@ -11,7 +11,8 @@ from obspy.core.event import Catalog, Event, Origin
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
-from per_obspy.records.events import EventRow, find_events, read_event
+from per_obspy.records.event_file import read_event
+from per_obspy.records.fdsn.event_list import EventRow, find_events
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 

@@ -1,4 +1,4 @@
-"""Fetching alone: the cache of a run's FDSN section is filled, and nothing is computed."""
+"""Fetching alone: fill the cache of a run's FDSN section without computing anything."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from per_obspy.records.fdsn.cache import fetch, fetched_stations
 
 class FetchResult(NamedTuple):
     """
-    What is at hand after fetching.
+    Records at hand after fetching.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ def fetch_configured(
     again : bool
         Whether to ask again for stations of which every service had no data.
     progress : callable
-        Told of every station: stage, done, total.
+        Called for every station: stage, done, total.
 
     Raises
     ------

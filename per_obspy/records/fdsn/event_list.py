@@ -1,24 +1,24 @@
-"""Earthquakes: from QuakeML files, FDSN event services, GeoJSON feeds of the USGS, and ASDF workspaces."""
+"""Lists of earthquakes from QuakeML files, FDSN event services and GeoJSON feeds of the USGS."""
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import obspy
+import urllib3
 from obspy import UTCDateTime
 from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
 from per_obspy.files import written_whole
-from per_obspy.records import folder
-from per_obspy.records.asdf import is_asdf, read_asdf_event
+from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.web import NotFound, answer, web_pool
 from per_obspy.records.obspy_readers import read_with_obspy
 
-#: how patiently a list of events is asked for: s, retries, s
+#: Patience with a service that lists events: s, retries, s.
 _PATIENCE = (60.0, 3, 1.0)
 
 
@@ -51,7 +51,7 @@ class EventRow(NamedTuple):
     place: str
 
 
-#: What files of events are called; other sources that are no file are services.
+#: Suffixes of files of events; other sources that are no file are services.
 FILES = (".xml", ".quakeml", ".json", ".geojson")
 
 
@@ -78,30 +78,17 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     if Path(source).is_file():
         rows = _rows_of_file(Path(source))
     elif source.startswith(("http://", "https://")) and ".geojson" in source:
-        rows = _rows_of_answer(source, _feed_rows, answer(web_pool(*_PATIENCE), source, {}))
+        rows = _rows_of_answer(source, _feed_rows, {})
     elif Path(source).suffix.lower() in FILES and "://" not in source:
         raise CatalogError(source, "no such file")
     else:
+        # Everything else is the base URL or the name of an event service
         url = f"{base_url(source)}/fdsnws/event/1/query"
-        rows = _rows_of_answer(
-            url, _text_rows, answer(web_pool(*_PATIENCE), url, {**query, "format": "text"})
-        )
+        rows = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
     return sorted(rows, key=lambda row: row.time, reverse=True)
 
 
-def read_event(path: Path) -> Event:
-    """
-    Read the one event of a QuakeML file or of an ASDF workspace.
-
-    Raises
-    ------
-    CatalogError
-        If the file cannot be read or does not hold exactly one event with an origin.
-    """
-    return read_asdf_event(path) if path.is_file() and is_asdf(path) else folder.read_event(path)
-
-
-def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:
+def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache: Path) -> Path:
     """
     Return the QuakeML file of an event in the cache; it is fetched if it is not there.
 
@@ -123,88 +110,93 @@ def fetched_event(pool: Any, provider: str, event_id: str, cache: Path) -> Path:
     ServiceError
         If the service does not answer, or with something else.
     """
-    path = (
-        cache / f"event-{''.join(letter if letter.isalnum() else '-' for letter in event_id)}.xml"
-    )
+    name = "".join(letter if letter.isalnum() else "-" for letter in event_id)
+    path = cache / f"event-{name}.xml"
     if path.is_file():
         return path
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
-        said = answer(pool, url, {"eventid": event_id, "format": "quakeml"})
+        content = answer(pool, url, {"eventid": event_id, "format": "quakeml"})
     except NotFound:
-        said = b""
-    if not said:
+        content = b""
+    if not content:
         raise CatalogError(url, f"has no event {event_id}")
+    # Only an answer that can be read as one event stays in the cache
     with written_whole(path) as part:
-        part.write_bytes(said)
+        part.write_bytes(content)
         try:
-            folder.read_event(part)
+            read_event(part)
         except CatalogError as error:
-            raise ServiceError(
-                f"{url}: answers with something else than the event: {error.problem}"
-            ) from error
+            reason = f"answers with something else than the event: {error.problem}"
+            raise ServiceError(f"{url}: {reason}") from error
     return path
 
 
 def _rows_of_file(path: Path) -> list[EventRow]:
+    """Return the earthquakes of a GeoJSON or QuakeML file."""
     content = path.read_bytes()
     try:
         if content.lstrip()[:1] == b"{":
             return _feed_rows(content)
         return [_quakeml_row(event) for event in read_with_obspy(obspy.read_events, path)]
     except (RecordRejected, ValueError, KeyError, TypeError, IndexError) as error:
-        raise CatalogError(str(path), f"is no list of events: {_said(error)}") from error
+        raise CatalogError(str(path), f"is no list of events: {_reason(error)}") from error
 
 
-def _rows_of_answer(url: str, rows: Any, content: bytes) -> list[EventRow]:
+def _rows_of_answer(
+    url: str, rows: Callable[[bytes], list[EventRow]], query: Mapping[str, str]
+) -> list[EventRow]:
+    """Return the earthquakes in the answer of a service or feed."""
+    content = answer(web_pool(*_PATIENCE), url, query)
     try:
-        found: list[EventRow] = rows(content)
+        return rows(content)
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise ServiceError(
-            f"{url}: answers with something else than a list of events: {_said(error)}"
-        ) from error
-    return found
+        reason = f"answers with something else than a list of events: {_reason(error)}"
+        raise ServiceError(f"{url}: {reason}") from error
 
 
-def _said(error: Exception) -> str:
+def _reason(error: Exception) -> str:
+    """Return the message of an error, of one of Python's own with its class."""
     return str(error) if isinstance(error, PerError) else f"{type(error).__name__}: {error}"
 
 
 def _feed_rows(content: bytes) -> list[EventRow]:
-    """Return the rows of a GeoJSON feed: time in ms, depth in km."""
-    rows = []
-    for feature in json.loads(content)["features"]:
-        known, (longitude, latitude, *depth) = (
-            feature["properties"],
-            feature["geometry"]["coordinates"],
-        )
-        row = EventRow(
-            event_id=feature["id"],
-            time=_iso(UTCDateTime(known["time"] / 1000)),
-            latitude=float(latitude),
-            longitude=float(longitude),
-            depth=1000 * depth[0] if depth and depth[0] is not None else None,
-            magnitude=known.get("mag"),
-            magnitude_type=known.get("magType") or "",
-            place=known.get("place") or "",
-        )
-        rows.append(row)
-    return rows
+    """Return the earthquakes of a GeoJSON feed: time in ms, depth in km."""
+    return [_feed_row(feature) for feature in json.loads(content)["features"]]
+
+
+def _feed_row(feature: dict[str, Any]) -> EventRow:
+    """Return one earthquake of a GeoJSON feed, depth in m."""
+    properties = feature["properties"]
+    longitude, latitude, *depth = feature["geometry"]["coordinates"]
+    # A feed leaves out or nulls what its network does not know
+    return EventRow(
+        event_id=feature["id"],
+        time=_iso(UTCDateTime(properties["time"] / 1000)),
+        latitude=float(latitude),
+        longitude=float(longitude),
+        depth=1000 * depth[0] if depth and depth[0] is not None else None,
+        magnitude=properties.get("mag"),
+        magnitude_type=properties.get("magType") or "",
+        place=properties.get("place") or "",
+    )
 
 
 def _text_rows(content: bytes) -> list[EventRow]:
-    """Return the rows of the text format of fdsnws-event 1.2: depth in km, 13 columns and perhaps more."""
+    """Return the earthquakes of the text format of fdsnws-event 1.2: 13 columns and perhaps more."""
     if not content:
         return []
-    header, *lines = csv.reader(
-        content.decode("utf-8").splitlines(), delimiter="|", quoting=csv.QUOTE_NONE
-    )
+    lines = content.decode("utf-8").splitlines()
+    header, *rows = csv.reader(lines, delimiter="|", quoting=csv.QUOTE_NONE)
+    # A web page or an error text of the service has another first line
     if not header[0].lstrip("# ").startswith("EventID"):
         raise ValueError(f"the first line is {'|'.join(header):.80}")
-    return [_text_row([cell.strip() for cell in line]) for line in lines if line]
+    return [_text_row(row) for row in rows if row]
 
 
-def _text_row(cells: list[str]) -> EventRow:
+def _text_row(row: list[str]) -> EventRow:
+    """Return one earthquake of the text format, depth from km to m."""
+    cells = [cell.strip() for cell in row]
     event_id, time, latitude, longitude, depth = cells[:5]
     magnitude_type, magnitude = cells[9:11]
     return EventRow(
@@ -220,25 +212,28 @@ def _text_row(cells: list[str]) -> EventRow:
 
 
 def _quakeml_row(event: Event) -> EventRow:
+    """Return one earthquake of a QuakeML file, from its preferred origin and magnitude."""
+    name = str(event.resource_id)
     if not event.origins:
-        raise RecordRejected(str(event.resource_id), "has no origin")
+        raise RecordRejected(name, "has no origin")
     origin = event.preferred_origin() or event.origins[0]
     if None in (origin.time, origin.latitude, origin.longitude):
-        raise RecordRejected(
-            str(event.resource_id), "has an origin without time, latitude or longitude"
-        )
+        raise RecordRejected(name, "has an origin without time, latitude or longitude")
+    # Magnitude and place may be unknown
     size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    descriptions = event.event_descriptions
     return EventRow(
-        str(event.resource_id).rpartition("/")[2],
+        name.rpartition("/")[2],
         _iso(origin.time),
         float(origin.latitude),
         float(origin.longitude),
         origin.depth,
         float(size.mag) if size else None,
         (size.magnitude_type or "") if size else "",
-        event.event_descriptions[0].text if event.event_descriptions else "",
+        descriptions[0].text if descriptions else "",
     )
 
 
 def _iso(time: UTCDateTime) -> str:
+    """Return a time in ISO 8601 to the millisecond."""
     return str(time.datetime.isoformat(timespec="milliseconds"))

@@ -1,0 +1,165 @@
+"""Ground motion of a region as files and small tables, which other processes read once each."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from per_obspy.config import Interpolation
+from per_obspy.errors import Rejection
+from per_obspy.files import bytes_hash, file_hash
+from per_obspy.jobs.station import FinishedStation
+from per_obspy.records.shakemap import read_shakemap
+from per_obspy.screening.ground_motion.assignment import Stations, site_class_of
+from per_obspy.screening.ground_motion.site_motion import (
+    Hypocentre,
+    RegionalMotion,
+    StationField,
+    prepared_field,
+)
+from per_obspy.spectra.storage import read_spectra
+
+#: Attributes of a station's Dataset with the place where the earthquake started.
+HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
+
+#: Stations that a worker keeps in memory, each of about 2 MB.
+STATIONS_KEPT = 200
+
+
+class StationFile(NamedTuple):
+    """
+    A station that can serve pairs.
+
+    Attributes
+    ----------
+    name : str
+        ``NETWORK.STATION``.
+    longitude, latitude : float
+        Degrees east and north.
+    site_class : str
+        Of the ground, empty if unknown.
+    shard : Path
+        Its Dataset.
+    hash : str
+        Of the shard.
+    """
+
+    name: str
+    longitude: float
+    latitude: float
+    site_class: str
+    shard: Path
+    hash: str
+
+
+class GroundFiles(NamedTuple):
+    """
+    Ground motion of a region, for other processes to read.
+
+    Attributes
+    ----------
+    stations : tuple of StationFile
+        Stations that can serve pairs.
+    field : StationField or None
+        The motion between them; None if there are none.
+    shakemap : tuple of Path
+        ``grid.xml``, perhaps ``uncertainty.xml`` as well; empty if there is no map.
+    key : str
+        Hash of all their contents.
+    """
+
+    stations: tuple[StationFile, ...]
+    field: StationField | None
+    shakemap: tuple[Path, ...]
+    key: str
+
+
+def ground_files(
+    stations: Iterable[FinishedStation], shakemap: tuple[Path, ...], settings: Interpolation
+) -> tuple[GroundFiles, tuple[Rejection, ...]]:
+    """
+    Describe the ground motion by finished stations and a ShakeMap; no shard is opened.
+
+    Parameters
+    ----------
+    stations : iterable of FinishedStation
+        With shards of spectra.
+    shakemap : tuple of Path
+        Files of the ShakeMap, empty if there is none.
+    settings : Interpolation
+        For the motion between the stations.
+
+    Returns
+    -------
+    ground : GroundFiles
+    rejected : tuple of Rejection
+        Stations without coordinates.
+    """
+    files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
+    for station in stations:
+        file, dataset = _station_file(station)
+        if np.isfinite(file.longitude):
+            files.append(file)
+            spectra.append(dataset)
+        else:
+            reason = "its coordinates are unknown: it serves no pair"
+            rejected.append(Rejection("station", file.name, "", None, (reason,)))
+
+    # All stations recorded the same earthquake
+    hypocentre = _hypocentre(spectra[-1]) if spectra else []
+    field = prepared_field(spectra, settings, *hypocentre) if spectra else None
+    contents = [(file.name, file.hash) for file in files]
+    known = [*contents, *map(file_hash, shakemap), hypocentre]
+    key = bytes_hash(repr(known).encode())
+    return GroundFiles(tuple(files), field, shakemap, key), tuple(rejected)
+
+
+def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
+    """Return name, place and ground of a station with its spectra."""
+    spectra, shard = station.spectra, station.shard
+    assert spectra is not None  # stations without a shard serve no pair
+    assert shard is not None
+    name, longitude, latitude = (
+        spectra[key].item() for key in ("station", "longitude", "latitude")
+    )
+    site_class = site_class_of(spectra)
+    return StationFile(name, longitude, latitude, site_class, shard, station.hash), spectra
+
+
+def _hypocentre(spectra: xr.Dataset) -> list[Hypocentre]:
+    """Return the place where the earthquake started, in a list that is empty if it is unknown."""
+    if HYPOCENTRE[0] not in spectra.attrs:
+        return []
+    return [Hypocentre(*(spectra.attrs[name] for name in HYPOCENTRE))]
+
+
+def read_ground(files: GroundFiles) -> RegionalMotion:
+    """Return the ground motion of a region; a station is read when a pair needs it."""
+    places = [(file.longitude, file.latitude) for file in files.stations]
+    longitude, latitude = np.array(places).reshape(-1, 2).T
+    names = np.array([file.name for file in files.stations], dtype=object)
+    classes = np.array([file.site_class for file in files.stations], dtype=object)
+    shards = [(file.shard, file.hash) for file in files.stations]
+    # Stations and the map stay in memory from one chunk to the next
+    stations = Stations(
+        names, longitude, latitude, classes, lambda index: read_station_once(*shards[index])
+    )
+    shakemap = _shakemap(files.shakemap, files.key) if files.shakemap else None
+    return RegionalMotion(stations, files.field, shakemap)
+
+
+@lru_cache(1)
+def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
+    """Return a ShakeMap; a changed one has another key."""
+    del key
+    return read_shakemap(*files)
+
+
+@lru_cache(STATIONS_KEPT)
+def read_station_once(shard: Path, digest: str) -> xr.Dataset:
+    """Return a station's Dataset with its motion; a changed shard has another hash."""
+    del digest
+    return read_spectra(shard, shard.read_bytes())

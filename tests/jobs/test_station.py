@@ -1,0 +1,182 @@
+"""Stations as jobs: shards and their status files, faults that cost one station only."""
+
+import os
+import pickle
+from functools import partial
+
+import pytest
+import xarray as xr
+
+from per_obspy.config import Processing, Scenario, Spectra
+from per_obspy.errors import CatalogError
+from per_obspy.jobs import station as jobs
+from per_obspy.jobs.station import StationJob, do_stations, earlier_station
+from per_obspy.records.event_file import read_event_file
+from per_obspy.records.folder import read_station
+from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.records.sources import find_path_sources
+from per_obspy.spectra.storage import read_spectra
+
+GRID = Spectra(count=5, dampings=(0.05,), azimuth_step=90)
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """A folder with two simulated stations, their metadata and their event."""
+    folder = tmp_path_factory.mktemp("records")
+    write_simulation(simulate(Scenario(stations=2, dt=0.02, magnitude=5.5)), folder)
+    return folder
+
+
+@pytest.fixture
+def make_jobs(records, tmp_path):
+    """Return a function that makes the jobs of both stations."""
+
+    def make_jobs(**changes):
+        # Records in the folder of the module, shards in that of the test
+        found = find_path_sources([records])
+        common = {"processing": Processing(), "spectra": GRID, "simulated": True} | changes
+        return [
+            StationJob(
+                station=name,
+                source=source.files,
+                inventory=source.inventory,
+                event=read_event_file(records / "event.xml"),
+                shard=tmp_path / f"{name}.nc",
+                hashes=source.hashes,
+                **common,
+            )
+            for name, source in sorted(found.stations.items())
+        ]
+
+    return make_jobs
+
+
+def done(jobs, workers=1):
+    return sorted(do_stations(jobs, workers), key=lambda station: station.station)
+
+
+def test_a_finished_station_carries_its_spectra_and_the_hash_of_its_shard(make_jobs):
+    # would catch spectra that differ from those of the shard, which later stages do not read
+    for first, again in zip(done(make_jobs()), done(make_jobs()), strict=True):
+        assert (first.resumed, again.resumed) == (False, True)
+        whole = read_spectra(first.shard)
+        for station in (first, again):
+            assert station.hash == first.hash
+            xr.testing.assert_identical(station.spectra, whole[list(station.spectra.variables)])
+        assert "acceleration" in whole
+        assert "acceleration" not in first.spectra
+
+
+def test_a_shard_knows_where_the_earthquake_started(make_jobs, records):
+    origin = read_event_file(records / "event.xml").event.origins[0]
+    attributes = done(make_jobs())[0].spectra.attrs
+    assert attributes["hypocentre_depth"] == origin.depth
+    assert attributes["hypocentre_longitude"] == origin.longitude
+
+
+CHANGES = {
+    "settings": {"processing": Processing(highpass=0.2)},
+    "grid": {"spectra": GRID.model_copy(update={"count": 6})},
+    "kind of motion": {"simulated": False},
+    "reader": {"reader": partial(read_station, start=None)},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_whatever_changes_a_shard_changes_its_key(make_jobs, change):
+    done(make_jobs())
+    assert not any(station.resumed for station in done(make_jobs(**CHANGES[change])))
+
+
+def test_a_changed_file_is_read_again(make_jobs):
+    first, second = make_jobs()
+    done([first, second])
+    again = done([first._replace(hashes=("another",) * len(first.hashes)), second])
+    assert [station.resumed for station in again] == [False, True]
+
+
+FAULTS = {
+    "shard cut": lambda shard: shard.write_bytes(shard.read_bytes()[:-1]),
+    "shard removed": lambda shard: shard.unlink(),
+    "status removed": lambda shard: shard.with_suffix(".json").unlink(),
+    "status cut": lambda shard: shard.with_suffix(".json").write_bytes(b'{"key": '),
+    "status without rejections": lambda shard: shard.with_suffix(".json").write_text(
+        '{"key": "x", "outputs": {}}'
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_station_that_is_not_whole_is_done_again(make_jobs, fault):
+    before = [station.hash for station in done(make_jobs())]
+    FAULTS[fault](make_jobs()[0].shard)
+    again = done(make_jobs())
+    assert [station.resumed for station in again] == [False, True]
+    assert [station.hash for station in again] == before
+
+
+def test_an_earlier_station_is_found_by_its_status(make_jobs):
+    station = done(make_jobs())[0]
+    found = earlier_station(station.shard.with_suffix(".json"))
+    assert found[:2] == station[:2]
+    assert found.hash == station.hash
+    # a shard that was damaged since is an error
+    station.shard.write_bytes(b"half")
+    with pytest.raises(CatalogError, match="damaged: not as the run left it"):
+        earlier_station(station.shard.with_suffix(".json"))
+    station.shard.with_suffix(".json").write_text("[]")
+    with pytest.raises(CatalogError, match="not the note of a station"):
+        earlier_station(station.shard.with_suffix(".json"))
+
+
+def test_finished_stations_travel_to_other_processes(make_jobs):
+    first = {station.station: station for station in do_stations(make_jobs(), workers=2)}
+    # the same job in this process
+    for station in done([job._replace(shard=job.shard.with_stem("a")) for job in make_jobs()]):
+        xr.testing.assert_identical(first[station.station].spectra, station.spectra)
+        again = pickle.loads(pickle.dumps(station))
+        xr.testing.assert_identical(again.spectra, station.spectra)
+
+
+def empty_job(station, folder, **changes):
+    """Return a job without files."""
+    common = {"processing": Processing(), "spectra": Spectra(), "simulated": False}
+    shard = folder / f"{station}.nc"
+    return StationJob(station, (), None, None, shard=shard, **common)._replace(**changes)
+
+
+class Poison:
+    """Ends the process that unpickles it, as the system does with one that needs too much."""
+
+    def __reduce__(self):
+        return os._exit, (9,)
+
+
+def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
+    batch = [empty_job(f"XX.S{number}", tmp_path) for number in range(4)]
+    batch[2] = batch[2]._replace(reader=partial(read_station, Poison()))
+    stations = {station.station: station for station in do_stations(batch, workers=2)}
+    # every station has a result, and only the guilty one died
+    assert set(stations) == {job.station for job in batch}
+    died = [name for name, station in stations.items() if "died" in str(station.rejected)]
+    assert died == ["XX.S2"]
+    assert stations["XX.S2"].rejected[0].reasons == ("its worker process died",)
+
+
+def _raises(job):
+    raise RuntimeError(f"no luck with {job.station}")
+
+
+def test_whatever_a_worker_raises_becomes_a_reason(monkeypatch, tmp_path):
+    monkeypatch.setattr(jobs, "do_station", _raises)
+    (station,) = do_stations([empty_job("XX.S1", tmp_path)], workers=2)
+    assert station.rejected[0].reasons == ("RuntimeError: no luck with XX.S1",)
+
+
+def test_a_key_that_cannot_be_computed_costs_its_own_station(tmp_path):
+    # would catch a run that ends with the metadata of one station
+    batch = [empty_job("XX.S1", tmp_path, inventory=object()), empty_job("XX.S2", tmp_path)]
+    stations = done(batch)
+    assert [station.station for station in stations] == ["XX.S1", "XX.S2"]
+    assert stations[0].rejected[0].reasons[0].startswith("AttributeError")

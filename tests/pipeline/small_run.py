@@ -1,0 +1,36 @@
+"""A small simulated run that several test modules share: three stations, sixty pairs."""
+
+from concurrent.futures import Executor, Future
+from pathlib import Path
+
+SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
+SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
+
+
+class InProcess(Executor):
+    """Do the work at once in this process: no test needs more, but those of the pool."""
+
+    def submit(self, function, /, *arguments):
+        future = Future()
+        try:
+            future.set_result(function(*arguments))
+        except Exception as error:  # noqa: BLE001 - whatever it is, its result raises it
+            future.set_exception(error)
+        return future
+
+
+def write_configuration(folder: Path, text: str = "") -> Path:
+    """Write the configuration of the run, with further lines, and return its path."""
+    (folder / "scenario.toml").write_text(SCENARIO)
+    file = folder / "run.toml"
+    head = 'name = "small"\noutput = "out"\nsimulation = "scenario.toml"\n'
+    file.write_text(f"{head}{text}{SPECTRA}")
+    return file
+
+
+def write_folder_configuration(folder: Path, output: str, text: str = "") -> Path:
+    """Write the configuration of a run of the records in a folder, and return its path."""
+    file = folder / "folder.toml"
+    head = f'name = "folder"\noutput = "{output}"\n[records]\nfolder = "records"\n'
+    file.write_text(f'{head}[pairs]\nfile = "out/pairs.csv"\n{text}')
+    return file

@@ -1,0 +1,98 @@
+"""The one earthquake of a file: read and hashed together, and sent to other processes."""
+
+import pickle
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from obspy import UTCDateTime
+from obspy.core.event import Catalog, Event, Magnitude, Origin
+
+from per_obspy.errors import CatalogError
+from per_obspy.files import file_hash
+from per_obspy.records.event_file import portable, read_event, read_event_file
+
+START = UTCDateTime(2019, 7, 6, 3, 19, 53)
+
+
+@pytest.fixture
+def event_file(tmp_path: Path) -> Path:
+    """An event with two origins and two magnitudes, of which the second ones are preferred."""
+    origins = [Origin(time=START + i, latitude=35.0, longitude=-117.0 - i) for i in range(2)]
+    magnitudes = [Magnitude(mag=6.9 + i / 10) for i in range(2)]
+    event = Event(origins=origins, magnitudes=magnitudes)
+    # Origins and magnitudes are referred to by their identifiers
+    event.preferred_origin_id = origins[1].resource_id
+    event.preferred_magnitude_id = magnitudes[1].resource_id
+    Catalog([event]).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    return tmp_path / "event.xml"
+
+
+def test_the_hash_is_that_of_the_file(event_file: Path):
+    file = read_event_file(event_file)
+    assert (file.path, file.hash) == (event_file, file_hash(event_file))
+    assert file.event == read_event(event_file)
+
+
+def test_an_event_in_an_archive(event_file: Path, tmp_path: Path):
+    with zipfile.ZipFile(tmp_path / "events.zip", "w") as archive:
+        archive.write(event_file, "event.xml")
+    file = read_event_file(tmp_path / "events.zip" / "event.xml")
+    assert file.hash == file_hash(event_file)
+    assert file.event.origins[0].time == START
+
+
+LOADS = """
+import pickle, sys
+event = pickle.load(sys.stdin.buffer).event
+origin = event.preferred_origin() or event.origins[0]
+magnitude = event.preferred_magnitude() or event.magnitudes[0]
+print(origin.time - {start!r}, origin.longitude, magnitude.mag)
+"""
+
+
+def test_preferred_origin_and_magnitude_survive_the_way_to_another_process(event_file: Path):
+    # would catch stations that are processed with the first of several origins
+    content = pickle.dumps(portable(read_event_file(event_file)))
+    code = f"from obspy import UTCDateTime\n{LOADS.format(start=START)}"
+    process = subprocess.run(
+        [sys.executable, "-c", code], input=content, capture_output=True, check=True
+    )
+    assert process.stdout.decode().split() == ["1.0", "-118.0", "7.0"]
+
+
+def test_an_event_without_magnitude_stays_without(tmp_path: Path):
+    Catalog([Event(origins=[Origin(time=START, latitude=0, longitude=0)])]).write(
+        str(tmp_path / "event.xml"), format="QUAKEML"
+    )
+    assert portable(read_event_file(tmp_path / "event.xml")).event.magnitudes == []
+
+
+WRONG = {
+    "two events": ([Origin(time=START)], 2, "must hold one event, holds 2"),
+    "no origin": ([], 1, "has no origin"),
+    "no time": ([Origin(latitude=1.0, longitude=2.0)], 1, "has an origin without time"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_file_needs_one_event_with_origin_and_time(tmp_path: Path, fault: str):
+    origins, count, reason = WRONG[fault]
+    events = [Event(origins=origins) for _ in range(count)]
+    Catalog(events).write(str(tmp_path / "event.xml"), format="QUAKEML")
+    with pytest.raises(CatalogError, match=rf"event\.xml: .*{reason}"):
+        read_event_file(tmp_path / "event.xml")
+
+
+@pytest.mark.parametrize("content", [b"", b"<html>", b"\x89HDF\r\n\x1a\n"])
+def test_other_files_are_refused(tmp_path: Path, content: bytes):
+    (tmp_path / "event.xml").write_bytes(content)
+    with pytest.raises(CatalogError, match=r"event\.xml"):
+        read_event(tmp_path / "event.xml")
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    with pytest.raises(CatalogError, match=r"missing\.xml: cannot be read: No such file"):
+        read_event(tmp_path / "missing.xml")
