@@ -1,4 +1,4 @@
-"""``per-obspy screen`` of an ensemble as a user meets it: two small simulated earthquakes and one inventory."""
+"""``per-obspy screen`` of an ensemble: two small simulated earthquakes and one inventory."""
 
 import json
 import shutil
@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy import cli
 
-from .test_run import SPECTRA
+from .small_run import SPECTRA
 
 PAIRS = """\
 pair_id,longitude_1,latitude_1,height_1,period_1,longitude_2,latitude_2,height_2,period_2,gap
@@ -40,9 +40,9 @@ def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ensemble")
     (folder / "pairs.csv").write_text(PAIRS)
     for name, magnitude in (("large", 7.0), ("small", 5.5)):
-        (folder / f"{name}_event.toml").write_text(
-            f"[scenario]\nstations = 1\nmagnitude = {magnitude}\ndt = 0.02\n"
-        )
+        # One station each
+        scenario = f"[scenario]\nstations = 1\nmagnitude = {magnitude}\ndt = 0.02\n"
+        (folder / f"{name}_event.toml").write_text(scenario)
         (folder / f"{name}.toml").write_text(
             f'name = "{name}"\noutput = "{name}"\nworkers = 1\nsimulation = "{name}_event.toml"\n'
             f'[pairs]\nfile = "pairs.csv"\n{SPECTRA}'
@@ -79,6 +79,7 @@ def test_every_scenario_is_run_and_the_probabilities_are_joined(copied, capsys):
     assert "small: stations: 1 of 1" in err
     assert "large: stations" not in err  # it was done
     table = pd.read_csv(copied / "both" / "ensemble.csv").set_index("pair_id")
+    # joined by pandas instead
     large, small = (
         pd.read_parquet(copied / name / "risk.parquet")
         .set_index("pair_id")["probability"]
@@ -97,21 +98,23 @@ def test_the_same_again_does_nothing_and_a_new_rate_runs_nothing(copied, capsys)
     out, err = capsys.readouterr()
     assert json.loads(out)["did_nothing"]
     assert err == ""
+    # another rate joins the same runs
     (copied / "ensemble.toml").write_text(ENSEMBLE.replace("0.03", "0.06"))
     assert _call(copied, "--json") == 0
     out, err = capsys.readouterr()
-    assert not json.loads(out)["did_nothing"]
+    record = json.loads(out)
+    assert not record["did_nothing"]
     assert "stations" not in err
-    assert [one["rate"] for one in json.loads(out)["scenarios"]] == [0.01, 0.06]
+    assert [scenario["rate"] for scenario in record["scenarios"]] == [0.01, 0.06]
 
 
-def test_what_an_ensemble_stands_on_is_told(copied, capsys):
+def test_the_record_of_an_ensemble_names_its_runs(copied, capsys):
     _call(copied, "-o", str(copied / "elsewhere"))
     record = json.loads((copied / "elsewhere" / "ensemble.json").read_text())
-    keys = [
-        json.loads((copied / name / "run.json").read_text())["key"] for name in ("large", "small")
-    ]
-    assert [one["key"] for one in record["scenarios"]] == keys
+    # by their keys, and without the folders of this machine
+    files = [copied / name / "run.json" for name in ("large", "small")]
+    keys = [json.loads(file.read_text())["key"] for file in files]
+    assert [scenario["key"] for scenario in record["scenarios"]] == keys
     assert str(copied) not in json.dumps(record)
     capsys.readouterr()
 
@@ -121,6 +124,7 @@ def test_runs_with_different_inventories_reject_what_they_do_not_share(copied, c
     text = (copied / "small.toml").read_text()
     (copied / "small.toml").write_text(text.replace("pairs.csv", "fewer.csv"))
     assert _call(copied) == 0
+    # a is in the first only, d in the second only, b differs
     assert "1 pairs; 3 rejected" in capsys.readouterr().out
     rejected = pd.read_csv(copied / "both" / "rejected.csv").set_index("name")["reasons"]
     assert rejected["a"].startswith("no probability in small")

@@ -1,4 +1,4 @@
-"""``per-obspy process``: files whole and readable again, corners and reasons in tables, nothing done twice."""
+"""``per-obspy process``: files that are read again, corners and reasons, no work done twice."""
 
 import json
 
@@ -55,10 +55,11 @@ def only_station(folder):
     return name, stream
 
 
-def assert_same(one, other):
-    assert_array_equal(one.data, other.data)  # would catch float32, and Steim's whole numbers
-    assert other.id == one.id
-    assert abs(other.stats.starttime - one.stats.starttime) < 2e-6  # s: MiniSEED keeps microseconds
+def assert_same(first, other):
+    assert_array_equal(first.data, other.data)  # would catch float32, and Steim's whole numbers
+    assert other.id == first.id
+    # s: MiniSEED keeps microseconds
+    assert abs(other.stats.starttime - first.stats.starttime) < 2e-6
     for word in (
         "delta",
         "units",
@@ -68,19 +69,20 @@ def assert_same(one, other):
         "coordinates",
         "corners",
     ):
-        assert other.stats.get(word) == one.stats.get(word)
-    assert other.stats.per_obspy == one.stats.per_obspy
+        assert other.stats.get(word) == first.stats.get(word)
+    assert other.stats.per_obspy == first.stats.per_obspy
 
 
 def test_what_is_read_again_is_what_was_processed(source, tmp_path):
     result = processed(source, tmp_path / "out")
     name, raw = only_station(source)
     memory, _ = process_station(raw, Processing())
+    # the same chain in memory, and from the file
     again, file = only_station(tmp_path / "out" / "stations")
     assert again == name == result.done[0].station
     assert len(memory) == len(file) == 3
-    for one, other in zip(memory, file, strict=True):
-        assert_same(one, other)
+    for first, other in zip(memory, file, strict=True):
+        assert_same(first, other)
 
 
 def test_names_and_intervals_that_miniseed_cannot_hold_are_in_the_description(tmp_path):
@@ -107,16 +109,17 @@ def test_records_once_processed_pass_through_a_second_time(source, tmp_path):
     processed(source, tmp_path / "out")
     processed(tmp_path / "out" / "stations", tmp_path / "again")
     first, second = (only_station(tmp_path / name / "stations")[1] for name in ("out", "again"))
-    for one, other in zip(first, second, strict=True):
-        assert_array_equal(one.data, other.data)  # a second filter would change them
-        assert one.stats.corners == other.stats.corners
+    for before, after in zip(first, second, strict=True):
+        assert_array_equal(before.data, after.data)  # a second filter would change them
+        assert before.stats.corners == after.stats.corners
 
 
-def test_the_table_tells_every_corner_and_its_reason(source, tmp_path):
+def test_the_table_has_every_corner_and_its_reason(source, tmp_path):
     processed(source, tmp_path / "out", highpass=0.1)
     table = pd.read_csv(tmp_path / "out" / "processed.csv")
     columns = pd.read_csv(tmp_path / "out" / "processed.columns.csv", keep_default_na=False)
     assert list(table) == list(columns["name"]) == list(COLUMNS)
+    # one row per component, with the corner of the configuration
     assert len(table) == 3
     assert (table["highpass"] == 0.1).all()
     assert (table["highpass_source"] == "configuration").all()
@@ -133,43 +136,60 @@ def test_every_number_of_a_record_has_a_column(source, tmp_path):
     assert described - set(COLUMNS) <= {"mean", "mean_of", "trend_order"}
 
 
-def test_the_spectra_tell_of_the_processing_what_the_table_tells(source, tmp_path):
+#: Corners, windows, signal to noise and baseline of every trace; failed checks where there are any.
+NOTED = {
+    "highpass_source",
+    "lowpass_source",
+    "noise",
+    "onset",
+    "signal_to_noise",
+    "baseline",
+    "residual_velocity",
+}
+
+
+def test_the_spectra_have_the_same_notes_as_the_table(source, tmp_path):
     processed(source, tmp_path / "out")
     _, stream = only_station(tmp_path / "out" / "stations")
-    told = [
-        json.loads(text) for text in station_spectra(stream, [1.0], [0.05])["processing"].to_numpy()
-    ]
-    wanted = {
-        "highpass_source",
-        "lowpass_source",
-        "noise",
-        "onset",
-        "signal_to_noise",
-        "baseline",
-        "residual_velocity",
-    }
-    # corners, windows, signal to noise and baseline of every trace; failed checks where there are
-    # any
-    for one in told:
-        assert wanted <= one.keys()
-        assert any("Butterworth" in step for step in one["steps"])
-    table = pd.read_csv(tmp_path / "out" / "processed.csv")
+    texts = station_spectra(stream, [1.0], [0.05])["processing"].to_numpy()
+    notes = [json.loads(text) for text in texts]
+    for note in notes:
+        assert note.keys() >= NOTED
+        assert any("Butterworth" in step for step in note["steps"])
     # text keeps 16 digits
-    assert sorted(one["highpass"] for one in told) == pytest.approx(
-        sorted(table["highpass"]), rel=1e-12
-    )
+    table = pd.read_csv(tmp_path / "out" / "processed.csv")
+    corners = sorted(note["highpass"] for note in notes)
+    assert corners == pytest.approx(sorted(table["highpass"]), rel=1e-12)
+
+
+def is_resumed(source, folder, **options):
+    """Process again and return whether the only station was not done again."""
+    (station,) = processed(source, folder, **options).done
+    return station.resumed
 
 
 def test_nothing_is_done_twice_and_what_changed_is_done_again(source, tmp_path):
     out = tmp_path / "out"
-    done = processed(source, out).done
-    assert not done[0].resumed
-    assert all(one.resumed for one in processed(source, out).done)
-    assert not any(one.resumed for one in processed(source, out, highpass=0.1).done)
-    done[0].shard.write_bytes(b"half a file")
-    assert not any(one.resumed for one in processed(source, out, highpass=0.1).done)
-    done[0].shard.with_suffix(".json").unlink()
-    assert not any(one.resumed for one in processed(source, out, highpass=0.1).done)
+    (station,) = processed(source, out).done
+    assert not station.resumed
+    assert is_resumed(source, out)
+    assert not is_resumed(source, out, highpass=0.1)
+    # a damaged file, and a missing status
+    station.shard.write_bytes(b"half a file")
+    assert not is_resumed(source, out, highpass=0.1)
+    station.shard.with_suffix(".json").unlink()
+    assert not is_resumed(source, out, highpass=0.1)
+
+
+@pytest.mark.parametrize("name", ["LONGNAME.mseed", "LONGNAME.json"])
+def test_a_structure_that_was_lost_comes_back(tmp_path, name):
+    # would catch a station that counts as done although a part of its files is missing
+    source, out = write_structure(tmp_path / "records"), tmp_path / "out"
+    processed(source, out)
+    assert is_resumed(source, out)
+    (out / "structures" / name).unlink()
+    assert not is_resumed(source, out)
+    assert (out / "structures" / name).exists()
 
 
 def test_a_description_of_another_file_is_refused(source, tmp_path):
@@ -192,35 +212,26 @@ def test_the_report_has_a_page_a_record_and_comes_back_if_it_was_lost(source, tm
 def test_structures_are_apart_with_their_reason(tmp_path):
     source = write_structure(tmp_path / "records")
     result = processed(source, tmp_path / "out")
-    assert [path.name for path in (tmp_path / "out" / "structures").glob("*.mseed")] == [
-        "LONGNAME.mseed"
-    ]
+    files = (tmp_path / "out" / "structures").glob("*.mseed")
+    assert [path.name for path in files] == ["LONGNAME.mseed"]
+    # the table has both, and the roof is no ground motion
     table = pd.read_csv(tmp_path / "out" / "processed.csv")
     assert set(table["file"]) == {"stations/LONGNAME.mseed", "structures/LONGNAME.mseed"}
-    assert any(
-        "in a structure (Roof)" in reason for row in result.rejected for reason in row.reasons
-    )
+    reasons = [reason for row in result.rejected for reason in row.reasons]
+    assert any("in a structure (Roof)" in reason for reason in reasons)
 
 
 def write_structure(folder):
-    """Write a station with a free-field instrument and one on the roof, in the form that this package writes."""
+    """Write a station with instruments in the free field and on the roof, as this package does."""
     folder.mkdir()
+    common = {"station": "LONGNAME", "sampling_rate": RATE, "units": "m/s2"}
+    common |= {"quantity": "acceleration", "processing_level": "raw"}
     traces = []
     for place, code in (("Freefield", "01"), ("Roof", "02")):
+        # Two horizontals of each instrument
         for number, channel in enumerate(("HNE", "HNN")):
-            header = {
-                "station": "LONGNAME",
-                "location": code,
-                "channel": channel,
-                "sampling_rate": RATE,
-            }
-            words = {
-                "units": "m/s2",
-                "quantity": "acceleration",
-                "sensor_location": place,
-                "processing_level": "raw",
-            }
-            traces.append(with_metadata(Trace(motion(number), header | words), None))
+            header = {"location": code, "channel": channel, "sensor_location": place}
+            traces.append(with_metadata(Trace(motion(number), common | header), None))
     write_description(folder / "XX.mseed", write_processed(Stream(traces), folder / "XX.mseed"))
     return folder
 
@@ -233,14 +244,16 @@ def test_the_command_prints_what_there_is(source, tmp_path):
     (tmp_path / "settings.toml").write_text("highpass = 0.2\n")
     done = call(source, "-o", tmp_path / "out", "--settings", tmp_path / "settings.toml", "--json")
     assert done.exit_code == 0
-    told = json.loads(done.stdout)
-    assert (told["stations"], told["rejected"]) == (1, [])
+    result = json.loads(done.stdout)
+    assert (result["stations"], result["rejected"]) == (1, [])
+    # the settings reach the chain
     assert pd.read_csv(tmp_path / "out" / "processed.csv")["highpass"].tolist() == [0.2, 0.2, 0.2]
 
 
 def test_nothing_usable_exits_with_3_and_says_why(source, tmp_path):
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "stations.xml").write_bytes((source / "stations.xml").read_bytes())
+    # a station with its vertical only
     vertical = read(str(source / "*.mseed")).select(channel="HNZ")
     vertical.write(str(tmp_path / "records" / "vertical.mseed"), format="MSEED")
     assert call(tmp_path / "records", "-o", tmp_path / "out").exit_code == 3
@@ -248,7 +261,10 @@ def test_nothing_usable_exits_with_3_and_says_why(source, tmp_path):
     assert rejected["reasons"].tolist() == ["no horizontal of its instrument is usable"]
 
 
-@pytest.mark.parametrize("fault", ["no such folder", "wrong key", "no such event"])
+WRONG = {"no such folder": "absent", "wrong key": "highpas", "no such event": "absent.xml"}
+
+
+@pytest.mark.parametrize("fault", WRONG)
 def test_wrong_input_is_one_line(source, tmp_path, fault):
     (tmp_path / "settings.toml").write_text("highpas = 0.2\n")
     arguments = {
@@ -257,9 +273,6 @@ def test_wrong_input_is_one_line(source, tmp_path, fault):
         "no such event": (source, "-o", tmp_path / "out", "--event", tmp_path / "absent.xml"),
     }
     done = call(*arguments[fault])
-    assert isinstance(
-        done.exception, CatalogError
-    )  # which ``cli.main`` turns into a line and exit code 2
-    assert {"no such folder": "absent", "wrong key": "highpas", "no such event": "absent.xml"}[
-        fault
-    ] in str(done.exception)
+    # which ``cli.main`` turns into a line and exit code 2
+    assert isinstance(done.exception, CatalogError)
+    assert WRONG[fault] in str(done.exception)

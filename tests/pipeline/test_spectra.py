@@ -1,0 +1,72 @@
+"""Spectra alone: one file of all stations, nothing done twice, figures."""
+
+import pandas as pd
+import pytest
+import xarray as xr
+
+from per_obspy.config import Processing, Scenario, Spectra
+from per_obspy.errors import CatalogError
+from per_obspy.pipeline.spectra import plot_station, spectra_of
+from per_obspy.progress import silent
+from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.spectra.storage import read_spectra, region
+
+GRID = Spectra(count=8, dampings=(0.05,), azimuth_step=90)
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """A folder with two simulated stations and a file that is no record."""
+    folder = tmp_path_factory.mktemp("records")
+    write_simulation(simulate(Scenario(stations=2, dt=0.02, magnitude=5.5)), folder)
+    (folder / "notes.txt").write_text("bring an umbrella")
+    return folder
+
+
+def spectra(records, folder):
+    return spectra_of([records], folder / "spectra.nc", Processing(), GRID, 1, silent)
+
+
+def test_one_file_holds_the_spectra_of_all_shards(records, tmp_path):
+    done, rejected = spectra(records, tmp_path)
+    assert [station.station for station in done] == ["XX.S001", "XX.S002"]
+    joined = read_spectra(tmp_path / "spectra.nc")
+    xr.testing.assert_identical(joined, region(read_spectra(station.shard) for station in done))
+    # what was left out is a table too
+    assert [row.kind for row in rejected] == ["file"]
+    assert pd.read_csv(tmp_path / "spectra.rejected.csv")["name"].tolist() == ["notes.txt"]
+
+
+def test_the_same_again_has_the_same_file(records, tmp_path):
+    spectra(records, tmp_path)
+    before = (tmp_path / "spectra.nc").read_bytes()
+    done, _ = spectra(records, tmp_path)
+    assert all(station.resumed for station in done)
+    assert (tmp_path / "spectra.nc").read_bytes() == before
+
+
+def test_a_part_file_of_a_killed_process_is_removed(records, tmp_path):
+    # no process has a number above the largest of Linux, 2 ** 22
+    left = tmp_path / "spectra.stations" / ".XX.S001.4194305.part.nc"
+    left.parent.mkdir()
+    left.write_bytes(b"half")
+    spectra(records, tmp_path)
+    assert not left.exists()
+
+
+def test_files_of_a_station_in_several_sources_are_joined(records, tmp_path):
+    sources = [records / "XX.S001.mseed", records / "stations.xml", records]
+    with pytest.raises(CatalogError, match="there is only metadata"):
+        spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, 1, silent)
+    done, _ = spectra_of(
+        [records, records / "XX.S001.mseed"], tmp_path / "a.nc", Processing(), GRID, 1, silent
+    )
+    # metadata of the folder serves the single file
+    assert [station.shard is not None for station in done] == [True, True]
+
+
+def test_a_station_is_drawn(records, tmp_path):
+    done, _ = spectra(records, tmp_path)
+    files = plot_station(done[0].shard, 0.05, 1.0, tmp_path)
+    assert [file.name for file in files] == ["XX.S001.spectra.png", "XX.S001.state_space.png"]
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
