@@ -203,7 +203,7 @@ def print_result(result: "Result") -> None:
     if result.did_nothing:
         print("Nothing to do: the same inputs were run before.")
     if record["simulated"]:
-        print("The ground motion is SIMULATED.")
+        print(_simulated_line(counts))
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     print(
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
@@ -216,6 +216,14 @@ def print_result(result: "Result") -> None:
         _print_worst(folder / "risk.csv", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
+
+
+def _simulated_line(counts: dict[str, int]) -> str:
+    """Return the warning that motion is simulated, with the number of stations if not of all."""
+    stations, simulated = counts["stations"], counts.get("stations_simulated", 0)
+    if 0 < simulated < stations:
+        return f"The ground motion of {simulated} of {stations} stations is SIMULATED."
+    return "The ground motion is SIMULATED."
 
 
 def _print_evaluation(found: dict[str, Any]) -> None:

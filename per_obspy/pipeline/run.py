@@ -37,6 +37,8 @@ from per_obspy.pipeline.stations import (
     all_rejections,
     find_station_jobs,
     finished_stations,
+    simulated_motion,
+    simulated_stations,
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent
@@ -232,8 +234,13 @@ def _screened_and_reported(
         "name": settings.name,
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": any(rejections),
-        "simulated": settings.simulation is not None,
-        "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
+        "simulated": simulated_motion(settings, usable),
+        "counts": {
+            "stations": len(usable),
+            "stations_resumed": resumed,
+            "stations_simulated": simulated_stations(usable),
+            **counts,
+        },
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,

@@ -14,6 +14,7 @@ from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, ear
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
+from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
@@ -75,11 +76,10 @@ def find_station_jobs(
         _note_simulation(scenario, folder, found.hashes)
     progress("finding records", 1, 1)
 
-    # One job per station, which knows whether its motion was simulated
+    # One job per station
     jobs = station_jobs(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
-    jobs = [job._replace(simulated=scenario is not None) for job in jobs]
     return FoundStations(jobs, list(found.rejected), found.hashes)
 
 
@@ -113,7 +113,6 @@ def station_jobs(
             processing=processing,
             spectra=spectra,
             shard=shards / f"{name.strip('.')}.nc",
-            simulated=False,
             hashes=source.hashes,
             reader=source.reader,
         )
@@ -130,6 +129,18 @@ def finished_stations(
         finished.append(station)
         progress("stations", len(finished), len(jobs))
     return sorted(finished, key=lambda station: station.station)
+
+
+def simulated_stations(stations: Sequence[FinishedStation]) -> int:
+    """Return the number of stations whose motion is simulated, by the mark of their spectra."""
+    spectra = [station.spectra for station in stations if station.spectra is not None]
+    return sum(dataset.attrs.get("simulated") == "true" for dataset in spectra)
+
+
+def simulated_motion(settings: Run, stations: Sequence[FinishedStation]) -> bool:
+    """Return whether any motion of a run is simulated: that of a station or of the ShakeMap."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return simulated_stations(stations) > 0 or (shakemap is not None and is_scenario(shakemap))
 
 
 def all_rejections(

@@ -16,9 +16,12 @@ import pytest
 from filelock import FileLock
 from pyarrow import parquet
 
+from per_obspy.config import Processing
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import station as jobs
+from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import run
+from per_obspy.progress import silent
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
@@ -90,6 +93,26 @@ def test_simulated_motion_is_marked_everywhere(finished):
     # facts of the whole table
     metadata = parquet.read_schema(result.folder / "risk.parquet").metadata
     assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
+
+
+def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copied, tmp_path):
+    # the folder of `per-obspy simulate`, copied, and what `per-obspy process` makes of it
+    shutil.copytree(copied / "out" / "simulated", copied / "raw")
+    process_records([copied / "raw"], copied / "clean", Processing(), None, False, (1, silent))
+    for source in ("raw", "clean"):
+        shutil.rmtree(tmp_path / "records", ignore_errors=True)
+        shutil.copytree(copied / source, copied / "records")
+        result = run(
+            write_folder_configuration(copied, f"out-{source}", SPECTRA), executor=InProcess()
+        )
+        assert result.record["simulated"] is True
+        assert result.record["counts"]["stations_simulated"] == 3
+        table = pd.read_parquet(result.folder / "risk.parquet")
+        assert table["flags"].str.split().map(lambda flags: "simulated" in flags).all()
+        with netCDF4.Dataset(result.folder / "spectra.nc") as spectra:
+            assert spectra.simulated == "true"
+        metadata = parquet.read_schema(result.folder / "risk.parquet").metadata
+        assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
 
 
 def test_every_stage_counts_up_to_its_size(tmp_path):

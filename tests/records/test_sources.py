@@ -161,7 +161,8 @@ def test_readers_travel_to_other_processes_by_name(folder: Path):
 def test_a_workspace_brings_its_event(real_data: Path):
     path = real_data / "records" / "asdf" / "nc72282711_workspace.h5"
     found = find_sources(Records(asdf=Asdf(file=path, tag="*_default")), None)
-    assert found.event is not None and found.event.path == path
+    assert found.event is not None
+    assert found.event.path == path
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
 

@@ -29,6 +29,8 @@ station_name
     As the header has it.
 site_class, vs30
     Of the ground as the metadata have it: any word; m/s.
+simulated
+    True where the motion is simulated; absent from records of real ground motion.
 header_peak
     Largest absolute value according to the header, in ``units``.
 
