@@ -66,7 +66,7 @@ def looks_like(path: Path) -> str:
 
 
 def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
-    """Return why a file is not of the expected kind: its kind, or else its reader's first sentence."""
+    """Return why a file is not of the expected kind: its kind, or what its reader found."""
     kind = looks_like(path)
     known = kind and expected not in kind
     reason = f"it is {kind}" if known else str(error).partition("; ")[0].rstrip(".")
@@ -151,6 +151,7 @@ def remove_dead_parts(folder: Path) -> None:
             writer = _WRITER.match(name)
             if writer is None or _is_running(int(writer["process"]), writer["machine"]):
                 continue
+            # A temporary folder is removed with everything inside
             path = Path(parent, name)
             if path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)

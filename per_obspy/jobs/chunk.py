@@ -118,6 +118,7 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
             else:
                 resumed.append(earlier)
 
+    # Resumed parts are passed on as soon as the next one is finished
     for part in results(missing(), do_chunk, _failed, workers, executor):
         yield from resumed
         resumed.clear()

@@ -46,6 +46,7 @@ def read_event(path: Path) -> Event:
 
 def read_event_file(path: Path) -> EventFile:
     """Read the one event of a file with the file's hash; parameters and errors of `read_event`."""
+    # A workspace, which may be large, is never in memory as a whole
     try:
         with open_file(path) as file:
             head = file.read(len(ASDF_MARK))
@@ -76,6 +77,7 @@ def _only_event(events: list[Event], source: str) -> Event:
     """Return the one event of a list; raise ``CatalogError`` if its origin or time is missing."""
     if len(events) != 1:
         raise CatalogError(source, f"must hold one event, holds {len(events)}")
+    # Place and time of the earthquake are needed everywhere
     event = events[0]
     if not event.origins:
         raise CatalogError(source, f"the event {event.resource_id} has no origin")
