@@ -204,6 +204,8 @@ def print_result(result: "Result") -> None:
         print("Nothing to do: the same inputs were run before.")
     if record["simulated"]:
         print(_simulated_line(counts))
+    for line in _earthquake_lines(record.get("earthquakes", ())):
+        print(line)
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     print(
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
@@ -224,6 +226,19 @@ def _simulated_line(counts: dict[str, int]) -> str:
     if 0 < simulated < stations:
         return f"The ground motion of {simulated} of {stations} stations is SIMULATED."
     return "The ground motion is SIMULATED."
+
+
+def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
+    """Return which earthquake is screened where there are several, and its undated records."""
+    lines = []
+    for group in earthquakes:
+        if len(earthquakes) > 1 and group["screened"]:
+            others = ", ".join(other["start"] for other in earthquakes if not other["screened"])
+            facts = f"{group['stations']} stations; others, left out: {others}"
+            lines.append(f"Records of {len(earthquakes)} earthquakes: {group['start']}, {facts}")
+        if group["screened"] and group["undated"] and group["undated"] < group["records"]:
+            lines.append(f"{group['undated']} records have no date and are taken for this one.")
+    return lines
 
 
 def _print_evaluation(found: dict[str, Any]) -> None:

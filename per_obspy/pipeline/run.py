@@ -107,6 +107,7 @@ def run(
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
+        record["earthquakes"] = list(found.earthquakes)
         return recorded(folder / RECORD, {**record, "started": started, **head})
 
 

@@ -33,11 +33,14 @@ class FoundStations(NamedTuple):
         What cannot be used of the sources.
     hashes : dict
         Hash of every file that was read on the way.
+    earthquakes : tuple of dict
+        Facts of every earthquake in the folder of records.
     """
 
     jobs: list[StationJob]
     rejected: list[Rejection]
     hashes: dict[Path, str]
+    earthquakes: tuple[dict[str, object], ...] = ()
 
 
 def find_station_jobs(
@@ -80,7 +83,7 @@ def find_station_jobs(
     jobs = station_jobs(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
-    return FoundStations(jobs, list(found.rejected), found.hashes)
+    return FoundStations(jobs, list(found.rejected), found.hashes, found.earthquakes)
 
 
 def station_jobs(

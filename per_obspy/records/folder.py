@@ -18,6 +18,7 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.records.archives import is_archive, members, open_file
+from per_obspy.records.earthquakes.groups import RecordSpan, stream_spans
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_content, read_with_obspy
 from per_obspy.records.processed_files import described
@@ -47,12 +48,15 @@ class SourceContents(NamedTuple):
         Files that are neither records nor metadata, each with its reason.
     hashes : mapping of Path to str
         Hash of every file that was read on the way.
+    records : tuple of RecordSpan
+        Times of the records, where their headers were read.
     """
 
     stations: dict[str, tuple[Path, ...]]
     inventory: Inventory | None
     rejected: tuple[Rejection, ...]
     hashes: Mapping[Path, str] = MappingProxyType({})
+    records: tuple[RecordSpan, ...] = ()
 
 
 def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> SourceContents:
@@ -78,7 +82,7 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
     found = [_read_file(path) for path in files]
     stations: dict[str, list[Path]] = defaultdict(list)
     for file in found:
-        for station in file.stations:
+        for station in sorted({record.station for record in file.records}):
             stations[station].append(file.path)
     # Metadata that is named comes before that of the folder
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
@@ -93,16 +97,17 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
         merged_inventory(inventories),
         tuple(rejected),
         {file.path: file.hash for file in found if file.hash},
+        tuple(record for file in found for record in file.records),
     )
 
 
 class _File(NamedTuple):
-    """A file of a folder: hash, kind, and its stations, its metadata or the reason for neither."""
+    """A file of a folder: hash, kind, and its records, its metadata or the reason for neither."""
 
     path: Path
     hash: str = ""
     kind: str = "record"
-    stations: tuple[str, ...] = ()
+    records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
     rejection: Rejection | None = None
 
@@ -114,7 +119,8 @@ def _read_file(path: Path) -> _File:
         content = _content(path)
         file = file._replace(hash=bytes_hash(content), kind=_kind(content))
         if file.kind == "record":
-            return file._replace(stations=_stations(_traces(path, content, headonly=True)))
+            stream = _traces(path, content, headonly=True)
+            return file._replace(records=stream_spans(stream, path))
         if file.kind == "inventory":
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
@@ -145,11 +151,6 @@ def _traces(path: Path, content: bytes, **options: Any) -> Stream:
 def station_name(trace: Trace) -> str:
     """Return ``"NET.STA"`` of a trace."""
     return f"{trace.stats.network}.{trace.stats.station}"
-
-
-def _stations(stream: Stream) -> tuple[str, ...]:
-    """Return the stations of some traces, ``"NET.STA"``, sorted and each once."""
-    return tuple(sorted({station_name(trace) for trace in stream}))
 
 
 def read_station(

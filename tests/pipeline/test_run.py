@@ -115,6 +115,26 @@ def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copie
         assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
 
 
+def test_a_second_earthquake_in_the_folder_costs_no_station(copied):
+    # would catch records of two earthquakes that are joined into one with a gap of hours
+    shutil.copytree(copied / "out" / "simulated", copied / "records" / "main")
+    later = copied / "records" / "later"
+    later.mkdir()
+    for path in (copied / "out" / "simulated").glob("*.S00[12].mseed"):
+        stream = obspy.read(str(path))
+        for trace in stream:
+            trace.stats.starttime += 7200
+        stream.write(str(later / path.name), format="MSEED")
+    result = run(write_folder_configuration(copied, "both", SPECTRA), executor=InProcess())
+    assert result.record["counts"]["stations"] == 3
+    assert [group["screened"] for group in result.record["earthquakes"]] == [True, False]
+    rejected = pd.read_csv(result.folder / "rejected.csv")
+    assert (rejected["kind"] == "record").all()
+    assert rejected["reasons"].str.startswith("belongs to another earthquake: starts").all()
+    # three components of two stations
+    assert len(rejected) == 6
+
+
 def test_every_stage_counts_up_to_its_size(tmp_path):
     # would catch a stage that ends before its size, or begins after its first step
     calls = defaultdict(list)
