@@ -134,6 +134,7 @@ def _event_lines(records: "Sequence[RecordInfo]") -> list[str]:
     for record in records:
         for label in record.event.split(", "):
             groups.setdefault(label, []).append(record)
+    # One line per earthquake, by number
     lines = []
     for label, members in sorted(groups.items(), key=lambda item: int(item[0].split(":")[0])):
         stations = len({tuple(record.record.split(".")[:2]) for record in members})

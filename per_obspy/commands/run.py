@@ -233,6 +233,7 @@ def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
     lines = []
     for group in earthquakes:
         if len(earthquakes) > 1 and group["screened"]:
+            # The others are left out, each by its start
             others = ", ".join(other["start"] for other in earthquakes if not other["screened"])
             facts = f"{group['stations']} stations; others, left out: {others}"
             lines.append(f"Records of {len(earthquakes)} earthquakes: {group['start']}, {facts}")

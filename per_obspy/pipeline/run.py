@@ -107,7 +107,6 @@ def run(
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
-        record["earthquakes"] = list(found.earthquakes)
         return recorded(folder / RECORD, {**record, "started": started, **head})
 
 
@@ -221,6 +220,7 @@ def _all_stages(
     # From here on no record is needed
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    record["earthquakes"] = found.earthquakes
     return {**record, "seconds": seconds | record["seconds"]}
 
 

@@ -33,14 +33,14 @@ class FoundStations(NamedTuple):
         What cannot be used of the sources.
     hashes : dict
         Hash of every file that was read on the way.
-    earthquakes : tuple of dict
+    earthquakes : list of dict
         Facts of every earthquake in the folder of records.
     """
 
     jobs: list[StationJob]
     rejected: list[Rejection]
     hashes: dict[Path, str]
-    earthquakes: tuple[dict[str, object], ...] = ()
+    earthquakes: list[dict[str, object]]
 
 
 def find_station_jobs(

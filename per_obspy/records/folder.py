@@ -4,9 +4,9 @@ A folder of records: every file that ObsPy and its plugins understand.
 StationXML may be in the same folder or elsewhere.
 """
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import reduce
+from itertools import chain
 from operator import add
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.records.archives import is_archive, members, open_file
-from per_obspy.records.earthquakes.groups import RecordSpan, stream_spans
+from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_content, read_with_obspy
 from per_obspy.records.processed_files import described
@@ -80,24 +80,21 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
     """
     files, rejected = _files(Path(folder))
     found = [_read_file(path) for path in files]
-    stations: dict[str, list[Path]] = defaultdict(list)
-    for file in found:
-        for station in sorted({record.station for record in file.records}):
-            stations[station].append(file.path)
+    records = tuple(chain.from_iterable(file.records for file in found))
     # Metadata that is named comes before that of the folder
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     inventories += [file.inventory for file in found if file.inventory is not None]
     # Unusable records come before unusable metadata
     for kind in ("record", "inventory"):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
-    if not stations:
+    if not records:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
     return SourceContents(
-        {station: tuple(paths) for station, paths in sorted(stations.items())},
+        station_files(records),
         merged_inventory(inventories),
         tuple(rejected),
         {file.path: file.hash for file in found if file.hash},
-        tuple(record for file in found for record in file.records),
+        records,
     )
 
 
@@ -117,10 +114,11 @@ def _read_file(path: Path) -> _File:
     file = _File(path)
     try:
         content = _content(path)
+        # Hash, headers and metadata come from the same bytes
         file = file._replace(hash=bytes_hash(content), kind=_kind(content))
         if file.kind == "record":
             stream = _traces(path, content, headonly=True)
-            return file._replace(records=stream_spans(stream, path))
+            return file._replace(records=tuple(record_span(trace, path) for trace in stream))
         if file.kind == "inventory":
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)

@@ -61,7 +61,7 @@ class Sources(NamedTuple):
         What cannot be used, with every reason.
     hashes : dict
         Hash of every file that was read on the way.
-    earthquakes : tuple of dict
+    earthquakes : list of dict
         Facts of every earthquake in the folder, see ``records.earthquakes.choice.OneEarthquake``.
     """
 
@@ -69,7 +69,7 @@ class Sources(NamedTuple):
     event: EventFile | None
     rejected: tuple[Rejection, ...]
     hashes: dict[Path, str]
-    earthquakes: tuple[dict[str, object], ...] = ()
+    earthquakes: list[dict[str, object]]
 
 
 def fetched_records(records: config.Records | None, progress: Progress = silent) -> Fetched | None:
@@ -98,6 +98,7 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     hashes = {event.path: event.hash} if event else {}
     stations: dict[str, StationSource] = {}
     rejected: list[Rejection] = []
+    # Of several earthquakes in the folder one is screened
     folder = _folder(records, event and event.event)
     for found, reader in _contents(records, fetched, event and event.event, folder):
         rejected += found.rejected
@@ -108,7 +109,7 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
                 continue
             inventory = _selected(found.inventory, name)
             stations[name] = StationSource(paths, _hashes(paths, hashes), inventory, reader)
-    earthquakes = folder.earthquakes if folder else ()
+    earthquakes = folder.earthquakes if folder else []
     return Sources(stations, event, tuple(rejected), hashes, earthquakes)
 
 
@@ -143,7 +144,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
         for name, station_files in files.items()
     }
     rejected = [rejection for contents in found for rejection in contents.rejected]
-    return Sources(stations, None, tuple(rejected), hashes)
+    return Sources(stations, None, tuple(rejected), hashes, [])
 
 
 def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:

@@ -11,7 +11,7 @@ from obspy import Stream, Trace
 from per_obspy.errors import Rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
 from per_obspy.records.earthquakes.choice import peak_motion
-from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, stream_spans
+from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
 from per_obspy.records.folder import find_stations, read_station
 
 
@@ -102,23 +102,25 @@ def describe_records(
     for name, paths in found.stations.items():
         stream, unread = reader(paths, found.inventory, name)
         rejected += unread
-        readable = Stream([trace for trace in stream if trace.stats.npts])
+        readable = [trace for trace in stream if trace.stats.npts]
         records += [_described(trace, root) for trace in readable]
-        for trace in readable:
-            spans += stream_spans(Stream([trace]), Path(trace.stats.source))
+        spans += [record_span(trace, Path(trace.stats.source)) for trace in readable]
         rejected += _empty(stream)
-    labels = _labels(spans)
-    rows = [record._replace(event=label) for record, label in zip(records, labels, strict=True)]
-    return tuple(rows), tuple(rejected)
+    # Times of all records show which are of one earthquake
+    return _with_events(records, spans), tuple(rejected)
 
 
-def _labels(spans: Sequence[RecordSpan]) -> list[str]:
-    """Return number and start of the earthquake of every record; of each that it belongs to."""
+def _with_events(
+    records: Sequence[RecordInfo], spans: Sequence[RecordSpan]
+) -> tuple[RecordInfo, ...]:
+    """Return the rows with number and start of the earthquakes that each belongs to."""
+    # A continuous record may hold several earthquakes
     numbers: dict[tuple[object, ...], list[str]] = defaultdict(list)
     for number, group in enumerate(event_groups(spans), start=1):
         for record in group.records:
             numbers[record.key].append(f"{number}: {group.label}")
-    return [", ".join(numbers[span.key]) for span in spans]
+    rows = zip(records, spans, strict=True)
+    return tuple(row._replace(event=", ".join(numbers[span.key])) for row, span in rows)
 
 
 def _empty(stream: Stream) -> list[Rejection]:
@@ -137,6 +139,7 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
     place = stats.get("coordinates") or {}
     peak, unit = peak_motion(trace)
     source = Path(stats.source)
+    # Values that the header does not have stay empty
     return RecordInfo(
         record=trace.id,
         format=stats.get("_format", "ASDF"),

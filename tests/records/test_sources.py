@@ -200,6 +200,7 @@ def test_a_workspace_brings_its_event(real_data: Path):
     assert found.event is not None
     assert found.event.path == path
     assert found.event.hash == file_hash(path)
+    # Three components of each station
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
 
@@ -211,8 +212,8 @@ def test_the_sections_in_the_documentation_are_valid():
     sources = []
     for block in blocks:
         records = Records(**tomllib.loads(block)["records"])
-        sources += records.model_fields_set - {"event", "stationxml"}
-    assert sources == ["fdsn", "sds", "asdf"]
+        sources += records.model_fields_set - {"event", "stationxml", "time", "event_gap"}
+    assert sources == ["folder", "fdsn", "sds", "asdf"]
 
 
 def test_the_documentation_has_every_key_of_the_services():

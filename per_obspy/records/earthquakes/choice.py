@@ -1,6 +1,5 @@
 """The one earthquake of a folder that is screened: its stations and files, and what is left out."""
 
-from collections import defaultdict
 from collections.abc import Container
 from functools import partial
 from pathlib import Path
@@ -19,6 +18,7 @@ from per_obspy.records.earthquakes.groups import (
     RecordSpan,
     chosen_group,
     event_groups,
+    station_files,
 )
 from per_obspy.records.folder import SourceContents, read_station
 
@@ -37,13 +37,13 @@ class OneEarthquake(NamedTuple):
     contents : tuple of (SourceContents, Reader)
         Stations whose files are read whole, with the rejections of all; then each station of which
         only a window is read.
-    earthquakes : tuple of dict
+    earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
         (records without a date that are taken for this earthquake) and ``screened``.
     """
 
     contents: tuple[tuple[SourceContents, Reader], ...]
-    earthquakes: tuple[dict[str, object], ...]
+    earthquakes: list[dict[str, object]]
 
 
 def one_earthquake(
@@ -68,23 +68,31 @@ def one_earthquake(
     """
     groups = event_groups(found.records, records.event_gap)
     time, source = _time(records, event)
-    group = chosen_group(groups, time, source, partial(largest_motion, found), records.event_gap)
-    facts = tuple(_facts(other, is_screened=other is group) for other in groups)
+    motion = partial(largest_motion, found)
+    group = chosen_group(groups, time, source, motion, records.event_gap)
+    facts = [_facts(other, is_screened=other is group) for other in groups]
+    # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
     rejected = (*found.rejected, *(_rejection(record, group) for record in others))
-    # The first contents have the rejections of all
     mixed = {record.path for record in others}
-    whole, contents = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
-    for station, paths in _files(group.records).items():
+    return OneEarthquake(_contents(found._replace(rejected=rejected), group, mixed), facts)
+
+
+def _contents(
+    found: SourceContents, group: EventGroup, mixed: Container[Path]
+) -> tuple[tuple[SourceContents, Reader], ...]:
+    """Return the stations of a group with their readers; the first contents have rejections."""
+    # Stations of which only a window is read have a reader of their own
+    whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
+    for station, paths in station_files(group.records).items():
         limits = _station_limits(station, group, mixed)
         if limits:
             part = found._replace(stations={station: paths}, rejected=())
-            contents.append((part, partial(read_station, **limits)))
+            windows.append((part, partial(read_station, **limits)))
         else:
             whole[station] = paths
-    first = found._replace(stations=whole, rejected=rejected)
-    return OneEarthquake(((first, partial(read_station)), *contents), facts)
+    return (found._replace(stations=whole), partial(read_station)), *windows
 
 
 def _station_limits(
@@ -107,7 +115,7 @@ def _station_limits(
 def largest_motion(found: SourceContents, group: EventGroup) -> float:
     """Return the largest acceleration of a group's readable records, m/s2; 0 without any."""
     largest = 0.0
-    for station, paths in _files(group.records).items():
+    for station, paths in station_files(group.records).items():
         stream, _ = read_station(paths, found.inventory, station, **_limits(group))
         for trace in stream:
             peak, unit = peak_motion(trace)
@@ -142,14 +150,6 @@ def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | N
         return None, ""
     origin = event.preferred_origin() or event.origins[0]
     return origin.time, "records.event"
-
-
-def _files(records: tuple[RecordSpan, ...]) -> dict[str, tuple[Path, ...]]:
-    """Return the files of every station, sorted."""
-    files: dict[str, set[Path]] = defaultdict(set)
-    for record in records:
-        files[record.station].add(record.path)
-    return {station: tuple(sorted(paths)) for station, paths in sorted(files.items())}
 
 
 def _limits(group: EventGroup) -> dict[str, UTCDateTime]:

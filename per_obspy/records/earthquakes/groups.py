@@ -13,12 +13,12 @@ one:
   other records of their folder, and in a folder of their own every group.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from obspy import Stream, UTCDateTime
+from obspy import Trace, UTCDateTime
 
 from per_obspy.errors import CatalogError
 
@@ -108,7 +108,8 @@ class EventGroup(NamedTuple):
         triggered = [record for record in dated if not record.is_continuous] or dated
         if not triggered:
             return None
-        return min(record.start for record in triggered), max(record.end for record in triggered)
+        first = min(record.start for record in triggered)
+        return first, max(record.end for record in triggered)
 
     @property
     def label(self) -> str:
@@ -116,18 +117,22 @@ class EventGroup(NamedTuple):
         return str(self.start)[:16] if self.start else "without a date"
 
 
-def stream_spans(stream: Stream, path: Path) -> tuple[RecordSpan, ...]:
-    """Return the times of the traces of a file, from their headers."""
-    spans = []
-    for trace in stream:
-        stats = trace.stats
-        station = f"{stats.network}.{stats.station}"
-        # Zeros that the processing put before and after the record are no part of it
-        pads = stats.get("per_obspy", {})
-        start = stats.starttime + (pads.get("pad_before") or 0.0)
-        end = stats.endtime - (pads.get("pad_after") or 0.0)
-        spans.append(RecordSpan(trace.id, station, path, start, end))
-    return tuple(spans)
+def record_span(trace: Trace, path: Path) -> RecordSpan:
+    """Return the time of a trace of a file, from its header."""
+    stats = trace.stats
+    # Zeros that the processing put before and after the record are no part of it
+    pads = stats.get("per_obspy", {})
+    start = stats.starttime + (pads.get("pad_before") or 0.0)
+    end = stats.endtime - (pads.get("pad_after") or 0.0)
+    return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end)
+
+
+def station_files(records: Iterable[RecordSpan]) -> dict[str, tuple[Path, ...]]:
+    """Return the files of every station, by their names, each once and sorted as paths are."""
+    files: dict[str, dict[Path, None]] = defaultdict(dict)
+    for record in records:
+        files[record.station][record.path] = None
+    return {station: tuple(sorted(paths)) for station, paths in sorted(files.items())}
 
 
 def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[EventGroup, ...]:
@@ -255,15 +260,22 @@ def _near(group: list[RecordSpan], record: RecordSpan) -> bool:
 
 def _join_folders(groups: list[list[RecordSpan]], undated: Sequence[RecordSpan]) -> None:
     """Add records without a date to the group that has most records in their folder."""
-    counts = [Counter(record.path.parent for record in group) for group in groups]
+    counts = list(map(_folder_counts, groups))
     for record in undated:
         in_folder = [count[record.path.parent] for count in counts]
         # In a folder of their own they go with whichever group is screened
-        joined = groups if not any(in_folder) else [groups[in_folder.index(max(in_folder))]]
-        for group in joined:
-            group.append(record)
+        most = max(in_folder, default=0)
+        for count, group in zip(in_folder, groups, strict=True):
+            # The first of those that have most; all where none has any
+            if count == most and (most == 0 or group is groups[in_folder.index(most)]):
+                group.append(record)
     if undated and not groups:
         groups.append(list(undated))
+
+
+def _folder_counts(group: Sequence[RecordSpan]) -> Counter[Path]:
+    """Return the number of records of a group in every folder."""
+    return Counter(record.path.parent for record in group)
 
 
 def _group(members: Sequence[RecordSpan]) -> EventGroup:
@@ -278,6 +290,6 @@ def _follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
     if window is None:
         return True
     # The day of records without a time begins and ends in whichever zone
-    timed = [record for record in group.records if record.has_time]
-    before, after = (gap, 0.0) if timed else (0.5 * _DAY, 1.5 * _DAY)
+    is_timed = any(record.has_time for record in group.records)
+    before, after = (gap, 0.0) if is_timed else (0.5 * _DAY, 1.5 * _DAY)
     return bool(window[0] - before <= time <= window[1] + after)

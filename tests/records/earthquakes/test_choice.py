@@ -53,7 +53,9 @@ def test_the_earthquake_of_most_stations_is_screened_and_the_other_listed(both: 
     assert len(sources.rejected) == 6
     row = sources.rejected[0]
     assert (row.kind, row.name) == ("record", "XX.S001..HNN")
-    pattern = "belongs to another earthquake: starts 2019-07-06T04:, the screened one 2019-07-06T03"
+    pattern = (
+        "belongs to another earthquake: starts 2019-07-06T04:29, the screened one 2019-07-06T03"
+    )
     assert row.reasons[0].startswith(pattern)
     facts = [(group["stations"], group["screened"]) for group in sources.earthquakes]
     assert facts == [(3, True), (2, False)]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from obspy import Stream, Trace, UTCDateTime
+from obspy import Trace, UTCDateTime
 
 from per_obspy.errors import CatalogError
 from per_obspy.records.earthquakes.groups import (
@@ -12,7 +12,8 @@ from per_obspy.records.earthquakes.groups import (
     RecordSpan,
     chosen_group,
     event_groups,
-    stream_spans,
+    record_span,
+    station_files,
 )
 
 MAIN = UTCDateTime(2019, 7, 6, 3, 19, 53)
@@ -27,7 +28,11 @@ def span(station: str, start: UTCDateTime, length: float = 60.0, folder: str = "
 
 def stations(groups: tuple[EventGroup, ...]) -> list[set[str]]:
     """Return the stations of every group."""
-    return [{record.station for record in group.records} for group in groups]
+    return list(map(_names, groups))
+
+
+def _names(group: EventGroup) -> set[str]:
+    return {record.station for record in group.records}
 
 
 def no_motion(group: EventGroup) -> float:
@@ -90,12 +95,18 @@ def test_records_without_a_date_join_the_group_of_their_folder(year: int):
     assert (group.start, group.label) == (None, "without a date")
 
 
+def test_files_of_a_station_are_named_once_and_sorted():
+    first, second = span("N.A", MAIN), span("N.A", MAIN, folder="b")
+    files = station_files([second, first, first, span("N.B", MAIN)])
+    assert files == {"N.A": (first.path, second.path), "N.B": (Path("a") / "N.B.mseed",)}
+
+
 def test_pads_of_processed_records_do_not_count():
     # would catch records of one earthquake that processing padded by minutes
     header = {"network": "N", "station": "A", "starttime": MAIN - 400, "delta": 1.0}
     trace = Trace(np.zeros(1001), header)
     trace.stats.per_obspy = {"pad_before": 400.0, "pad_after": 500.0}
-    (record,) = stream_spans(Stream([trace]), Path("a.mseed"))
+    record = record_span(trace, Path("a.mseed"))
     assert (record.start, record.end) == (MAIN, MAIN + 100)
 
 
@@ -105,7 +116,7 @@ def test_the_group_of_most_stations_is_chosen():
 
 
 def as_strong(group: EventGroup) -> float:
-    return 0.0 * group.stations
+    return 0.0 * group.stations  # the same of every group
 
 
 def test_of_groups_as_large_the_strongest_and_then_the_latest_is_chosen():
