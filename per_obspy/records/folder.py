@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
-from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
@@ -215,7 +215,7 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
     if not files and not rejected:
-        raise CatalogError(str(folder), "the folder is empty")
+        raise NothingUsable(str(folder), "the folder is empty")
     return files, rejected
 
 
