@@ -12,12 +12,12 @@ from typing import Annotated
 import typer
 
 import per_obspy
-from per_obspy.commands.endings import SERVICE_UNAVAILABLE, WRONG_INPUT
+from per_obspy.commands.endings import NOTHING_USABLE, SERVICE_UNAVAILABLE, WRONG_INPUT
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
-from per_obspy.errors import PerError, ServiceError
+from per_obspy.errors import NothingUsable, PerError, ServiceError
 
 app = typer.Typer(
     name="per-obspy",
@@ -72,6 +72,8 @@ def _exit_code() -> int:
         app()
     except ServiceError as error:
         return _failed(error, SERVICE_UNAVAILABLE)
+    except NothingUsable as error:
+        return _failed(error, NOTHING_USABLE)
     except PerError as error:
         return _failed(error, WRONG_INPUT)
     except SystemExit as ending:

@@ -3,10 +3,12 @@ The errors that a user can meet.
 
 ::
 
-    PerError ├── RecordRejected   a record cannot be used; the run goes on without it ├──
-    CatalogError     a file that the run needs (configuration, table, folder) is wrong; the run
-    stops ├── MissingExtra     an optional library that was asked for is not installed └──
-    ServiceError     a service did not answer; try later
+    PerError
+    ├── RecordRejected     a record cannot be used; the run goes on without it
+    ├── CatalogError       a file that the run needs (configuration, table, folder) is wrong
+    │   └── NothingUsable  a folder holds no record
+    ├── MissingExtra       an optional library that was asked for is not installed
+    └── ServiceError       a service did not answer; try later
 
 Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error
 it amounts to.
@@ -60,6 +62,10 @@ class CatalogError(PerError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.source}: {self.problem}"
+
+
+class NothingUsable(CatalogError):
+    """A folder is as it should be, but holds no record."""
 
 
 class MissingExtra(PerError, ImportError):

@@ -11,12 +11,26 @@ from per_obspy.commands.endings import AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from per_obspy.errors import Rejection
     from per_obspy.records.fdsn.event_list import EventRow
     from per_obspy.records.summary import RecordInfo
 
 #: What the table of records shows of each; JSON has everything.
-SHOWN = ("record", "format", "level", "start", "dt", "duration", "azimuth", "peak", "unit", "file")
+SHOWN = (
+    "record",
+    "format",
+    "level",
+    "start",
+    "dt",
+    "duration",
+    "azimuth",
+    "peak",
+    "unit",
+    "event",
+    "file",
+)
 
 
 #: What the table of earthquakes shows of each.
@@ -108,8 +122,25 @@ def info(
         print(json.dumps({"records": usable, "rejected": unusable}))
     else:
         print_table(f"{len(records)} records", SHOWN, [_record_cells(record) for record in records])
+        for line in _event_lines(records):
+            print(line)
         _print_rejected(rejected)
     stop_if_nothing(len(records))
+
+
+def _event_lines(records: "Sequence[RecordInfo]") -> list[str]:
+    """Return one line per earthquake with its records and stations, and one on simulated motion."""
+    groups: dict[str, list[RecordInfo]] = {}
+    for record in records:
+        for label in record.event.split(", "):
+            groups.setdefault(label, []).append(record)
+    # One line per earthquake, by number
+    lines = []
+    for label, members in sorted(groups.items(), key=lambda item: int(item[0].split(":")[0])):
+        stations = len({tuple(record.record.split(".")[:2]) for record in members})
+        lines.append(f"earthquake {label}: {stations} stations, {len(members)} records")
+    simulated = sum(record.simulated for record in records)
+    return [*lines, *([f"{simulated} records are SIMULATED."] if simulated else [])]
 
 
 def _event_cells(row: "EventRow") -> list[object]:

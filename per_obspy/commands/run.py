@@ -216,7 +216,9 @@ def print_result(result: "Result") -> None:
     if result.did_nothing:
         print("Nothing to do: the same inputs were run before.")
     if record["simulated"]:
-        print("The ground motion is SIMULATED.")
+        print(_simulated_line(counts))
+    for line in _earthquake_lines(record.get("earthquakes", ())):
+        print(line)
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     print(
         f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
@@ -245,6 +247,28 @@ def _print_warnings(warnings: dict[str, list[str]]) -> None:
             texts.append(f"{len(stations)}{noun} {meaning} ({names}{more})")
     if texts:
         print(f"warnings: {', '.join(texts)}; see stations.csv")
+
+
+def _simulated_line(counts: dict[str, int]) -> str:
+    """Return the warning that motion is simulated, with the number of stations if not of all."""
+    stations, simulated = counts["stations"], counts.get("stations_simulated", 0)
+    if 0 < simulated < stations:
+        return f"The ground motion of {simulated} of {stations} stations is SIMULATED."
+    return "The ground motion is SIMULATED."
+
+
+def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
+    """Return which earthquake is screened where there are several, and its undated records."""
+    lines = []
+    for group in earthquakes:
+        if len(earthquakes) > 1 and group["screened"]:
+            # The others are left out, each by its start
+            others = ", ".join(other["start"] for other in earthquakes if not other["screened"])
+            facts = f"{group['stations']} stations; others, left out: {others}"
+            lines.append(f"Records of {len(earthquakes)} earthquakes: {group['start']}, {facts}")
+        if group["screened"] and group["undated"] and group["undated"] < group["records"]:
+            lines.append(f"{group['undated']} records have no date and are taken for this one.")
+    return lines
 
 
 def _print_evaluation(found: dict[str, Any]) -> None:

@@ -154,6 +154,23 @@ class Records(Section):
         None, description="StationXML file or folder, if not beside the records"
     )
     event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
+    time: Moment | None = Field(
+        None,
+        description=(
+            "ISO 8601, UTC: the earthquake to screen where the folder holds several, by a time "
+            "within its records or up to event_gap before; not given: origin time of the event, or "
+            "else the earthquake of most stations"
+        ),
+    )
+    event_gap: float = Field(
+        300.0,
+        gt=0,
+        le=86_400,
+        description=(
+            "s; records of the folder that start within it of the first one are of one earthquake; "
+            "longer where clocks of stations are wrong"
+        ),
+    )
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")
     sds: Sds | None = Field(None, description="SDS archive")

@@ -65,7 +65,6 @@ def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") ->
     grid = job.spectra
     periods = np.geomspace(grid.shortest, grid.longest, grid.count)
     dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
-    dataset.attrs["simulated"] = str(job.simulated).lower()
     dataset.attrs |= _hypocentre(event)
     write_spectra(dataset, job.shard)
     return Products(unfit, (job.shard,))
@@ -99,8 +98,6 @@ class StationJob(NamedTuple):
         Settings.
     shard : Path
         Where its Dataset goes.
-    simulated : bool
-        Whether the motion was made by a scenario.
     hashes : tuple of str
         Of the waveform files.
     reader : partial
@@ -118,7 +115,6 @@ class StationJob(NamedTuple):
     processing: Processing
     spectra: Spectra
     shard: Path
-    simulated: bool
     hashes: tuple[str, ...] = ()
     reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
     product: "Callable[[StationJob, Stream, Event | None], Products]" = spectra_shard
@@ -246,7 +242,7 @@ def _from_status(shard: Path, file: Path) -> str:
 
 def _key(job: StationJob) -> str:
     """Return the hash of everything on which the products of a station depend."""
-    settings = [job.processing.model_dump_json(), job.spectra.model_dump_json(), job.simulated]
+    settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
     files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
     files += [f"{job.event.path.name} {job.event.hash}"] if job.event else []
     # Reader and product are known by name, so that other processes find the same

@@ -11,6 +11,7 @@ import xarray as xr
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.figures import draw_overview, draw_record_to_pair
@@ -84,22 +85,23 @@ def reported(
         Called when it begins and ends.
     """
     progress("report", 0, 1)
+    simulated = simulated_motion(settings, stations)
     outputs, risk = list[Path](), folder / "risk.parquet"
     spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
     if spectra is not None:
         outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
     if risk.exists():
-        summary = _summary(settings, risk, folder)
+        summary = _summary(settings, risk, folder, _facts(settings, simulated))
         if spectra is not None:
             outputs += _draw_figures(settings, summary, spectra, stations, folder)
         # Totals, layers and the comparison with observations need no record
         write_totals(summary.totals.table, folder / "totals.csv")
         outputs.append(folder / "totals.csv")
-        simulated = settings.simulation is not None
         outputs += write_evaluation(summary.observed, folder, simulated)
         if settings.geopackage:
-            _write_totals_layer(settings, summary.totals, folder / "totals.gpkg")
+            facts = _facts(settings, simulated)
+            _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
             outputs += [folder / "risk.gpkg", folder / "totals.gpkg"]
     progress("report", 1, 1)
     return outputs
@@ -112,7 +114,7 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
     return spectra
 
 
-def _summary(settings: Run, risk: Path, folder: Path) -> RiskSummary:
+def _summary(settings: Run, risk: Path, folder: Path, facts: dict[str, str]) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
     needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
     columns = None if settings.geopackage else list(dict.fromkeys(needed))
@@ -121,7 +123,7 @@ def _summary(settings: Run, risk: Path, folder: Path) -> RiskSummary:
     with ranked_table(risk, columns) as table:
         noted = _noted(table, settings, pieces)
         if settings.geopackage:
-            _write_pairs_layer(settings, noted, folder / "risk.gpkg")
+            _write_pairs_layer(settings, noted, folder / "risk.gpkg", facts)
         else:
             deque(noted, maxlen=0)
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
@@ -171,20 +173,22 @@ def _draw_figures(
     return [walk, overview]
 
 
-def _facts(settings: Run) -> dict[str, str]:
+def _facts(settings: Run, simulated: bool) -> dict[str, str]:
     """Return the facts of the whole table that layers state."""
-    return {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
+    return {"name": settings.name, "simulated": str(simulated).lower()}
 
 
-def _write_pairs_layer(settings: Run, pieces: Iterator[pd.DataFrame], path: Path) -> None:
+def _write_pairs_layer(
+    settings: Run, pieces: Iterator[pd.DataFrame], path: Path, facts: dict[str, str]
+) -> None:
     """Write the pairs as a layer for QGIS with the optional libraries."""
     from per_obspy.report.gis import write_pairs_layer
 
-    write_pairs_layer(pieces, list(settings.screening.classes), path, _facts(settings))
+    write_pairs_layer(pieces, list(settings.screening.classes), path, facts)
 
 
-def _write_totals_layer(settings: Run, totals: RegionTotals, path: Path) -> None:
+def _write_totals_layer(totals: RegionTotals, path: Path, facts: dict[str, str]) -> None:
     """Write the totals as a layer for QGIS with the optional libraries."""
     from per_obspy.report.gis import write_totals_layer
 
-    write_totals_layer(*totals, path, _facts(settings))
+    write_totals_layer(*totals, path, facts)

@@ -38,6 +38,8 @@ from per_obspy.pipeline.stations import (
     all_rejections,
     find_station_jobs,
     finished_stations,
+    simulated_motion,
+    simulated_stations,
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent
@@ -219,6 +221,7 @@ def _all_stages(
     # From here on no record is needed
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    record["earthquakes"] = found.earthquakes
     return {**record, "seconds": seconds | record["seconds"]}
 
 
@@ -250,9 +253,14 @@ def _later_stages(
         "name": settings.name,
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": any(rejections),
-        "simulated": settings.simulation is not None,
+        "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
-        "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
+        "counts": {
+            "stations": len(usable),
+            "stations_resumed": resumed,
+            "stations_simulated": simulated_stations(usable),
+            **counts,
+        },
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,

@@ -14,6 +14,7 @@ from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
+from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.tables.risk import write_risk
 from per_obspy.tables.table_files import write_rejected
@@ -88,7 +89,8 @@ def screened(
     tables = [part.path for part in parts if part.path]
     if tables:
         progress("ranking", 0, 1)
-        facts = {"name": settings.name, "simulated": str(settings.simulation is not None).lower()}
+        is_simulated = simulated_motion(settings, stations)
+        facts = {"name": settings.name, "simulated": str(is_simulated).lower()}
         risk = write_risk(tables, folder, facts, settings.csv_rows)
         outputs, states = [*outputs, *risk.files], risk.states
         served = risk.stations

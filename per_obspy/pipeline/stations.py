@@ -14,6 +14,7 @@ from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, ear
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
+from per_obspy.records.shakemap import is_scenario
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
@@ -32,11 +33,14 @@ class FoundStations(NamedTuple):
         What cannot be used of the sources.
     hashes : dict
         Hash of every file that was read on the way.
+    earthquakes : list of dict
+        Facts of every earthquake in the folder of records.
     """
 
     jobs: list[StationJob]
     rejected: list[Rejection]
     hashes: dict[Path, str]
+    earthquakes: list[dict[str, object]]
 
 
 def find_station_jobs(
@@ -75,12 +79,11 @@ def find_station_jobs(
         _note_simulation(scenario, folder, found.hashes)
     progress("finding records", 1, 1)
 
-    # One job per station, which knows whether its motion was simulated
+    # One job per station
     jobs = station_jobs(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
-    jobs = [job._replace(simulated=scenario is not None) for job in jobs]
-    return FoundStations(jobs, list(found.rejected), found.hashes)
+    return FoundStations(jobs, list(found.rejected), found.hashes, found.earthquakes)
 
 
 def station_jobs(
@@ -113,7 +116,6 @@ def station_jobs(
             processing=processing,
             spectra=spectra,
             shard=shards / f"{name.strip('.')}.nc",
-            simulated=False,
             hashes=source.hashes,
             reader=source.reader,
         )
@@ -130,6 +132,18 @@ def finished_stations(
         finished.append(station)
         progress("stations", len(finished), len(jobs))
     return sorted(finished, key=lambda station: station.station)
+
+
+def simulated_stations(stations: Sequence[FinishedStation]) -> int:
+    """Return the number of stations whose motion is simulated, by the mark of their spectra."""
+    spectra = [station.spectra for station in stations if station.spectra is not None]
+    return sum(dataset.attrs.get("simulated") == "true" for dataset in spectra)
+
+
+def simulated_motion(settings: Run, stations: Sequence[FinishedStation]) -> bool:
+    """Return whether any motion of a run is simulated: that of a station or of the ShakeMap."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return simulated_stations(stations) > 0 or (shakemap is not None and is_scenario(shakemap))
 
 
 def all_rejections(

@@ -4,9 +4,9 @@ A folder of records: every file that ObsPy and its plugins understand.
 StationXML may be in the same folder or elsewhere.
 """
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import reduce
+from itertools import chain
 from operator import add
 from pathlib import Path
 from types import MappingProxyType
@@ -15,9 +15,10 @@ from typing import Any, NamedTuple
 import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
-from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.records.archives import is_archive, members, open_file
+from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_content, read_with_obspy
 from per_obspy.records.processed_files import described
@@ -50,12 +51,15 @@ class SourceContents(NamedTuple):
         Files that are neither records nor metadata, each with its reason.
     hashes : mapping of Path to str
         Hash of every file that was read on the way.
+    records : tuple of RecordSpan
+        Times of the records, where their headers were read.
     """
 
     stations: dict[str, tuple[Path, ...]]
     inventory: Inventory | None
     rejected: tuple[Rejection, ...]
     hashes: Mapping[Path, str] = MappingProxyType({})
+    records: tuple[RecordSpan, ...] = ()
 
 
 def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> SourceContents:
@@ -79,33 +83,31 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
     """
     files, rejected = _files(Path(folder))
     found = [_read_file(path) for path in files]
-    stations: dict[str, list[Path]] = defaultdict(list)
-    for file in found:
-        for station in file.stations:
-            stations[station].append(file.path)
+    records = tuple(chain.from_iterable(file.records for file in found))
     # Metadata that is named comes before that of the folder
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     inventories += [file.inventory for file in found if file.inventory is not None]
     # Unusable records come before unusable metadata
     for kind in ("record", "inventory"):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
-    if not stations:
+    if not records:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
     return SourceContents(
-        {station: tuple(paths) for station, paths in sorted(stations.items())},
+        station_files(records),
         merged_inventory(inventories),
         tuple(rejected),
         {file.path: file.hash for file in found if file.hash},
+        records,
     )
 
 
 class _File(NamedTuple):
-    """A file of a folder: hash, kind, and its stations, metadata or reason for rejection."""
+    """A file of a folder: hash, kind, and its records, its metadata or the reason for neither."""
 
     path: Path
     hash: str = ""
     kind: str = "record"
-    stations: tuple[str, ...] = ()
+    records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
     rejection: Rejection | None = None
 
@@ -116,9 +118,11 @@ def _read_file(path: Path) -> _File:
     file = _File(path)
     try:
         content = _content(path)
+        # Hash, headers and metadata come from the same bytes
         file = file._replace(hash=bytes_hash(content), kind=_kind(content))
         if file.kind == "record":
-            return file._replace(stations=_stations(_traces(path, content, headonly=True)))
+            stream = _traces(path, content, headonly=True)
+            return file._replace(records=tuple(record_span(trace, path) for trace in stream))
         if file.kind == "inventory":
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
@@ -144,12 +148,6 @@ def _traces(path: Path, content: bytes, **options: Any) -> Stream:
     if not content:
         raise RecordRejected(str(path), "the file is empty")
     return described(read_content(obspy.read, content, path, **options), path, content)
-
-
-def _stations(stream: Stream) -> tuple[str, ...]:
-    """Return the stations of some traces, ``"NET.STA"``, sorted and each once."""
-    stations = {f"{trace.stats.network}.{trace.stats.station}" for trace in stream}
-    return tuple(sorted(stations))
 
 
 def station_name(trace: Trace) -> str:
@@ -243,7 +241,7 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
     if not files and not rejected:
-        raise CatalogError(str(folder), "the folder is empty")
+        raise NothingUsable(str(folder), "the folder is empty")
     return files, rejected
 
 

@@ -18,6 +18,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
+from per_obspy.records.simulation.station_metadata import MARK
 
 #: input unit of a response -> quantity of the samples
 _QUANTITIES = {
@@ -59,6 +60,8 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     if not result.stats.get("coordinates"):
         _place_station(result, inventory)
     result.stats.update(_ground(result, inventory))
+    if _is_simulated(result, inventory):
+        result.stats.simulated = True
     result.data = _samples(result)
     return result
 
@@ -230,6 +233,14 @@ def _comment_words(trace: Trace, inventory: Inventory | None) -> dict[str, str]:
             name, _, value = (comment.value or "").partition("=")
             words[name.strip()] = value.strip()
     return words
+
+
+def _is_simulated(trace: Trace, inventory: Inventory | None) -> bool:
+    """Return whether the trace's station is one that this package simulated, by its comment."""
+    for station in _stations(trace, inventory):
+        if any((comment.value or "").startswith(MARK) for comment in station.comments):
+            return True
+    return False
 
 
 def metadata_text(inventory: Inventory) -> bytes:

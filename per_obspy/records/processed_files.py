@@ -36,6 +36,7 @@ STATS_WORDS = (
     "station_name",
     "site_class",
     "vs30",
+    "simulated",
     "corners",
     "digitised",
     "per_obspy",

@@ -32,6 +32,9 @@ GRID_UNITS = {
     "velocity": {"ms": 1.0, "m/s": 1.0},
 }
 
+#: Characters from the beginning of a grid that hold the attributes of its map.
+_HEAD = 10_000
+
 _SPECTRAL, _MAP = ("period", "latitude", "longitude"), ("latitude", "longitude")
 
 
@@ -105,6 +108,12 @@ def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
         "longitude": grid.longitude,
     }
     return xr.Dataset(variables, coords=axes, attrs=_attributes(grid))
+
+
+def is_scenario(path: Path) -> bool:
+    """Return whether a ShakeMap is of a simulated earthquake, from the head of its grid."""
+    head = _text(path)[:_HEAD].upper()
+    return re.search(r"SHAKEMAP_EVENT_TYPE\s*=\s*[\"']SCENARIO[\"']", head) is not None
 
 
 def _variable(dimensions: tuple[str, ...], values: FloatArray, unit: str, meaning: str) -> Any:

@@ -16,15 +16,13 @@ from per_obspy.files import opened_hash
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
+from per_obspy.records.earthquakes.choice import OneEarthquake, Reader, one_earthquake
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
-
-#: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
-Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
 
 
 class StationSource(NamedTuple):
@@ -63,12 +61,15 @@ class Sources(NamedTuple):
         What cannot be used, with every reason.
     hashes : dict
         Hash of every file that was read on the way.
+    earthquakes : list of dict
+        Facts of every earthquake in the folder, see ``records.earthquakes.choice.OneEarthquake``.
     """
 
     stations: dict[str, StationSource]
     event: EventFile | None
     rejected: tuple[Rejection, ...]
     hashes: dict[Path, str]
+    earthquakes: list[dict[str, object]]
 
 
 def fetched_records(records: config.Records | None, progress: Progress = silent) -> Fetched | None:
@@ -97,7 +98,9 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     hashes = {event.path: event.hash} if event else {}
     stations: dict[str, StationSource] = {}
     rejected: list[Rejection] = []
-    for found, reader in _contents(records, fetched, event and event.event):
+    # Of several earthquakes in the folder one is screened
+    folder = _folder(records, event and event.event)
+    for found, reader in _contents(records, fetched, event and event.event, folder):
         rejected += found.rejected
         hashes |= found.hashes
         for name, paths in found.stations.items():
@@ -106,7 +109,8 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
                 continue
             inventory = _selected(found.inventory, name)
             stations[name] = StationSource(paths, _hashes(paths, hashes), inventory, reader)
-    return Sources(stations, event, tuple(rejected), hashes)
+    earthquakes = folder.earthquakes if folder else []
+    return Sources(stations, event, tuple(rejected), hashes, earthquakes)
 
 
 def find_path_sources(paths: Sequence[Path]) -> Sources:
@@ -140,7 +144,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
         for name, station_files in files.items()
     }
     rejected = [rejection for contents in found for rejection in contents.rejected]
-    return Sources(stations, None, tuple(rejected), hashes)
+    return Sources(stations, None, tuple(rejected), hashes, [])
 
 
 def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:
@@ -208,14 +212,17 @@ def _hash_if_readable(path: Path) -> str:
 
 
 def _contents(
-    records: config.Records, fetched: Fetched | None, event: Event | None
+    records: config.Records,
+    fetched: Fetched | None,
+    event: Event | None,
+    folder: OneEarthquake | None,
 ) -> Iterator[tuple[SourceContents, Reader]]:
     """Yield the contents of each source with the reader of its stations."""
     for table in records.columns:
         name = f"{table.network}.{table.station}"
         yield SourceContents({name: (table.file,)}, None, ()), partial(read_table, table=table)
-    if records.folder:
-        yield find_stations(records.folder, records.stationxml), partial(read_station)
+    if folder:
+        yield from folder.contents
     if records.sds:
         yield _sds(records, records.sds, event)
     # What others processed, and what services have, comes last
@@ -224,6 +231,13 @@ def _contents(
         yield found, partial(read_asdf_station, tag=records.asdf.tag)
     if fetched:
         yield fetched_stations(fetched), partial(read_station)
+
+
+def _folder(records: config.Records, event: Event | None) -> OneEarthquake | None:
+    """Return the records of one earthquake in the folder, None if there is no folder."""
+    if not records.folder:
+        return None
+    return one_earthquake(find_stations(records.folder, records.stationxml), records, event)
 
 
 def _sds(

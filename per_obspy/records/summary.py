@@ -1,17 +1,18 @@
 """Summary of a folder, an archive, a file or a workspace of records, one row per trace."""
 
+from collections import defaultdict
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import Rejection
 from per_obspy.records.asdf import find_asdf_stations, is_asdf, read_asdf_station
+from per_obspy.records.earthquakes.choice import peak_motion
+from per_obspy.records.earthquakes.groups import RecordSpan, event_groups, record_span
 from per_obspy.records.folder import find_stations, read_station
-
-_UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}
 
 
 class RecordInfo(NamedTuple):
@@ -42,6 +43,11 @@ class RecordInfo(NamedTuple):
         Of the peak.
     file : str
         Path from the folder that was named.
+    event : str
+        Number and start of the earthquake that the record belongs to, by its time; of several
+        where a continuous record holds them or a record has no date.
+    simulated : bool
+        Whether the motion is simulated.
     """
 
     record: str
@@ -56,6 +62,8 @@ class RecordInfo(NamedTuple):
     peak: float
     unit: str
     file: str
+    event: str = ""
+    simulated: bool = False
 
 
 def describe_records(
@@ -90,13 +98,29 @@ def describe_records(
     else:
         found, reader = find_stations(root, stationxml), partial(read_station)
     # Station by station, so that one alone is in memory
-    records, rejected = [], list(found.rejected)
+    records, spans, rejected = list[RecordInfo](), list[RecordSpan](), list(found.rejected)
     for name, paths in found.stations.items():
         stream, unread = reader(paths, found.inventory, name)
         rejected += unread
-        records += [_described(trace, root) for trace in stream if trace.stats.npts]
+        readable = [trace for trace in stream if trace.stats.npts]
+        records += [_described(trace, root) for trace in readable]
+        spans += [record_span(trace, Path(trace.stats.source)) for trace in readable]
         rejected += _empty(stream)
-    return tuple(records), tuple(rejected)
+    # Times of all records show which are of one earthquake
+    return _with_events(records, spans), tuple(rejected)
+
+
+def _with_events(
+    records: Sequence[RecordInfo], spans: Sequence[RecordSpan]
+) -> tuple[RecordInfo, ...]:
+    """Return the rows with number and start of the earthquakes that each belongs to."""
+    # A continuous record may hold several earthquakes
+    numbers: dict[tuple[object, ...], list[str]] = defaultdict(list)
+    for number, group in enumerate(event_groups(spans), start=1):
+        for record in group.records:
+            numbers[record.key].append(f"{number}: {group.label}")
+    rows = zip(records, spans, strict=True)
+    return tuple(row._replace(event=", ".join(numbers[span.key])) for row, span in rows)
 
 
 def _empty(stream: Stream) -> list[Rejection]:
@@ -113,10 +137,9 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
     """Return the row of a trace."""
     stats = trace.stats
     place = stats.get("coordinates") or {}
-    scale, unit = _scale(trace)
-    # Largest distance from the mean: raw records have an offset
-    peak = float(np.abs(trace.data - trace.data.mean()).max()) * scale
+    peak, unit = peak_motion(trace)
     source = Path(stats.source)
+    # Values that the header does not have stay empty
     return RecordInfo(
         record=trace.id,
         format=stats.get("_format", "ASDF"),
@@ -130,14 +153,5 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
         peak=peak,
         unit=unit,
         file=source.name if source == root else str(source.relative_to(root)),
+        simulated=stats.get("simulated", False),
     )
-
-
-def _scale(trace: Trace) -> tuple[float, str]:
-    """Return the factor from samples to SI, and the unit it leads to."""
-    stats = trace.stats
-    if stats.units != "counts":
-        return 1.0, stats.units
-    if "response" in stats:
-        return 1.0 / stats.response.instrument_sensitivity.value, _UNITS[stats.quantity]
-    return stats.calib, _UNITS[stats.quantity]

@@ -391,7 +391,7 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
         "time_coverage_start": str(first.starttime),
         "time_coverage_end": str(first.endtime),
         "horizontals": len(horizontals),
-        "simulated": "false",
+        "simulated": str(_is_simulated(horizontals)).lower(),
     }
     # The box of ACDD is a point, if the station's place is known
     known = first.get("coordinates", {})
@@ -400,3 +400,8 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
             attributes[f"geospatial_{name[:3]}_min"] = known[name]
             attributes[f"geospatial_{name[:3]}_max"] = known[name]
     return attributes
+
+
+def _is_simulated(traces: list[Trace]) -> bool:
+    """Return whether any of some traces is marked as simulated."""
+    return any(trace.stats.get("simulated", False) for trace in traces)

@@ -124,7 +124,9 @@ def region(stations: Iterable[xr.Dataset]) -> xr.Dataset:
     named = _unlabelled(joined).assign_attrs(
         title="Pseudo energy radius spectra of a region", id="region"
     )
-    return named.assign_attrs(_box(named))
+    # Simulated motion of one station must be seen in the region
+    simulated = any(station.attrs.get("simulated") == "true" for station in spectra)
+    return named.assign_attrs(_box(named), simulated=str(simulated).lower())
 
 
 def without_motion(station: xr.Dataset) -> xr.Dataset:

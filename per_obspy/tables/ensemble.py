@@ -141,7 +141,7 @@ def _join_query(tables: list[Path | None]) -> str:
         for number, table in enumerate(tables)
         if table
     ]
-    # One column of probabilities and of each severity per scenario, and the extremes of what should be the same
+    # Columns of probability and severity per scenario, extremes of what should be the same
     columns = [
         f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
         for number in range(len(tables))

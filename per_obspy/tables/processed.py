@@ -24,6 +24,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "sensor_dip": ("degrees", "down from horizontal; up is -90"),
     "azimuth_source": ("", "metadata, channel code or unknown"),
     "sensor_location": ("", "where the header puts the sensor"),
+    "simulated": ("", "True where the motion is simulated; empty for real records"),
     "conversion": ("", "how counts became m/s2; empty for physical records"),
     "onset": ("", "first wave, UTC"),
     "onset_source": ("", "pick, travel time or configuration"),

@@ -201,10 +201,34 @@ def test_info(simulation, tmp_path, call):
         assert one["file"] == f"{one['record'][:7]}.mseed"
 
 
+def test_info_shows_earthquakes_and_simulated_records(simulation, tmp_path, call):
+    write_simulation(simulation, tmp_path / "main")
+    later = Scenario(stations=1, dt=0.02, magnitude=5.5, origin_time="2001-02-03T04:05:06")
+    write_simulation(simulate(later), tmp_path / "later")
+    records = json.loads(call("info", tmp_path, "--json")[1])["records"]
+    assert {record["event"][:2] for record in records} == {"1:", "2:"}
+    assert all(record["simulated"] for record in records)
+    out = call("info", tmp_path)[1]
+    assert "earthquake 1: " in out
+    assert "earthquake 2: 2001-02-03T04:04: 1 stations, 3 records" in out
+    assert "9 records are SIMULATED." in out
+
+
 def test_info_of_nothing(tmp_path, call):
-    code, _, err = call("info", tmp_path)
-    assert code == 2
-    assert "the folder is empty" in err
+    (tmp_path / "records").mkdir()
+    run_file = tmp_path / "run.toml"
+    head = 'name = "x"\noutput = "out"\n[records]\nfolder = "records"\n'
+    run_file.write_text(f"{head}[pairs.simulated]\ncount = 2\n")
+    # The folder is named in one line, whatever reads it
+    for command in (
+        ("info", tmp_path / "records"),
+        ("run", run_file),
+        ("process", tmp_path / "records", "-o", tmp_path / "clean"),
+        ("spectra", tmp_path / "records", "-o", tmp_path / "spectra.nc"),
+    ):
+        code, _, err = call(*command)
+        assert code == 3
+        assert err.splitlines()[-1].endswith("records: the folder is empty")
     assert call("info", tmp_path / "absent")[0] == 2
 
 

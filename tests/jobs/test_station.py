@@ -35,7 +35,7 @@ def make_jobs(records, tmp_path):
     def make_jobs(**changes):
         # Records in the folder of the module, shards in that of the test
         found = find_path_sources([records])
-        common = {"processing": Processing(), "spectra": GRID, "simulated": True} | changes
+        common = {"processing": Processing(), "spectra": GRID} | changes
         return [
             StationJob(
                 station=name,
@@ -78,7 +78,6 @@ def test_a_shard_knows_where_the_earthquake_started(make_jobs, records):
 CHANGES = {
     "settings": {"processing": Processing(highpass=0.2)},
     "grid": {"spectra": GRID.model_copy(update={"count": 6})},
-    "kind of motion": {"simulated": False},
     "reader": {"reader": partial(read_station, start=None)},
 }
 
@@ -141,7 +140,7 @@ def test_finished_stations_travel_to_other_processes(make_jobs):
 
 def empty_job(station, folder, **changes):
     """Return a job without files."""
-    common = {"processing": Processing(), "spectra": Spectra(), "simulated": False}
+    common = {"processing": Processing(), "spectra": Spectra()}
     shard = folder / f"{station}.nc"
     return StationJob(station, (), None, None, shard=shard, **common)._replace(**changes)
 

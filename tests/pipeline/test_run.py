@@ -16,9 +16,12 @@ import pytest
 from filelock import FileLock
 from pyarrow import parquet
 
+from per_obspy.config import Processing
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import station as jobs
+from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import run
+from per_obspy.progress import silent
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
@@ -92,6 +95,46 @@ def test_simulated_motion_is_marked_everywhere(finished):
     # facts of the whole table
     metadata = parquet.read_schema(result.folder / "risk.parquet").metadata
     assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
+
+
+def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copied, tmp_path):
+    # the folder of `per-obspy simulate`, copied, and what `per-obspy process` makes of it
+    shutil.copytree(copied / "out" / "simulated", copied / "raw")
+    process_records([copied / "raw"], copied / "clean", Processing(), None, False, (1, silent))
+    for source in ("raw", "clean"):
+        shutil.rmtree(tmp_path / "records", ignore_errors=True)
+        shutil.copytree(copied / source, copied / "records")
+        result = run(
+            write_folder_configuration(copied, f"out-{source}", SPECTRA), executor=InProcess()
+        )
+        assert result.record["simulated"] is True
+        assert result.record["counts"]["stations_simulated"] == 3
+        table = pd.read_parquet(result.folder / "risk.parquet")
+        assert table["flags"].str.split().map(lambda flags: "simulated" in flags).all()
+        with netCDF4.Dataset(result.folder / "spectra.nc") as spectra:
+            assert spectra.simulated == "true"
+        metadata = parquet.read_schema(result.folder / "risk.parquet").metadata
+        assert json.loads(metadata[b"per_obspy"])["simulated"] == "true"
+
+
+def test_a_second_earthquake_in_the_folder_costs_no_station(copied):
+    # would catch records of two earthquakes that are joined into one with a gap of hours
+    shutil.copytree(copied / "out" / "simulated", copied / "records" / "main")
+    later = copied / "records" / "later"
+    later.mkdir()
+    for path in (copied / "out" / "simulated").glob("*.S00[12].mseed"):
+        stream = obspy.read(str(path))
+        for trace in stream:
+            trace.stats.starttime += 7200
+        stream.write(str(later / path.name), format="MSEED")
+    result = run(write_folder_configuration(copied, "both", SPECTRA), executor=InProcess())
+    assert result.record["counts"]["stations"] == 3
+    assert [group["screened"] for group in result.record["earthquakes"]] == [True, False]
+    rejected = pd.read_csv(result.folder / "rejected.csv")
+    assert (rejected["kind"] == "record").all()
+    assert rejected["reasons"].str.startswith("belongs to another earthquake: starts").all()
+    # three components of two stations
+    assert len(rejected) == 6
 
 
 def test_every_stage_counts_up_to_its_size(tmp_path):

@@ -5,6 +5,7 @@ import shutil
 from functools import partial
 
 import pytest
+import xarray as xr
 
 from per_obspy.config import Processing, Run, Spectra, load
 from per_obspy.errors import CatalogError, Rejection
@@ -13,6 +14,8 @@ from per_obspy.pipeline.stations import (
     all_rejections,
     find_station_jobs,
     finished_stations,
+    simulated_motion,
+    simulated_stations,
     station_jobs,
     stations_of_earlier_run,
 )
@@ -45,16 +48,35 @@ def found(settings):
 
 
 def test_every_station_has_a_job_with_the_hashes_of_its_files(settings):
-    stages, (jobs, rejected, hashes) = found(settings)
+    stages, (jobs, rejected, hashes, earthquakes) = found(settings)
     assert stages == ["simulating records", "finding records"]
     assert [job.station for job in jobs] == ["XX.S001", "XX.S002"]
     assert rejected == []
+    assert [group["stations"] for group in earthquakes] == [2]
     # hashes of the records and of the event are known, so that no file is read for them again
     for job in jobs:
-        assert job.simulated
         assert job.event.hash == hashes[job.event.path]
         assert job.hashes == tuple(hashes[path] for path in job.source)
         assert job.shard == settings.output / "stations" / f"{job.station}.nc"
+
+
+def test_simulated_stations_are_counted_by_their_spectra():
+    marked, real = (
+        FinishedStation("N.A", None, (), False, spectra=xr.Dataset(attrs={"simulated": mark}))
+        for mark in ("true", "false")
+    )
+    unusable = FinishedStation("N.B", None, (), False)
+    assert simulated_stations([marked, real, unusable]) == 1
+    assert simulated_stations([real, unusable]) == 0
+
+
+@pytest.mark.parametrize(("kind", "expected"), [("SCENARIO", True), ("ACTUAL", False)])
+def test_a_scenario_shakemap_is_simulated_motion(tmp_path, kind, expected):
+    grid = tmp_path / "grid.xml"
+    grid.write_text(f'<?xml version="1.0"?>\n<shakemap_grid shakemap_event_type="{kind}">')
+    pairs = {"file": tmp_path / "pairs.csv"}
+    settings = Run(name="x", output=tmp_path, records={"shakemap": grid}, pairs=pairs)
+    assert simulated_motion(settings, []) is expected
 
 
 def test_simulated_records_are_kept(settings):
@@ -94,7 +116,7 @@ def test_simulated_records_that_are_not_whole_are_made_again(settings, fault):
 def test_another_scenario_leaves_no_record_of_this_one(settings, tmp_path):
     found(settings)
     (tmp_path / "scenario.toml").write_text(SCENARIO.replace("stations = 2", "stations = 1"))
-    stages, (jobs, _, hashes) = found(settings)
+    stages, (jobs, _, hashes, _) = found(settings)
     assert stages == ["simulating records", "finding records"]
     assert [job.station for job in jobs] == ["XX.S001"]
     # the status lists just what is there
@@ -104,7 +126,7 @@ def test_another_scenario_leaves_no_record_of_this_one(settings, tmp_path):
 
 
 def test_an_earlier_run_has_its_stations(settings):
-    _, (jobs, _, _) = found(settings)
+    _, (jobs, _, _, _) = found(settings)
     done = finished_stations(jobs, 1, None, lambda *_: None)
     (settings.output / "stations" / ".XX.S003.1.part.json").write_text("{")
     again = stations_of_earlier_run(settings.output)

@@ -197,8 +197,10 @@ def test_readers_travel_to_other_processes_by_name(folder: Path):
 def test_a_workspace_brings_its_event(real_data: Path):
     path = real_data / "records" / "asdf" / "nc72282711_workspace.h5"
     found = find_sources(Records(asdf=Asdf(file=path, tag="*_default")), None)
+    assert found.event is not None
     assert found.event.path == path
     assert found.event.hash == file_hash(path)
+    # Three components of each station
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
 
@@ -210,8 +212,8 @@ def test_the_sections_in_the_documentation_are_valid():
     sources = []
     for block in blocks:
         records = Records(**tomllib.loads(block)["records"])
-        sources += records.model_fields_set - {"event", "stationxml"}
-    assert sources == ["columns", "fdsn", "sds", "asdf"]
+        sources += records.model_fields_set - {"event", "stationxml", "time", "event_gap"}
+    assert sources == ["columns", "folder", "fdsn", "sds", "asdf"]
 
 
 def test_the_documentation_has_every_key_of_the_services():

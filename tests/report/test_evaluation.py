@@ -16,9 +16,10 @@ def risk():
     """Return a risk table with these observations, and probabilities if there are any."""
 
     def risk(observed, probability):
-        rank = range(1, len(probability) + 1)
         state = np.where(np.nan_to_num(probability) > 0.5, "yes", "no")
-        table = pd.DataFrame({"rank": rank, "state": state, "probability": probability})
+        table = pd.DataFrame(
+            {"rank": range(1, len(probability) + 1), "state": state, "probability": probability}
+        )
         return table if observed is None else table.assign(observed=observed)
 
     return risk

@@ -27,9 +27,14 @@ def tables():
         }
     )
     pairs = pairs.assign(
-        demand_rule="exact", impact_velocity=np.nan, impact_velocity_exact=0.5, amplification_1=np.nan,
-        amplification_2=np.nan, amplification_exact_1=1.2, amplification_exact_2=1.1,
-    )  # fmt: skip
+        demand_rule="exact",
+        impact_velocity=np.nan,
+        impact_velocity_exact=0.5,
+        amplification_1=np.nan,
+        amplification_2=np.nan,
+        amplification_exact_1=1.2,
+        amplification_exact_2=1.1,
+    )
     # Each lacks a pair of the other
     near = pairs.assign(probability=random.uniform(0, 1, COUNT))
     far = pairs.assign(probability=random.uniform(0, 0.2, COUNT))

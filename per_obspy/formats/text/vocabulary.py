@@ -31,6 +31,8 @@ site_class, vs30
     Of the ground as the metadata have it: any word; m/s.
 digitised
     True where the record was digitised from film.
+simulated
+    True where the motion is simulated; absent from records of real ground motion.
 header_peak
     Largest absolute value according to the header, in ``units``.
 processing

@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import obspy
 import urllib3
 from obspy import UTCDateTime
 from obspy.core.event import Event
+from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
 from per_obspy.files import written_whole
@@ -51,6 +53,9 @@ class EventRow(NamedTuple):
     place: str
 
 
+#: Parameters of the circle in which epicentres are wanted.
+_CIRCLE = ("latitude", "longitude", "maxradius")
+
 #: Suffixes of files of events; other sources that are no file are services.
 FILES = (".xml", ".quakeml", ".json", ".geojson")
 
@@ -65,27 +70,85 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         A file (QuakeML or GeoJSON), the URL of a GeoJSON feed, or an FDSN event service (base URL
         or ObsPy's name).
     query : mapping
-        Parameters of the FDSN event service, such as ``starttime`` and ``minmagnitude``; files and
-        feeds, which are not asked, are listed whole.
+        Parameters of the FDSN event service. Of files and feeds, which cannot be asked, events are
+        selected by ``starttime``, ``endtime``, ``minmagnitude``, and ``latitude``, ``longitude``
+        and ``maxradius`` (degrees); an event of unknown magnitude has none that is large enough.
 
     Raises
     ------
     CatalogError
-        If the file is no list of events, or the source is unknown.
+        If the file is no list of events, the source is unknown, or a parameter is wrong.
     ServiceError
         If the service does not answer, or with something else.
     """
     if Path(source).is_file():
-        rows = _rows_of_file(Path(source))
+        select = selection(source, query)
+        rows = list(filter(select, _rows_of_file(Path(source))))
     elif source.startswith(("http://", "https://")) and ".geojson" in source:
-        rows = _rows_of_answer(source, _feed_rows, {})
+        select = selection(source, query)
+        rows = list(filter(select, _rows_of_answer(source, _feed_rows, {})))
     elif Path(source).suffix.lower() in FILES and "://" not in source:
         raise CatalogError(source, "no such file")
     else:
-        # Everything else is the base URL or the name of an event service
+        # Everything else is the base URL or the name of an event service, which selects itself
+        for name in ("starttime", "endtime"):
+            _time(source, name, query)
         url = f"{base_url(source)}/fdsnws/event/1/query"
         rows = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
     return sorted(rows, key=lambda row: row.time, reverse=True)
+
+
+def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], bool]:
+    """
+    Return a function that selects the earthquakes of a query, as an FDSN event service does.
+
+    Parameters
+    ----------
+    source : str
+        File or feed, for messages.
+    query : mapping
+        As for :func:`find_events`.
+
+    Raises
+    ------
+    CatalogError
+        If a time is no time, a circle is incomplete, or a parameter needs a service.
+    """
+    unknown = query.keys() - {"starttime", "endtime", "minmagnitude", *_CIRCLE}
+    if unknown:
+        raise CatalogError(source, f"{', '.join(sorted(unknown))}: only a service can select by it")
+    circle = [float(query[name]) for name in _CIRCLE if name in query]
+    if circle and len(circle) < len(_CIRCLE):
+        raise CatalogError(source, "latitude, longitude and radius: give all three or none")
+    # Limits that are not given leave all in
+    start, end = (_time(source, name, query) for name in ("starttime", "endtime"))
+    smallest = float(query.get("minmagnitude", "-inf"))
+
+    def select(row: EventRow) -> bool:
+        time = UTCDateTime(row.time)
+        if (start and time < start) or (end and time > end):
+            return False
+        if "minmagnitude" in query and (row.magnitude is None or row.magnitude < smallest):
+            return False
+        return not circle or _distance(row, *circle[:2]) <= circle[2]
+
+    return select
+
+
+def _time(source: str, name: str, query: Mapping[str, str]) -> UTCDateTime | None:
+    """Return a time of a query, None if it is not given."""
+    if name not in query:
+        return None
+    try:
+        return UTCDateTime(datetime.fromisoformat(query[name]))
+    except ValueError as error:
+        problem = f"{name}: {query[name]!r} is no time, expected ISO 8601 such as 2019-07-06T03:19"
+        raise CatalogError(source, problem) from error
+
+
+def _distance(row: EventRow, latitude: float, longitude: float) -> float:
+    """Return the distance of an epicentre from a place along a great circle, degrees."""
+    return float(locations2degrees(row.latitude, row.longitude, latitude, longitude))
 
 
 def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache: Path) -> Path:

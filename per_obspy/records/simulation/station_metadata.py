@@ -18,7 +18,10 @@ from obspy.core.inventory import Comment as StationComment
 from per_obspy import config
 
 NETWORK = "XX"
-NOTICE = "SIMULATED by per_obspy with the stochastic method (Boore 2003): not an observation"
+
+#: Beginning of the comment by which simulated stations and events are known when they are read.
+MARK = "SIMULATED by per_obspy"
+NOTICE = f"{MARK} with the stochastic method (Boore 2003): not an observation"
 
 #: Counts per m/s2; full scale of 24 bits is then 4.3 times gravity.
 GAIN = 2.0e5

@@ -138,3 +138,56 @@ def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wro
 def test_unknown_sources_are_wrong_input():
     with pytest.raises(CatalogError, match="absent: is no base URL"):
         find_events("absent", {})
+
+
+def write_two(folder: Path) -> Path:
+    """Write a feed of an earthquake of 7.1 and of one of unknown magnitude a day later."""
+    later = feature(time=1562383193040 + 86_400_000, mag=None) | {"id": "later"}
+    later["geometry"] = {"coordinates": [-116.599, 35.77, 8.0]}
+    (folder / "feed.json").write_bytes(feed(feature(), later))
+    return folder / "feed.json"
+
+
+@pytest.mark.parametrize(
+    ("query", "expected"),
+    [
+        ({}, ["later", "ci38457511"]),
+        ({"starttime": "2019-07-06T12:00"}, ["later"]),
+        ({"endtime": "2019-07-06T12:00"}, ["ci38457511"]),
+        # limits count as inside
+        (
+            {"starttime": "2019-07-06T03:19:53.040", "endtime": "2019-07-06T03:19:53.040"},
+            ["ci38457511"],
+        ),
+        ({"minmagnitude": "7.1"}, ["ci38457511"]),
+        ({"minmagnitude": "7.2"}, []),
+        # one degree of longitude at 35.77 degrees north is 0.81 degrees of arc
+        ({"latitude": "35.77", "longitude": "-117.599", "maxradius": "0.8"}, ["ci38457511"]),
+        (
+            {"latitude": "35.77", "longitude": "-117.599", "maxradius": "0.82"},
+            ["later", "ci38457511"],
+        ),
+    ],
+)
+def test_files_and_feeds_are_filtered_like_a_service(
+    server: FdsnServer, tmp_path: Path, query: dict[str, str], expected: list[str]
+):
+    path = write_two(tmp_path)
+    server.extra["/all_day.geojson"] = path.read_bytes()
+    for source in (str(path), f"{server.url}/all_day.geojson"):
+        assert [row.event_id for row in find_events(source, query)] == expected
+
+
+@pytest.mark.parametrize(
+    ("query", "message"),
+    [
+        ({"starttime": "yesterday"}, "starttime: 'yesterday' is no time"),
+        ({"latitude": "35.77", "maxradius": "1"}, "radius: give all three or none"),
+        ({"eventtype": "earthquake"}, "eventtype: only a service can select by it"),
+    ],
+)
+def test_filters_that_cannot_be_applied_are_refused(
+    tmp_path: Path, query: dict[str, str], message: str
+):
+    with pytest.raises(CatalogError, match=message):
+        find_events(str(write_two(tmp_path)), query)

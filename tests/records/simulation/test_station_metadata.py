@@ -1,9 +1,14 @@
 """Metadata of a simulated event."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
-from obspy import UTCDateTime
+from obspy import Trace, UTCDateTime, read_inventory
+from obspy.core.inventory import Comment
 
 from per_obspy.config import Scenario
+from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation.station_metadata import (
     CHANNELS,
     GAIN,
@@ -47,3 +52,24 @@ def test_identifiers_depend_on_the_seed_alone():
     assert scenario_event(SCENARIO).resource_id == scenario_event(SCENARIO).resource_id
     other = scenario_event(SCENARIO.model_copy(update={"seed": SCENARIO.seed + 1}))
     assert other.resource_id != scenario_event(SCENARIO).resource_id
+
+
+def test_the_mark_of_simulated_stations_survives_stationxml(tmp_path: Path):
+    path = str(tmp_path / "stations.xml")
+    scenario_inventory(SCENARIO, STATIONS).write(path, format="STATIONXML")
+    for station in STATIONS:
+        trace = Trace(np.zeros(3), header(station.code))
+        assert with_metadata(trace, read_inventory(path)).stats.simulated is True
+
+
+def test_a_real_record_is_never_marked():
+    # Same network and channel codes, and a station whose comment only mentions simulations
+    inventory = scenario_inventory(SCENARIO, STATIONS)
+    inventory[0][0].comments = [Comment("next to a station SIMULATED by per_obspy")]
+    trace = Trace(np.zeros(3), header("S001"))
+    assert "simulated" not in with_metadata(trace, inventory).stats
+
+
+def header(code: str) -> dict[str, str]:
+    """Return the codes of a record of a simulated station."""
+    return {"network": "XX", "station": code, "channel": "HNN"}

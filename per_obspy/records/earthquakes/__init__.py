@@ -1,0 +1,1 @@
+"""Earthquakes among the records of a folder, and the one to screen."""

@@ -1,0 +1,179 @@
+"""The one earthquake of a folder that is screened: its stations and files, and what is left out."""
+
+from collections.abc import Container
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from obspy import Stream, Trace, UTCDateTime
+from obspy.core.event import Event
+
+from per_obspy import config
+from per_obspy.errors import Rejection
+from per_obspy.records.earthquakes.groups import (
+    HOURS,
+    MARGIN,
+    EventGroup,
+    RecordSpan,
+    chosen_group,
+    event_groups,
+    station_files,
+)
+from per_obspy.records.folder import SourceContents, read_station
+
+#: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
+Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
+
+_UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}
+
+
+class OneEarthquake(NamedTuple):
+    """
+    Contents of a folder of which one earthquake is screened.
+
+    Attributes
+    ----------
+    contents : tuple of (SourceContents, Reader)
+        Stations whose files are read whole, with the rejections of all; then each station of which
+        only a window is read.
+    earthquakes : list of dict
+        Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
+        (records without a date that are taken for this earthquake) and ``screened``.
+    """
+
+    contents: tuple[tuple[SourceContents, Reader], ...]
+    earthquakes: list[dict[str, object]]
+
+
+def one_earthquake(
+    found: SourceContents, records: config.Records, event: Event | None
+) -> OneEarthquake:
+    """
+    Separate the earthquake to screen from the others in a folder.
+
+    Parameters
+    ----------
+    found : SourceContents
+        Of the folder.
+    records : config.Records
+        Its ``time`` and ``event_gap``.
+    event : Event or None
+        The earthquake of the run.
+
+    Raises
+    ------
+    CatalogError
+        If no record is of the configured time or the origin time.
+    """
+    groups = event_groups(found.records, records.event_gap)
+    time, source = _time(records, event)
+    motion = partial(largest_motion, found)
+    group = chosen_group(groups, time, source, motion, records.event_gap)
+    facts = [_facts(other, is_screened=other is group) for other in groups]
+    # Everything that is not of this earthquake is listed
+    members = {record.key for record in group.records}
+    others = [record for record in found.records if record.key not in members]
+    rejected = (*found.rejected, *(_rejection(record, group) for record in others))
+    mixed = {record.path for record in others}
+    return OneEarthquake(_contents(found._replace(rejected=rejected), group, mixed), facts)
+
+
+def _contents(
+    found: SourceContents, group: EventGroup, mixed: Container[Path]
+) -> tuple[tuple[SourceContents, Reader], ...]:
+    """Return the stations of a group with their readers; the first contents have rejections."""
+    # Stations of which only a window is read have a reader of their own
+    whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
+    for station, paths in station_files(group.records).items():
+        limits = _station_limits(station, group, mixed)
+        if limits:
+            part = found._replace(stations={station: paths}, rejected=())
+            windows.append((part, partial(read_station, **limits)))
+        else:
+            whole[station] = paths
+    return (found._replace(stations=whole), partial(read_station)), *windows
+
+
+def _station_limits(
+    station: str, group: EventGroup, mixed: Container[Path]
+) -> dict[str, UTCDateTime]:
+    """Return the window to read of a station's files; empty if they are read whole."""
+    own = [record for record in group.records if record.station == station]
+    # Hours of record are cut to the time of the triggered records of all stations
+    if any(record.end - record.start > HOURS for record in own):
+        return _limits(group)
+    # A file with records of other earthquakes is cut to its own
+    if any(record.path in mixed for record in own):
+        return {
+            "start": min(record.start for record in own),
+            "end": max(record.end for record in own),
+        }
+    return {}
+
+
+def largest_motion(found: SourceContents, group: EventGroup) -> float:
+    """Return the largest acceleration of a group's readable records, m/s2; 0 without any."""
+    largest = 0.0
+    for station, paths in station_files(group.records).items():
+        stream, _ = read_station(paths, found.inventory, station, **_limits(group))
+        for trace in stream:
+            peak, unit = peak_motion(trace)
+            largest = max(largest, peak if unit == "m/s2" else 0.0)
+    return largest
+
+
+def peak_motion(trace: Trace) -> tuple[float, str]:
+    """Return the largest distance from the mean and its unit; of raw counts by the sensitivity."""
+    if not trace.stats.npts:
+        return 0.0, ""
+    scale, unit = _scale(trace)
+    # Raw records have an offset
+    return float(np.abs(trace.data - trace.data.mean()).max()) * scale, unit
+
+
+def _scale(trace: Trace) -> tuple[float, str]:
+    """Return the factor from samples to SI, and the unit it leads to."""
+    stats = trace.stats
+    if stats.units != "counts":
+        return 1.0, stats.units
+    if "response" in stats:
+        return 1.0 / stats.response.instrument_sensitivity.value, _UNITS[stats.quantity]
+    return stats.calib, _UNITS[stats.quantity]
+
+
+def _time(records: config.Records, event: Event | None) -> tuple[UTCDateTime | None, str]:
+    """Return the time of the earthquake to screen, if one is known, and where it comes from."""
+    if records.time is not None:
+        return UTCDateTime(records.time), "records.time"
+    if event is None:
+        return None, ""
+    origin = event.preferred_origin() or event.origins[0]
+    return origin.time, "records.event"
+
+
+def _limits(group: EventGroup) -> dict[str, UTCDateTime]:
+    """Return the window of a group as a reader takes it; empty without any date."""
+    window = group.window
+    if window is None:
+        return {}
+    return {"start": window[0] - MARGIN, "end": window[1] + MARGIN}
+
+
+def _rejection(record: RecordSpan, screened: EventGroup) -> Rejection:
+    """Return the row of a record of another earthquake."""
+    start = str(record.start)[:16] if record.is_dated else "without a date"
+    reason = f"belongs to another earthquake: starts {start}, the screened one {screened.label}"
+    return Rejection("record", record.record, str(record.path), None, (reason,))
+
+
+def _facts(group: EventGroup, is_screened: bool) -> dict[str, object]:
+    """Return the facts of a group."""
+    undated = sum(not record.is_dated for record in group.records)
+    return {
+        "start": group.label,
+        "stations": group.stations,
+        "records": len(group.records),
+        "undated": undated,
+        "screened": is_screened,
+    }

@@ -1,0 +1,295 @@
+"""
+Earthquakes in a folder of records: records that start together, and the one group to screen.
+
+A group begins with its earliest record and takes every record that starts within a gap of 300 s
+after it: more than waves need across any network of strong motion, less than most aftershocks wait.
+Three kinds of records are no evidence of another earthquake and found no group where they can join
+one:
+
+* continuous records, longer than 600 s, belong to every group that they overlap;
+* records whose header has a date but no time start at midnight: they join the largest group that
+  starts from half a day before to one and a half days after it, in whichever zone the date is;
+* records without a date (film, or a clock that was never set: 1970 or 1980) join the group of the
+  other records of their folder, and in a folder of their own every group.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from obspy import Trace, UTCDateTime
+
+from per_obspy.errors import CatalogError
+
+#: Longest time from the first start of a group to the last, s.
+GAP = 300.0
+
+#: Records longer than this, s, do not found a group where they overlap one.
+CONTINUOUS = 600.0
+
+#: Records longer than this, s, hold hours in which other earthquakes may be: only the window of the
+#: group is read, with so many s before and after it.
+HOURS, MARGIN = 3600.0, 60.0
+
+#: Days on which clocks stand that were never set: ObsPy's default, and that of GPS receivers.
+_UNSET = {(1970, 1, 1), (1980, 1, 1), (1980, 1, 6)}
+
+_DAY = 86400.0
+
+
+class RecordSpan(NamedTuple):
+    """
+    Time of a record.
+
+    Attributes
+    ----------
+    record : str
+        ``NET.STA.LOC.CHA``.
+    station : str
+        ``NET.STA``.
+    path : Path
+        Its file.
+    start, end : UTCDateTime
+        Of the first and the last sample.
+    """
+
+    record: str
+    station: str
+    path: Path
+    start: UTCDateTime
+    end: UTCDateTime
+
+    @property
+    def key(self) -> tuple[str, str, int, int]:
+        """Record, file and times, by which records can be looked up."""
+        return self.record, str(self.path), int(self.start.ns), int(self.end.ns)
+
+    @property
+    def is_dated(self) -> bool:
+        """Whether the day of the record is known."""
+        return (self.start.year, self.start.month, self.start.day) not in _UNSET
+
+    @property
+    def has_time(self) -> bool:
+        """Whether the time of the record is known, not only its day."""
+        return self.is_dated and bool(self.start.ns % int(_DAY * 1e9) or self.is_continuous)
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the record is too long for one that an earthquake triggered."""
+        return bool(self.end - self.start > CONTINUOUS)
+
+
+class EventGroup(NamedTuple):
+    """
+    Records of one earthquake.
+
+    Attributes
+    ----------
+    start : UTCDateTime or None
+        Of the earliest record, continuous ones aside; None if no record has a date.
+    records : tuple of RecordSpan
+        Sorted by start.
+    """
+
+    start: UTCDateTime | None
+    records: tuple[RecordSpan, ...]
+
+    @property
+    def stations(self) -> int:
+        """Number of stations."""
+        return len({record.station for record in self.records})
+
+    @property
+    def window(self) -> tuple[UTCDateTime, UTCDateTime] | None:
+        """Times of the first and the last sample, of triggered records if there are any."""
+        dated = [record for record in self.records if record.is_dated]
+        triggered = [record for record in dated if not record.is_continuous] or dated
+        if not triggered:
+            return None
+        first = min(record.start for record in triggered)
+        return first, max(record.end for record in triggered)
+
+    @property
+    def label(self) -> str:
+        """Start of the earthquake's records to the minute, for people."""
+        return str(self.start)[:16] if self.start else "without a date"
+
+
+def record_span(trace: Trace, path: Path) -> RecordSpan:
+    """Return the time of a trace of a file, from its header."""
+    stats = trace.stats
+    # Zeros that the processing put before and after the record are no part of it
+    pads = stats.get("per_obspy", {})
+    start = stats.starttime + (pads.get("pad_before") or 0.0)
+    end = stats.endtime - (pads.get("pad_after") or 0.0)
+    return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end)
+
+
+def station_files(records: Iterable[RecordSpan]) -> dict[str, tuple[Path, ...]]:
+    """Return the files of every station, by their names, each once and sorted as paths are."""
+    files: dict[str, dict[Path, None]] = defaultdict(dict)
+    for record in records:
+        files[record.station][record.path] = None
+    return {station: tuple(sorted(paths)) for station, paths in sorted(files.items())}
+
+
+def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[EventGroup, ...]:
+    """
+    Group records into earthquakes.
+
+    Parameters
+    ----------
+    records : iterable of RecordSpan
+        Records of all stations.
+    gap : float
+        Longest time from the first start of a group to the last, s.
+
+    Returns
+    -------
+    tuple of EventGroup
+        By start. Every record is in a group, a continuous one perhaps in several.
+    """
+    known = sorted(records, key=lambda record: (record.start.ns, record.record, str(record.path)))
+    triggered = [record for record in known if record.has_time and not record.is_continuous]
+    groups = _started_together(triggered, gap)
+    # Records that cannot found a group of their own where there is one to join
+    continuous = [record for record in known if record.is_dated and record.is_continuous]
+    groups += _overlapping_together(_without_group(groups, continuous, _overlapping))
+    days = [record for record in known if record.is_dated and not record.has_time]
+    groups += _started_together(_without_group(groups, days, _near), 0.0)
+    _join_folders(groups, [record for record in known if not record.is_dated])
+    groups.sort(key=lambda group: group[0].start.ns)
+    return tuple(_group(members) for members in groups)
+
+
+def chosen_group(
+    groups: Sequence[EventGroup],
+    time: UTCDateTime | None,
+    source: str,
+    motion: Callable[[EventGroup], float],
+    gap: float = GAP,
+) -> EventGroup:
+    """
+    Return the group to screen.
+
+    Parameters
+    ----------
+    groups : sequence of EventGroup
+        At least one.
+    time : UTCDateTime or None
+        Origin time of the earthquake, or another time within its records. Without it the group of
+        most stations is taken, of these the one of the largest motion, of these the latest.
+    source : str
+        Where the time comes from, for the error.
+    motion : callable
+        Returns the largest motion of a group; called only if several have as many stations.
+    gap : float
+        Longest time from the time to the start of the records, s.
+
+    Raises
+    ------
+    CatalogError
+        If the records of no group contain the time, or follow it within the gap.
+    """
+    if time is not None:
+        fitting = [group for group in groups if _follows(group, time, gap)]
+        if not fitting:
+            starts = ", ".join(group.label for group in groups)
+            problem = f"no record is of {time}, they start {starts}: choose one by records.time"
+            raise CatalogError(source, problem)
+        # Of two earthquakes within minutes, the one that starts nearer to the time
+        return min(fitting, key=lambda group: abs(group.start - time) if group.start else 0.0)
+    largest = max(group.stations for group in groups)
+    tied = [group for group in groups if group.stations == largest]
+    return tied[0] if len(tied) == 1 else max(reversed(tied), key=motion)
+
+
+def _started_together(records: Sequence[RecordSpan], gap: float) -> list[list[RecordSpan]]:
+    """Return groups of records, sorted by start, that start within the gap of their first."""
+    groups: list[list[RecordSpan]] = []
+    for record in records:
+        if groups and record.start - groups[-1][0].start <= gap:
+            groups[-1].append(record)
+        else:
+            groups.append([record])
+    return groups
+
+
+def _without_group(
+    groups: list[list[RecordSpan]],
+    records: Sequence[RecordSpan],
+    fits: Callable[[list[RecordSpan], RecordSpan], bool],
+) -> list[RecordSpan]:
+    """Add records to the groups that they fit, and return those that fit none."""
+    without: list[RecordSpan] = []
+    for record in records:
+        fitting = [group for group in groups if fits(group, record)]
+        # A day may hold several earthquakes, of which only one has the record
+        if fitting and not record.has_time:
+            fitting = [max(fitting, key=lambda group: len({member.station for member in group}))]
+        for group in fitting:
+            group.append(record)
+        if not fitting:
+            without.append(record)
+    return without
+
+
+def _overlapping_together(records: Sequence[RecordSpan]) -> list[list[RecordSpan]]:
+    """Return groups of continuous records, sorted by start, that overlap."""
+    groups: list[list[RecordSpan]] = []
+    for record in records:
+        if groups and record.start <= max(member.end for member in groups[-1]):
+            groups[-1].append(record)
+        else:
+            groups.append([record])
+    return groups
+
+
+def _overlapping(group: list[RecordSpan], record: RecordSpan) -> bool:
+    """Return whether a continuous record contains a part of the triggered records of a group."""
+    start, end = group[0].start, max(member.end for member in group if not member.is_continuous)
+    return bool(record.start <= end and record.end >= start)
+
+
+def _near(group: list[RecordSpan], record: RecordSpan) -> bool:
+    """Return whether a group may be of the day of a record that starts at midnight."""
+    return bool(-0.5 * _DAY <= group[0].start - record.start <= 1.5 * _DAY)
+
+
+def _join_folders(groups: list[list[RecordSpan]], undated: Sequence[RecordSpan]) -> None:
+    """Add records without a date to the group that has most records in their folder."""
+    counts = list(map(_folder_counts, groups))
+    for record in undated:
+        in_folder = [count[record.path.parent] for count in counts]
+        # In a folder of their own they go with whichever group is screened
+        most = max(in_folder, default=0)
+        for count, group in zip(in_folder, groups, strict=True):
+            # The first of those that have most; all where none has any
+            if count == most and (most == 0 or group is groups[in_folder.index(most)]):
+                group.append(record)
+    if undated and not groups:
+        groups.append(list(undated))
+
+
+def _folder_counts(group: Sequence[RecordSpan]) -> Counter[Path]:
+    """Return the number of records of a group in every folder."""
+    return Counter(record.path.parent for record in group)
+
+
+def _group(members: Sequence[RecordSpan]) -> EventGroup:
+    """Return a group with the start of its earliest record that founded it."""
+    first = members[0]
+    return EventGroup(first.start if first.is_dated else None, tuple(members))
+
+
+def _follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
+    """Return whether a group's records contain a time or start within the gap after it."""
+    window = group.window
+    if window is None:
+        return True
+    # The day of records without a time begins and ends in whichever zone
+    is_timed = any(record.has_time for record in group.records)
+    before, after = (gap, 0.0) if is_timed else (0.5 * _DAY, 1.5 * _DAY)
+    return bool(window[0] - before <= time <= window[1] + after)
