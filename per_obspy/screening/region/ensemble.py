@@ -155,6 +155,7 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
         ),
         *((COLUMNS | COMPLETED)[name] for name in SAME),
     ]
+    # weights that are no rates leave the yearly probability out
     return {
         column.name: column for column in columns if yearly or column.name != "annual_probability"
     }
