@@ -20,15 +20,25 @@ from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_with_obspy
 from per_obspy.records.processed_files import described
+from per_obspy.records.station_table import (
+    StationRow,
+    is_station_table,
+    located_stations,
+    read_station_table,
+    read_station_text,
+)
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
 #: records -> kind of file
 _MARKS = {
     b"<FDSNStationXML": "inventory",
-    b"#Network": "inventory",
+    b"#Network": "station text",
     b"quakeml": "event",
     b'"shard": ': "description",
 }
+
+#: kinds of files that describe stations
+_METADATA = ("inventory", "station text", "station table")
 
 #: unit of a series -> its quantity, for the integrals of acceleration
 _INTEGRALS = {"m/s": "velocity", "m": "displacement"}
@@ -64,8 +74,8 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
         Any mixture of waveform files, in archives too, or a single file; StationXML among them is
         used, QuakeML is passed over.
     stationxml : str or Path, optional
-        A StationXML file, or a folder of them, in addition. FDSN station text does where only
-        coordinates are missing.
+        A StationXML file, or a folder of them, in addition. FDSN station text or a table of
+        stations (CSV) does where only coordinates are missing.
 
     Raises
     ------
@@ -84,15 +94,49 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> F
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
     # Metadata from elsewhere, then from the folder
-    inventories = [] if stationxml is None else read_inventories(Path(stationxml))
-    for path in (path for path in files if kinds[path] == "inventory"):
-        try:
-            inventories.append(_read_inventory(path))
-        except RecordRejected as rejection:
-            rejected.append(_rejected_file(path, rejection))
+    inventories, rows = _named_metadata(None if stationxml is None else Path(stationxml))
+    metadata = {path: kind for path, kind in kinds.items() if kind in _METADATA}
+    rejected += _read_metadata(metadata, inventories, rows)
+    if rows:
+        inventories.append(located_stations(rows, stations))
     if not stations:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
     return FolderContents(_sorted(stations), merged_inventory(inventories), tuple(rejected))
+
+
+def _read_metadata(
+    kinds: dict[Path, str], inventories: list[Inventory], rows: list[StationRow]
+) -> list[Rejection]:
+    """Add the content of files to descriptions and rows, and return those that cannot be read."""
+    rejected = []
+    for path, kind in kinds.items():
+        try:
+            if kind == "station table":
+                rows += read_station_table(str(path), _content(path))
+            else:
+                inventories.append(_read_inventory(path))
+        except RecordRejected as rejection:
+            rejected.append(_rejected_file(path, rejection))
+    return rejected
+
+
+def _named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
+    """Return the descriptions of stations, or the rows of a table of them, that a user named."""
+    if path is None:
+        return [], []
+    if not path.is_file() or _kind(path) != "station table":
+        return read_inventories(path), []
+    # A table that the user named must be right
+    try:
+        return [], [*read_station_table(str(path), _content(path))]
+    except RecordRejected as rejection:
+        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
+
+
+def _content(path: Path) -> bytes:
+    """Return the content of a file, which may be in an archive."""
+    with open_file(path) as file:
+        return bytes(file.read())
 
 
 def _station_names(path: Path) -> list[str]:
@@ -224,12 +268,14 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
 
 
 def _kind(path: Path) -> str:
-    """Return the kind of a file: inventory, event, description, or else record."""
+    """Return the kind of a file: a kind of metadata, event, description, or else record."""
     try:
         with open_file(path) as file:
             start = file.read(1000)
     except RecordRejected:
         return "record"  # reading it gives the reason why it cannot be read
+    if path.suffix.lower() == ".csv" and is_station_table(start):
+        return "station table"
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
@@ -242,6 +288,9 @@ def _read(path: Path, **options: Any) -> Stream:
 
 
 def _read_inventory(path: Path) -> Inventory:
+    """Read StationXML or FDSN station text."""
+    if _kind(path) == "station text":
+        return read_station_text(str(path), _content(path))
     return read_with_obspy(obspy.read_inventory, path)
 
 
