@@ -16,17 +16,17 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
-from per_obspy.records.archives import is_archive, members, open_file
-from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_with_obspy
-from per_obspy.records.processed_files import described
-from per_obspy.records.station_table import (
+from per_obspy.formats.text.station_table import (
     StationRow,
     is_station_table,
     located_stations,
     read_station_table,
     read_station_text,
 )
+from per_obspy.records.archives import is_archive, members, open_file
+from per_obspy.records.metadata import with_metadata
+from per_obspy.records.obspy_readers import read_with_obspy
+from per_obspy.records.processed_files import described
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
 #: records -> kind of file

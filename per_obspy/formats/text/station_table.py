@@ -101,6 +101,7 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
     places = _places(_fields(lines[0] if lines else ""))
     if missing := [column for column in _REQUIRED if column not in places]:
         raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
+    # Every other line is a station or a comment
     rows = []
     for number, line in enumerate(lines[1:], 2):
         if line.strip() and not line.startswith("#"):
@@ -141,13 +142,11 @@ def _row(line: str, name: str, fields: list[str], places: dict[str, list[int]]) 
     if not names:
         raise RecordRejected(name, f"{line}, station: empty")
     # Of the numbers only the elevation may be missing
-    numbers = {}
-    for column in ("latitude", "longitude", "elevation"):
-        word = words.get(column, [""])[0]
-        is_unknown = column == "elevation" and not word
-        numbers[column] = None if is_unknown else _number(line, name, column, word)
+    place = [_number(line, name, column, words[column][0]) for column in ("latitude", "longitude")]
+    height = words.get("elevation", [""])[0]
+    elevation = _number(line, name, "elevation", height) if height else None
     network = words.get("network", [""])[0].upper()
-    return StationRow(network, names, **numbers)
+    return StationRow(network, names, place[0], place[1], elevation)
 
 
 def _number(line: str, name: str, column: str, word: str) -> float:
