@@ -151,7 +151,10 @@ class Records(Section):
         None, description="folder of waveform files, with StationXML beside them"
     )
     stationxml: RelativePath | None = Field(
-        None, description="StationXML file or folder, if not beside the records"
+        None,
+        description=(
+            "StationXML file or folder, or a CSV table of stations, if not beside the records"
+        ),
     )
     event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
     time: Moment | None = Field(

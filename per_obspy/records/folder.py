@@ -17,20 +17,30 @@ from obspy import Inventory, Stream, Trace, UTCDateTime
 
 from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
 from per_obspy.files import bytes_hash, is_part
+from per_obspy.formats.text.station_table import (
+    StationRow,
+    is_station_table,
+    located_stations,
+    read_station_table,
+    read_station_text,
+)
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_content, read_with_obspy
+from per_obspy.records.obspy_readers import read_content
 from per_obspy.records.processed_files import described
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
 #: records -> kind of file
 _MARKS = {
     b"<FDSNStationXML": "inventory",
-    b"#Network": "inventory",
+    b"#Network": "station text",
     b"quakeml": "event",
     b'"shard": ': "description",
 }
+
+#: Kinds of files that describe stations.
+_METADATA = ("inventory", "station text", "station table")
 
 #: unit of a series -> its quantity, for the integrals of acceleration
 _INTEGRALS = {"m/s": "velocity", "m": "displacement"}
@@ -72,8 +82,8 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
         Any mixture of waveform files, in archives too, or a single file; StationXML among them is
         used, QuakeML is passed over.
     stationxml : str or Path, optional
-        A StationXML file, or a folder of them, in addition. FDSN station text does where only
-        coordinates are missing.
+        A StationXML file, or a folder of them, in addition. FDSN station text or a table of
+        stations (CSV) does where only coordinates are missing.
 
     Raises
     ------
@@ -85,15 +95,20 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
     found = [_read_file(path) for path in files]
     records = tuple(chain.from_iterable(file.records for file in found))
     # Metadata that is named comes before that of the folder
-    inventories = [] if stationxml is None else read_inventories(Path(stationxml))
+    inventories, rows = _named_metadata(None if stationxml is None else Path(stationxml))
     inventories += [file.inventory for file in found if file.inventory is not None]
+    rows += chain.from_iterable(file.rows for file in found)
     # Unusable records come before unusable metadata
-    for kind in ("record", "inventory"):
+    for kind in ("record", *_METADATA):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
     if not records:
         raise CatalogError(str(folder), _nothing_found(files, rejected))
+    stations = station_files(records)
+    # Tables of coordinates serve the stations that have records
+    if rows:
+        inventories.append(located_stations(rows, stations))
     return SourceContents(
-        station_files(records),
+        stations,
         merged_inventory(inventories),
         tuple(rejected),
         {file.path: file.hash for file in found if file.hash},
@@ -109,6 +124,7 @@ class _File(NamedTuple):
     kind: str = "record"
     records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
+    rows: tuple[StationRow, ...] = ()
     rejection: Rejection | None = None
 
 
@@ -119,13 +135,17 @@ def _read_file(path: Path) -> _File:
     try:
         content = _content(path)
         # Hash, headers and metadata come from the same bytes
-        file = file._replace(hash=bytes_hash(content), kind=_kind(content))
+        file = file._replace(hash=bytes_hash(content), kind=_kind(path, content))
         if file.kind == "record":
             stream = _traces(path, content, headonly=True)
             return file._replace(records=tuple(record_span(trace, path) for trace in stream))
         if file.kind == "inventory":
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
+        if file.kind == "station text":
+            return file._replace(inventory=read_station_text(str(path), content))
+        if file.kind == "station table":
+            return file._replace(rows=read_station_table(str(path), content))
     except RecordRejected as rejection:
         return file._replace(rejection=_rejected_file(path, rejection))
     return file
@@ -137,9 +157,24 @@ def _content(path: Path) -> bytes:
         return file.read()
 
 
-def _kind(content: bytes) -> str:
-    """Return the kind of a file by its start: inventory, event, description, or else record."""
+def _named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
+    """Return the descriptions of stations, or the rows of a table of them, that a user named."""
+    if path is None:
+        return [], []
+    # A table that the user named must be right
+    try:
+        if path.is_file() and _kind(path, content := _content(path)) == "station table":
+            return [], [*read_station_table(str(path), content)]
+    except RecordRejected as rejection:
+        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
+    return read_inventories(path), []
+
+
+def _kind(path: Path, content: bytes) -> str:
+    """Return the kind of a file: a kind of metadata, event, description, or else record."""
     start = content[:1000]
+    if path.suffix.lower() == ".csv" and is_station_table(start):
+        return "station table"
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
@@ -246,7 +281,11 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
 
 
 def _read_inventory(path: Path) -> Inventory:
-    return read_with_obspy(obspy.read_inventory, path)
+    """Read StationXML or FDSN station text."""
+    content = _content(path)
+    if _kind(path, content) == "station text":
+        return read_station_text(str(path), content)
+    return read_content(obspy.read_inventory, content, path)
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:

@@ -202,6 +202,8 @@ def _place_station(trace: Trace, inventory: Inventory | None) -> None:
     station = _only(trace, "station", list(_stations(trace, inventory)), _station_facts)
     if station is not None:
         trace.stats.coordinates = _place(station)
+        if _comment_words(trace, inventory).get("elevation") == "unknown":
+            del trace.stats.coordinates["elevation"]
 
 
 def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]:

@@ -188,3 +188,46 @@ def test_velocity_without_acceleration_is_read_as_such(tmp_path: Path):
     (paths,) = find_stations(tmp_path).stations.values()
     stream, rejected = read_station(paths, None)
     assert ({trace.stats.units for trace in stream}, rejected) == ({"m/s"}, ())
+
+
+STATION_TABLE = "Network,Station,LATITUDE,Longitude,Elevation\nxx,Some Town,-33.5,-71.25,12\n"
+
+
+def test_a_table_beside_the_records_gives_their_coordinates(tmp_path: Path):
+    write_peer(tmp_path, ("ACCELERATION",))
+    (tmp_path / "stations.csv").write_text(STATION_TABLE)
+    # The name is that in the header, in another case
+    contents = find_stations(tmp_path)
+    assert contents.rejected == ()
+    (paths,) = contents.stations.values()
+    stream, rejected = read_station(paths, contents.inventory)
+    assert rejected == ()
+    for trace in stream:
+        place = trace.stats.coordinates
+        assert (place.latitude, place.longitude, place.elevation) == (-33.5, -71.25, 12.0)
+
+
+def test_a_table_may_be_named_and_lie_elsewhere(tmp_path: Path):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    write_peer(folder, ("ACCELERATION",))
+    table = tmp_path / "places.csv"
+    table.write_text("name;lat;lon\nSOME TOWN;1.5;2.5\n")
+    contents = find_stations(folder, table)
+    (paths,) = contents.stations.values()
+    for trace in read_station(paths, contents.inventory)[0]:
+        # an elevation that the table lacks stays unknown
+        assert trace.stats.coordinates == {"latitude": 1.5, "longitude": 2.5}
+    table.write_text("name;lat;lon\nSOME TOWN;91;2.5\n")
+    with pytest.raises(CatalogError, match="line 2, latitude: '91' is not a number from -90 to 90"):
+        find_stations(folder, table)
+
+
+def test_station_text_without_starts_serves_the_records_beside_it(tmp_path: Path):
+    write_peer(tmp_path, ("ACCELERATION",))
+    header = "#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime"
+    (tmp_path / "stations.txt").write_text(f"{header}\n|SOMETOWN|1|2|3|Town||\n")
+    contents = find_stations(tmp_path)
+    (paths,) = contents.stations.values()
+    stream, _ = read_station(paths, contents.inventory)
+    assert {trace.stats.coordinates.latitude for trace in stream} == {1.0}

@@ -1,0 +1,228 @@
+"""Coordinates of stations from plain text: FDSN station text and tables in CSV."""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import obspy
+from obspy import Inventory, UTCDateTime
+from obspy.core.inventory import Comment, Network, Station
+
+from per_obspy.errors import RecordRejected
+
+#: column of a table of stations -> names that it may have, in lower case
+_COLUMNS = {
+    "network": ("network", "net", "network_code"),
+    "station": ("station", "code", "station_code", "sta", "name", "station_name"),
+    "latitude": ("latitude", "lat", "latitude_deg"),
+    "longitude": ("longitude", "lon", "long", "longitude_deg"),
+    "elevation": ("elevation", "elev", "height", "elevation_m"),
+}
+_REQUIRED = ("station", "latitude", "longitude")
+
+#: largest absolute value, degrees or m
+_LARGEST = {"latitude": 90.0, "longitude": 180.0, "elevation": 9000.0}
+
+#: start of an epoch that FDSN station text leaves open
+_OPEN = UTCDateTime(1, 1, 2)
+
+
+class StationRow(NamedTuple):
+    """
+    One row of a table of stations.
+
+    Attributes
+    ----------
+    network : str
+        Code in capitals; empty where the table has none, which fits any.
+    names : tuple of str
+        Code and name, as :func:`bare_name` gives them.
+    latitude, longitude : float
+        Degrees.
+    elevation : float or None
+        m.
+    """
+
+    network: str
+    names: tuple[str, ...]
+    latitude: float
+    longitude: float
+    elevation: float | None
+
+
+def bare_name(name: str) -> str:
+    """
+    Return capitals, letters and digits only, as codes are made from names.
+
+    >>> bare_name("Viña del Mar (Centro)") == bare_name("VIÑA DEL MAR CENTRO")
+    True
+    """
+    return re.sub(r"[\W_]", "", name.upper())
+
+
+def is_station_table(start: bytes) -> bool:
+    r"""
+    Check whether a file starts like a table of stations.
+
+    >>> is_station_table(b"Station;Lat;Lon\n"), is_station_table(b"time,acceleration\n")
+    (True, False)
+    """
+    first_line = start.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf").split("\n")[0]
+    try:
+        return set(_REQUIRED) <= set(_places(_fields(first_line)))
+    except csv.Error:
+        return False
+
+
+def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
+    """
+    Read a table of stations: comma or semicolon between columns, names of columns in any case.
+
+    Parameters
+    ----------
+    name : str
+        File, for messages.
+    content : bytes
+        UTF-8 or Latin-1.
+
+    Raises
+    ------
+    RecordRejected
+        Naming line and column of the first fault.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    # Lines are counted from 1; empty ones are passed over
+    lines = text.splitlines()
+    places = _places(_fields(lines[0] if lines else ""))
+    if missing := [column for column in _REQUIRED if column not in places]:
+        raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
+    # Every other line is a station or a comment
+    rows = []
+    for number, line in enumerate(lines[1:], 2):
+        if line.strip() and not line.startswith("#"):
+            try:
+                fields = _fields(line, lines[0])
+            except csv.Error as error:
+                raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
+            rows.append(_row(f"line {number}", name, fields, places))
+    return tuple(rows)
+
+
+def _fields(line: str, header: str | None = None) -> list[str]:
+    """Return the fields of a line, without blanks; the header decides the separator."""
+    separator = ";" if ";" in (line if header is None else header) else ","
+    row = next(csv.reader([line], delimiter=separator), [])
+    return [field.strip() for field in row]
+
+
+def _places(header: Sequence[str]) -> dict[str, list[int]]:
+    """Return column -> its places in the header; of stations there may be code and name."""
+    places: dict[str, list[int]] = {}
+    for place, field in enumerate(header):
+        for column, names in _COLUMNS.items():
+            if field.lower().strip(" #\ufeff").replace(" ", "_") in names:
+                places.setdefault(column, []).append(place)
+    return places
+
+
+def _row(line: str, name: str, fields: list[str], places: dict[str, list[int]]) -> StationRow:
+    """Return a row, whose numbers must be in their range."""
+    words = {}
+    for column, found in places.items():
+        if max(found) >= len(fields):
+            raise RecordRejected(name, f"{line}: {len(fields)} columns, no {column}")
+        words[column] = [fields[place] for place in found]
+    # A station may have a code, a name or both
+    names = tuple(bare_name(word) for word in words["station"] if bare_name(word))
+    if not names:
+        raise RecordRejected(name, f"{line}, station: empty")
+    # Of the numbers only the elevation may be missing
+    place = [_number(line, name, column, words[column][0]) for column in ("latitude", "longitude")]
+    height = words.get("elevation", [""])[0]
+    elevation = _number(line, name, "elevation", height) if height else None
+    network = words.get("network", [""])[0].upper()
+    return StationRow(network, names, place[0], place[1], elevation)
+
+
+def _number(line: str, name: str, column: str, word: str) -> float:
+    """Return a decimal number of a column within its range."""
+    # Neither nan nor inf nor long runs of digits
+    is_decimal = re.fullmatch(r"[-+]?(\d{1,20}(\.\d{0,30})?|\.\d{1,30})", word)
+    if is_decimal is None or abs(float(word)) > _LARGEST[column]:
+        expected = f"a number from -{_LARGEST[column]:g} to {_LARGEST[column]:g}"
+        raise RecordRejected(name, f"{line}, {column}: {word[:40]!r} is not {expected}")
+    return float(word)
+
+
+def located_stations(rows: Iterable[StationRow], stations: Iterable[str]) -> Inventory:
+    """
+    Return the coordinates of stations that have records.
+
+    Parameters
+    ----------
+    rows : iterable of StationRow
+        Of all tables.
+    stations : iterable of str
+        ``"NET.STA"``; code or name in a table may be in any case.
+    """
+    table = tuple(rows)
+    networks = []
+    for identifier in stations:
+        network, station = identifier.split(".", 1)
+        # A table without networks fits all of them, and so does a record without one
+        found = []
+        for row in table:
+            same_network = not row.network or not network or row.network == network.upper()
+            if same_network and bare_name(station) in row.names:
+                found.append(_station(station, row))
+        if found:
+            networks.append(Network(network, stations=found))
+    return Inventory(networks=networks, source="")
+
+
+def _station(code: str, row: StationRow) -> Station:
+    """Return the description of a station; ObsPy needs a number for an elevation."""
+    comments = [] if row.elevation is not None else [Comment("elevation=unknown")]
+    elevation = 0.0 if row.elevation is None else row.elevation
+    return Station(code, row.latitude, row.longitude, elevation, comments=comments)
+
+
+def read_station_text(name: str, content: bytes) -> Inventory:
+    """
+    Read FDSN station text, whose empty start means an open one.
+
+    Raises
+    ------
+    RecordRejected
+        If it cannot be read.
+    """
+    lines = content.decode("utf-8", "replace").splitlines()
+    header = [field.strip().lower() for field in lines[0].lstrip("#").split("|")]
+    start = header.index("starttime") if "starttime" in header else len(header)
+    # ObsPy refuses an empty start
+    for index, line in enumerate(lines[1:], 1):
+        fields = line.split("|")
+        if start < len(fields) and not fields[start].strip() and not line.startswith("#"):
+            lines[index] = "|".join((*fields[:start], str(_OPEN), *fields[start + 1 :]))
+    # Whatever ObsPy cannot read has one kind of error
+    try:
+        text = io.BytesIO("\n".join(lines).encode())
+        inventory = obspy.read_inventory(text, format="STATIONTXT")
+    except Exception as error:
+        raise RecordRejected(name, f"is no FDSN station text: {error!s:.200}") from error
+    return _with_open_starts(inventory)
+
+
+def _with_open_starts(inventory: Inventory) -> Inventory:
+    """Return an inventory just read without the mark of open starts."""
+    for network in inventory:
+        for station in network:
+            for description in (station, *station.channels):
+                if description.start_date == _OPEN:
+                    description.start_date = None
+    return inventory
