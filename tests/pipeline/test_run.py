@@ -105,6 +105,7 @@ def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copie
         result = run(
             write_folder_configuration(copied, f"out-{source}", SPECTRA), executor=InProcess()
         )
+        # in the record of the run, every row, the spectra and the facts of the table
         assert result.record["simulated"] is True
         assert result.record["counts"]["stations_simulated"] == 3
         table = pd.read_parquet(result.folder / "risk.parquet")
