@@ -76,7 +76,7 @@ def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
     """
-    Give a temporary path beside the final one, renamed to it if the block succeeds, else removed.
+    Give a temporary path that is renamed to the final one if the block succeeds, else removed.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
     Parameters
     ----------
     jobs : iterable of ChunkJob
-        What to do; asked for while the work goes on.
+        Chunks, which are taken while the work goes on.
     workers : int
         Number of processes.
     executor : Executor or None

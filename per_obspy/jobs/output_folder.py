@@ -1,8 +1,8 @@
 """
 Output folder of a run: locked by one run at a time, and described by one JSON file.
 
-That file is a status file (:mod:`per_obspy.resume`) and written last: where it is, the results
-beside it are complete.
+That file is a status file (:mod:`per_obspy.resume`) and written last: where it is, the other
+results are complete.
 """
 
 import json

@@ -59,10 +59,10 @@ def process_records(
     Parameters
     ----------
     sources : sequence of Path
-        Waveform files, archives, or folders of them with StationXML beside.
+        Waveform files, archives, or folders of them with StationXML.
     folder : Path
-        Gets ``stations/NET.STA.mseed`` with ``.json`` beside, ``structures/`` with the same for
-        sensors in structures, ``processed.csv``, ``processed.columns.csv`` and ``rejected.csv``.
+        Gets ``stations/NET.STA.mseed`` and ``.json``, ``structures/`` with the same for sensors
+        in structures, ``processed.csv``, ``processed.columns.csv`` and ``rejected.csv``.
         What is still true is not done again.
     settings : Processing
         Every number of the chain.
@@ -121,7 +121,7 @@ def _structure(job: StationJob) -> Path:
 
 
 def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the processed records of a station as its shard, and those of structures apart."""
+    """Write the processed records of a station as its shard, structures in another file."""
     clean, unfit = process_station(stream, job.processing, event)
     return _write_records(job, clean, unfit, _write_structure(job, stream, event))
 

@@ -26,7 +26,7 @@ from per_obspy.tables.totals import (
     write_totals,
 )
 
-#: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
+#: Pairs that a figure shows, evenly from all of them: marks of more would cover each other.
 SHOWN = 20_000
 
 #: Columns of the pairs that a figure shows.

@@ -2,7 +2,7 @@
 One run, from records to report, or one of its stages alone.
 
 Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
-``run.json`` is removed first and written last: where it is, the results beside it are complete,
+``run.json`` is removed first and written last: where it is, the other results are complete,
 and a run of the same inputs does nothing.
 """
 

@@ -209,7 +209,7 @@ def test_part_files_of_a_killed_run_do_not_hinder_the_next(copied):
         path.write_bytes(b"{half")
     (out / "run.json").unlink()
     counts = run(copied / "run.toml", executor=InProcess()).record["counts"]
-    assert (counts["stations_resumed"], counts["chunks_resumed"]) == (3, 1)
+    assert (counts["stations"], counts["stations_resumed"], counts["chunks"]) == (3, 3, 1)
     # no process has a number above the largest of Linux, 2 ** 22
     assert not any(path.exists() for path in left)
 

@@ -50,7 +50,7 @@ class Fetched(NamedTuple):
     event : EventFile or None
         QuakeML file and its event.
     wanted : Wanted
-        What was asked for.
+        Circle, window and channels of the request.
     rejected : tuple of Rejection
         Stations and services that failed, with every reason.
     """
