@@ -205,6 +205,7 @@ def test_info_shows_earthquakes_and_simulated_records(simulation, tmp_path, call
     write_simulation(simulation, tmp_path / "main")
     later = Scenario(stations=1, dt=0.02, magnitude=5.5, origin_time="2001-02-03T04:05:06")
     write_simulation(simulate(later), tmp_path / "later")
+    # as JSON every record has its mark, as text every earthquake has a line
     records = json.loads(call("info", tmp_path, "--json")[1])["records"]
     assert {record["event"][:2] for record in records} == {"1:", "2:"}
     assert all(record["simulated"] for record in records)

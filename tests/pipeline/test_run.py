@@ -107,6 +107,7 @@ def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copie
         result = run(
             write_folder_configuration(copied, f"out-{source}", SPECTRA), executor=InProcess()
         )
+        # in the record of the run, every row, the spectra and the facts of the table
         assert result.record["simulated"] is True
         assert result.record["counts"]["stations_simulated"] == 3
         table = pd.read_parquet(result.folder / "risk.parquet")
@@ -210,7 +211,7 @@ def test_part_files_of_a_killed_run_do_not_hinder_the_next(copied):
         path.write_bytes(b"{half")
     (out / "run.json").unlink()
     counts = run(copied / "run.toml", executor=InProcess()).record["counts"]
-    assert (counts["stations_resumed"], counts["chunks_resumed"]) == (3, 1)
+    assert (counts["stations"], counts["stations_resumed"], counts["chunks"]) == (3, 3, 1)
     # no process has a number above the largest of Linux, 2 ** 22
     assert not any(path.exists() for path in left)
 

@@ -70,6 +70,20 @@ def test_a_region_is_sorted_and_tells_what_is_missing(stations):
     assert "acceleration" not in joined
 
 
+def test_one_simulated_station_marks_the_region(stations):
+    # would catch a mark that is dropped because other stations differ
+    assert region(stations).attrs["simulated"] == "false"
+    marked = stations[0].assign_attrs(simulated="true")
+    assert region([marked, *stations[1:]]).attrs["simulated"] == "true"
+
+
+def test_a_simulated_record_marks_the_spectra():
+    trace = Trace(RANDOM.normal(size=200), {"channel": "HNE", "delta": 0.02, "units": "m/s2"})
+    trace.stats.simulated = True
+    spectra = per_obspy.station_spectra(Stream([trace]), [0.5, 1.0], (0.05,), 90)
+    assert spectra.attrs["simulated"] == "true"
+
+
 def test_stations_on_different_grids_do_not_make_a_region(stations):
     with pytest.raises(ValueError, match="period differs between the stations"):
         region([stations[0], _station("D", count=21)])

@@ -114,6 +114,7 @@ def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], boo
     CatalogError
         If a time is no time, a circle is incomplete, or a parameter needs a service.
     """
+    # Everything else that a service can select by is unknown of a file
     unknown = query.keys() - {"starttime", "endtime", "minmagnitude", *_CIRCLE}
     if unknown:
         raise CatalogError(source, f"{', '.join(sorted(unknown))}: only a service can select by it")
