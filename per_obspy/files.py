@@ -67,7 +67,7 @@ def looks_like(path: Path) -> str:
 
 
 def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
-    """Return why a file is not of the expected kind: its kind, or else its reader's first sentence."""
+    """Return why a file is not of the expected kind: its kind, or what its reader found."""
     kind = looks_like(path)
     known = kind and expected not in kind
     reason = f"it is {kind}" if known else str(error).partition("; ")[0].rstrip(".")
@@ -77,7 +77,7 @@ def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
     """
-    Give a temporary path beside the final one, renamed to it if the block succeeds, else removed.
+    Give a temporary path that is renamed to the final one if the block succeeds, else removed.
 
     Parameters
     ----------
@@ -152,6 +152,7 @@ def remove_dead_parts(folder: Path) -> None:
             writer = _WRITER.match(name)
             if writer is None or _is_running(int(writer["process"]), writer["machine"]):
                 continue
+            # A temporary folder is removed with everything inside
             path = Path(parent, name)
             if path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)

@@ -36,13 +36,13 @@ def write_status(
     Parameters
     ----------
     path : Path
-        JSON file, beside or above the outputs.
+        JSON file, in the folder of the outputs or above.
     key : str
         Hash of everything on which the work depends; empty if it shall be done again.
     outputs : mapping of str to str
         Path of every output, seen from the folder of the status file, and its hash.
     facts : mapping
-        Plain values to be kept: other names than ``key`` and ``outputs``.
+        Plain values by other names than ``key`` and ``outputs``.
     indent : int, optional
         Spaces per level, for files that people read.
     """

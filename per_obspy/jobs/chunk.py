@@ -100,7 +100,7 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
     Parameters
     ----------
     jobs : iterable of ChunkJob
-        What to do; asked for while the work goes on.
+        Chunks, which are taken while the work goes on.
     workers : int
         Number of processes.
     executor : Executor or None
@@ -118,6 +118,7 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
             else:
                 resumed.append(earlier)
 
+    # Resumed parts are passed on as soon as the next one is finished
     for part in results(missing(), do_chunk, _failed, workers, executor):
         yield from resumed
         resumed.clear()

@@ -99,6 +99,7 @@ def ground_files(
         Stations without coordinates.
     """
     files, spectra, rejected = list[StationFile](), list[xr.Dataset](), list[Rejection]()
+    # Pairs are given stations by distance
     for station in stations:
         file, dataset = _station_file(station)
         if np.isfinite(file.longitude):
@@ -108,9 +109,10 @@ def ground_files(
             reason = "its coordinates are unknown: it serves no pair"
             rejected.append(Rejection("station", file.name, "", None, (reason,)))
 
-    # All stations recorded the same earthquake
+    # Motion between the stations, which recorded the same earthquake
     hypocentre = _hypocentre(spectra[-1]) if spectra else []
     field = prepared_field(spectra, settings, *hypocentre) if spectra else None
+    # Everything that decides the motion at a pair
     contents = [(file.name, file.hash) for file in files]
     known = [*contents, *map(file_hash, shakemap), hypocentre]
     key = bytes_hash(repr(known).encode())

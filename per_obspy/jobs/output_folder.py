@@ -1,8 +1,8 @@
 """
 Output folder of a run: locked by one run at a time, and described by one JSON file.
 
-That file is a status file (:mod:`per_obspy.resume`) and written last: where it is, the results
-beside it are complete.
+That file is a status file (:mod:`per_obspy.resume`) and written last: where it is, the other
+results are complete.
 """
 
 import json
@@ -94,6 +94,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
 def _acquired_lock(folder: Path, holder: Path) -> FileLock:
     """Make the output folder if need be and acquire its lock at once."""
+    # The lock ends with its process, so that a killed run holds nothing
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = FileLock(str(folder / ".lock"), timeout=0)

@@ -2,7 +2,7 @@
 Independent tasks on several processes, or on any executor; none of them can stop the others.
 
 A task whose worker dies takes the whole pool with it. What was under way then is done again, each
-task in a process of its own, so that only the guilty one is lost; the rest goes on in a new pool.
+task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
 """
 
@@ -28,7 +28,7 @@ Do = Callable[[Task], Result]
 #: Return the substitute for the result of a task that failed, given the reason.
 Failed = Callable[[Task, str], Result]
 
-#: Tasks submitted ahead, for each worker: one at work and one waiting.
+#: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
 
 #: Tasks submitted ahead to an executor of unknown size.
@@ -48,7 +48,7 @@ def results(
     Parameters
     ----------
     tasks : iterable
-        What to do; asked for while the work goes on.
+        Tasks, which are taken while the work goes on.
     do, failed : callable
         Work of a task, and the substitute for its result if it fails.
     workers : int
@@ -143,5 +143,5 @@ def _caught(task: Task, work: Callable[[], Result], failed: Failed[Task, Result]
         raise
     except PerError as error:
         return failed(task, str(error))
-    except Exception as error:  # noqa: BLE001 - where a worker returns, nothing may be lost
+    except Exception as error:  # noqa: BLE001 - where a worker returns, every task needs a result
         return failed(task, f"{type(error).__name__}: {error}")

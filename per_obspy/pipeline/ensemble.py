@@ -71,6 +71,7 @@ def screen_scenarios(
     settings = load(configuration, Ensemble)
     folder = (output or settings.output).resolve()
     _check_folders(settings, configuration, folder)
+    # Each run takes its own folder, one after the other
     started = now()
     runs = {
         scenario.name: run(scenario.run, None, executor, _prefixed(scenario.name, progress))

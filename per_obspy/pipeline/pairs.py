@@ -102,7 +102,7 @@ def _simulated(simulation: SimulatedPairs, stations: Sequence[StationFile]) -> p
     classes = np.array([station.site_class for station in stations], dtype=object)
     if not classes.any():
         return table
-    # Buildings stand on the ground of the station next to them
+    # Buildings have the site class of the nearest station
     east, north = table["longitude_1"].to_numpy(), table["latitude_1"].to_numpy()
     nearest, _ = nearest_station(east, north, longitude, latitude)
     return table.assign(site_class=classes[nearest])

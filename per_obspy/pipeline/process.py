@@ -59,10 +59,10 @@ def process_records(
     Parameters
     ----------
     sources : sequence of Path
-        Waveform files, archives, or folders of them with StationXML beside.
+        Waveform files, archives, or folders of them with StationXML.
     folder : Path
-        Gets ``stations/NET.STA.mseed`` with ``.json`` beside, ``structures/`` with the same for
-        sensors in structures, ``processed.csv``, ``processed.columns.csv`` and ``rejected.csv``.
+        Gets ``stations/NET.STA.mseed`` and ``.json``, ``structures/`` with the same for sensors
+        in structures, ``processed.csv``, ``processed.columns.csv`` and ``rejected.csv``.
         What is still true is not done again.
     settings : Processing
         Every number of the chain.
@@ -110,8 +110,9 @@ def process_records(
 
 def _records(jobs: Sequence[StationJob]) -> list[Path]:
     """Return the MiniSEED files that these jobs left, those of structures last."""
-    paths = [job.shard for job in jobs] + [_structure(job) for job in jobs]
-    return [path for path in paths if path.exists()]
+    shards = [job.shard for job in jobs]
+    structures = [_structure(job) for job in jobs]
+    return [path for path in (*shards, *structures) if path.exists()]
 
 
 def _structure(job: StationJob) -> Path:
@@ -120,7 +121,7 @@ def _structure(job: StationJob) -> Path:
 
 
 def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the processed records of a station as its shard, and those of structures apart."""
+    """Write the processed records of a station as its shard, structures in another file."""
     clean, unfit = process_station(stream, job.processing, event)
     return _write_records(job, clean, unfit, _write_structure(job, stream, event))
 
@@ -128,6 +129,7 @@ def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Produ
 def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
     """Do as :func:`records_shard`, and draw a page per record."""
     clean, unfit = process_station(stream, job.processing, event)
+    # Each page shows a record before and after
     pages = job.shard.with_suffix(".pdf")
     if clean:
         traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
@@ -152,6 +154,7 @@ def _write_structure(job: StationJob, stream: Stream, event: Event | None) -> Pr
     path = _structure(job)
     path.unlink(missing_ok=True)
     instruments, rejected = process_instruments(kept_apart(stream)[1], job.processing, event)
+    # All instruments in one file
     built = Stream([trace for traces in instruments for trace in traces])
     if not built:
         return Products(rejected)

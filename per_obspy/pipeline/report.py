@@ -25,7 +25,7 @@ from per_obspy.tables.totals import (
     write_totals,
 )
 
-#: Pairs that a figure shows, evenly from all of them: more cannot be told apart.
+#: Pairs that a figure shows, evenly from all of them: marks of more would cover each other.
 SHOWN = 20_000
 
 #: Columns of the pairs that a figure shows.
@@ -88,6 +88,7 @@ def reported(
     spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
     if spectra is not None:
         outputs.append(folder / "spectra.nc")
+    # Without a pair there is no risk table
     if risk.exists():
         summary = _summary(settings, risk, folder)
         if spectra is not None:
@@ -115,6 +116,7 @@ def _summary(settings: Run, risk: Path, folder: Path) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
     needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
     columns = None if settings.geopackage else list(dict.fromkeys(needed))
+    # The layer takes the pieces one by one, and so they are noted on the way
     pieces = _Pieces([], [], [], [])
     with ranked_table(risk, columns) as table:
         noted = _noted(table, settings, pieces)

@@ -2,7 +2,7 @@
 One run, from records to report, or one of its stages alone.
 
 Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
-``run.json`` is removed first and written last: where it is, the results beside it are complete,
+``run.json`` is removed first and written last: where it is, the other results are complete,
 and a run of the same inputs does nothing.
 """
 
@@ -34,6 +34,7 @@ from per_obspy.pipeline.preflight import check_inputs, require_extras
 from per_obspy.pipeline.report import reported
 from per_obspy.pipeline.screening import Screened, screened
 from per_obspy.pipeline.stations import (
+    FoundStations,
     all_rejections,
     find_station_jobs,
     finished_stations,
@@ -88,25 +89,22 @@ def run(
     folder = (output or settings.output).resolve()
     with locked_folder(folder):
         fetched = fetched_records(settings.records, progress)
-        # Inputs are read only to compare them with those of a finished run
+        # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():
             head = _head(settings, configuration, fetched, {})
             known = earlier_status(folder / RECORD, head["key"])
             if known is not None:
                 return Result(folder, known, did_nothing=True)
+
+        # Otherwise they are hashed while their headers are read
         check_inputs(settings)
         (folder / RECORD).unlink(missing_ok=True)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
-            # Otherwise they have been hashed while their headers were read
             head = head or _head(settings, configuration, fetched, found.hashes)
-        with _timed(seconds, "stations"), _compiling(progress):
-            progress("stations", 0, len(found.jobs))
-            stations = finished_stations(found.jobs, settings.workers, executor, progress)
-        rejected = all_rejections(found.rejected, stations)
-        record = _screened_and_reported(settings, folder, stations, rejected, executor, progress)
+        record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
         return recorded(folder / RECORD, {**record, "started": started, **head})
 
@@ -136,9 +134,7 @@ def screen(
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
         with _compiling(progress):
-            record = _screened_and_reported(
-                settings, folder, stations, rejected, executor, progress
-            )
+            record = _later_stages(settings, folder, stations, rejected, executor, progress)
         return recorded(folder / RECORD, {**record, "started": started, **head})
 
 
@@ -208,7 +204,25 @@ def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
     return [station for station in stations if station.shard is not None]
 
 
-def _screened_and_reported(
+def _all_stages(
+    settings: Run,
+    folder: Path,
+    found: FoundStations,
+    executor: Executor | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Do the stations and the stages after them, and return their part of ``run.json``."""
+    seconds = dict[str, float]()
+    with _timed(seconds, "stations"), _compiling(progress):
+        progress("stations", 0, len(found.jobs))
+        stations = finished_stations(found.jobs, settings.workers, executor, progress)
+    # From here on no record is needed
+    rejected = all_rejections(found.rejected, stations)
+    record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    return {**record, "seconds": seconds | record["seconds"]}
+
+
+def _later_stages(
     settings: Run,
     folder: Path,
     stations: Sequence[FinishedStation],
@@ -219,6 +233,7 @@ def _screened_and_reported(
     """Do the stages after the stations and return their part of ``run.json``."""
     # Files of an earlier table would not agree with the stations
     seconds, usable = dict[str, float](), _usable(stations)
+    # A table of an earlier run would be taken for one of this run
     for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
         (folder / name).unlink(missing_ok=True)
     with _timed(seconds, "screening"):

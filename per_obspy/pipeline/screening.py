@@ -78,6 +78,7 @@ def screened(
     """
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
+    # Pairs need a station or a map
     has_motion = bool(stations or maps)
     parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
     served = Counter[str]()
@@ -97,7 +98,8 @@ def screened(
 
 def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
     """Return the numbers of pairs, of rejections of each kind and of chunks."""
-    counts = {"pairs": states.total(), **{state: states[state] for state in STATES}}
+    counts = {"pairs": states.total()}
+    counts |= {state: states[state] for state in STATES}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
     return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
 
@@ -131,7 +133,8 @@ def _parts(
 
 def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
     """Remove everything but these parts: those of a longer inventory, and half written ones."""
-    known = {part.status for part in parts} | {part.path for part in parts}
+    known = {part.status for part in parts}
+    known |= {part.path for part in parts if part.path}
     for path in folder.iterdir() if folder.is_dir() else ():
         if path not in known and path.is_file():
             path.unlink()

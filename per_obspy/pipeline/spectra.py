@@ -29,11 +29,10 @@ def spectra_of(
     Parameters
     ----------
     sources : sequence of Path
-        Waveform files, archives, or folders of them with StationXML beside.
+        Waveform files, archives, or folders of them with StationXML.
     output : Path
-        netCDF file. Beside it, in a folder of its name with ``.stations``, stays one shard per
-        station; those that are still true are not computed again. What was left out goes to
-        ``.rejected.csv``.
+        netCDF file. A folder of its name with ``.stations`` keeps one shard per station; those
+        that are still true are not computed again. What was left out goes to ``.rejected.csv``.
     processing, grid : Processing, Spectra
         Settings.
     workers : int

@@ -46,6 +46,7 @@ def read_event(path: Path) -> Event:
 
 def read_event_file(path: Path) -> EventFile:
     """Read the one event of a file with the file's hash; parameters and errors of `read_event`."""
+    # A workspace, which may be large, is never in memory as a whole
     try:
         with open_file(path) as file:
             head = file.read(len(ASDF_MARK))
@@ -63,7 +64,7 @@ def portable(file: EventFile) -> EventFile:
     Return an event file whose event can be sent to other processes.
 
     Its event holds one origin and at most one magnitude, the preferred ones: ObsPy keeps which are
-    preferred in a table of its own process, so that a pickled event may have lost them.
+    preferred in a table of its own process, so that a pickled event may lack them.
     """
     event = file.event
     origin = event.preferred_origin() or event.origins[0]
@@ -76,6 +77,7 @@ def _only_event(events: list[Event], source: str) -> Event:
     """Return the one event of a list; raise ``CatalogError`` if its origin or time is missing."""
     if len(events) != 1:
         raise CatalogError(source, f"must hold one event, holds {len(events)}")
+    # Place and time of the earthquake are needed everywhere
     event = events[0]
     if not event.origins:
         raise CatalogError(source, f"the event {event.resource_id} has no origin")

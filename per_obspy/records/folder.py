@@ -122,6 +122,7 @@ def _read_file(path: Path) -> _File:
     try:
         content = _content(path)
         file = file._replace(hash=bytes_hash(content), kind=_kind(content))
+        # Only headers of records, as samples are read by the jobs of the stations
         if file.kind == "record":
             return file._replace(stations=_stations(_traces(path, content, headonly=True)))
         if file.kind == "inventory":

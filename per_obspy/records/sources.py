@@ -118,6 +118,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     CatalogError
         If a path is missing or holds no record.
     """
+    # Files of each station in all paths
     found = [find_stations(path) for path in paths]
     files: dict[str, tuple[Path, ...]] = {}
     hashes: dict[Path, str] = {}

@@ -56,6 +56,7 @@ def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:
     CatalogError
         If the file is missing, damaged or of another kind.
     """
+    # Times stay numbers, which are exact
     try:
         dataset = xr.load_dataset(
             path if content is None else _in_memory(path, content),

@@ -120,7 +120,7 @@ def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
 
 
 class _Rows:
-    """The rows of a part from its first to its last; the file is not kept open."""
+    """The rows of a part from its first to its last; the file is closed in between."""
 
     def __init__(self, part: Path, schema: pa.Schema) -> None:
         self._left = schema.empty_table()

@@ -11,11 +11,12 @@ import pytest
 from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
+from per_obspy.files import file_hash
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import scenario_event
-from per_obspy.records.sources import find_sources, input_files
+from per_obspy.records.sources import find_path_sources, find_sources, input_files
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -38,16 +39,11 @@ def archive(simulation: Simulation, tmp_path: Path) -> Path:
         whole = trace.copy()
         whole.data = whole.data.astype(np.int32)
         stats = whole.stats
+        # One file per day
         for piece in whole / 1:
             day = piece.stats.starttime
-            target = (
-                tmp_path
-                / "sds"
-                / str(day.year)
-                / stats.network
-                / stats.station
-                / f"{stats.channel}.D"
-            )
+            target = tmp_path / "sds" / str(day.year) / stats.network / stats.station
+            target = target / f"{stats.channel}.D"
             target.mkdir(parents=True, exist_ok=True)
             piece.write(str(target / f"{piece.id}.D.{day.year}.{day.julday:03d}"), format="MSEED")
     return tmp_path / "sds"
@@ -70,16 +66,16 @@ def table(tmp_path: Path, network: str = "XX", station: str = "T1") -> Columns:
     )
 
 
-def test_folder_and_table_stand_side_by_side(folder: Path, tmp_path: Path):
+def test_a_folder_and_a_table_are_used_together(folder: Path, tmp_path: Path):
     found = find_sources(Records(folder=folder, columns=(table(tmp_path),)), None)
     assert list(found.stations) == ["XX.T1", "XX.S001", "XX.S002"]
     for name, source in found.stations.items():
         stream, rejected = source.reader(source.files, source.inventory, name)
         assert rejected == ()
         assert {f"{trace.stats.network}.{trace.stats.station}" for trace in stream} == {name}
-        assert {trace.stats.units for trace in stream} == (
-            {"m/s2"} if name == "XX.T1" else {"counts"}
-        )
+        # the table is physical, MiniSEED is not
+        units = "m/s2" if name == "XX.T1" else "counts"
+        assert {trace.stats.units for trace in stream} == {units}
 
 
 def test_a_station_of_two_sources_is_taken_from_the_first(folder: Path, tmp_path: Path):
@@ -100,6 +96,7 @@ def test_an_archive_gives_the_window_around_the_event(
     )
     found = find_sources(records, None)
     assert list(found.stations) == ["XX.S001", "XX.S002"]
+    # 15 s, of the day files of both days
     origin = simulation.event.origins[0].time
     source = found.stations["XX.S001"]
     stream, rejected = source.reader(source.files, source.inventory, "XX.S001")
@@ -114,6 +111,7 @@ def test_an_archive_needs_a_window():
         Records(sds=Sds(folder=Path("x")))
     with pytest.raises(ValueError, match="sds needs start and end, or event"):
         Records(sds=Sds(folder=Path("x"), start="2000-01-01"))
+    # times that are none, or in the wrong order
     with pytest.raises(ValueError, match="start"):
         Sds(folder=Path("x"), start="yesterday", end="2000-01-01")
     records = Records(sds=Sds(folder=Path("x"), start="2000-01-02", end="2000-01-01"))
@@ -121,7 +119,7 @@ def test_an_archive_needs_a_window():
         find_sources(records, None)
 
 
-def test_what_a_result_depends_on(folder: Path, archive: Path, tmp_path: Path):
+def test_what_a_result_depends_on(folder: Path, tmp_path: Path):
     (tmp_path / "grid.xml").touch()
     records = Records(
         folder=folder,
@@ -137,13 +135,51 @@ def test_what_a_result_depends_on(folder: Path, archive: Path, tmp_path: Path):
         "stations.xml",
         "table.txt",
     }
+    assert input_files(None, None) == []
+
+
+def test_only_day_files_of_the_window_are_inputs(archive: Path):
     (archive / "1990").mkdir()
     (archive / "1990" / "old").touch()
     window = Sds(folder=archive, start="1999-12-31T23:00:00", end="2000-01-01T01:00:00")
     names = {path.name for path in input_files(Records(sds=window), None)}
     assert "old" not in names
     assert len(names) == 6
-    assert input_files(None, None) == []
+
+
+def test_every_file_has_its_hash(folder: Path, archive: Path, tmp_path: Path):
+    # would catch a change of a record that leaves the key of its station as it was
+    window = Sds(folder=archive, start="1999-12-31T23:00:00", end="2000-01-01T01:00:00")
+    for records in (
+        Records(folder=folder, columns=(table(tmp_path),), event=folder / "event.xml"),
+        Records(sds=window, stationxml=folder / "stations.xml"),
+    ):
+        found = find_sources(records, None)
+        for source in found.stations.values():
+            assert source.hashes == tuple(map(file_hash, source.files))
+        assert all(file_hash(path) == digest for path, digest in found.hashes.items())
+
+
+def test_a_file_that_cannot_be_read_has_no_hash(folder: Path, archive: Path):
+    # would catch a run that ends with one damaged day file
+    window = Sds(folder=archive, start="1999-12-31T23:00:00", end="2000-01-01T01:00:00")
+    records = Records(sds=window, stationxml=folder / "stations.xml")
+    (victim, *_) = find_sources(records, None).stations["XX.S001"].files
+    victim.unlink()
+    victim.mkdir()
+    assert "" in find_sources(records, None).stations["XX.S001"].hashes
+
+
+def test_files_of_a_station_in_several_paths_are_joined(folder: Path, tmp_path: Path):
+    copy = tmp_path / "later.mseed"
+    copy.write_bytes((folder / "XX.S001.mseed").read_bytes())
+    found = find_path_sources([copy, folder])
+    source = found.stations["XX.S001"]
+    assert source.files == (copy, folder / "XX.S001.mseed")
+    assert source.hashes == (file_hash(copy),) * 2
+    # metadata of the folder describes the other file too
+    stream, rejected = source.reader(source.files, source.inventory, "XX.S001")
+    assert (len(stream), rejected) == (6, ())
 
 
 def test_a_wrong_event_stops_at_once(folder: Path):
@@ -163,28 +199,26 @@ def test_a_workspace_brings_its_event(real_data: Path):
     found = find_sources(Records(asdf=Asdf(file=path, tag="*_default")), None)
     assert found.event is not None
     assert found.event.path == path
+    assert found.event.hash == file_hash(path)
     source = found.stations["CE.68150"]
     assert len(source.reader(source.files, source.inventory, "CE.68150")[0]) == 3
 
 
 def test_the_sections_in_the_documentation_are_valid():
     text = (CHECKOUT / "docs" / "sources.md").read_text(encoding="utf-8")
-    examples = [
-        tomllib.loads(block.split("```")[0])["records"] for block in text.split("```toml")[1:]
-    ]
-    assert [
-        name
-        for example in examples
-        for name in Records(**example).model_fields_set - {"event", "stationxml"}
-    ] == [
-        "fdsn",
-        "sds",
-        "asdf",
-    ]
-    table = text.split("| key |")[1].split("\n\n")[0]
-    keys = {
-        key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1])
-    }
+    blocks = [block.split("```")[0] for block in text.split("```toml")[1:]]
+    # one example of each source
+    sources = []
+    for block in blocks:
+        records = Records(**tomllib.loads(block)["records"])
+        sources += records.model_fields_set - {"event", "stationxml"}
+    assert sources == ["fdsn", "sds", "asdf"]
+
+
+def test_the_documentation_has_every_key_of_the_services():
+    text = (CHECKOUT / "docs" / "sources.md").read_text(encoding="utf-8")
+    rows = text.split("| key |")[1].split("\n\n")[0].splitlines()[2:]
+    keys = {key for row in rows for key in re.findall(r"`(\w+)`", row.split("|")[1])}
     assert keys == set(Fdsn.model_fields) - {"providers", "cache"}
 
 

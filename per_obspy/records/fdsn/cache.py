@@ -50,7 +50,7 @@ class Fetched(NamedTuple):
     event : EventFile or None
         QuakeML file and its event.
     wanted : Wanted
-        What was asked for.
+        Circle, window and channels of the request.
     rejected : tuple of Rejection
         Stations and services that failed, with every reason.
     """
@@ -89,23 +89,20 @@ def fetch(
         If services fail and the cache has no station at all, or the window is not over yet.
     """
     pool = web_pool(request.timeout, request.retries, request.wait)
-    if event is None and request.event_id:
-        event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
-    origin = read_event_file(event) if event else None
-    wanted = wanted_around(request, origin.event if origin else None)
-    fetched = Fetched(request.cache / folder_name(wanted), origin, wanted, ())
+    fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
-    key = digest((wanted, request.providers))
+    key = digest((fetched.wanted, request.providers))
     status_file = request.cache / f"complete-{key}.json"
     status = None if again else earlier_status(status_file, key)
     if status is not None:
         return fetched._replace(rejected=tuple(map(Rejection.stored, status["rejected"])))
 
     # Everything else needs the services
-    if wanted.end > UTCDateTime():
+    end = fetched.wanted.end
+    if end > UTCDateTime():
         raise ServiceError(
-            f"the wanted window lasts until {wanted.end}, which is still to come: fetch after it"
+            f"the wanted window lasts until {end}, which is still to come: fetch after it"
         )
     remove_dead_parts(request.cache)
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
@@ -115,6 +112,15 @@ def fetch(
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
+
+
+def _requested(pool: urllib3.PoolManager, request: config.Fdsn, event: Path | None) -> Fetched:
+    """Return the place of a request in the cache, with its event and nothing rejected yet."""
+    if event is None and request.event_id:
+        event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
+    file = read_event_file(event) if event else None
+    wanted = wanted_around(request, file.event if file else None)
+    return Fetched(request.cache / folder_name(wanted), file, wanted, ())
 
 
 def _fetch_missing(
@@ -203,6 +209,7 @@ def _stations(
     progress: Progress,
 ) -> list[Outcome]:
     """Fetch several stations at the same time; when interrupted, leave the rest for later."""
+    # Files are whole one by one: an interruption loses only those under way
     threads = ThreadPoolExecutor(connections)
     outcomes = []
     try:
@@ -220,6 +227,7 @@ def _stations(
 
 def _no_station(bases: list[str], wanted: Wanted) -> list[Rejection]:
     """Return one row per service that has no station inside the circle."""
+    # Circle, channels and window of the request
     place = f"{wanted.radius:.3g} degrees of {wanted.latitude:g}, {wanted.longitude:g}"
     channels = f"channels {','.join(wanted.channels)} from {wanted.start} to {wanted.end}"
     reason = f"no station within {place} has {channels}"

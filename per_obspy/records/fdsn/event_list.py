@@ -183,7 +183,7 @@ def _feed_row(feature: dict[str, Any]) -> EventRow:
 
 
 def _text_rows(content: bytes) -> list[EventRow]:
-    """Return the earthquakes of the text format of fdsnws-event 1.2: 13 columns and perhaps more."""
+    """Return the earthquakes in the text format of fdsnws-event 1.2: 13 columns or more."""
     if not content:
         return []
     lines = content.decode("utf-8").splitlines()
@@ -197,6 +197,7 @@ def _text_rows(content: bytes) -> list[EventRow]:
 def _text_row(row: list[str]) -> EventRow:
     """Return one earthquake of the text format, depth from km to m."""
     cells = [cell.strip() for cell in row]
+    # Between them are author, catalogue and contributor
     event_id, time, latitude, longitude, depth = cells[:5]
     magnitude_type, magnitude = cells[9:11]
     return EventRow(

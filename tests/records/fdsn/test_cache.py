@@ -1,4 +1,4 @@
-"""Fetching from a real HTTP server on loopback that fails on demand: nothing lost, nothing fetched twice."""
+"""Fetching from an HTTP server on loopback that fails on demand: each file arrives, and once."""
 
 import json
 import os
@@ -27,6 +27,7 @@ from obspy import UTCDateTime
 
 from per_obspy.config import Fdsn, Scenario
 from per_obspy.errors import CatalogError, ServiceError
+from per_obspy.files import file_hash
 from per_obspy.records.fdsn import providers
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.folder import read_station
@@ -92,15 +93,17 @@ def test_the_window_and_the_circle_are_those_of_the_event(server: FdsnServer, as
     origin = fetched.event.event.origins[0]
     assert fetched.wanted.start == origin.time - 10
     assert fetched.wanted.end == origin.time + 20
-    (listed,) = [
-        one.parameters for one in server.requests if one.subject == "*" and one.service == "station"
-    ]
+    # the one list of stations that was asked for
+    lists = [request for request in server.requests if request.service == "station"]
+    (listed,) = [request.parameters for request in lists if request.subject == "*"]
     # 50 km on a sphere of 6371 km, six digits
     assert float(listed["maxradius"]) == pytest.approx(np.rad2deg(50 / 6371), rel=1e-5)
-    assert (float(listed["latitude"]), float(listed["longitude"])) == (
-        origin.latitude,
-        origin.longitude,
-    )
+    assert float(listed["latitude"]) == origin.latitude
+    assert float(listed["longitude"]) == origin.longitude
+
+
+def test_records_end_with_the_window(ask: Ask):
+    fetched = ask(before=10, after=20)
     for paths in fetched_stations(fetched).stations.values():
         for trace in read_station(paths, None)[0]:
             assert trace.stats.starttime >= fetched.wanted.start
@@ -201,8 +204,8 @@ def test_retry_after_is_honoured(server: FdsnServer, ask: Ask):
     assert names(ask()) == STATIONS
     moments = [
         moment
-        for one, moment in zip(server.requests, server.times, strict=True)
-        if (one.service, one.subject) == ("dataselect", "S002")
+        for request, moment in zip(server.requests, server.times, strict=True)
+        if (request.service, request.subject) == ("dataselect", "S002")
     ]
     # without the header the first retry comes at once
     assert moments[1] - moments[0] >= 1.0
@@ -212,7 +215,9 @@ def test_waits_double(server: FdsnServer, ask: Ask):
     server.fail("station", "*", *[status(503)] * 3)
     ask(wait=0.1)
     moments = [
-        t for one, t in zip(server.requests, server.times, strict=True) if one.subject == "*"
+        moment
+        for request, moment in zip(server.requests, server.times, strict=True)
+        if request.subject == "*"
     ][-4:]
     # nothing, then 0.2 and 0.4 s
     assert np.diff(moments)[1] >= 0.2
@@ -232,7 +237,7 @@ LASTING = {
 
 
 @pytest.mark.parametrize("fault", LASTING)
-def test_a_fault_that_stays_costs_one_station_and_says_why(server, ask, fault):
+def test_a_fault_that_stays_costs_its_station_and_is_the_reason(server, ask, fault):
     answer, reason = LASTING[fault]
     server.fail("dataselect", "S002", *[answer] * 6)
     fetched = ask(retries=1, timeout=1.0 if fault in TIMED else 10.0)
@@ -240,6 +245,7 @@ def test_a_fault_that_stays_costs_one_station_and_says_why(server, ask, fault):
     (rejection,) = fetched.rejected
     assert (rejection.kind, rejection.name) == ("station", "XX.S002")
     assert reason in rejection.reasons[0]
+    # the next fetch asks for this station only
     server.faults.clear()
     assert names(ask()) == STATIONS
     assert {server.asked("dataselect", name) for name in ("S001", "S003", "S004")} == {1}
@@ -252,7 +258,7 @@ def test_records_without_metadata_are_kept_until_it_comes(
     server.fail("station", "S002", content(wrong))
     fetched = ask()
     assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
-    assert [one.name for one in fetched.rejected] == ["XX.S002"]
+    assert [rejection.name for rejection in fetched.rejected] == ["XX.S002"]
     ask(again=True)
     assert server.asked("dataselect", "S002") == 1
     assert server.asked("station", "S002") == 2
@@ -262,18 +268,18 @@ def test_another_stations_records_are_refused(server: FdsnServer, ask: Ask):
     server.fail("dataselect", "S002", content(mseed(server.stream.select(station="S001").copy())))
     (rejection,) = ask().rejected
     assert "answers with XX.S001 instead of XX.S002" in rejection.reasons[0]
-    assert (
-        server.asked("dataselect", "S002") == 1
-    )  # wrong content is no reason to ask again at once
+    # wrong content is no reason to ask again at once
+    assert server.asked("dataselect", "S002") == 1
 
 
-def test_no_data_is_a_reason_and_is_not_asked_for_again_until_told(server: FdsnServer, ask: Ask):
+def test_no_data_is_a_reason_and_is_asked_for_again_on_demand_only(server: FdsnServer, ask: Ask):
     server.fail("dataselect", "S002", status(204))
     fetched = ask()
     assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
     assert fetched.rejected[0].reasons == (
         f"127.0.0.1:{server.server_port} has no data of the window",
     )
+    # a complete request asks for nothing
     asked = len(server.requests)
     assert ask() == fetched
     assert len(server.requests) == asked
@@ -297,10 +303,9 @@ def test_the_next_provider_serves_what_the_first_cannot(
         server.fail("dataselect", "S003", *[status(500)] * 2)
         fetched = ask(providers=(server.url, second.url), retries=1)
     assert (names(fetched), fetched.rejected) == (STATIONS, ())
-    assert [one.subject for one in second.requests if one.service == "dataselect"] == [
-        "S002",
-        "S003",
-    ]
+    # the second is asked for what the first has not
+    records = [request for request in second.requests if request.service == "dataselect"]
+    assert [request.subject for request in records] == ["S002", "S003"]
 
 
 def test_a_provider_that_is_down_is_one_row_and_the_other_serves(server: FdsnServer, ask: Ask):
@@ -311,18 +316,29 @@ def test_a_provider_that_is_down_is_one_row_and_the_other_serves(server: FdsnSer
     assert "no answer" in rejection.reasons[0]
 
 
-@pytest.mark.parametrize("router", ["eida-routing", "earthscope-federator"])
+#: Answers of routers, with the URL of the service.
+ROUTES = {
+    "eida-routing": """\
+{url}/fdsnws/station/1/query
+XX * * * 1990-01-01T00:00:00 2000-01-01T00:00:00
+""",
+    "earthscope-federator": """\
+DATACENTER=A,http://a
+STATIONSERVICE={url}/fdsnws/station/1/
+XX S001 -- HNE 1990 2000
+""",
+}
+
+
+@pytest.mark.parametrize("router", ROUTES)
 def test_routers_name_the_services(server: FdsnServer, ask: Ask, monkeypatch, router: str):
     _, *rest = providers.ROUTERS[router]
     monkeypatch.setitem(providers.ROUTERS, router, (f"{server.url}/route", *rest))
-    server.extra["/route"] = (
-        f"DATACENTER=A,http://a\nSTATIONSERVICE={server.url}/fdsnws/station/1/\nXX S001 -- HNE 1990 2000\n"
-        if router == "earthscope-federator"
-        else f"{server.url}/fdsnws/station/1/query\nXX * * * 1990-01-01T00:00:00 2000-01-01T00:00:00\n"
-    ).encode()
+    server.extra["/route"] = ROUTES[router].format(url=server.url).encode()
     assert names(ask(providers=(router,))) == STATIONS
-    (asked,) = [one.parameters for one in server.requests if one.service == "/route"]
-    assert asked["channel"] == "HN?,BN?,CN?,EN?"
+    # the channels select what the router has
+    (asked,) = [request for request in server.requests if request.service == "/route"]
+    assert asked.parameters["channel"] == "HN?,BN?,CN?,EN?"
 
 
 def test_unknown_providers_and_events_are_wrong_input(ask: Ask):
@@ -339,7 +355,7 @@ def test_an_event_that_is_none_is_not_kept(server: FdsnServer, ask: Ask):
     assert names(ask()) == STATIONS
 
 
-def test_services_that_fail_altogether_are_said_to_be_unavailable(server: FdsnServer, ask: Ask):
+def test_services_that_fail_altogether_are_unavailable(server: FdsnServer, ask: Ask):
     server.fail("station", "*", *[status(503)] * 2)
     with pytest.raises(ServiceError, match=r"nothing could be fetched; .*HTTP 503"):
         ask(retries=1)
@@ -354,7 +370,7 @@ def test_what_is_in_the_cache_serves_when_services_fail(server: FdsnServer, ask:
     assert fetched.rejected[0].kind == "service"
 
 
-def test_nobody_there_is_a_reason(server: FdsnServer, ask: Ask):
+def test_no_station_is_a_reason(server: FdsnServer, ask: Ask):
     fetched = ask(stations=("NOBODY",))
     assert names(fetched) == []
     assert "no station within" in fetched.rejected[0].reasons[0]
@@ -368,39 +384,77 @@ def test_a_window_that_is_not_over_is_fetched_later(server: FdsnServer, ask: Ask
     assert server.asked("station") == 0
 
 
-def test_a_killed_fetch_goes_on_where_it_stopped(server: FdsnServer, ask: Ask, tmp_path: Path):
+#: Fetches in a process of its own.
+FETCHES = """
+import sys
+from per_obspy.config import Fdsn
+from per_obspy.records.fdsn.cache import fetch
+fetch(Fdsn.model_validate_json(sys.argv[1]))
+"""
+
+
+@pytest.fixture
+def killed(server: FdsnServer, tmp_path: Path) -> int:
+    """Kill a fetch while it waits for the third station, and return the number of its process."""
     request = request_to(server, tmp_path, connections=1, timeout=30.0)
     server.fail("dataselect", "S003", late(20.0))
-    code = "import sys; from per_obspy.config import Fdsn; from per_obspy.records.fdsn.cache import fetch\n"
-    code += "fetch(Fdsn.model_validate_json(sys.argv[1]))"
-    process = subprocess.Popen([sys.executable, "-c", code, request.model_dump_json()])
+    process = subprocess.Popen([sys.executable, "-c", FETCHES, request.model_dump_json()])
     while not server.asked("dataselect", "S003"):
         assert process.poll() is None
         time.sleep(0.02)
+    # no handler of the process runs
     process.send_signal(signal.SIGKILL)
     process.wait()
+    return process.pid
+
+
+def test_a_killed_fetch_goes_on_where_it_stopped(
+    server: FdsnServer, ask: Ask, tmp_path: Path, killed: int
+):
     (folder,) = [path for path in tmp_path.iterdir() if path.is_dir()]
     assert {path.stem for path in folder.glob("*.mseed")} == {"XX.S001", "XX.S002"}
-    half = (folder / "XX.S001.mseed").read_bytes()[:1000]
-    (folder / f".XX.S003.{os.getpid() + 1}.part.mseed").write_bytes(
-        half
-    )  # as a kill while writing would leave it
+    # as a kill while writing would leave it
+    part = folder / f".XX.S003.{killed}.part.mseed"
+    part.write_bytes((folder / "XX.S001.mseed").read_bytes()[:1000])
     fetched = ask(connections=1)
     assert (names(fetched), fetched.rejected) == (STATIONS, ())
-    assert {
-        name: server.asked("dataselect", name) for name in ("S001", "S002", "S003", "S004")
-    } == {
-        "S001": 1,
-        "S002": 1,
-        "S003": 2,
-        "S004": 1,
-    }
-    assert all(len(paths) == 1 for paths in fetched_stations(fetched).stations.values())
+    # what had arrived is not asked for again, and half a file is gone
+    counts = {name: server.asked("dataselect", name) for name in ("S001", "S002", "S003", "S004")}
+    assert counts == {"S001": 1, "S002": 1, "S003": 2, "S004": 1}
+    assert not part.exists()
 
 
-def test_the_mark_says_why_stations_are_missing(server: FdsnServer, ask: Ask, tmp_path: Path):
+def test_half_a_file_is_no_record(ask: Ask):
+    # that of a process which is still running
+    fetched = ask()
+    whole = fetched.folder / "XX.S001.mseed"
+    part = fetched.folder / f".XX.S001.{os.getpid()}.part.mseed"
+    part.write_bytes(whole.read_bytes()[:1000])
+    found = fetched_stations(fetched)
+    assert found.stations["XX.S001"] == (whole,)
+    assert part.exists()
+    assert found.hashes[whole] == file_hash(whole)
+
+
+def test_the_status_has_the_reasons_why_stations_are_missing(
+    server: FdsnServer, ask: Ask, tmp_path: Path
+):
     server.fail("dataselect", "S002", status(204))
     fetched = ask()
-    (mark,) = tmp_path.glob("complete-*.json")
-    assert json.loads(mark.read_text())["rejected"][0][:2] == ["station", "XX.S002"]
+    (status_file,) = tmp_path.glob("complete-*.json")
+    assert json.loads(status_file.read_text())["rejected"][0][:2] == ["station", "XX.S002"]
     assert ask().rejected == fetched.rejected
+
+
+@pytest.mark.parametrize("content", ["", "[]", '[["station", "XX.S002", "FDSN", null, ["why"]]]'])
+def test_a_damaged_status_asks_again(server: FdsnServer, ask: Ask, tmp_path: Path, content: str):
+    # would catch a run that ends with the status of a killed or of an older program
+    ask()
+    asked = server.asked("dataselect")
+    (status_file,) = tmp_path.glob("complete-*.json")
+    status_file.write_text(content)
+    fetched = ask()
+    assert (names(fetched), fetched.rejected) == (STATIONS, ())
+    # files that have arrived stay
+    assert server.asked("dataselect") == asked
+    assert json.loads(status_file.read_text())["rejected"] == []

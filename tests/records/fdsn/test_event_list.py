@@ -67,6 +67,7 @@ def test_a_feed_from_the_web_and_from_a_file(server: FdsnServer, tmp_path: Path)
 
 
 def test_the_latest_comes_first_and_gaps_stay_gaps(tmp_path: Path):
+    # magnitude, place and depth may be unknown
     later = feature(time=1562383193041, mag=None, place=None, magType=None)
     later["geometry"] = {"coordinates": [1, 2, None]}
     (tmp_path / "feed.json").write_bytes(feed(feature(), later))
