@@ -211,19 +211,9 @@ def process(
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
     folder, record = result.folder, result.record
-    counts = record["counts"]
-    # Counts, with a warning where the motion is simulated
     if result.did_nothing:
         print("Nothing to do: the same inputs were run before.")
-    if record["simulated"]:
-        print(_simulated_line(counts))
-    for line in _earthquake_lines(record.get("earthquakes", ())):
-        print(line)
-    rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
-    print(
-        f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
-        f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
-    )
+    _print_counts(record)
     _print_warnings(record.get("warnings", {}))
     # Agreement with observed pounding, worst pairs, files
     if "evaluation.json" in record["outputs"]:
@@ -232,6 +222,21 @@ def print_result(result: "Result") -> None:
         _print_worst(folder / "risk.csv", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
+
+
+def _print_counts(record: dict[str, Any]) -> None:
+    """Print the earthquake of a run, whether its motion is simulated, and its counts."""
+    counts = record["counts"]
+    if record["simulated"]:
+        print(_simulated_line(counts))
+    for line in _earthquake_lines(record.get("earthquakes", ())):
+        print(line)
+    # Stations, pairs by state, and all rejections together
+    rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
+    print(
+        f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
+        f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
+    )
 
 
 def _print_warnings(warnings: dict[str, list[str]]) -> None:

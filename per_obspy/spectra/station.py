@@ -368,6 +368,7 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
     """Return the attributes of CF 1.11 and ACDD 1.3 that are true of one station."""
     first = horizontals[0].stats
     station, software = f"{first.network}.{first.station}", f"per_obspy {version('per_obspy')}"
+    # Title, source and time of the Dataset
     attributes = {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": f"Pseudo energy radius spectra of station {station}",

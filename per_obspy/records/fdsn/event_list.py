@@ -118,6 +118,7 @@ def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], boo
     unknown = query.keys() - {"starttime", "endtime", "minmagnitude", *_CIRCLE}
     if unknown:
         raise CatalogError(source, f"{', '.join(sorted(unknown))}: only a service can select by it")
+    # A circle needs its centre and its radius
     circle = [float(query[name]) for name in _CIRCLE if name in query]
     if circle and len(circle) < len(_CIRCLE):
         raise CatalogError(source, "latitude, longitude and radius: give all three or none")
