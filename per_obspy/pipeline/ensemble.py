@@ -15,7 +15,7 @@ from typing import Any
 
 from per_obspy.config import Ensemble, EnsembleScenario, Run, load
 from per_obspy.errors import CatalogError
-from per_obspy.files import content_hash
+from per_obspy.files import content_hash, remove_file
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -83,7 +83,7 @@ def screen_scenarios(
         known = earlier_status(folder / RECORD, head["key"])
         if known is not None:
             return Result(folder, known, did_nothing=True)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         progress("joining scenarios", 0, 1)
         found = _joined(settings, folder, runs, head["simulated"])
         progress("joining scenarios", 1, 1)

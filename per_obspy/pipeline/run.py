@@ -19,7 +19,7 @@ from typing import Any
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, file_hash
+from per_obspy.files import content_hash, file_hash, remove_file
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.jobs.output_folder import (
     Result,
@@ -48,6 +48,9 @@ from per_obspy.screening.warmup import compile_screening
 
 #: Written last.
 RECORD = "run.json"
+
+#: Stage that the first run waits for.
+COMPILING = "loading kernels (the first run compiles them for a minute)"
 
 
 def run(
@@ -98,14 +101,16 @@ def run(
 
         # Otherwise they are hashed while their headers are read
         check_inputs(settings)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
-        return recorded(folder / RECORD, {**record, "started": started, **head})
+        # What failed unexpectedly is done again by the next run
+        key = "" if record["failed"] else head["key"]
+        return recorded(folder / RECORD, {**record, "started": started, **head, "key": key})
 
 
 def screen(
@@ -126,7 +131,7 @@ def screen(
     with locked_folder(folder):
         stations = stations_of_earlier_run(folder)
         check_inputs(settings)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
         head = _head(settings, configuration, None, {})
@@ -233,7 +238,7 @@ def _later_stages(
     seconds, usable = dict[str, float](), _usable(stations)
     # A table of an earlier run would be taken for one of this run
     for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        (folder / name).unlink(missing_ok=True)
+        remove_file(folder / name)
     with _timed(seconds, "screening"):
         found = screened(settings, folder, usable, rejected, executor, progress)
     with _timed(seconds, "report"):
@@ -243,10 +248,12 @@ def _later_stages(
     counts = found.counts
     rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
     resumed = sum(station.resumed for station in stations)
+    failed = found.failed or any(station.failed for station in stations)
     return {
         "name": settings.name,
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": any(rejections),
+        "failed": failed,
         "simulated": settings.simulation is not None,
         "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
         "outputs": file_hashes(folder, outputs),
@@ -274,10 +281,13 @@ def _compiling(progress: Progress) -> Iterator[None]:
     """Compile the kernels of screening in a thread, while other processes do the stations."""
     thread = Thread(target=compile_screening)
     thread.start()
-    yield
-    progress("loading kernels (the first run compiles them for a minute)", 0, 1)
-    thread.join()
-    progress("loading kernels (the first run compiles them for a minute)", 1, 1)
+    try:
+        yield
+        progress(COMPILING, 0, 1)
+    finally:
+        # A thread that is alive when the interpreter ends can abort it
+        thread.join()
+    progress(COMPILING, 1, 1)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
@@ -33,10 +34,13 @@ class Screened(NamedTuple):
         The files.
     counts : dict
         Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
+    failed : bool
+        Whether the work of a chunk failed unexpectedly.
     """
 
     outputs: list[Path]
     counts: dict[str, int]
+    failed: bool
 
 
 def screened(
@@ -85,7 +89,8 @@ def screened(
         risk = write_risk(tables, folder, facts, settings.csv_rows)
         outputs, states = [*outputs, *risk.files], risk.states
         progress("ranking", 1, 1)
-    return Screened(outputs, _counts(states, kinds, parts))
+    failed = any(part.failed for part in parts)
+    return Screened(outputs, _counts(states, kinds, parts), failed)
 
 
 def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
@@ -129,7 +134,7 @@ def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
     known |= {part.path for part in parts if part.path}
     for path in folder.iterdir() if folder.is_dir() else ():
         if path not in known and path.is_file():
-            path.unlink()
+            remove_file(path)
 
 
 def _jobs(
