@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.config import Interpolation
-from per_obspy.errors import Rejection
+from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.records.shakemap import read_shakemap
@@ -110,7 +110,7 @@ def ground_files(
             rejected.append(Rejection("station", file.name, "", None, (reason,)))
 
     # Motion between the stations, which recorded the same earthquake
-    hypocentre = _hypocentre(spectra[-1]) if spectra else []
+    hypocentre = _hypocentre(spectra)
     field = prepared_field(spectra, settings, *hypocentre) if spectra else None
     # Everything that decides the motion at a pair
     contents = [(file.name, file.hash) for file in files]
@@ -131,11 +131,29 @@ def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
     return StationFile(name, longitude, latitude, site_class, shard, station.hash), spectra
 
 
-def _hypocentre(spectra: xr.Dataset) -> list[Hypocentre]:
-    """Return the place where the earthquake started, in a list that is empty if it is unknown."""
-    if HYPOCENTRE[0] not in spectra.attrs:
-        return []
-    return [Hypocentre(*(spectra.attrs[name] for name in HYPOCENTRE))]
+def _hypocentre(spectra: Iterable[xr.Dataset]) -> list[Hypocentre]:
+    """
+    Return the place where the earthquake started, in a list that is empty if it is unknown.
+
+    It is that of the first station that has one, and all others must agree with it.
+    """
+    known = {
+        str(station["station"].item()): Hypocentre(
+            *(float(station.attrs[name]) for name in HYPOCENTRE)
+        )
+        for station in spectra
+        if HYPOCENTRE[0] in station.attrs
+    }
+    for name, place in known.items():
+        first, expected = next(iter(known.items()))
+        if place != expected:
+            places = f"{first} {tuple(expected)}, {name} {tuple(place)}"
+            raise CatalogError(
+                "stations",
+                f"the hypocentre (degrees, degrees, m) is not that of one earthquake: {places}; "
+                "run again with the records of one event",
+            )
+    return list(known.values())[:1]
 
 
 def read_ground(files: GroundFiles) -> RegionalMotion:
