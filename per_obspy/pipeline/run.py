@@ -19,7 +19,7 @@ from typing import Any
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, file_hash, remove_file
+from per_obspy.files import content_hash, file_hash, is_part, remove_file
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.jobs.output_folder import (
     Result,
@@ -96,7 +96,7 @@ def run(
         if (folder / RECORD).is_file():
             head = _head(settings, configuration, fetched, {})
             known = earlier_status(folder / RECORD, head["key"])
-            if known is not None:
+            if known is not None and _has_whole_intermediates(folder, known):
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
@@ -257,9 +257,26 @@ def _later_stages(
         "simulated": settings.simulation is not None,
         "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
         "outputs": file_hashes(folder, outputs),
+        "intermediate": file_hashes(folder, _intermediates(folder)),
         "versions": software_versions(),
         "seconds": seconds,
     }
+
+
+def _intermediates(folder: Path) -> list[Path]:
+    """Return the files of the stages before the screening, which other commands or users read."""
+    folders = [folder / name for name in ("simulated", "stations")]
+    files = [path for parent in folders for path in parent.rglob("*")]
+    files += [folder / name for name in ("simulated.json", "pairs.csv")]
+    return sorted(path for path in files if path.is_file() and not is_part(path))
+
+
+def _has_whole_intermediates(folder: Path, record: dict[str, Any]) -> bool:
+    """Return whether the files of the earlier stages are as the run left them."""
+    known = record.get("intermediate")
+    if not isinstance(known, dict):
+        return False
+    return not changed_outputs(folder / RECORD, {**record, "outputs": known})
 
 
 def _finished(file: Path) -> dict[str, Any]:
