@@ -1,23 +1,25 @@
 """
 Command line: each command parses its arguments, calls one function and prints.
 
-Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 a
-service is unavailable.
+Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 try
+later: a service is unavailable, another run holds the output folder, or a file cannot be written.
 """
 
 import os
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import per_obspy
-from per_obspy.commands.endings import NOTHING_USABLE, SERVICE_UNAVAILABLE, WRONG_INPUT
+from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
-from per_obspy.errors import NothingUsable, PerError, ServiceError
+from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
+from per_obspy.files import UNWRITABLE, writing
 
 app = typer.Typer(
     name="per-obspy",
@@ -59,23 +61,44 @@ def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
     code = _exit_code()
     try:
-        sys.stdout.flush()
+        with writing(Path("standard output")):
+            sys.stdout.flush()
     except BrokenPipeError:
-        # The interpreter would flush again at its end and complain
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
+    except WriteError as error:
+        code = _failed_output(error)
     raise SystemExit(code)
+
+
+def _drop_output() -> None:
+    """Drop what is left of the output: the interpreter would write it at its end and complain."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _failed_output(error: OSError) -> int:
+    """Print that the output cannot be written and return the exit code."""
+    _drop_output()
+    reason = error.strerror or "unknown reason"
+    return _failed(WriteError("standard output", reason), TRY_LATER)
 
 
 def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
         app()
-    except ServiceError as error:
-        return _failed(error, SERVICE_UNAVAILABLE)
+    except TryLater as error:
+        return _failed(error, TRY_LATER)
     except NothingUsable as error:
         return _failed(error, NOTHING_USABLE)
     except PerError as error:
         return _failed(error, WRONG_INPUT)
+    except MemoryError as error:
+        return _failed(TryLater(f"not enough memory: {error}; try again with more"), TRY_LATER)
+    except OSError as error:
+        # Files have a name and are looked after where they are written
+        if error.filename is not None or error.errno not in UNWRITABLE:
+            raise
+        return _failed_output(error)
     except SystemExit as ending:
         # A reader that has enough, such as ``head``, is no failure
         if isinstance(ending.__context__, BrokenPipeError):

@@ -4,11 +4,14 @@ The errors that a user can meet.
 ::
 
     PerError
-    ├── RecordRejected     a record cannot be used; the run goes on without it
-    ├── CatalogError       a file that the run needs (configuration, table, folder) is wrong
-    │   └── NothingUsable  a folder holds no record
-    ├── MissingExtra       an optional library that was asked for is not installed
-    └── ServiceError       a service did not answer; try later
+    ├── RecordRejected   a record cannot be used; the run goes on without it
+    ├── CatalogError     a file that the run needs (configuration, table, folder) is wrong
+    │   └── NothingUsable    a folder holds no record
+    ├── MissingExtra     an optional library is not installed
+    └── TryLater         no input is wrong: the same command succeeds later
+        ├── ServiceError     a service does not answer
+        ├── WriteError       a file cannot be written: the disk is full, or a right is missing
+        └── FolderInUse      another run holds the output folder
 
 Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error
 it amounts to.
@@ -21,7 +24,7 @@ from typing import Any, NamedTuple, Self
 
 
 class PerError(Exception):
-    """Anything that is wrong with the user's input rather than with the program."""
+    """Any error that a user can mend, rather than an error of the program."""
 
 
 class RecordRejected(PerError, ValueError):
@@ -121,8 +124,52 @@ def reason_of(error: Exception) -> str:
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
 
 
-class ServiceError(PerError, ConnectionError):
+class TryLater(PerError):
+    """No input is wrong: the same command succeeds once its surroundings allow it."""
+
+
+class ServiceError(TryLater, ConnectionError):
     """A service cannot be reached or answers with an error."""
+
+
+class WriteError(TryLater, OSError):
+    """
+    A file cannot be written: the disk is full, or the right to write is missing.
+
+    Parameters
+    ----------
+    path : str
+        The file or folder.
+    reason : str
+        Why, and what helps.
+    """
+
+    def __init__(self, path: str, reason: str) -> None:
+        super().__init__(path, reason)
+        self.path, self.reason = path, reason
+
+    def __str__(self) -> str:
+        return f"{self.path}: cannot be written: {self.reason}"
+
+
+class FolderInUse(TryLater, BlockingIOError):
+    """
+    Another run holds the output folder.
+
+    Parameters
+    ----------
+    folder : str
+        The output folder.
+    holder : str
+        The run that holds it.
+    """
+
+    def __init__(self, folder: str, holder: str) -> None:
+        super().__init__(folder, holder)
+        self.folder, self.holder = folder, holder
+
+    def __str__(self) -> str:
+        return f"{self.folder}: another run holds this folder: {self.holder}; try again after it"
 
 
 class Rejection(NamedTuple):

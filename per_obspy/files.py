@@ -8,13 +8,13 @@ import platform
 import re
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 from unicodedata import category
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, PerError, WriteError
 
 #: How files of other kinds begin.
 SIGNATURES = {
@@ -29,16 +29,29 @@ SIGNATURES = {
     b"<": "an XML or HTML document",
 }
 
-#: Errors of the disk or of its rights, which are no mistake of the program.
+#: Errors of a name that belongs to something else: another name mends them.
+_WRONG_NAMES = {errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ENOTEMPTY}
+
+#: Errors of the machine when writing, and what helps; none is a mistake of program or input.
+_ROOM = "try again when there is room"
+_RIGHT = "try again with the right to write, or write elsewhere"
+_LATER = "try again later"
 UNWRITABLE = {
-    errno.EACCES,
-    errno.EPERM,
-    errno.EROFS,
-    errno.ENOSPC,
-    errno.EDQUOT,
-    errno.ENOTDIR,
-    errno.EISDIR,
+    errno.ENOSPC: _ROOM,
+    errno.EDQUOT: _ROOM,
+    errno.EFBIG: _ROOM,
+    errno.EACCES: _RIGHT,
+    errno.EPERM: _RIGHT,
+    errno.EROFS: _RIGHT,
+    errno.EIO: _LATER,
+    errno.EMFILE: _LATER,
+    errno.ENFILE: _LATER,
+    errno.ENOMEM: _LATER,
+    errno.ESTALE: _LATER,
 }
+
+#: Bytes that are written to learn whether the disk is full.
+_PROBE = 1 << 20
 
 #: End of the name of a part file before its suffix: process and machine that write it.
 _WRITER = re.compile(r"^\..*\.(?P<process>\d+)(?:@(?P<machine>[^.]*))?\.part(?:\.[^.]*)?$")
@@ -92,6 +105,8 @@ def written_whole(path: Path) -> Iterator[Path]:
     Raises
     ------
     CatalogError
+        If the name or its folder is that of something else.
+    WriteError
         If the folder cannot be made or written to, or the disk is full.
 
     Examples
@@ -103,29 +118,111 @@ def written_whole(path: Path) -> Iterator[Path]:
     >>> final.read_text()
     'gap'
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = f"cannot be written: {path.parent}: {error.strerror}"
-        raise CatalogError(str(path), reason) from error
     part = path.with_name(_part_name(path.stem, path.suffix))
     try:
-        yield part
-        # Readers see the old file or the whole new one, never a half
-        part.replace(path)
-    except OSError as error:
-        if error.errno not in UNWRITABLE:
-            raise
-        raise CatalogError(str(path), f"cannot be written: {error.strerror}") from error
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield part
+            # Readers see the old file or the whole new one, never a half
+            part.replace(path)
     finally:
+        _remove_part(part)
+
+
+def _remove_part(part: Path) -> None:
+    """Remove a part file; where even that fails, a later run removes it."""
+    with suppress(OSError):
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """
+    Turn a failure to write into one line that names the file, the reason and what helps.
+
+    Libraries that write have errors of their own when the disk is full (HDF5 and netCDF, DuckDB,
+    GDAL, libxml2): such an error counts as a failure to write if its message is that of the
+    operating system, or if no file of some size can be written in the same folder.
+
+    Parameters
+    ----------
+    path : Path
+        What is written.
+
+    Raises
+    ------
+    CatalogError
+        If the name or its folder is that of something else.
+    WriteError
+        If the machine cannot write.
+    """
+    try:
+        yield
+    except PerError:
+        raise
+    except OSError as error:
+        known = _failed_write(path, error)
+        if known is None:
+            raise
+        raise known from error
+    except Exception as error:
+        folder = path if path.is_dir() else path.parent
+        failure = _named_failure(error) or _probed_failure(folder)
+        write_error = _failed_write(path, failure) if failure else None
+        if write_error is None:
+            raise
+        raise write_error from error
+
+
+def _failed_write(path: Path, error: OSError) -> PerError | None:
+    """Return the error that a user meets instead of one of the operating system, if there is."""
+    reason = os.strerror(error.errno) if error.errno else ""
+    if error.errno in UNWRITABLE:
+        return WriteError(str(path), f"{reason}; {UNWRITABLE[error.errno]}")
+    # The folder is named where its own name is the wrong one
+    if error.errno in _WRONG_NAMES:
+        place = f"{path.parent}: " if not path.parent.is_dir() else ""
+        return CatalogError(str(path), f"cannot be written: {place}{reason}")
+    # Some libraries keep the number in the message only
+    named = _named_failure(error) if error.errno is None else None
+    return _failed_write(path, named) if named else None
+
+
+def _named_failure(error: Exception) -> OSError | None:
+    """Return the failure to write that the message of another error names."""
+    message = str(error).lower()
+    for number in UNWRITABLE:
+        if os.strerror(number).lower() in message:
+            return OSError(number, os.strerror(number))
+    return None
+
+
+def _probed_failure(folder: Path) -> OSError | None:
+    """Return the failure to write a file of some size in a folder; None if it can be written."""
+    probe = folder / _part_name("probe", "")
+    try:
+        probe.write_bytes(bytes(_PROBE))
+    except OSError as error:
+        return error
+    finally:
+        _remove_part(probe)
+    return None
+
+
+def remove_file(path: Path) -> None:
+    """Remove a result that is made again, if it is there; raise ``WriteError`` if it must stay."""
+    with writing(path):
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
 def temporary_folder(parent: Path) -> Iterator[Path]:
     """Give a folder that is removed afterwards, or by a later run if this process is killed."""
-    with TemporaryDirectory(dir=parent, prefix=".", suffix=_part_name("", "")) as folder:
-        yield Path(folder)
+    with writing(parent):
+        folder = TemporaryDirectory(dir=parent, prefix=".", suffix=_part_name("", ""))
+    # A failure is looked into while the disk is still as full as it was
+    with folder as name, writing(parent):
+        yield Path(name)
 
 
 def _part_name(stem: str, suffix: str) -> str:

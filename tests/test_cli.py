@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 
 import per_obspy
+from per_obspy.jobs.output_folder import locked_folder
 
 CHECKOUT = Path(__file__).parents[1]
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap"
@@ -154,6 +155,26 @@ def test_nothing_in_reach_exits_with_3(call, configuration):
     assert "rejected.csv, first pair a: nearest station" in err.splitlines()[-1]
     rejected = pd.read_csv(configuration.parent / "out" / "rejected.csv")
     assert rejected[rejected["kind"] == "pair"]["reasons"].str.contains("m away").all()
+
+
+def test_a_folder_that_another_run_holds_exits_with_75(call, configuration):
+    with locked_folder(configuration.parent / "out"):
+        for command in ("run", "screen", "report"):
+            code, _, err = call(command, configuration)
+            assert code == 75
+            line = err.strip().splitlines()[-1]
+            assert f"out: another run holds this folder: process {os.getpid()} on " in line
+
+
+def test_output_that_cannot_be_written_exits_with_75():
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "per_obspy", "--version"]
+        done = subprocess.run(command, check=False, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 75
+    assert done.stderr.startswith("per-obspy: standard output: cannot be written: No space left")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_no_such_command_exits_with_2(call):

@@ -6,21 +6,36 @@ import pytest
 
 from per_obspy.errors import (
     CatalogError,
+    FolderInUse,
     PerError,
     RecordRejected,
     ServiceError,
+    TryLater,
+    WriteError,
     did_you_mean,
     reason_of,
 )
 
 
 @pytest.mark.parametrize(
-    ("error", "built_in"), [(RecordRejected, ValueError), (CatalogError, ValueError)]
+    ("error", "built_in"),
+    [
+        (RecordRejected, ValueError),
+        (CatalogError, ValueError),
+        (WriteError, OSError),
+        (FolderInUse, BlockingIOError),
+    ],
 )
 def test_errors_are_also_built_in(error, built_in):
     assert issubclass(error, PerError)
     assert issubclass(error, built_in)
     assert issubclass(ServiceError, ConnectionError)
+
+
+@pytest.mark.parametrize("error", [ServiceError, WriteError, FolderInUse])
+def test_what_passes_by_itself_is_no_wrong_input(error):
+    assert issubclass(error, TryLater)
+    assert not issubclass(error, CatalogError)
 
 
 def test_every_reason_is_in_the_text():
@@ -31,7 +46,13 @@ def test_every_reason_is_in_the_text():
 
 
 @pytest.mark.parametrize(
-    "error", [RecordRejected("CI.CLC", "a", "b"), CatalogError("pairs.csv", "no column gap")]
+    "error",
+    [
+        RecordRejected("CI.CLC", "a", "b"),
+        CatalogError("pairs.csv", "no column gap"),
+        WriteError("risk.csv", "No space left on device"),
+        FolderInUse("out", "process 4711"),
+    ],
 )
 def test_errors_come_back_from_a_worker_process_as_they_left(error):
     assert str(pickle.loads(pickle.dumps(error))) == str(error)

@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 
 from per_obspy import files
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, WriteError
 from per_obspy.files import (
     bytes_hash,
     content_hash,
     file_hash,
     is_part,
     remove_dead_parts,
+    remove_file,
     temporary_folder,
     written_whole,
 )
@@ -59,9 +60,59 @@ def test_a_full_disk_is_named_in_one_line(tmp_path):
             part.write_text("half")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    with pytest.raises(CatalogError, match=r"risk\.csv: cannot be written: No space left"):
+    reason = r"risk\.csv: cannot be written: No space left on device; try again when there is room"
+    with pytest.raises(WriteError, match=reason):
         fill()
     assert list(tmp_path.iterdir()) == []
+
+
+class LibraryError(Exception):
+    """An error of a library that writes, which is not one of the operating system."""
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EMFILE])
+def test_a_library_that_names_the_failure_in_its_message_only(tmp_path, number):
+    # would catch the traceback of a database on a full disk
+    reason = os.strerror(number)
+    expected = rf"risk\.csv: cannot be written: {reason}; try again"
+    with pytest.raises(WriteError, match=expected), written_whole(tmp_path / "risk.csv"):
+        raise LibraryError(f'IO Error: Could not write file "x": {reason}')
+
+
+def test_a_library_that_gives_no_reason_is_asked_for_by_a_probe(tmp_path, monkeypatch):
+    # HDF5 states only that it failed
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def fails():
+        with written_whole(tmp_path / "spectra.nc") as part:
+            part.write_text("half")
+            monkeypatch.setattr(Path, "write_bytes", full)
+            raise RuntimeError("NetCDF: HDF error")
+
+    with pytest.raises(WriteError, match=r"spectra\.nc: cannot be written: No space left"):
+        fails()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mistake_of_the_program_is_not_taken_for_a_full_disk(tmp_path):
+    reason = "NetCDF: HDF error"
+    with pytest.raises(RuntimeError, match=reason), written_whole(tmp_path / "spectra.nc"):
+        raise RuntimeError(reason)
+    with pytest.raises(FileNotFoundError), written_whole(tmp_path / "risk.csv"):
+        (tmp_path / "absent").read_text()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_must_stay_is_named(tmp_path, monkeypatch):
+    remove_file(tmp_path / "absent")
+
+    def refuses(*_, **__):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "unlink", refuses)
+    with pytest.raises(WriteError, match=r"risk\.csv: cannot be written: Permission denied"):
+        remove_file(tmp_path / "risk.csv")
 
 
 @pytest.fixture(scope="module")

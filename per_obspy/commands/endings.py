@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from per_obspy.jobs.output_folder import Result
 
 #: Exit codes; 0 is done, and 1 is left to crashes, which are bugs.
-WRONG_INPUT, NOTHING_USABLE, SERVICE_UNAVAILABLE = 2, 3, 75
+WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 

@@ -18,7 +18,7 @@ import pyarrow as pa
 
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
-from per_obspy.files import file_hash
+from per_obspy.files import file_hash, remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
 from per_obspy.jobs.parallel import results
@@ -78,6 +78,8 @@ class Part(NamedTuple):
         Status file with what was left out, see :func:`rejections`.
     resumed : bool
         Whether an earlier run had done it.
+    failed : bool
+        Whether its work failed unexpectedly, so that the next run does it again.
     """
 
     number: int
@@ -85,6 +87,7 @@ class Part(NamedTuple):
     path: Path | None
     status: Path
     resumed: bool
+    failed: bool = False
 
 
 def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
@@ -128,7 +131,7 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
 
 def do_chunk(job: ChunkJob) -> Part:
     """Write the rows of a chunk and their status, and return the finished part."""
-    job.part.unlink(missing_ok=True)
+    remove_file(job.part)
     pairs = checked_chunk(job.chunk)
     rows, uncomputed = _computed_rows(pairs, read_ground(job.ground), job)
     # Rows that cannot be computed belong to the file of the chunk
@@ -205,10 +208,11 @@ def _earlier(job: ChunkJob) -> Part | None:
 
 def _failed(job: ChunkJob, reason: str) -> Part:
     """Return a part that holds only rejections, because its work failed; the next run does it."""
+    # One rejection per pair, with its line
     rows = job.chunk.rows
     names = rows.table["pair_id"].cast(pa.string()).to_pylist()
     rejected = [
         Rejection("pair", name or "", rows.source, line, (reason,))
         for name, line in zip(names, rows.lines.tolist(), strict=True)
     ]
-    return _recorded(job, "", False, [*rows.broken, *rejected])
+    return _recorded(job, "", False, [*rows.broken, *rejected])._replace(failed=True)

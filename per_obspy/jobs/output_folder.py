@@ -9,7 +9,7 @@ import json
 import os
 import platform
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
-from per_obspy.errors import CatalogError
-from per_obspy.files import file_hash, remove_dead_parts
+from per_obspy.errors import CatalogError, FolderInUse
+from per_obspy.files import file_hash, remove_dead_parts, writing
 from per_obspy.resume import write_status
 
 #: Libraries whose versions a result may depend on.
@@ -84,27 +84,30 @@ def locked_folder(folder: Path) -> Iterator[None]:
     lock = _acquired_lock(folder, holder)
     try:
         owner = {"process": os.getpid(), "host": platform.node(), "since": now()}
-        holder.write_text(json.dumps(owner), encoding="utf-8")
+        # What killed processes left is removed first: it may fill the disk
         remove_dead_parts(folder)
+        with writing(holder):
+            holder.write_text(json.dumps(owner), encoding="utf-8")
         yield
     finally:
-        holder.unlink(missing_ok=True)
+        with suppress(OSError):
+            holder.unlink(missing_ok=True)
         lock.release()
 
 
 def _acquired_lock(folder: Path, holder: Path) -> FileLock:
     """Make the output folder if need be and acquire its lock at once."""
     # The lock ends with its process, so that a killed run holds nothing
+    lock = FileLock(str(folder / ".lock"), timeout=0)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(str(folder / ".lock"), timeout=0)
-        lock.acquire()
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            lock.acquire()
+    except CatalogError as error:
+        reason = error.problem.removeprefix("cannot be written: ")
+        raise CatalogError(str(folder), f"cannot be used as output folder: {reason}") from error
     except Timeout as error:
-        reason = f"another run holds this folder: {_holder(holder)}"
-        raise CatalogError(str(folder), reason) from error
-    except OSError as error:
-        reason = f"cannot be used as output folder: {error.strerror}"
-        raise CatalogError(str(folder), reason) from error
+        raise FolderInUse(str(folder), _holder(holder)) from error
     return lock
 
 
@@ -112,6 +115,6 @@ def _holder(path: Path) -> str:
     """Return process, host and start of the run that holds an output folder."""
     try:
         owner = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return "it does not say which"
-    return f"process {owner['process']} on {owner['host']} since {owner['since']}"
+        return f"process {owner['process']} on {owner['host']} since {owner['since']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "its process is unknown"

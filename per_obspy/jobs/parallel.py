@@ -1,6 +1,8 @@
 """
 Independent tasks on several processes, or on any executor; none of them can stop the others.
 
+The exception is a machine that cannot write: the first ``WriteError`` ends the work.
+
 A task whose worker dies takes the whole pool with it. What was under way then is done again, each
 task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
@@ -16,7 +18,7 @@ from multiprocessing import get_context, parent_process
 from threading import Thread
 from typing import TypeVar
 
-from per_obspy.errors import PerError
+from per_obspy.errors import PerError, WriteError
 from per_obspy.threads import use_one_thread
 
 Task = TypeVar("Task")
@@ -55,6 +57,11 @@ def results(
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
         Where to work instead.
+
+    Raises
+    ------
+    WriteError
+        If a task cannot write its result; tasks that have not begun are cancelled.
     """
     if executor is not None:
         unfinished = yield from _on(executor, tasks, do, failed, AHEAD_ELSEWHERE)
@@ -83,6 +90,7 @@ def _on(
     """Yield results until all tasks are done or the executor is broken; return its tasks then."""
     remaining, unfinished = iter(tasks), list[Task]()
     pending: dict[Future[Result], Task] = {}
+    unwritten: WriteError | None = None
     while True:
         # Keep the executor busy, but only a few tasks ahead of the results
         room = 0 if unfinished else ahead - len(pending)
@@ -101,6 +109,13 @@ def _on(
                 yield _caught(task, future.result, failed)
             except BrokenProcessPool:
                 unfinished.append(task)
+            except WriteError as error:
+                unwritten = error
+        # Other tasks cannot write either; what was finished has been passed on
+        if unwritten:
+            for future in pending:
+                future.cancel()
+            raise unwritten
 
 
 def _alone(task: Task, do: Do[Task, Result], failed: Failed[Task, Result]) -> Result:
@@ -136,10 +151,14 @@ def _end_with_parent() -> None:
 
 
 def _caught(task: Task, work: Callable[[], Result], failed: Failed[Task, Result]) -> Result:
-    """Return the result; whatever is raised becomes a reason, so that no task stops the others."""
+    """
+    Return the result; whatever is raised becomes a reason, so that no task stops the others.
+
+    Only where the machine cannot write, the other tasks fail too, and all of them stop.
+    """
     try:
         return work()
-    except BrokenProcessPool:
+    except (BrokenProcessPool, WriteError):
         raise
     except PerError as error:
         return failed(task, str(error))

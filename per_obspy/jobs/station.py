@@ -18,8 +18,8 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.config import Processing, Spectra
-from per_obspy.errors import CatalogError, PerError, Rejection
-from per_obspy.files import bytes_hash, file_hash
+from per_obspy.errors import CatalogError, PerError, Rejection, WriteError
+from per_obspy.files import bytes_hash, file_hash, remove_file
 from per_obspy.jobs.parallel import results
 from per_obspy.processing.chain import process_station
 from per_obspy.records.event_file import EventFile, portable
@@ -139,6 +139,8 @@ class FinishedStation(NamedTuple):
         Of the shard; empty if there is none.
     spectra : Dataset or None
         Content of a shard of spectra without the motion, so that no later stage reads it again.
+    failed : bool
+        Whether its work failed unexpectedly, so that the next run does it again.
     """
 
     station: str
@@ -147,6 +149,7 @@ class FinishedStation(NamedTuple):
     resumed: bool
     hash: str = ""
     spectra: xr.Dataset | None = None
+    failed: bool = False
 
 
 def do_stations(
@@ -186,7 +189,7 @@ def _prepared(job: StationJob) -> StationJob | FinishedStation:
 
 def do_station(job: StationJob) -> FinishedStation:
     """Write the shard of a station and its status, and return the finished station."""
-    job.shard.unlink(missing_ok=True)
+    remove_file(job.shard)
     products = _products(job)
     has_shard = job.shard in products.files
     digest, spectra = _read_shard(job.shard) if has_shard else ("", None)
@@ -206,6 +209,8 @@ def _products(job: StationJob) -> Products:
     try:
         stream, unread = job.reader(job.source, job.inventory, job.station)
         products = job.product(job, stream, job.event.event if job.event else None)
+    except WriteError:
+        raise  # no property of the station
     except PerError as error:
         reasons = getattr(error, "reasons", None) or (str(error),)
         return Products((Rejection("station", job.station, source, None, tuple(reasons)),))
@@ -318,4 +323,4 @@ def earlier_station(status_file: Path) -> FinishedStation:
 def _failed(job: StationJob, reason: str) -> FinishedStation:
     """Return a station whose work failed; the next run does it again."""
     rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
-    return FinishedStation(job.station, None, (rejection,), resumed=False)
+    return FinishedStation(job.station, None, (rejection,), resumed=False, failed=True)

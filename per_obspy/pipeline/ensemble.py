@@ -15,7 +15,7 @@ from typing import Any
 
 from per_obspy.config import Ensemble, EnsembleScenario, Run, load
 from per_obspy.errors import CatalogError
-from per_obspy.files import content_hash
+from per_obspy.files import content_hash, remove_file
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -24,6 +24,7 @@ from per_obspy.jobs.output_folder import (
     recorded,
     software_versions,
 )
+from per_obspy.pipeline.preflight import check_inputs, require_extras
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
@@ -70,7 +71,7 @@ def screen_scenarios(
     configuration = configuration.resolve()
     settings = load(configuration, Ensemble)
     folder = (output or settings.output).resolve()
-    _check_folders(settings, configuration, folder)
+    _check_runs(settings, configuration, folder)
     # Each run takes its own folder, one after the other
     started = now()
     runs = {
@@ -83,7 +84,7 @@ def screen_scenarios(
         known = earlier_status(folder / RECORD, head["key"])
         if known is not None:
             return Result(folder, known, did_nothing=True)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         progress("joining scenarios", 0, 1)
         found = _joined(settings, folder, runs, head["simulated"])
         progress("joining scenarios", 1, 1)
@@ -110,16 +111,20 @@ def _joined(
     }
 
 
-def _check_folders(settings: Ensemble, configuration: Path, folder: Path) -> None:
-    """Check that no run writes where another one or the ensemble does."""
+def _check_runs(settings: Ensemble, configuration: Path, folder: Path) -> None:
+    """Check the inputs of every run, and that none writes where another or the ensemble does."""
     owners = {folder: "the ensemble"}
     for scenario in settings.scenario:
-        place = load(scenario.run, Run).output.resolve()
+        run_settings = load(scenario.run, Run)
+        place = run_settings.output.resolve()
         name = f"scenario {scenario.name!r}"
         if place in owners:
             reason = f"{name} has the output folder of {owners[place]}, {place}"
             raise CatalogError(str(configuration), reason)
         owners[place] = name
+        # A fault of the last run would otherwise be found after all others are done
+        require_extras(run_settings)
+        check_inputs(run_settings)
 
 
 def _prefixed(name: str, progress: Progress) -> Progress:

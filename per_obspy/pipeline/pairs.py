@@ -51,11 +51,11 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
     if pairs and pairs.catalog:
         return _stored(pairs, pairs.catalog, stations, settings.screening.largest_distance)
     with written_whole(folder / "pairs.csv") as part:
-        _simulated(_simulation(settings), stations).to_csv(part, index=False)
+        _simulated(pair_simulation(settings), stations).to_csv(part, index=False)
     return [folder / "pairs.csv"]
 
 
-def _simulation(settings: Run) -> SimulatedPairs:
+def pair_simulation(settings: Run) -> SimulatedPairs:
     """Return how the pairs are to be simulated, in the run or in the simulation that it names."""
     if settings.pairs and settings.pairs.simulated:
         return settings.pairs.simulated

@@ -1,10 +1,14 @@
 """Checks of everything that later stages need, before the first record is read."""
 
+import numpy as np
+
 from per_obspy.config import Run
-from per_obspy.errors import require_extra
+from per_obspy.errors import CatalogError, require_extra
+from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.checking import check_columns
 from per_obspy.inventory.files.formats import pair_file
-from per_obspy.pipeline.pairs import named_files
+from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
 
 
@@ -25,7 +29,7 @@ def require_extras(settings: Run) -> None:
 
 def check_inputs(settings: Run) -> None:
     """
-    Check the head of the pair table, the inventories that are named, and the whole ShakeMap.
+    Check the head of the pair table, the named inventories, the area, and the whole ShakeMap.
 
     Raises
     ------
@@ -39,3 +43,31 @@ def check_inputs(settings: Run) -> None:
         named_files(pairs.names, pairs.catalog)
     if settings.records and settings.records.shakemap:
         read_shakemap(settings.records.shakemap, settings.records.shakemap_uncertainty)
+    _check_area(settings)
+
+
+def _check_area(settings: Run) -> None:
+    """Check that the pairs have the column by which totals are counted."""
+    area = settings.totals.area
+    if area is None or area in _pair_columns(settings):
+        return
+    raise CatalogError("totals", f"area: the pair table has no column {area!r}")
+
+
+def _pair_columns(settings: Run) -> set[str]:
+    """Return the columns of the pairs; of inventories not chosen yet, those that any has."""
+    pairs = settings.pairs
+    if pairs and pairs.file:
+        return set(pair_file(pairs.file).names)
+    if pairs and pairs.catalog and pairs.names:
+        files = named_files(pairs.names, pairs.catalog)
+        return set.intersection(*(set(pair_file(file).names) for file in files))
+    if pairs and pairs.catalog:
+        # The region of the stations decides later which of them are taken
+        stored = [entry.file for entry in stored_inventories(pairs.catalog)]
+        columns = [set(pair_file(file).names) for file in stored if file.is_file()]
+        return set[str]().union(*columns)
+    # One simulated pair has the columns of all, and perhaps the site class of its station
+    simulation = pair_simulation(settings).model_copy(update={"count": 1})
+    table = simulated_pairs(np.zeros(1), np.zeros(1), **simulation.model_dump())
+    return {*table.columns, "site_class"}

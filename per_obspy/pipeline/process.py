@@ -9,7 +9,7 @@ from obspy.core.event import Event
 
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import Rejection
-from per_obspy.files import remove_dead_parts
+from per_obspy.files import remove_dead_parts, remove_file
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
@@ -152,7 +152,7 @@ def _write_records(
 def _write_structure(job: StationJob, stream: Stream, event: Event | None) -> Products:
     """Write the records of the sensors in structures, every instrument, with their description."""
     path = _structure(job)
-    path.unlink(missing_ok=True)
+    remove_file(path)
     instruments, rejected = process_instruments(kept_apart(stream)[1], job.processing, event)
     # All instruments in one file
     built = Stream([trace for traces in instruments for trace in traces])

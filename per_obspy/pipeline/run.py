@@ -19,7 +19,7 @@ from typing import Any
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, file_hash
+from per_obspy.files import content_hash, file_hash, is_part, remove_file
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.jobs.output_folder import (
     Result,
@@ -51,6 +51,9 @@ from per_obspy.tables.station_summary import StationSummary, write_stations
 
 #: Written last.
 RECORD = "run.json"
+
+#: Stage that the first run waits for.
+COMPILING = "loading kernels (the first run compiles them for a minute)"
 
 
 def run(
@@ -95,20 +98,21 @@ def run(
         head = None
         if (folder / RECORD).is_file():
             head = _head(settings, configuration, fetched, {})
-            known = earlier_status(folder / RECORD, head["key"])
-            if known is not None:
+            if known := _finished_before(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
         check_inputs(settings)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
-        return recorded(folder / RECORD, {**record, "started": started, **head})
+        # What failed unexpectedly is done again by the next run
+        key = "" if record["failed"] else head["key"]
+        return recorded(folder / RECORD, {**record, "started": started, **head, "key": key})
 
 
 def screen(
@@ -129,7 +133,7 @@ def screen(
     with locked_folder(folder):
         stations = stations_of_earlier_run(folder)
         check_inputs(settings)
-        (folder / RECORD).unlink(missing_ok=True)
+        remove_file(folder / RECORD)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
         head = _head(settings, configuration, None, {})
@@ -225,6 +229,12 @@ def _all_stages(
     return {**record, "seconds": seconds | record["seconds"]}
 
 
+def _finished_before(folder: Path, key: str) -> dict[str, Any] | None:
+    """Return the record of a run with this key whose files are all as it left them."""
+    known = earlier_status(folder / RECORD, key)
+    return known if known is not None and _has_whole_intermediates(folder, known) else None
+
+
 def _later_stages(
     settings: Run,
     folder: Path,
@@ -238,32 +248,41 @@ def _later_stages(
     seconds, usable = dict[str, float](), _usable(stations)
     # A table of an earlier run would be taken for one of this run
     for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        (folder / name).unlink(missing_ok=True)
+        remove_file(folder / name)
     with _timed(seconds, "screening"):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with _timed(seconds, "report"):
         outputs = [*found.outputs, *table.files, *reported(settings, folder, usable, progress)]
 
-    # Rejections make a result partial
-    counts = found.counts
-    rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
-    resumed = sum(station.resumed for station in stations)
     return {
         "name": settings.name,
-        "state": "complete" if counts["pairs"] else "nothing_usable",
-        "partial": any(rejections),
+        **_outcome(found, stations),
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
-        "counts": {
-            "stations": len(usable),
-            "stations_resumed": resumed,
-            "stations_simulated": simulated_stations(usable),
-            **counts,
-        },
         "outputs": file_hashes(folder, outputs),
+        "intermediate": file_hashes(folder, _intermediates(folder)),
         "versions": software_versions(),
         "seconds": seconds,
+    }
+
+
+def _outcome(found: Screened, stations: Sequence[FinishedStation]) -> dict[str, Any]:
+    """Return state and counts of a run; rejections make its result partial."""
+    counts = found.counts
+    rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
+    usable = _usable(stations)
+    # Stations that were done before, and those of simulated motion, are counted apart
+    of_stations = {
+        "stations": len(usable),
+        "stations_resumed": sum(station.resumed for station in stations),
+        "stations_simulated": simulated_stations(usable),
+    }
+    return {
+        "state": "complete" if counts["pairs"] else "nothing_usable",
+        "partial": any(rejections),
+        "failed": found.failed or any(station.failed for station in stations),
+        "counts": {**of_stations, **counts},
     }
 
 
@@ -276,6 +295,22 @@ def _write_stations(
     """Write the table of the stations with the pairs that each serves."""
     spectra = [station.spectra for station in usable if station.spectra is not None]
     return write_stations(spectra, [*rejected, *found.unplaced], found.served, folder)
+
+
+def _intermediates(folder: Path) -> list[Path]:
+    """Return the files of the stages before the screening, which other commands or users read."""
+    folders = [folder / name for name in ("simulated", "stations")]
+    files = [path for parent in folders for path in parent.rglob("*")]
+    files += [folder / name for name in ("simulated.json", "pairs.csv")]
+    return sorted(path for path in files if path.is_file() and not is_part(path))
+
+
+def _has_whole_intermediates(folder: Path, record: dict[str, Any]) -> bool:
+    """Return whether the files of the earlier stages are as the run left them."""
+    known = record.get("intermediate")
+    if not isinstance(known, dict):
+        return False
+    return not changed_outputs(folder / RECORD, {**record, "outputs": known})
 
 
 def _finished(file: Path) -> dict[str, Any]:
@@ -297,10 +332,13 @@ def _compiling(progress: Progress) -> Iterator[None]:
     """Compile the kernels of screening in a thread, while other processes do the stations."""
     thread = Thread(target=compile_screening)
     thread.start()
-    yield
-    progress("loading kernels (the first run compiles them for a minute)", 0, 1)
-    thread.join()
-    progress("loading kernels (the first run compiles them for a minute)", 1, 1)
+    try:
+        yield
+        progress(COMPILING, 0, 1)
+    finally:
+        # A thread that is alive when the interpreter ends can abort it
+        thread.join()
+    progress(COMPILING, 1, 1)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
@@ -38,12 +39,15 @@ class Screened(NamedTuple):
         Number of pairs for which the record of each station is used.
     unplaced : tuple of Rejection
         Stations that serve no pair because their place is unknown.
+    failed : bool
+        Whether the work of a chunk failed unexpectedly.
     """
 
     outputs: list[Path]
     counts: dict[str, int]
     served: Counter[str]
     unplaced: tuple[Rejection, ...]
+    failed: bool
 
 
 def screened(
@@ -82,20 +86,23 @@ def screened(
     # Pairs need a station or a map
     has_motion = bool(stations or maps)
     parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
-    served = Counter[str]()
-    outputs, states = [folder / "rejected.csv"], Counter[str]()
+    outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
     kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
     # The parts of the chunks become one table, worst pair first
     tables = [part.path for part in parts if part.path]
     if tables:
         progress("ranking", 0, 1)
-        is_simulated = simulated_motion(settings, stations)
-        facts = {"name": settings.name, "simulated": str(is_simulated).lower()}
-        risk = write_risk(tables, folder, facts, settings.csv_rows)
-        outputs, states = [*outputs, *risk.files], risk.states
-        served = risk.stations
+        risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
+        outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
         progress("ranking", 1, 1)
-    return Screened(outputs, _counts(states, kinds, parts), served, unplaced)
+    failed = any(part.failed for part in parts)
+    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed)
+
+
+def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
+    """Return name and origin of the motion as texts of a table."""
+    is_simulated = simulated_motion(settings, stations)
+    return {"name": settings.name, "simulated": str(is_simulated).lower()}
 
 
 def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
@@ -139,7 +146,7 @@ def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
     known |= {part.path for part in parts if part.path}
     for path in folder.iterdir() if folder.is_dir() else ():
         if path not in known and path.is_file():
-            path.unlink()
+            remove_file(path)
 
 
 def _jobs(

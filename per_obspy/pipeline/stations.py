@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spectra, load
-from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, is_part
+from per_obspy.errors import CatalogError, Rejection, WriteError
+from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
@@ -19,6 +19,9 @@ from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import StationSource, find_sources
 from per_obspy.resume import earlier_status, write_status
 from per_obspy.threads import usable_processors
+
+#: Stations that a message names.
+NAMED = 10
 
 
 class FoundStations(NamedTuple):
@@ -126,11 +129,25 @@ def station_jobs(
 def finished_stations(
     jobs: Sequence[StationJob], workers: int, executor: Executor | None, progress: Progress
 ) -> list[FinishedStation]:
-    """Do the jobs and return every station, sorted by name."""
+    """
+    Do the jobs and return every station, sorted by name.
+
+    Raises
+    ------
+    WriteError
+        If a station cannot be written; it names the stations that wait for another run.
+    """
     finished = []
-    for station in do_stations(jobs, workers or usable_processors(), executor):
-        finished.append(station)
-        progress("stations", len(finished), len(jobs))
+    # A machine that cannot write says nothing about the stations that wait
+    try:
+        for station in do_stations(jobs, workers or usable_processors(), executor):
+            finished.append(station)
+            progress("stations", len(finished), len(jobs))
+    except WriteError as error:
+        done = {station.station for station in finished}
+        waiting = {job.station for job in jobs} - done
+        reason = f"{error.reason}; {_waiting_stations(sorted(waiting))}"
+        raise WriteError(error.path, reason) from error
     return sorted(finished, key=lambda station: station.station)
 
 
@@ -144,6 +161,12 @@ def simulated_motion(settings: Run, stations: Sequence[FinishedStation]) -> bool
     """Return whether any motion of a run is simulated: that of a station or of the ShakeMap."""
     shakemap = settings.records.shakemap if settings.records else None
     return simulated_stations(stations) > 0 or (shakemap is not None and is_scenario(shakemap))
+
+
+def _waiting_stations(names: Sequence[str]) -> str:
+    """Return a message with the number of stations that wait and the names of some."""
+    others = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{len(names)} stations wait for another run: {', '.join(names[:NAMED])}{others}"
 
 
 def all_rejections(
@@ -183,7 +206,7 @@ def _write_simulated_records(scenario: Scenario, folder: Path, progress: Progres
         return
     progress("simulating records", 0, 1)
     # Files of another scenario, or of a killed run, would be taken for records of this one
-    _simulation_status(folder).unlink(missing_ok=True)
+    remove_file(_simulation_status(folder))
     shutil.rmtree(folder / "simulated", ignore_errors=True)
     write_simulation(simulate(scenario), folder / "simulated")
     progress("simulating records", 1, 1)

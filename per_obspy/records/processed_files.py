@@ -9,6 +9,7 @@ with another's partner.
 """
 
 import json
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,10 @@ def write_processed(stream: Stream, path: Path) -> dict[str, Any]:
     """
     with written_whole(path) as part:
         short = Stream([_with_short_codes(trace) for trace in stream])
-        short.write(str(part), format="MSEED", encoding="FLOAT64")
+        # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
+        content = BytesIO()
+        short.write(content, format="MSEED", encoding="FLOAT64")
+        part.write_bytes(content.getvalue())
     return {"traces": [_description(trace) for trace in stream]}
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 from obspy import Stream, Trace
 
 from per_obspy.config import Interpolation
+from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
 from per_obspy.jobs.ground_files import ground_files, read_ground, read_station_once
 from per_obspy.jobs.station import FinishedStation
@@ -99,3 +100,19 @@ def test_a_station_is_read_once_and_again_when_it_has_changed(stations, monkeypa
     # another hash is another content
     assert read_station_once(stations[1].shard, "another") is not first
     assert len(opened) == 2
+
+
+def test_the_hypocentre_is_that_of_the_first_station_that_has_one(stations):
+    # would catch the station that comes last deciding
+    *first, last = stations[:2]
+    expected = ground_files(stations[:2], (), Interpolation())[0].key
+    last.spectra.attrs = {"simulated": "false"}
+    assert ground_files([*first, last], (), Interpolation())[0].key == expected
+    assert ground_files([last, *first], (), Interpolation())[0].field is not None
+
+
+def test_stations_of_two_earthquakes_are_refused(stations):
+    stations[1].spectra.attrs["hypocentre_depth"] = 9.0
+    reason = r"not that of one earthquake: XX.S1 \(0.5, 0.5, 0.5\), XX.S2 \(0.5, 0.5, 9.0\)"
+    with pytest.raises(CatalogError, match=reason):
+        ground_files(stations, (), Interpolation())

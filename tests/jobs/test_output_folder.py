@@ -47,6 +47,14 @@ def test_a_folder_is_free_after_an_error(tmp_path):
     assert locks(tmp_path) == ("locked\n", "")
 
 
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"process": 1'])
+def test_a_holder_that_cannot_be_read_is_unknown(tmp_path, content):
+    with locked_folder(tmp_path):
+        (tmp_path / ".holder.json").write_text(content)
+        _, errors = locks(tmp_path)
+    assert errors.strip().endswith("its process is unknown; try again after it")
+
+
 def test_a_file_is_no_output_folder(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(CatalogError, match="cannot be used as output folder"):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, WriteError
 from per_obspy.jobs.parallel import AHEAD, results
 
 #: Ends a process as the system does with one that takes too much memory.
@@ -28,9 +28,20 @@ class InProcess(Executor):
         future = Future()
         try:
             future.set_result(function(*arguments))
-        except ValueError as error:
+        except (ValueError, WriteError) as error:
             future.set_exception(error)
         return future
+
+
+def _full(number):
+    raise WriteError(f"{number}.nc", "No space left on device")
+
+
+@pytest.mark.parametrize("executor", [None, InProcess()])
+def test_a_machine_that_cannot_write_stops_all_tasks(executor):
+    # would catch a full disk that is noted as a fault of every task
+    with pytest.raises(WriteError, match=r"\.nc: cannot be written: No space left on device"):
+        list(results(iter(range(100)), _full, failed, 1, executor))
 
 
 @pytest.mark.parametrize("workers", [1, 2])

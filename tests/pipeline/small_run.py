@@ -1,7 +1,9 @@
-"""A small simulated run that several test modules share: three stations, sixty pairs."""
+"""A small simulated run that several test modules share: three stations, sixty pairs, or fewer."""
 
 from concurrent.futures import Executor, Future
 from pathlib import Path
+
+from per_obspy.files import written_whole
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -26,6 +28,20 @@ def write_configuration(folder: Path, text: str = "") -> Path:
     head = 'name = "small"\noutput = "out"\nsimulation = "scenario.toml"\n'
     file.write_text(f"{head}{text}{SPECTRA}")
     return file
+
+
+def write_smallest_configuration(folder: Path, text: str = "") -> Path:
+    """Write the configuration of a run of one station and four pairs, and return its path."""
+    file = write_configuration(folder, text)
+    scenario = SCENARIO.replace("stations = 3", "stations = 1").replace("count = 60", "count = 4")
+    (folder / "scenario.toml").write_text(scenario)
+    return file
+
+
+def plain_figure(*arguments: object) -> None:
+    """Write a figure as a short file: most of the time of a small run goes into its figures."""
+    with written_whole(Path(str(arguments[-1]))) as part:
+        part.write_bytes(b"a figure")
 
 
 def write_folder_configuration(folder: Path, output: str, text: str = "") -> Path:

@@ -1,12 +1,18 @@
 """What is wrong with later stages stops a run before its first record is read."""
 
+import datetime
 import shutil
 import sys
+import threading
+import time
 
 import pytest
 
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, MissingExtra
+from per_obspy.inventory.catalogue import Origin, add_inventory
+from per_obspy.pipeline import run as whole_run
+from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.preflight import check_inputs
 from per_obspy.pipeline.run import report, run, screen
 
@@ -61,3 +67,54 @@ def test_a_whole_table_passes(tmp_path):
     with pytest.raises(CatalogError, match="absent: no such folder or file"):
         run(tmp_path / "run.toml")
     shutil.rmtree(tmp_path / "out")
+
+
+AREA = '[totals]\narea = "district"\n'
+
+
+@pytest.mark.parametrize("source", ["file", "names", "catalog", "simulated"])
+def test_an_area_that_the_pairs_lack_is_found_before_records(tmp_path, source):
+    # would catch a run that does all stations and then ends with this
+    (tmp_path / "pairs.csv").write_text(f"{HEADER}a,0.1,0.1,10,0.1001,0.1,12,0.1\n")
+    origin = Origin("x", "by hand", "CC0-1.0", datetime.date(2026, 1, 1))
+    add_inventory(tmp_path / "catalog.toml", tmp_path / "pairs.csv", origin)
+    pairs = {
+        "file": PAIRS,
+        "names": '[pairs]\ncatalog = "catalog.toml"\nnames = ["x"]\n',
+        "catalog": '[pairs]\ncatalog = "catalog.toml"\n',
+        "simulated": "[pairs.simulated]\ncount = 10\n",
+    }[source]
+    (tmp_path / "run.toml").write_text(RECORDS + pairs + AREA)
+    with pytest.raises(CatalogError, match="totals: area: the pair table has no column 'district'"):
+        check_inputs(load(tmp_path / "run.toml", Run))
+    (tmp_path / "run.toml").write_text(RECORDS + pairs + AREA.replace("district", "gap"))
+    check_inputs(load(tmp_path / "run.toml", Run))
+
+
+def test_an_ensemble_checks_all_its_runs_before_the_first(tmp_path):
+    write_configuration(tmp_path)
+    wrong = (tmp_path / "run.toml").read_text().replace('"out"', '"other"') + AREA
+    (tmp_path / "wrong.toml").write_text(wrong)
+    scenarios = [
+        f'[[scenario]]\nname = "{name}"\nrun = "{name}.toml"\nweight = 0.5\n'
+        for name in ("run", "wrong")
+    ]
+    (tmp_path / "ensemble.toml").write_text('name = "e"\noutput = "joined"\n' + "".join(scenarios))
+    with pytest.raises(CatalogError, match="no column 'district'"):
+        screen_scenarios(tmp_path / "ensemble.toml")
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_thread_is_alive_after_a_run_that_fails(tmp_path, monkeypatch):
+    # would catch an interpreter that aborts at its end because a thread still compiles
+    write_configuration(tmp_path)
+    monkeypatch.setattr(whole_run, "compile_screening", lambda: time.sleep(0.5))
+
+    def fails(*_):
+        raise CatalogError("stations", "no luck")
+
+    monkeypatch.setattr(whole_run, "finished_stations", fails)
+    before = set(threading.enumerate())
+    with pytest.raises(CatalogError, match="no luck"):
+        run(tmp_path / "run.toml")
+    assert set(threading.enumerate()) <= before

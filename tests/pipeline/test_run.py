@@ -17,7 +17,7 @@ from filelock import FileLock
 from pyarrow import parquet
 
 from per_obspy.config import Processing
-from per_obspy.errors import CatalogError
+from per_obspy.errors import FolderInUse
 from per_obspy.jobs import station as jobs
 from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import run
@@ -262,5 +262,5 @@ def test_a_second_run_in_the_same_folder_names_the_holder(copied):
     holder = '{"process": 4711, "host": "quake", "since": "2026-01-01"}'
     (copied / "out" / ".holder.json").write_text(holder)
     reason = r"another run holds this folder: process 4711 on quake since 2026-01-01"
-    with FileLock(copied / "out" / ".lock"), pytest.raises(CatalogError, match=reason):
+    with FileLock(copied / "out" / ".lock"), pytest.raises(FolderInUse, match=reason):
         run(copied / "run.toml", executor=InProcess())

@@ -201,7 +201,8 @@ def test_a_wrong_file_is_named_with_its_fault(tmp_path, fault):
 
 
 @pytest.mark.parametrize(
-    "content", [gzip.compress(b"<shakemap_grid/>", mtime=0)[:-9], "<shakemap_grid/>".encode("utf-16")]
+    "content",
+    [gzip.compress(b"<shakemap_grid/>", mtime=0)[:-9], "<shakemap_grid/>".encode("utf-16")],
 )
 def test_files_that_cannot_be_read(tmp_path, content):
     (tmp_path / "grid.xml").write_bytes(content)

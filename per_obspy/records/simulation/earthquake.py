@@ -8,6 +8,7 @@ background noise), which MiniSEED stores without loss. Each station has random n
 so that no other station changes a sample of it.
 """
 
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -99,7 +100,10 @@ def write_simulation(simulation: Simulation, folder: str | Path) -> None:
         for trace in stream:
             trace.data = trace.data.astype(np.int32)
         with written_whole(target / f"{NETWORK}.{code}.mseed") as part:
-            stream.write(part, format="MSEED", encoding="STEIM2")
+            # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
+            content = BytesIO()
+            stream.write(content, format="MSEED", encoding="STEIM2")
+            part.write_bytes(content.getvalue())
     with written_whole(target / "stations.xml") as part:
         simulation.inventory.write(part, format="STATIONXML")
     with written_whole(target / "event.xml") as part:

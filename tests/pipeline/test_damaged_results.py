@@ -1,0 +1,107 @@
+"""Every file of a finished run that was damaged is made again, or named in one line."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from per_obspy.pipeline import report
+from per_obspy.pipeline.run import run
+
+from .small_run import InProcess, plain_figure, write_smallest_configuration
+
+#: Files of the run, seen from its output folder; their names are the same in every run.
+FILES = (
+    "run.json",
+    "risk.csv",
+    "risk.parquet",
+    "risk.columns.csv",
+    "rejected.csv",
+    "totals.csv",
+    "spectra.nc",
+    "pairs.csv",
+    "simulated.json",
+    "simulated/XX.S001.mseed",
+    "simulated/stations.xml",
+    "simulated/event.xml",
+    "stations/XX.S001.nc",
+    "stations/XX.S001.json",
+    "chunks/000000.parquet",
+    "chunks/000000.json",
+    "figures/overview.png",
+    "figures/worst_pair.png",
+)
+
+
+@pytest.fixture(autouse=True)
+def _short_figures(monkeypatch):
+    for name in ("draw_overview", "draw_record_to_pair"):
+        monkeypatch.setattr(report, name, plain_figure)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("draw_overview", "draw_record_to_pair"):
+            patch.setattr(report, name, plain_figure)
+        run(write_smallest_configuration(folder), executor=InProcess())
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return every result of a run by its name."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_list_of_files_is_that_of_a_run(finished):
+    found = set(contents(finished / "out")) - {".lock"}
+    assert found == set(FILES)
+
+
+def damage(path: Path, kind: str) -> None:
+    """Truncate, change, empty or remove a file."""
+    content = path.read_bytes()
+    middle = len(content) // 2
+    if kind == "removed":
+        path.unlink()
+        return
+    flipped = bytes([content[middle] ^ 1])
+    damaged = {
+        "truncated": content[:middle],
+        "a byte changed": content[:middle] + flipped + content[middle + 1 :],
+        "emptied": b"",
+    }
+    path.write_bytes(damaged[kind])
+
+
+@pytest.mark.parametrize("kind", ["truncated", "a byte changed", "emptied", "removed"])
+def test_a_damaged_file_does_not_change_the_result(finished, tmp_path, kind):
+    # would catch products of the run that are taken as they are, and tracebacks
+    out, whole = finished / "out", tmp_path / "whole"
+    shutil.copytree(out, whole)
+    before, wrong = contents(whole), {}
+    for name in FILES:
+        damage(out / name, kind)
+        run(finished / "run.toml", executor=InProcess())
+        after = contents(out)
+        changed = [file for file in before if after.get(file) != before[file]]
+        # The record states when the run began; parts are compared with their hash when needed
+        changed = [file for file in changed if file != "run.json" and "chunks" not in file]
+        if changed:
+            wrong[name] = changed
+        # Chunks are part of a folder whose place is in their key: restored in place
+        shutil.rmtree(out)
+        shutil.copytree(whole, out)
+    assert not wrong
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.startswith("chunks/")])
+def test_a_damaged_part_is_made_again_when_it_is_needed(finished, name):
+    before = (finished / "out" / name).read_bytes()
+    (finished / "out" / name).write_bytes(before[:-1])
+    (finished / "out" / "risk.csv").unlink()
+    counts = run(finished / "run.toml", executor=InProcess()).record["counts"]
+    assert (counts["stations_resumed"], counts["chunks_resumed"]) == (1, 0)
+    assert (finished / "out" / name).read_bytes() == before
