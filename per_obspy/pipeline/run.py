@@ -111,8 +111,9 @@ def run(
         record = _all_stages(settings, folder, found, executor, progress)
         record["seconds"] = seconds | record["seconds"]
         # What failed unexpectedly is done again by the next run
-        key = "" if record["failed"] else head["key"]
-        return recorded(folder / RECORD, {**record, "started": started, **head, "key": key})
+        if record["failed"]:
+            head["key"] = ""
+        return recorded(folder / RECORD, {**record, "started": started, **head})
 
 
 def screen(
