@@ -165,12 +165,13 @@ def writing(path: Path) -> Iterator[None]:
             raise
         raise known from error
     except Exception as error:
+        # Errors of libraries: by their message, or else by writing there
         folder = path if path.is_dir() else path.parent
         failure = _named_failure(error) or _probed_failure(folder)
-        known = failure and _failed_write(path, failure)
-        if not known:
+        described = _failed_write(path, failure) if failure is not None else None
+        if described is None:
             raise
-        raise known from error
+        raise described from error
 
 
 def _failed_write(path: Path, error: OSError) -> PerError | None:

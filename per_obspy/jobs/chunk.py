@@ -209,6 +209,7 @@ def _earlier(job: ChunkJob) -> Part | None:
 def _failed(job: ChunkJob, reason: str) -> Part:
     """Return a part that holds only rejections, because its work failed; the next run does it."""
     rows = job.chunk.rows
+    # Every row has the reason
     names = rows.table["pair_id"].cast(pa.string()).to_pylist()
     rejected = [
         Rejection("pair", name or "", rows.source, line, (reason,))

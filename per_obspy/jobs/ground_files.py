@@ -137,6 +137,7 @@ def _hypocentre(spectra: Iterable[xr.Dataset]) -> list[Hypocentre]:
 
     It is that of the first station that has one, and all others must agree with it.
     """
+    # Stations without an event have no hypocentre
     known = {
         str(station["station"].item()): Hypocentre(
             *(float(station.attrs[name]) for name in HYPOCENTRE)

@@ -95,8 +95,8 @@ def run(
         head = None
         if (folder / RECORD).is_file():
             head = _head(settings, configuration, fetched, {})
-            known = earlier_status(folder / RECORD, head["key"])
-            if known is not None and _has_whole_intermediates(folder, known):
+            known = _earlier_run(folder, head["key"])
+            if known is not None:
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
@@ -107,10 +107,10 @@ def run(
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
-        record["seconds"] = seconds | record["seconds"]
+        record |= {"seconds": seconds | record["seconds"], "started": started}
         # What failed unexpectedly is done again by the next run
-        key = "" if record["failed"] else head["key"]
-        return recorded(folder / RECORD, {**record, "started": started, **head, "key": key})
+        head["key"] *= not record["failed"]
+        return recorded(folder / RECORD, record | head)
 
 
 def screen(
@@ -248,12 +248,11 @@ def _later_stages(
     counts = found.counts
     rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
     resumed = sum(station.resumed for station in stations)
-    failed = found.failed or any(station.failed for station in stations)
     return {
         "name": settings.name,
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": any(rejections),
-        "failed": failed,
+        "failed": found.failed or _any_failed(stations),
         "simulated": settings.simulation is not None,
         "counts": {"stations": len(usable), "stations_resumed": resumed, **counts},
         "outputs": file_hashes(folder, outputs),
@@ -271,12 +270,19 @@ def _intermediates(folder: Path) -> list[Path]:
     return sorted(path for path in files if path.is_file() and not is_part(path))
 
 
-def _has_whole_intermediates(folder: Path, record: dict[str, Any]) -> bool:
-    """Return whether the files of the earlier stages are as the run left them."""
-    known = record.get("intermediate")
-    if not isinstance(known, dict):
-        return False
-    return not changed_outputs(folder / RECORD, {**record, "outputs": known})
+def _any_failed(stations: Sequence[FinishedStation]) -> bool:
+    """Return whether the work of a station failed unexpectedly."""
+    return any(station.failed for station in stations)
+
+
+def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
+    """Return the record of the same run if its results and earlier stages are as it left them."""
+    record = earlier_status(folder / RECORD, key)
+    known = record and record.get("intermediate")
+    if record is None or not isinstance(known, dict):
+        return None
+    changed = changed_outputs(folder / RECORD, {**record, "outputs": known})
+    return None if changed else record
 
 
 def _finished(file: Path) -> dict[str, Any]:

@@ -141,7 +141,9 @@ def finished_stations(
             finished.append(station)
             progress("stations", len(finished), len(jobs))
     except WriteError as error:
-        waiting = {job.station for job in jobs} - {station.station for station in finished}
+        # Stations that are finished stay so
+        waiting = {job.station for job in jobs}
+        waiting -= {station.station for station in finished}
         reason = f"{error.reason}; {_waiting_stations(sorted(waiting))}"
         raise WriteError(error.path, reason) from error
     return sorted(finished, key=lambda station: station.station)
