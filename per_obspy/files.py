@@ -166,6 +166,7 @@ def writing(path: Path) -> Iterator[None]:
             raise
         raise known from error
     except Exception as error:
+        # Errors of libraries: by their message, or else by writing there
         folder = path if path.is_dir() else path.parent
         failure = _named_failure(error) or _probed_failure(folder)
         write_error = _failed_write(path, failure) if failure else None

@@ -210,6 +210,7 @@ def _failed(job: ChunkJob, reason: str) -> Part:
     """Return a part that holds only rejections, because its work failed; the next run does it."""
     # One rejection per pair, with its line
     rows = job.chunk.rows
+    # Every row has the reason
     names = rows.table["pair_id"].cast(pa.string()).to_pylist()
     rejected = [
         Rejection("pair", name or "", rows.source, line, (reason,))

@@ -109,7 +109,7 @@ def run(
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
-        record["seconds"] = seconds | record["seconds"]
+        record |= {"seconds": seconds | record["seconds"], "started": started}
         # What failed unexpectedly is done again by the next run
         if record["failed"]:
             head["key"] = ""
@@ -306,12 +306,19 @@ def _intermediates(folder: Path) -> list[Path]:
     return sorted(path for path in files if path.is_file() and not is_part(path))
 
 
-def _has_whole_intermediates(folder: Path, record: dict[str, Any]) -> bool:
-    """Return whether the files of the earlier stages are as the run left them."""
-    known = record.get("intermediate")
-    if not isinstance(known, dict):
-        return False
-    return not changed_outputs(folder / RECORD, {**record, "outputs": known})
+def _any_failed(stations: Sequence[FinishedStation]) -> bool:
+    """Return whether the work of a station failed unexpectedly."""
+    return any(station.failed for station in stations)
+
+
+def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
+    """Return the record of the same run if its results and earlier stages are as it left them."""
+    record = earlier_status(folder / RECORD, key)
+    known = record and record.get("intermediate")
+    if record is None or not isinstance(known, dict):
+        return None
+    changed = changed_outputs(folder / RECORD, {**record, "outputs": known})
+    return None if changed else record
 
 
 def _finished(file: Path) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def kill_at(number: int, events: list[str], folder: Path) -> None:
             return
         if event == "open" and not set(str(arguments[1] or "")) & set("wax+"):
             return
+        # A killed process runs no handler
         left -= 1
         if not left:
             os._exit(KILLED)

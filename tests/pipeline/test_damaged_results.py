@@ -67,6 +67,7 @@ def damage(path: Path, kind: str) -> None:
     if kind == "removed":
         path.unlink()
         return
+    # One bit in the middle
     flipped = bytes([content[middle] ^ 1])
     damaged = {
         "truncated": content[:middle],
@@ -99,6 +100,7 @@ def test_a_damaged_file_does_not_change_the_result(finished, tmp_path, kind):
 
 @pytest.mark.parametrize("name", [name for name in FILES if name.startswith("chunks/")])
 def test_a_damaged_part_is_made_again_when_it_is_needed(finished, name):
+    # Without the risk table the run has to be done again
     before = (finished / "out" / name).read_bytes()
     (finished / "out" / name).write_bytes(before[:-1])
     (finished / "out" / "risk.csv").unlink()

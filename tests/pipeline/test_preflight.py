@@ -93,6 +93,7 @@ def test_an_area_that_the_pairs_lack_is_found_before_records(tmp_path, source):
 
 def test_an_ensemble_checks_all_its_runs_before_the_first(tmp_path):
     write_configuration(tmp_path)
+    # The second of two runs lacks the area
     wrong = (tmp_path / "run.toml").read_text().replace('"out"', '"other"') + AREA
     (tmp_path / "wrong.toml").write_text(wrong)
     scenarios = [
