@@ -98,7 +98,7 @@ def run(
         head = None
         if (folder / RECORD).is_file():
             head = _head(settings, configuration, fetched, {})
-            if known := _finished_before(folder, head["key"]):
+            if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
@@ -113,7 +113,7 @@ def run(
         # What failed unexpectedly is done again by the next run
         if record["failed"]:
             head["key"] = ""
-        return recorded(folder / RECORD, {**record, "started": started, **head})
+        return recorded(folder / RECORD, {**record, **head})
 
 
 def screen(
@@ -227,13 +227,8 @@ def _all_stages(
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
     record["earthquakes"] = found.earthquakes
+    record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}
-
-
-def _finished_before(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of a run with this key whose files are all as it left them."""
-    known = earlier_status(folder / RECORD, key)
-    return known if known is not None and _has_whole_intermediates(folder, known) else None
 
 
 def _later_stages(
@@ -262,7 +257,6 @@ def _later_stages(
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "outputs": file_hashes(folder, outputs),
-        "intermediate": file_hashes(folder, _intermediates(folder)),
         "versions": software_versions(),
         "seconds": seconds,
     }
@@ -298,17 +292,21 @@ def _write_stations(
     return write_stations(spectra, [*rejected, *found.unplaced], found.served, folder)
 
 
-def _intermediates(folder: Path) -> list[Path]:
-    """Return the files of the stages before the screening, which other commands or users read."""
+def _intermediate_hashes(
+    folder: Path, stations: Sequence[FinishedStation], known: Mapping[Path, str]
+) -> dict[str, str]:
+    """Return the hashes of the files of the first stage, which other commands or users read."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
     files += [folder / name for name in ("simulated.json", "pairs.csv")]
-    return sorted(path for path in files if path.is_file() and not is_part(path))
-
-
-def _any_failed(stations: Sequence[FinishedStation]) -> bool:
-    """Return whether the work of a station failed unexpectedly."""
-    return any(station.failed for station in stations)
+    # What was hashed on the way is not opened again
+    hashes = dict(known)
+    hashes |= {station.shard: station.hash for station in stations if station.shard}
+    return {
+        str(path.relative_to(folder)): hashes.get(path) or file_hash(path)
+        for path in sorted(files)
+        if path.is_file() and not is_part(path)
+    }
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
