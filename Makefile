@@ -15,7 +15,7 @@ figures: .venv/run
 
 test: .venv/test
 	@echo "== tests, doctests and README"
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto --dist loadfile
 	@echo "== the kernels' tests once more without the compiler"
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/kernels
 

@@ -133,10 +133,11 @@ def test_wrong_folders_stop_with_one_line(call, configuration, tmp_path):
     (tmp_path / "texts" / "readme.txt").write_text("hello")
     text = configuration.read_text()
     before = text[text.index("[records]") : text.index("[pairs]")]
-    for folder in ("absent", "empty", "texts"):
+    # an empty folder is nothing usable, the others are wrong input
+    for folder, expected in (("absent", 2), ("empty", 3), ("texts", 2)):
         configuration.write_text(text.replace(before, f'[records]\nfolder = "{folder}"\n'))
         code, _, err = call("run", configuration)
-        assert code == 2
+        assert code == expected
         assert folder in err.strip().splitlines()[-1]
 
 

@@ -118,7 +118,9 @@ def _rows_at_stations(
         rows = np.flatnonzero(index == number)
         block = chosen(known, rows)
         parts.append((rows, _record_columns(ground.stations.read(number), block, screening)))
-    return _with_states_and_flags(pairs.assign(**joined(parts)), screening)
+    # All at once: columns that are inserted one by one fragment a table
+    columns = pd.DataFrame(joined(parts), index=pairs.index)
+    return _with_states_and_flags(pd.concat([pairs, columns], axis=1), screening)
 
 
 def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -> Columns:

@@ -8,11 +8,10 @@ import xarray as xr
 from obspy import Stream, Trace
 
 from per_obspy.config import Interpolation
-from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
 from per_obspy.jobs.ground_files import ground_files, read_ground, read_station_once
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.screening.ground_motion.site_motion import prepared_field
+from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE, prepared_field
 from per_obspy.spectra.station import station_spectra
 from per_obspy.spectra.storage import read_spectra, without_motion, write_spectra
 
@@ -111,8 +110,12 @@ def test_the_hypocentre_is_that_of_the_first_station_that_has_one(stations):
     assert ground_files([last, *first], (), Interpolation())[0].field is not None
 
 
-def test_stations_of_two_earthquakes_are_refused(stations):
-    stations[1].spectra.attrs["hypocentre_depth"] = 9.0
-    reason = r"not that of one earthquake: XX.S1 \(0.5, 0.5, 0.5\), XX.S2 \(0.5, 0.5, 9.0\)"
-    with pytest.raises(CatalogError, match=reason):
-        ground_files(stations, (), Interpolation())
+def test_stations_of_two_earthquakes_have_no_common_hypocentre(stations):
+    # would catch: the field of one of two hypocentres
+    for station in stations:
+        for name in HYPOCENTRE:
+            station.spectra.attrs.pop(name, None)
+    unknown = ground_files(stations, (), Interpolation())[0].key
+    for depth, station in enumerate(stations[:2]):
+        station.spectra.attrs |= dict.fromkeys(HYPOCENTRE, 0.5) | {"hypocentre_depth": float(depth)}
+    assert ground_files(stations, (), Interpolation())[0].key == unknown

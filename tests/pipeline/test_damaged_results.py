@@ -17,6 +17,8 @@ FILES = (
     "risk.parquet",
     "risk.columns.csv",
     "rejected.csv",
+    "stations.csv",
+    "stations.columns.csv",
     "totals.csv",
     "spectra.nc",
     "pairs.csv",

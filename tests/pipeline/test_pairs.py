@@ -57,7 +57,7 @@ def test_nothing_is_simulated_around_no_station(tmp_path):
 def catalog(tmp_path):
     """Three stored inventories: two around the stations, one far away."""
     for name, longitude in (("west", 0.3), ("east", 0.4), ("far", 10.0)):
-        table = simulated_pairs([longitude], [0.0], 10, seed=1)
+        table = simulated_pairs([longitude], [0.0], 10, seed=1, radius=2000.0, touching=0.5)
         table.to_csv(tmp_path / f"{name}.csv", index=False)
         # The index has name, source, licence, date and region of each
         origin = Origin(name, "a test", "none", datetime.date(2026, 1, 1))

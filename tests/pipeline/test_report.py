@@ -58,7 +58,7 @@ def test_a_report_needs_a_finished_run(copied):
 
 
 def summary(folder):
-    return _summary(load(folder / "run.toml", Run), folder / "out" / "risk.parquet", folder)
+    return _summary(load(folder / "run.toml", Run), folder / "out" / "risk.parquet", folder, {})
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])

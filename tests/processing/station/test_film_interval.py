@@ -14,7 +14,7 @@ def film(channel, dt, seconds=20.0, digitised=True):
 
 def test_horizontals_of_film_whose_intervals_differ_by_parts_in_100_000_are_a_pair():
     stream = oriented(Stream([film("HNN", 0.01), film("HNE", 0.01 * (1 + 4e-5))]))
-    kept, rejected = paired(stream)
+    kept, rejected = paired(stream, 0.8)
     assert rejected == ()
     assert [trace.stats.delta for trace in kept] == [0.01, 0.01]
     assert len({trace.stats.npts for trace in kept}) == 1
@@ -28,7 +28,7 @@ def test_horizontals_of_film_whose_intervals_differ_by_parts_in_100_000_are_a_pa
 
 def test_other_records_whose_intervals_differ_are_no_pair():
     stream = [film("HNN", 0.01, digitised=False), film("HNE", 0.0100004, digitised=False)]
-    _, rejected = paired(oriented(Stream(stream)))
+    _, rejected = paired(oriented(Stream(stream)), 0.8)
     assert len(rejected) == 1
     assert "sampled every" in rejected[0].reasons[0]
 
