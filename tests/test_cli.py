@@ -127,6 +127,20 @@ def test_pairs_are_screened_again_with_the_stations_of_a_run(call, configuration
     assert json.loads(out)["counts"]["pairs"] == 2
 
 
+def test_a_table_that_shrinks_is_told_and_stops_a_strict_run(call, configuration):
+    # would catch: a half saved table that replaces the result without a word
+    table = configuration.parent / "pairs.csv"
+    table.write_text(f"{HEADER}\n{ROW}\nb{ROW[1:]}\n")
+    assert call("run", configuration)[0] == 0
+    table.write_text(f"{HEADER}\n{ROW}\n")
+    code, _, err = call("run", configuration, "--strict")
+    assert code == 3
+    assert "rows lost: the pair tables hold 1 rows, 2 in the previous run" in err
+    # the rows of the run before count, and nothing is lost any more
+    code, _, err = call("screen", configuration, "--strict")
+    assert (code, "rows lost" in err) == (0, False)
+
+
 def test_wrong_folders_stop_with_one_line(call, configuration, tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "texts").mkdir()

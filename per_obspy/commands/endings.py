@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 #: Exit codes; 0 is done, and 1 is left to crashes, which are bugs.
 WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
 
+Strict = Annotated[
+    bool,
+    typer.Option("--strict", help="End with exit code 3 if rows of the pair tables were lost."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 
 
@@ -28,13 +32,25 @@ def stop_if_nothing(usable: int, reason: str = "") -> None:
     raise typer.Exit(NOTHING_USABLE)
 
 
-def print_and_end(result: "Result", as_json: bool, show: "Callable[[Result], None]") -> None:
-    """Print the result of a run or of several, and stop where nothing usable was left."""
+def print_and_end(
+    result: "Result", as_json: bool, show: "Callable[[Result], None]", strict: bool = False
+) -> None:
+    """
+    Print the result of a run or of several, and stop where nothing usable was left.
+
+    Lost rows are printed on standard error; with ``strict`` they stop too.
+    """
     if as_json:
         known = {"folder": str(result.folder), "did_nothing": result.did_nothing}
         print(json.dumps({**known, **result.record}))
     else:
         show(result)
+    # Losses are for people and for jobs that nobody watches
+    lost = result.record.get("losses", [])
+    for sentence in lost:
+        print(f"per-obspy: {sentence}", file=sys.stderr)
+    if strict and lost:
+        stop_if_nothing(0)
     if result.record["state"] == "nothing_usable":
         stop_if_nothing(0, why_nothing(result.folder / "rejected.csv"))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing
+from per_obspy.commands.endings import AsJson, Strict, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 from per_obspy.files import printable
 from per_obspy.threads import usable_processors
@@ -52,6 +52,7 @@ def run(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of the results.")
     ] = None,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -63,7 +64,7 @@ def run(
 
     with shown_progress() as progress:
         result = whole_run(configuration, output, progress=progress)
-    print_and_end(result, as_json, print_result)
+    print_and_end(result, as_json, print_result, strict)
 
 
 def report(

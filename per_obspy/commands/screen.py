@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.endings import AsJson, print_and_end, stop_if_nothing, why_nothing
+from per_obspy.commands.endings import AsJson, Strict, print_and_end, stop_if_nothing, why_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 from per_obspy.commands.run import print_result
 
@@ -48,6 +48,7 @@ def screen(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of the results.")
     ] = None,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -61,21 +62,23 @@ def screen(
     from per_obspy.config import Design, Ensemble, screening_kind
 
     kind = screening_kind(configuration)
+    if strict and kind in (Design, Ensemble):
+        raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
     if kind is Design:
         _screen_by_spectrum(configuration, output, as_json)
     elif kind is Ensemble:
         _screen_ensemble(configuration, output, as_json)
     else:
-        _screen_again(configuration, output, as_json)
+        _screen_again(configuration, output, strict, as_json)
 
 
-def _screen_again(configuration: Path, output: Path | None, as_json: bool) -> None:
+def _screen_again(configuration: Path, output: Path | None, strict: bool, as_json: bool) -> None:
     """Screen the pairs of a run again with the stations that it left."""
     from per_obspy.pipeline.run import screen as screen_again
 
     with shown_progress() as progress:
         result = screen_again(configuration, output, progress=progress)
-    print_and_end(result, as_json, print_result)
+    print_and_end(result, as_json, print_result, strict)
 
 
 def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:

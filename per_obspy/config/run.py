@@ -31,6 +31,9 @@ class Pairs(Section):
     simulated: SimulatedPairs | None = Field(
         None, description="simulated inventory around the stations"
     )
+    largest_rejected_share: float = Field(
+        0.5, ge=0, le=1, description="share of rejected rows above which a run warns; see --strict"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

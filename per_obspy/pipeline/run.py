@@ -30,6 +30,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs, require_extras
 from per_obspy.pipeline.report import reported
 from per_obspy.pipeline.screening import Screened, screened
@@ -103,17 +104,14 @@ def run(
 
         # Otherwise they are hashed while their headers are read
         check_inputs(settings)
-        remove_file(folder / RECORD)
+        earlier_rows = _forget(folder)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
         record |= {"seconds": seconds | record["seconds"], "started": started}
-        # What failed unexpectedly is done again by the next run
-        if record["failed"]:
-            head["key"] = ""
-        return recorded(folder / RECORD, {**record, **head})
+        return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def screen(
@@ -134,7 +132,7 @@ def screen(
     with locked_folder(folder):
         stations = stations_of_earlier_run(folder)
         check_inputs(settings)
-        remove_file(folder / RECORD)
+        earlier_rows = _forget(folder)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
         head = _head(settings, configuration, None, {})
@@ -142,7 +140,8 @@ def screen(
         rejected = all_rejections([], stations)
         with _compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
-        return recorded(folder / RECORD, {**record, "started": started, **head})
+        record["started"] = started
+        return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def report(configuration: Path, output: Path | None = None, progress: Progress = silent) -> Result:
@@ -229,6 +228,27 @@ def _all_stages(
     record["earthquakes"] = found.earthquakes
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}
+
+
+def _forget(folder: Path) -> int | None:
+    """Remove the record of an earlier run, and return the number of rows of its pair tables."""
+    rows = number_of_rows(folder / RECORD)
+    remove_file(folder / RECORD)
+    return rows
+
+
+def _finished_record(
+    settings: Run,
+    folder: Path,
+    record: dict[str, Any],
+    head: dict[str, Any],
+    earlier_rows: int | None,
+) -> Result:
+    """Write the record of a run, with the rows that it lost."""
+    lost = losses(settings, record["counts"], earlier_rows)
+    # What failed unexpectedly is done again by the next run
+    key = "" if record["failed"] else head["key"]
+    return recorded(folder / RECORD, {**record, "losses": lost, **head, "key": key})
 
 
 def _later_stages(
