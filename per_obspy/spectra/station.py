@@ -38,16 +38,8 @@ from per_obspy.spectra.record_facts import Variable, peak_motions, record_facts
 
 #: Attributes of the coordinates of a station, as CF asks for them.
 COORDINATES = {
-    "latitude": {
-        "units": "degrees_north",
-        "standard_name": "latitude",
-        "long_name": "latitude",
-    },
-    "longitude": {
-        "units": "degrees_east",
-        "standard_name": "longitude",
-        "long_name": "longitude",
-    },
+    "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
+    "longitude": {"units": "degrees_east", "standard_name": "longitude", "long_name": "longitude"},
     "elevation": {
         "units": "m",
         "standard_name": "surface_altitude",
