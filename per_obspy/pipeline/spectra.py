@@ -85,7 +85,8 @@ def plot_station(shard: Path, damping: float, period: float, folder: Path) -> tu
         The files.
     """
     station = read_spectra(shard)
-    name = station["station"].item()
+    # The shard has the station's name without the dot of a missing network, which would hide a file
+    name = shard.stem
     spectra, state_space = folder / f"{name}.spectra.png", folder / f"{name}.state_space.png"
     draw_spectra(station, damping, spectra)
     # The component with the larger peak acceleration

@@ -84,9 +84,10 @@ def station_spectra(
     RecordRejected
         If there is no horizontal, no acceleration in m/s², or the horizontals do not match.
     """
+    stream = Stream([stream]) if isinstance(stream, Trace) else stream
     grid = _grid(periods)
     damping = np.atleast_1d(checks.fraction_of_critical("dampings", dampings))
-    traces = _components(Stream([stream]) if isinstance(stream, Trace) else stream)
+    traces = _components(stream)
     horizontals = [trace for name, trace in traces.items() if name != "vertical"]
     motion, azimuths = _horizontal_motion(horizontals)
 

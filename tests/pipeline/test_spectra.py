@@ -1,15 +1,18 @@
 """Spectra alone: one file of all stations, nothing done twice, figures."""
 
+import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from obspy import Trace
 
+import per_obspy
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.spectra import plot_station, spectra_of
 from per_obspy.progress import silent
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
-from per_obspy.spectra.storage import read_spectra, region
+from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
 GRID = Spectra(count=8, dampings=(0.05,), azimuth_step=90)
 
@@ -70,3 +73,14 @@ def test_a_station_is_drawn(records, tmp_path):
     files = plot_station(done[0].shard, 0.05, 1.0, tmp_path)
     assert [file.name for file in files] == ["XX.S001.spectra.png", "XX.S001.state_space.png"]
     assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
+
+
+def test_figures_of_a_station_without_network_are_no_hidden_files(tmp_path, monkeypatch):
+    # would catch: the dot before the station as the start of a file's name
+    monkeypatch.setattr("per_obspy.pipeline.spectra.draw_spectra", lambda *_: None)
+    monkeypatch.setattr("per_obspy.pipeline.spectra.draw_state_space", lambda *_: None)
+    motion = np.random.default_rng(3).normal(size=2000)
+    trace = Trace(motion, {"station": "ELC", "channel": "HNN", "delta": 0.01, "units": "m/s2"})
+    write_spectra(per_obspy.station_spectra(trace), tmp_path / "ELC.nc")
+    files = plot_station(tmp_path / "ELC.nc", 0.05, 1.0, tmp_path)
+    assert [file.name for file in files] == ["ELC.spectra.png", "ELC.state_space.png"]
