@@ -167,10 +167,10 @@ WHOLE = {
         "simulate s.toml -o out",
         "magnitude: unknown key (got 7), it belongs",
     ),
-    "not in bar": (
-        {"s.toml": "[scenario]\nstress_drop = 100\n"},
+    "not in per cent": (
+        {"s.toml": "[scenario]\nlakebed_damping = 10\n"},
         "simulate s.toml -o out",
-        "(got 100), expected: Pa",
+        "(got 10), expected: of the Kanai-Tajimi filter, fraction of critical",
     ),
     "no section": ({}, "fetch run.toml", "run.toml: has no section [records.fdsn]"),
     "no run yet": ({}, "report run.toml", "run.json: no finished run here"),

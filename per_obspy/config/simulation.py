@@ -22,7 +22,6 @@ class Scenario(Section):
     latitude: float = Field(0.0, ge=-90, le=90, description="of the epicentre, degrees north")
     longitude: float = Field(0.0, ge=-180, le=180, description="of the epicentre, degrees east")
     depth: float = Field(15_000.0, ge=0, le=700_000, description="m")
-    stress_drop: float = Field(10e6, ge=1e5, le=1e9, description="Pa; 100 bar (Boore 2003)")
     density: float = Field(2800.0, ge=1000, le=5000, description="kg/m3 at the source (Boore 2003)")
     shear_velocity: float = Field(
         3500.0, ge=100, le=6000, description="m/s at the source (Boore 2003)"
@@ -55,6 +54,18 @@ class Scenario(Section):
     )
     lakebed_scatter: float = Field(
         0.1, ge=0, description="log-standard deviation of its frequency between stations"
+    )
+    site_log_std: float = Field(
+        0.7,
+        ge=0,
+        le=1.5,
+        description="log-standard deviation of the Fourier spectrum between places",
+    )
+    site_reach: float = Field(
+        25_000.0,
+        gt=0,
+        description="m, where its correlation between places has fallen to 0.05 (SA at 1 s: "
+        "Jayaram & Baker 2009)",
     )
     correlation: float = Field(
         0.3, ge=-1, le=1, description="between the north and east components"

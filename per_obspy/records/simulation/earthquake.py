@@ -33,6 +33,10 @@ from per_obspy.records.simulation.station_metadata import (
     scenario_event,
     scenario_inventory,
 )
+from per_obspy.records.simulation.variability import log_variation
+
+#: Key of the random numbers of the variation between places, which no station's number is.
+FIELD = 1_000_000
 
 #: P waves relative to S waves: velocity and amplitude.
 P_VELOCITY, P_AMPLITUDE = np.sqrt(3.0), 0.2
@@ -187,9 +191,7 @@ def _acceleration(
 ) -> FloatArray:
     """Return north, east and up in m/s2, (3, n_samples): background, P waves, S waves."""
     distance = stochastic.effective_distance(hypocentral, scenario.magnitude)
-    shaking = stochastic.duration(
-        scenario.magnitude, distance, scenario.stress_drop, scenario.shear_velocity
-    )
+    shaking = stochastic.duration(scenario.magnitude, distance)
     s_wave = scenario.pre_event + hypocentral / scenario.shear_velocity * (1.0 - 1.0 / P_VELOCITY)
     n_samples = _n_samples(scenario, station, s_wave, shaking)
     # As many zeros again, so that the end of a filtered motion does not wrap round to its front
@@ -205,6 +207,26 @@ def _acceleration(
         wave = stochastic.shaped_noise(noise, shape, spectra, scenario.dt)
         motion += amplitude * wave[:, :n_samples]
     return motion
+
+
+def rock_acceleration(scenario: config.Scenario, hypocentral: float) -> FloatArray:
+    """
+    Simulate the motion of a place on rock, without digitiser.
+
+    Parameters
+    ----------
+    scenario : config.Scenario
+        Source and path.
+    hypocentral : float
+        Distance, m.
+
+    Returns
+    -------
+    acceleration : (3, n_samples) ndarray
+        North, east and up, m/s2.
+    """
+    place = SimulatedStation("", scenario.city_latitude, scenario.city_longitude, None)
+    return _acceleration(scenario, 0, place, hypocentral)
 
 
 def _n_samples(
@@ -241,7 +263,6 @@ def _spectra(
     source = stochastic.source_spectrum(
         frequency,
         scenario.magnitude,
-        scenario.stress_drop,
         scenario.shear_velocity,
         scenario.density,
     )
@@ -249,8 +270,21 @@ def _spectra(
         frequency, distance, scenario.shear_velocity, scenario.quality, scenario.quality_exponent
     )
     # Rock, and for the horizontals of a station on it the lakebed
-    rock = source * path * stochastic.rock_response(frequency, scenario.kappa)
+    variation = np.exp(scenario.site_log_std * _variation(scenario, station, frequency))
+    rock = source * path * stochastic.rock_response(frequency, scenario.kappa) * variation
     horizontal = rock.astype(np.complex128)
     if station.lakebed is not None:
         horizontal *= stochastic.kanai_tajimi(frequency, station.lakebed, scenario.lakebed_damping)
     return np.stack([horizontal, horizontal, scenario.vertical * rock])
+
+
+def _variation(
+    scenario: config.Scenario, station: SimulatedStation, frequency: FloatArray
+) -> FloatArray:
+    """Return the variation between places at a station, standard normal."""
+    north = METRES_PER_DEGREE * (station.latitude - scenario.city_latitude)
+    # The shorter way round, across the date line too
+    degrees = (station.longitude - scenario.city_longitude + 180.0) % 360.0 - 180.0
+    east = METRES_PER_DEGREE * degrees * np.cos(np.deg2rad(scenario.city_latitude))
+    field = _random(scenario, FIELD)
+    return log_variation(field, (east, north), scenario.site_reach, frequency)

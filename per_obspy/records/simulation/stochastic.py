@@ -5,6 +5,8 @@ It is shaped noise with the spectrum of an omega-squared point source. Every fun
 site; numbers are SI. Reference for all: Boore (2003), Pure Appl. Geophys. 160, 635-676.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -36,22 +38,39 @@ def seismic_moment(magnitude: float) -> float:
     return float(10.0 ** (1.5 * magnitude + 9.05))
 
 
-def corner_frequency(magnitude: float, stress_drop: float, shear_velocity: float) -> float:
+class Source(NamedTuple):
     """
-    Compute Brune's corner frequency in Hz.
+    Shape of a source spectrum with two corners.
 
-    It is ``0.49 beta (stress drop / M0)**(1/3)`` in SI (Boore 2003, eq. 4).
+    Attributes
+    ----------
+    low_corner, high_corner : float
+        Hz.
+    high_share : float
+        Share of the moment that has the high corner, dimensionless.
     """
-    return float(0.49 * shear_velocity * (stress_drop / seismic_moment(magnitude)) ** (1.0 / 3.0))
+
+    low_corner: float
+    high_corner: float
+    high_share: float
+
+
+def source_of(magnitude: float) -> Source:
+    """Compute the two corners of a source (Atkinson & Silva 2000, eq. 3 to 6; California)."""
+    return Source(
+        low_corner=10.0 ** (2.181 - 0.496 * magnitude),
+        high_corner=10.0 ** (2.410 - 0.408 * magnitude),
+        high_share=10.0 ** (0.605 - 0.255 * magnitude),
+    )
 
 
 def effective_distance(hypocentral: float, magnitude: float) -> float:
     """
     Compute the distance in m with near-source saturation of an extended fault.
 
-    Reference: Yenier & Atkinson (2015).
+    Reference: Atkinson & Silva (2000), with which the source was fitted.
     """
-    return float(np.hypot(hypocentral, 1000.0 * 10.0 ** (-0.405 + 0.235 * magnitude)))
+    return float(np.hypot(hypocentral, 1000.0 * 10.0 ** (-0.05 + 0.15 * magnitude)))
 
 
 def spreading(distance: float) -> float:
@@ -60,20 +79,18 @@ def spreading(distance: float) -> float:
 
 
 def source_spectrum(
-    frequency: FloatArray,
-    magnitude: float,
-    stress_drop: float,
-    shear_velocity: float,
-    density: float,
+    frequency: FloatArray, magnitude: float, shear_velocity: float, density: float
 ) -> FloatArray:
     """
     Compute the acceleration spectrum of the source times distance, m2/s.
 
-    Reference: Boore (2003), eq. 3, 5 and 6.
+    Reference: Boore (2003), eq. 3, 5 and 6; shape of Atkinson & Silva (2000).
     """
     constant = RADIATION * FREE_SURFACE * PARTITION / (4.0 * np.pi * density * shear_velocity**3)
-    corner = corner_frequency(magnitude, stress_drop, shear_velocity)
-    displacement = constant * seismic_moment(magnitude) / (1.0 + (frequency / corner) ** 2)
+    source = source_of(magnitude)
+    low = (1.0 - source.high_share) / (1.0 + (frequency / source.low_corner) ** 2)
+    high = source.high_share / (1.0 + (frequency / source.high_corner) ** 2)
+    displacement = constant * seismic_moment(magnitude) * (low + high)
     spectrum: FloatArray = (2.0 * np.pi * frequency) ** 2 * displacement
     return spectrum
 
@@ -116,9 +133,13 @@ def kanai_tajimi(frequency: FloatArray, natural: float, damping: float) -> NDArr
     return np.asarray((1.0 + 2j * damping * ratio) / (1.0 - ratio**2 + 2j * damping * ratio))
 
 
-def duration(magnitude: float, distance: float, stress_drop: float, shear_velocity: float) -> float:
-    """Compute the duration of shaking in s: one over the corner frequency, and that of the path."""
-    return 1.0 / corner_frequency(magnitude, stress_drop, shear_velocity) + PATH_DURATION * distance
+def duration(magnitude: float, distance: float) -> float:
+    """
+    Compute the duration of shaking in s: half over the low corner, and that of the path.
+
+    Reference: Atkinson & Silva (2000).
+    """
+    return 0.5 / source_of(magnitude).low_corner + PATH_DURATION * distance
 
 
 def saragoni_hart_window(n_samples: int, dt: float, shaking: float) -> FloatArray:

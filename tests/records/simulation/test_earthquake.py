@@ -11,7 +11,7 @@ from scipy import signal
 
 from per_obspy.config import Scenario
 from per_obspy.records.folder import find_stations, read_station
-from per_obspy.records.simulation.earthquake import simulate, write_simulation
+from per_obspy.records.simulation.earthquake import rock_acceleration, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import GAIN
 
 GRAVITY = 9.80665
@@ -110,9 +110,9 @@ def test_response_and_gain_agree(simulation):
     by_response = trace.copy().remove_response(
         inventory=simulation.inventory, output="ACC", water_level=None, zero_mean=False, taper=False
     )
-    # the flat response divides by the same number at every frequency; single precision inside
-    # evalresp
-    assert_allclose(by_response.data, by_gain, atol=1e-5 * np.abs(by_gain).max())
+    # the flat response divides by the same number at every frequency; ObsPy leaves out mean and
+    # Nyquist frequency, which lie within the background noise
+    assert_allclose(by_response.data, by_gain, atol=2 * SCENARIO.noise)
 
 
 def test_rounding_to_counts_lies_below_the_noise(simulation):
@@ -131,8 +131,8 @@ def test_motion_ends_where_it_began(simulation):
     for trace in simulation.stream:
         velocity = np.cumsum(trace.data / GAIN) * SCENARIO.dt
         assert (
-            abs(velocity[-1]) < 0.02 * np.abs(velocity).max()
-        )  # the omega-squared spectrum has no mean
+            abs(velocity[-1]) < 0.05 * np.abs(velocity).max()
+        )  # the omega-squared spectrum has no mean; waves at the low corner outlast the record
 
 
 def test_larger_earthquakes_shake_more():
@@ -144,6 +144,21 @@ def test_larger_earthquakes_shake_more():
     # published medians of PGA at 40 km grow by 2.7 from magnitude 5 to 6 and 2.0 from 6 to 7 (Boore
     # & Atkinson 2008, eq. 1-5); a single record scatters by 1.3
     assert ((ratios > 1.4) & (ratios < 7.0)).all()
+
+
+def test_places_vary_as_recorded_ones_do():
+    # ln SA of one earthquake at places so far apart that they know nothing of each other: published
+    # deviations within and between events are 0.55 to 0.7 (Boore and others 2014); of 40 places the
+    # deviation itself has one of 11 %: three of them
+    periods = np.array([0.2, 0.5, 1.0, 2.0])
+    far = SCENARIO.model_copy(update={"stations": 40, "lakebed_radius": 0.0, "site_reach": 500.0})
+    stream = simulate(far).stream.select(channel="HNN")
+    logs = np.log([_sa(trace.data / GAIN, far.dt, periods) for trace in stream])
+    deviations, correlations = logs.std(axis=0, ddof=1), np.corrcoef(logs.T)
+    assert ((deviations > 0.55 * 0.67) & (deviations < 0.7 * 1.33)).all()
+    # neighbouring periods 0.75 (Baker & Jayaram 2008), 0.2 and 2 s 0.25; standard error 0.07, 0.15
+    assert 0.5 < np.mean(np.diag(correlations, 1)) < 0.95
+    assert -0.2 < correlations[0, 3] < 0.7
 
 
 def test_shaking_decays_with_distance():
@@ -158,7 +173,7 @@ def test_shaking_decays_with_distance():
 def test_rock_of_magnitude_seven_has_the_published_size():
     # Boore & Atkinson (2008), M 7, Rjb 35 km, Vs30 620 m/s: PGA 0.12 g, log-std 0.56: the mean of
     # eight sites lies within a factor of two
-    rock = simulate(Scenario(stations=8, lakebed_radius=0.0))
+    rock = simulate(Scenario(stations=8, lakebed_radius=0.0, site_log_std=0.0))
     stations = [f"S{number:03d}" for number in range(1, 9)]
     peaks = [_peak(rock, station) / GRAVITY for station in stations]
     assert 0.055 < np.exp(np.mean(np.log(peaks))) < 0.22
@@ -211,3 +226,11 @@ def test_a_city_across_the_date_line():
 def test_a_scenario_at_no_time():
     with pytest.raises(ValueError, match="origin_time"):
         Scenario(origin_time="yesterday")
+
+
+def test_the_motion_on_rock_needs_no_station():
+    # the same source and path: the station's number only chooses the noise
+    north, east, up = rock_acceleration(SCENARIO, 40_000.0)
+    assert north.shape == east.shape == up.shape
+    twice = rock_acceleration(SCENARIO, 80_000.0)
+    assert np.abs(twice[0]).max() < np.abs(north).max()

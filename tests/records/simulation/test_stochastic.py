@@ -14,22 +14,37 @@ def test_moment_of_hanks_and_kanamori():
     assert_allclose(stochastic.seismic_moment(7.0) * 1e7, 10 ** (1.5 * 7 + 16.05), rtol=1e-12)
 
 
-def test_corner_frequency_in_the_units_of_the_paper():
-    # f_c = 4.9e6 beta (stress drop / M0)**(1/3): km/s, bar, dyne cm; M 7, 100 bar, 3.5 km/s
-    expected = 4.9e6 * 3.5 * (100 / 10 ** (1.5 * 7 + 16.05)) ** (1 / 3)
-    assert_allclose(stochastic.corner_frequency(7.0, 10e6, 3500.0), expected, rtol=1e-12)
+def test_corners_of_atkinson_and_silva():
+    # log fa = 2.181 - 0.496 M, log fb = 2.410 - 0.408 M, log eps = 0.605 - 0.255 M at M 5 and 7
+    for magnitude, corners in ((5.0, (0.5023, 2.344, 0.2138)), (7.0, (0.05117, 0.3581, 0.06607))):
+        assert_allclose(stochastic.source_of(magnitude), corners, rtol=5e-4)  # four digits by hand
 
 
 def test_source_spectrum_limits():
-    low, high = stochastic.source_spectrum(np.array([1e-4, 1e3]), 6.0, 10e6, 3500.0, 2800.0)
+    low, high = stochastic.source_spectrum(np.array([1e-5, 1e4]), 6.0, 3500.0, 2800.0)
     constant = (
         0.55 * 2 / np.sqrt(2) / (4 * np.pi * 2800 * 3500.0**3) * stochastic.seismic_moment(6.0)
     )
-    corner = stochastic.corner_frequency(6.0, 10e6, 3500.0)
-    # flat in displacement below the corner, flat in acceleration above: (f/fc)**2 = 1e-7 and 1e-7
-    # off
-    assert_allclose(low, (2 * np.pi * 1e-4) ** 2 * constant, rtol=1e-6)
-    assert_allclose(high, (2 * np.pi * corner) ** 2 * constant, rtol=1e-6)
+    source = stochastic.source_of(6.0)
+    # flat in displacement below both corners, flat in acceleration above: (f/f_a)**2 = 4e-9 and
+    # (f_b/f)**2 = 1e-8 off
+    assert_allclose(low, (2 * np.pi * 1e-5) ** 2 * constant, rtol=1e-6)
+    corners = np.array([source.low_corner, source.high_corner])
+    shares = np.array([1.0 - source.high_share, source.high_share])
+    assert_allclose(high, (shares * (2 * np.pi * corners) ** 2).sum() * constant, rtol=1e-6)
+
+
+def test_two_corners_give_less_long_period_motion_than_one():
+    # same moment and same level above the corners, as Brune's source of one stress drop; between
+    # the corners, at 2 to 5 s of magnitude 7, less
+    frequency = np.array([1e-4, 0.2, 0.5, 1e3])
+    two = stochastic.source_spectrum(frequency, 7.0, 3500.0, 2800.0)
+    source = stochastic.source_of(7.0)
+    squares = np.array([source.low_corner, source.high_corner]) ** 2
+    corner = np.sqrt(np.dot([1.0 - source.high_share, source.high_share], squares))
+    one = two[0] / (1e-8) * frequency**2 / (1.0 + (frequency / corner) ** 2)
+    assert_allclose(two[[0, 3]] / one[[0, 3]], 1.0, rtol=1e-4)  # (1e-4 / f_a)**2 = 4e-6
+    assert (two[1:3] < 0.9 * one[1:3]).all()
 
 
 def test_spreading_is_continuous_and_turns():
@@ -93,16 +108,15 @@ def test_shaped_noise_has_the_spectrum_on_average():
 
 
 def test_larger_events_and_distances_shake_longer():
-    shaking = stochastic.duration(6.0, 1e4, 10e6, 3500.0)
     path = 5e-5 * 1e4
-    # Two magnitudes lower the corner frequency by ten; 100 km of path add 5 s
-    larger = stochastic.duration(8.0, 1e4, 10e6, 3500.0)
-    assert_allclose(larger - path, 10 * (shaking - path), rtol=1e-12)
-    farther = stochastic.duration(6.0, 1.1e5, 10e6, 3500.0)
-    assert_allclose(farther - shaking, 5.0, rtol=1e-12)
+    shaking = stochastic.duration(6.0, 1e4)
+    # Two magnitudes lower the corner by 10**(0.496 * 2); 100 km of path add 5 s
+    larger = stochastic.duration(8.0, 1e4)
+    assert_allclose(larger - path, 10**0.992 * (shaking - path), rtol=1e-12)
+    assert_allclose(stochastic.duration(6.0, 1.1e5) - shaking, 5.0, rtol=1e-12)
 
 
 def test_large_faults_are_never_near():
-    # Yenier & Atkinson (2015): h = 10**(-0.405 + 0.235 M) km, 17.4 km for M 7
-    assert_allclose(stochastic.effective_distance(0.0, 7.0), 17.4e3, rtol=0.005)
+    # Atkinson & Silva (2000): h = 10**(-0.05 + 0.15 M) km, 10 km for M 7
+    assert_allclose(stochastic.effective_distance(0.0, 7.0), 1e4, rtol=1e-12)
     assert_allclose(stochastic.effective_distance(1e6, 7.0), 1e6, rtol=2e-4)
