@@ -49,11 +49,8 @@ def log_variation(
     variation : (n,) ndarray
         Dimensionless, of mean 0 and standard deviation 1 over all fields.
     """
-    # Wave numbers in the plane: of exp(-h / a) the radial one has this distribution
     share, direction, slope, phase = generator.random((4, WAVES))
-    radial = np.sqrt((1.0 - share) ** -2 - 1.0) * 3.0 / reach
-    angle = 2.0 * np.pi * direction
-    at_place = radial * (np.cos(angle) * place[0] + np.sin(angle) * place[1])
+    at_place = _numbers_in_the_plane(share, direction, reach) @ np.array(place)
     # Wave numbers in ln frequency: a Cauchy distribution
     along = np.tan(np.pi * (slope - 0.5)) / FREQUENCY_LENGTH
     lowest, highest = np.log(FREQUENCIES)
@@ -61,4 +58,12 @@ def log_variation(
     waves = np.cos(at_place[:, None] + along[:, None] * nodes + 2.0 * np.pi * phase[:, None])
     field = np.sqrt(2.0 / WAVES) * waves.sum(axis=0)
     logs = np.log(np.clip(frequency, *FREQUENCIES))
-    return np.interp(logs, nodes, field)
+    variation: FloatArray = np.interp(logs, nodes, field)
+    return variation
+
+
+def _numbers_in_the_plane(share: FloatArray, direction: FloatArray, reach: float) -> FloatArray:
+    """Return wave numbers to east and north, 1/m, (n, 2): those of ``exp(-3 h / reach)``."""
+    radial = np.sqrt((1.0 - share) ** -2 - 1.0) * 3.0 / reach
+    angle = 2.0 * np.pi * direction
+    return np.stack([radial * np.cos(angle), radial * np.sin(angle)], axis=1)

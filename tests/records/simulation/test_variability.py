@@ -1,4 +1,4 @@
-"""Variability between places and frequencies: a normal field with the correlation that is stated."""
+"""Variability between places and frequencies: a normal field with the stated correlation."""
 
 import numpy as np
 from numpy.testing import assert_allclose
