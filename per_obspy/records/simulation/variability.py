@@ -20,7 +20,7 @@ FREQUENCY_LENGTH = 1.2
 WAVES = 1000
 
 #: Frequencies per e-fold at which the sum is evaluated; values between are interpolated.
-PER_FOLD = 16
+PER_FOLD = 8
 
 #: Lowest and highest frequency of the field, Hz; it is constant beyond.
 FREQUENCIES = (0.01, 100.0)
@@ -56,6 +56,7 @@ def log_variation(
     lowest, highest = np.log(FREQUENCIES)
     nodes = np.linspace(lowest, highest, round(PER_FOLD * (highest - lowest)) + 1)
     waves = np.cos(at_place[:, None] + along[:, None] * nodes + 2.0 * np.pi * phase[:, None])
+    # The sum at the nodes, then between them
     field = np.sqrt(2.0 / WAVES) * waves.sum(axis=0)
     logs = np.log(np.clip(frequency, *FREQUENCIES))
     variation: FloatArray = np.interp(logs, nodes, field)

@@ -9,11 +9,11 @@ REACH = 20_000.0
 FREQUENCIES = np.array([0.2, 1.0, 1.0 * np.exp(FREQUENCY_LENGTH), 20.0])
 
 #: Fields of a test.
-FIELDS = 2000
+FIELDS = 500
 
 #: Standard error of a standard deviation, and of a correlation near 0, from so many fields is
-#: 0.016 and 0.022: four times the larger.
-TOLERANCE = 0.09
+#: 0.032 and 0.045: four times the larger.
+TOLERANCE = 0.18
 
 
 def fields(east: float, north: float = 0.0) -> np.ndarray:
@@ -28,8 +28,8 @@ def test_mean_and_deviation_are_those_of_a_standard_normal_variable():
     values = fields(3e6)  # far from the origin of the field, which is no special place
     assert_allclose(values.mean(axis=0), 0.0, atol=TOLERANCE)
     assert_allclose(values.std(axis=0), 1.0, atol=TOLERANCE)
-    # a share of 0.954 lies within two deviations; standard error 0.005 for each frequency
-    assert_allclose((np.abs(values) < 2.0).mean(axis=0), 0.954, atol=0.02)
+    # a share of 0.954 lies within two deviations; standard error 0.009 for each frequency
+    assert_allclose((np.abs(values) < 2.0).mean(axis=0), 0.954, atol=0.04)
 
 
 def test_correlation_decays_with_distance_in_every_direction():
