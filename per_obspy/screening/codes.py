@@ -9,6 +9,7 @@ displacement; a column that uses the displacement of an event's elastic spectrum
 """
 
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -108,7 +109,7 @@ def _mexican_gaps(pair: RuleInputs, pairs: pd.DataFrame, codes: Codes) -> dict[s
     }
 
 
-def _height_gaps(pair: RuleInputs, codes: Codes) -> dict[str, NDArray]:
+def _height_gaps(pair: RuleInputs, codes: Codes) -> dict[str, NDArray[Any]]:
     """Return gaps, factor and flags of rules that rest on heights and storeys alone."""
     step = np.nan if codes.gb_intensity is None else formulas.GB_STEP[codes.gb_intensity]
     seismicity = codes.fema_seismicity
