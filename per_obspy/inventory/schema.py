@@ -125,7 +125,10 @@ _BUILDING = (
            low=TINY, high=3.0),
     Column("yield_displacement", "float64", "m",
            "of the equivalent oscillator; infinite if it stays linear", low=TINY),
-    Column("yield_coefficient", "float64", "1", "yield strength / weight", low=TINY, high=10.0),
+    Column("yield_coefficient", "float64", "1",
+           "base shear at yield / total weight of the building; the oscillator yields at that over "
+           "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",
+           low=TINY, high=10.0),
     Column("hardening", "float64", "1", "stiffness after yield / stiffness before",
            low=0.0, high=1.0 - 1e-9),
     Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),
