@@ -1,12 +1,13 @@
 """
 Measures that would have kept a pair from pounding or from harm: gap, damping, or softer contact.
 
-Where the exact demand decides, exact displacements with the added damping do so too. Elsewhere added
-damping is an estimate: the critical gap, eq. (15) and (16), follows it on the station's stored
-spectra, scaled to the pair's own radii, and above the stored dampings on their last slope; it is
-scaled to the demand that decides, so that a pair whose gap is enough needs no measure. A bumper is
-always an estimate, by the single hit. Where the gap of equivalent linear buildings governs, these
-take the place of the elastic ones; their periods and dampings are not followed as damping is added.
+Where the exact demand decides, exact displacements with the added damping do so too. Elsewhere
+added damping is an estimate: the critical gap, eq. (15) and (16), follows it on the station's
+stored spectra, scaled to the pair's own radii, and above the stored dampings on their last slope;
+it is scaled to the demand that decides, so that a pair whose gap is enough needs no measure. A
+bumper is always an estimate, by the single hit. Where the gap of equivalent linear buildings
+governs, these take the place of the elastic ones; their periods and dampings are not followed as
+damping is added.
 """
 
 import numpy as np
@@ -66,6 +67,7 @@ def mitigation_columns(
     damping, restitution = np.zeros_like(gap), np.ones_like(gap)
     # no damping keeps a pair that touches from pounding
     damping[pounds] = np.nan
+    # by exact displacements where these are the demand
     exact = separated & np.asarray(table["demand_rule"] == "exact")
     estimated = separated & ~exact
     if exact.any():

@@ -42,6 +42,7 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
     (n_pairs,) ndarray
         Fraction of critical, enough itself; NaN where none up to the largest is enough.
     """
+    # As far as both buildings still vibrate
     limit = NEARLY_CRITICAL - np.maximum(*both(table, "damping"))
     most = np.minimum(largest, limit)
     enough, low = np.full((2, most.size), np.nan)
@@ -65,6 +66,7 @@ def _refined(
     found = np.flatnonzero(np.isfinite(enough))
     if not found.size:
         return enough
+    # The upper end is always enough
     pairs = chosen(table, found)
     below, above = low[found], enough[found]
     for _ in range(HALVINGS):
@@ -81,6 +83,7 @@ def _fits(station: StationMotion, table: Table, added: FloatArray) -> NDArray[np
     damping_1, damping_2 = both(table, "damping")
     damped = {name: table[name] for name in table}
     damped |= {"damping_1": damping_1 + added, "damping_2": damping_2 + added}
+    # The worst azimuth turns as damping is added
     azimuth = values(table, "azimuth").copy()
     unknown = np.isnan(azimuth)
     if unknown.any():
