@@ -121,12 +121,13 @@ def _corners(text: Text) -> dict[str, float]:
     for letter, corner in _POINTS.findall(text.lines[2].upper()):
         corners[{"H": "highpass", "L": "lowpass"}[letter]] = float(corner)
     for sign, poles, corner in _POLES.findall(text.lines[3].upper()):
-        # A filter of no poles has a corner from earlier processing, if a low-pass one at all
+        # No poles: nothing was filtered here, but a low-pass corner may be that of earlier
+        # processing, as of digitized film; the cautious answer keeps it
         if sign == "-" and int(poles) > 0:
             corners["highpass"] = float(corner)
-        elif sign != "-":
+        elif sign != "-" and float(corner) > 0:
             corners["lowpass"] = float(corner)
-    contradictory = 0 < corners.get("lowpass", np.inf) <= corners.get("highpass", 0.0)
+    contradictory = corners.get("lowpass", np.inf) <= corners.get("highpass", 0.0)
     return {} if contradictory else corners
 
 

@@ -76,7 +76,7 @@ def test_the_older_header_with_velocity():
         ("+4 pole @ 25. hz", {"lowpass": 25.0}),
         # no filter: the displacement has to show how far it is clean
         ("  -0 POLE @ .10000 HZ", {}),
-        ("   0 POLE @ .00000 HZ,   0 POLE @ .00000 HZ", {"lowpass": 0.0}),
+        ("   0 POLE @ .00000 HZ,   0 POLE @ .00000 HZ", {}),
         # a low-pass corner below the high-pass one, and a number that overflowed
         ("   5 POLE @ .10000 HZ, -5 POLE @ 30.00000 HZ", {}),
         ("  -5 POLE @ ******** HZ", {}),
@@ -87,6 +87,13 @@ def test_corners_in_the_line_of_sizes(line_end: str, corners: dict):
     trace = read(NAMED.replace(".0100 SEC,", f".0100 SEC, {line_end}"))
     assert trace.stats.get("corners", {}) == corners
     assert (trace.stats.npts, trace.stats.delta) == (7, 0.01)
+
+
+def test_corners_of_a_real_record(real_data: Path):
+    trace = obspy.read(real_data / "records" / "peer_at2" / "RSN15_KERN_TAF021.AT2")[0]
+    assert trace.stats.corners == {"highpass": 0.1, "lowpass": 13.9}
+    passed = passed_through(obspy.Stream([trace]), Processing())[0].stats.per_obspy
+    assert_allclose(passed.longest_period, 0.8 / 0.1, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
