@@ -61,6 +61,9 @@ class Codes(Section):
     gb_intensity: int | None = Field(
         None, ge=6, le=9, description="GB 50011-2010: fortification intensity"
     )
+    italy_ground: float | None = Field(
+        None, gt=0, le=2, description="NTC Italy 2018: a_g S of the life safety limit state, g"
+    )
     fema_seismicity: str | None = Field(
         None,
         pattern="^(very_high|high|moderately_high|lower)$",

@@ -39,10 +39,11 @@ _PLAIN_SIZE = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.I
 _TITLE = re.compile(
     r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)"
 )
-_CORNERS = {
-    "highpass": re.compile(r"\bHP\s*=\s*(\d*\.?\d+)\s*HZ"),
-    "lowpass": re.compile(r"\bLP\s*=\s*(\d*\.?\d+)\s*HZ"),
-}
+#: corners in the units line: HP=0.1 Hz LP=30.0 Hz
+_POINTS = re.compile(r"\b([HL])P\s*=\s*(\d+\.?\d*|\.\d+)\s*HZ")
+#: corners in the line of sizes: 5 POLE @ 30.00000 HZ, -5 POLE @ .10000 HZ; a high-pass filter has
+#: a negative number of poles, and the line may end before the last unit
+_POLES = re.compile(r"([-+]?)(\d+)\s*POLES?\s*@\s*(\d+\.?\d*|\.\d+)")
 
 #: quantity and unit of the header -> unit of the samples, factor to it
 _UNITS = {
@@ -77,7 +78,7 @@ def read_at2(file: WaveformFile, **_unused: Any) -> Stream:
     values = factor * free_block(text, 4, None, samples)
     # Words of the header
     words = {"units": unit, "quantity": units[1].lower(), "processing_level": "processed"}
-    words |= _title(text) | {"corners": _corners(text.lines[2])}
+    words |= _title(text) | {"corners": _corners(text)}
     return Stream([trace(values, dt, words)])
 
 
@@ -114,13 +115,20 @@ def _code(name: str) -> str:
     return re.sub(r"[^A-Z0-9]", "", name.upper())
 
 
-def _corners(line: str) -> dict[str, float]:
-    """Return the corners of PEER's filter that the header has, Hz."""
+def _corners(text: Text) -> dict[str, float]:
+    """Return the corners of PEER's filter that the header has, Hz; none that contradict."""
     corners = {}
-    for name, pattern in _CORNERS.items():
-        if found := pattern.search(line.upper()):
-            corners[name] = float(found[1])
-    return corners
+    for letter, corner in _POINTS.findall(text.lines[2].upper()):
+        corners[{"H": "highpass", "L": "lowpass"}[letter]] = float(corner)
+    for sign, poles, corner in _POLES.findall(text.lines[3].upper()):
+        # No poles: nothing was filtered here, but a low-pass corner may be that of earlier
+        # processing, as of digitized film; the cautious answer keeps it
+        if sign == "-" and int(poles) > 0:
+            corners["highpass"] = float(corner)
+        elif sign != "-" and float(corner) > 0:
+            corners["lowpass"] = float(corner)
+    contradictory = corners.get("lowpass", np.inf) <= corners.get("highpass", 0.0)
+    return {} if contradictory else corners
 
 
 def write_at2(stream: Stream, filename: str | Path | BinaryIO, **_unused: Any) -> None:

@@ -17,6 +17,7 @@ from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.inventory.contact_height import (
     contact_mass,
     contact_participation,
+    effective_mass_ratio,
     floor_offset,
     floors_misaligned,
 )
@@ -60,6 +61,9 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
       stay NaN, the participation is 1 (a plain oscillator) and the building weighs as much as its
       neighbour.
     * The contact is at the top of the lower building of those whose height is known.
+    * A yield coefficient is a share of the total weight. The yield displacement of the oscillator
+      follows from it with the effective mass of a first mode that grows linearly with height, all
+      the mass where neither height nor storeys are known.
     * A building without yield displacement and yield coefficient stays linear (infinite yield
       displacement); a pair without azimuth keeps NaN, which means every direction. Neither counts
       as derived.
@@ -146,8 +150,9 @@ def _add_period(
 def _add_strength(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:
     """Add yield displacement, m, and hardening of building i; infinite and 0 where unknown."""
     name = f"yield_displacement_{i}"
-    # C_y g (T / 2 pi)**2 from the yield coefficient C_y
-    coefficient = numbers_in(pairs, f"yield_coefficient_{i}")
+    # C_y g (T / 2 pi)**2 from the base shear C_y M g, which the effective mass of the mode causes
+    storeys, _, _ = _size(columns, i)
+    coefficient = numbers_in(pairs, f"yield_coefficient_{i}") / effective_mass_ratio(storeys)
     from_coefficient = coefficient * STANDARD_GRAVITY * (columns[f"period_{i}"] / 2 / np.pi) ** 2
     _add_column(columns, derived, name, numbers_in(pairs, name), from_coefficient)
     columns[name] = _given_or(columns[name], np.inf)

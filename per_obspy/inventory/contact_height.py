@@ -1,5 +1,5 @@
 """
-The oscillator of a building at contact height: participation, generalised mass, misaligned floors.
+The oscillator of a building: participation, generalised and effective mass, misaligned floors.
 
 Equal floor masses and a first mode that grows linearly with height are assumed; for a building with
 a model of its own use ``shear_building.equivalent_sdof``.
@@ -107,6 +107,38 @@ def contact_mass(
         total * (count + 1.0) * (2.0 * count + 1.0) / (6.0 * count**2) / ratio**2
     )
     return generalised
+
+
+def effective_mass_ratio(storeys: ArrayLike) -> FloatArray:
+    """
+    Compute the effective mass of the first mode over the total mass, ``3(N+1) / (2(2N+1))``.
+
+    ``sum(m phi)**2 / (M sum(m phi**2))`` with the assumptions of :func:`contact_participation`. The
+    base shear of the first mode is this share of the mass times the pseudo-acceleration.
+
+    Parameters
+    ----------
+    storeys : array_like
+        Number of storeys N.
+
+    Returns
+    -------
+    ratio : ndarray
+        Dimensionless; 1 for one storey, 0.75 in the limit.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive.
+
+    Examples
+    --------
+    >>> effective_mass_ratio([1, 3, 10]).round(3)
+    array([1.   , 0.857, 0.786])
+    """
+    count = checks.positive("storeys", storeys)
+    ratio: FloatArray = 3.0 * (count + 1.0) / (2.0 * (2.0 * count + 1.0))
+    return ratio
 
 
 def floor_offset(

@@ -16,21 +16,38 @@ from per_obspy.inventory.schema import SYSTEMS
 
 #: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);
 #: ASCE 7, table 12.8-2, metric. The two ratios are those of Goel & Chopra (1997). No best fit is
-#: known for the other two systems: their lower bound is used as a median, unverified.
+#: known for the other systems: their lower bound is used as a median, unverified. Buildings with
+#: concrete walls are among ASCE 7's "all other structural systems".
 ASCE7 = {
     "steel_mrf": (1.25, 0.0724, 0.80),
     "concrete_mrf": (1.13, 0.0466, 0.90),
+    "concrete_frame_wall": (1.0, 0.0488, 0.75),
+    "concrete_wall": (1.0, 0.0488, 0.75),
     "ebf_brbf": (1.0, 0.0731, 0.75),
     "other": (1.0, 0.0488, 0.75),
 }
 
 #: system -> C_t of EN 1998-1, eq. (4.6), for buildings up to EC8_HEIGHT.
-EC8 = {"steel_mrf": 0.085, "concrete_mrf": 0.075, "ebf_brbf": 0.075, "other": 0.050}
+EC8 = {
+    "steel_mrf": 0.085,
+    "concrete_mrf": 0.075,
+    "concrete_frame_wall": 0.050,
+    "concrete_wall": 0.050,
+    "ebf_brbf": 0.075,
+    "other": 0.050,
+}
 EC8_HEIGHT = 40.0
 
-#: Logarithmic standard deviation of a period derived by either formula: 0.4 for masonry and unknown
-#: systems.
-LOG_STD = {"steel_mrf": 0.3, "concrete_mrf": 0.3, "ebf_brbf": 0.3, "other": 0.4}
+#: Logarithmic standard deviation of a period derived by either formula: 0.4 for masonry, unknown
+#: systems, and walls, whose period depends on their area more than on the height.
+LOG_STD = {
+    "steel_mrf": 0.3,
+    "concrete_mrf": 0.3,
+    "concrete_frame_wall": 0.4,
+    "concrete_wall": 0.4,
+    "ebf_brbf": 0.3,
+    "other": 0.4,
+}
 
 
 def _checked_systems(system: ArrayLike) -> NDArray[np.str_]:
@@ -55,7 +72,7 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     Compute the median period ``ratio * C h**x`` with the coefficients of ASCE 7.
 
     For moment frames this is the best fit of Goel & Chopra (1.25 and 1.13 times the code's lower
-    bound). For ``ebf_brbf`` and ``other`` it is the code's own value, which is a lower bound
+    bound). For the other systems it is the code's own value, which is a lower bound
     (unverified as a median).
 
     Parameters
@@ -63,7 +80,7 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     height : array_like
         From ground to roof, m.
     system : array_like of str
-        ``steel_mrf``, ``concrete_mrf``, ``ebf_brbf`` or ``other``; broadcast with the height.
+        One of ``SYSTEMS``; broadcast with the height.
 
     Returns
     -------
@@ -104,7 +121,7 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     height : array_like
         From ground to roof, m.
     system : array_like of str
-        ``steel_mrf``, ``concrete_mrf``, ``ebf_brbf`` or ``other``; broadcast with the height.
+        One of ``SYSTEMS``; broadcast with the height.
 
     Returns
     -------

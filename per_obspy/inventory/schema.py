@@ -10,13 +10,23 @@ from math import inf
 from typing import NamedTuple
 
 #: Structural systems for which period formulas exist; masonry and anything unknown is ``other``.
-SYSTEMS = ("steel_mrf", "concrete_mrf", "ebf_brbf", "other")
+SYSTEMS = (
+    "steel_mrf",
+    "concrete_mrf",
+    "concrete_frame_wall",
+    "concrete_wall",
+    "ebf_brbf",
+    "other",
+)
 
 #: Words for an empty cell, in lower case.
 EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 
 #: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
+
+#: Whether both buildings are within one property.
+ONE_PROPERTY = ("yes", "no")
 
 
 class Column(NamedTuple):
@@ -76,6 +86,9 @@ _PAIR = (
            low=0.0, high=1000.0),
     Column("position", "str", "", "whether the pair stands at the end of its row of buildings",
            choices=POSITIONS),
+    Column("same_property", "str", "",
+           "whether both buildings are within one property; code rules take the larger gap where "
+           "it is empty", choices=ONE_PROPERTY),
     Column("restitution", "float64", "1", "coefficient of restitution of impact",
            low=0.0, high=1.0),
     Column("vs30", "float64", "m/s", "mean shear-wave velocity of the upper 30 m of ground",
@@ -112,7 +125,10 @@ _BUILDING = (
            low=TINY, high=3.0),
     Column("yield_displacement", "float64", "m",
            "of the equivalent oscillator; infinite if it stays linear", low=TINY),
-    Column("yield_coefficient", "float64", "1", "yield strength / weight", low=TINY, high=10.0),
+    Column("yield_coefficient", "float64", "1",
+           "base shear at yield / total weight of the building; the oscillator yields at that over "
+           "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",
+           low=TINY, high=10.0),
     Column("hardening", "float64", "1", "stiffness after yield / stiffness before",
            low=0.0, high=1.0 - 1e-9),
     Column("occupants", "float64", "1", "people in the building", low=0.0, high=1e6),

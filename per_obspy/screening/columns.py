@@ -142,7 +142,10 @@ RESULTS: dict[str, Column] = {
         ),
         _number("missing_gap", "m", "by which the gap is below the demand; 0 where it is enough"),
         _number(
-            "supplemental_damping", "1", "estimate: least to add to both; empty: 0.4 is too little"
+            "supplemental_damping",
+            "1",
+            "least to add to both so that the demand fits into the gap: by exact displacements "
+            "where demand_rule is exact, else an estimate; empty: 0.4 is too little",
         ),
         _number(
             "bumper_restitution",

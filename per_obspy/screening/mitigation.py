@@ -1,12 +1,13 @@
 """
 Measures that would have kept a pair from pounding or from harm: gap, damping, or softer contact.
 
-Added damping and bumpers are estimates. The critical gap, eq. (15) and (16), follows the added
-damping on the station's stored spectra, scaled to the pair's own radii, and above the stored
-dampings on their last slope; it is scaled to the demand that decides, so that a pair whose gap is
-enough needs no measure. A bumper is assessed by the single hit. Where the gap of equivalent linear
-buildings governs, these take the place of the elastic ones; their periods and dampings are not
-followed as damping is added.
+Where the exact demand decides, exact displacements with the added damping do so too. Elsewhere
+added damping is an estimate: the critical gap, eq. (15) and (16), follows it on the station's
+stored spectra, scaled to the pair's own radii, and above the stored dampings on their last slope;
+it is scaled to the demand that decides, so that a pair whose gap is enough needs no measure. A
+bumper is always an estimate, by the single hit. Where the gap of equivalent linear buildings
+governs, these take the place of the elastic ones; their periods and dampings are not followed as
+damping is added.
 """
 
 import numpy as np
@@ -17,6 +18,7 @@ from per_obspy.kernels.pairs.added_damping import least_dampings
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap, srss_gap
 from per_obspy.pounding.mitigation.bumpers import required_restitution
+from per_obspy.screening.by_record.exact_damping import least_exact_damping
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import stored_log
 from per_obspy.screening.by_record.yielding import governing, governing_radii
@@ -65,8 +67,13 @@ def mitigation_columns(
     damping, restitution = np.zeros_like(gap), np.ones_like(gap)
     # no damping keeps a pair that touches from pounding
     damping[pounds] = np.nan
-    if separated.any():
-        damping[separated] = _supplemental_damping(station, chosen(table, separated))
+    # by exact displacements where these are the demand
+    exact = separated & np.asarray(table["demand_rule"] == "exact")
+    estimated = separated & ~exact
+    if exact.any():
+        damping[exact] = least_exact_damping(station, chosen(table, exact), LARGEST_DAMPING)
+    if estimated.any():
+        damping[estimated] = _supplemental_damping(station, chosen(table, estimated))
     if pounds.any():
         restitution[pounds] = _bumper_restitution(chosen(table, pounds), target_amplification)
     return {
@@ -77,7 +84,7 @@ def mitigation_columns(
 
 
 def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
-    """Return the least damping to add to both buildings of a pair; NaN where none is enough."""
+    """Return the least damping to add to both buildings, as estimated; NaN if none is enough."""
     period_1, period_2 = governing(table, "period")
     damping_1, damping_2 = governing(table, "damping")
     radius_1, radius_2 = governing_radii(table)

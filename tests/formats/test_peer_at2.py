@@ -8,8 +8,10 @@ import obspy
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.peer_at2 import is_at2, read_at2, write_at2
+from per_obspy.processing.already_processed import passed_through
 
 NAMED = """PEER NGA STRONG MOTION DATABASE RECORD
 Kern County, 7/21/1952, Taft Lincoln School, 21
@@ -58,6 +60,72 @@ def test_the_older_header_with_velocity():
     assert trace.stats.sensor_dip == -90
     assert trace.stats.corners == {"highpass": 0.1, "lowpass": 30.0}
     assert trace.stats.starttime.year == 1994  # two digits: records began in 1933
+
+
+@pytest.mark.parametrize(
+    ("line_end", "corners"),
+    [
+        # Taft 1952: the line is cut after 80 characters
+        (
+            "   0 POLE @    13.90000 HZ,  -5 POLE @      .10000",
+            {"highpass": 0.1, "lowpass": 13.9},
+        ),
+        ("   5 POLE @ 30.00000 HZ, -5 POLE @ .10000 HZ", {"highpass": 0.1, "lowpass": 30.0}),
+        ("  -5 POLE @ .08000 HZ", {"highpass": 0.08}),
+        (" -4 Poles @ 0.2 Hz", {"highpass": 0.2}),
+        ("+4 pole @ 25. hz", {"lowpass": 25.0}),
+        # no filter: the displacement has to show how far it is clean
+        ("  -0 POLE @ .10000 HZ", {}),
+        ("   0 POLE @ .00000 HZ,   0 POLE @ .00000 HZ", {}),
+        # a low-pass corner below the high-pass one, and a number that overflowed
+        ("   5 POLE @ .10000 HZ, -5 POLE @ 30.00000 HZ", {}),
+        ("  -5 POLE @ ******** HZ", {}),
+        ("", {}),
+    ],
+)
+def test_corners_in_the_line_of_sizes(line_end: str, corners: dict):
+    trace = read(NAMED.replace(".0100 SEC,", f".0100 SEC, {line_end}"))
+    assert trace.stats.get("corners", {}) == corners
+    assert (trace.stats.npts, trace.stats.delta) == (7, 0.01)
+
+
+def test_corners_of_a_real_record(real_data: Path):
+    trace = obspy.read(real_data / "records" / "peer_at2" / "RSN15_KERN_TAF021.AT2")[0]
+    assert trace.stats.corners == {"highpass": 0.1, "lowpass": 13.9}
+    passed = passed_through(obspy.Stream([trace]), Processing())[0].stats.per_obspy
+    assert_allclose(passed.longest_period, 0.8 / 0.1, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "corners"),
+    [
+        ("HP=.1 Hz LP=30. Hz", {"highpass": 0.1, "lowpass": 30.0}),
+        ("HP=0.08 HZ LP=NULL HZ", {"highpass": 0.08}),
+    ],
+)
+def test_corners_in_the_line_of_units(points: str, corners: dict):
+    text = PLAIN.replace("HP=0.1 Hz LP=30.0 Hz", points)
+    assert read(text).stats.corners == corners
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["DT= .0050 SEC, 5 POLE @ 30.00000 HZ, -5 POLE @ .08000 HZ", "DT= .0050 SEC, -5 POLE @ .08000"],
+)
+def test_the_corner_of_the_header_sets_the_longest_usable_period(words: str):
+    # A pulse with a drifting displacement, as near a fault: from the drift alone it would end early
+    times = 0.005 * np.arange(3000)
+    samples = np.where(np.abs(times - 3) < 1, np.sin(np.pi * (times - 2)) + 0.3, 0.0)
+    header = [*NAMED.split("\n")[:3], f"NPTS= {times.size}, {words}"]
+    body = [f"{value:.7E}" for value in samples]
+    stream = obspy.Stream([read("\n".join(header + body))])
+    settings = Processing()
+    # 0.8 / HP (Boore and others): 10 s
+    longest = passed_through(stream, settings)[0].stats.per_obspy.longest_period
+    assert_allclose(longest, 10.0, rtol=1e-12)
+    # Without it the displacement decides
+    del stream[0].stats.corners["highpass"]
+    assert passed_through(stream, settings)[0].stats.per_obspy.longest_period < 5.0
 
 
 def test_windows_line_ends_change_nothing():

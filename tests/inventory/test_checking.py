@@ -6,7 +6,7 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.checking import checked_pairs
-from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF
+from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF, SYSTEMS
 
 
 def _row(**changes):
@@ -61,9 +61,10 @@ FRACTION = "(a fraction is expected, not per cent)"
         ({"period_1": 500.0}, "period_1 = 500 s is outside 0.01 to 20 s (in milliseconds?)"),
         ({"mass_1": 0.0}, "mass_1 = 0 kg is outside 1 to 1e+12 kg"),
         ({"system_1": "masonry"},
-         "system_1 = 'masonry' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
+         f"system_1 = 'masonry' is unknown, expected {', '.join(SYSTEMS)}"),
         ({"system_2": 3},
-         "system_2 = '3' is unknown, expected steel_mrf, concrete_mrf, ebf_brbf, other"),
+         f"system_2 = '3' is unknown, expected {', '.join(SYSTEMS)}"),
+        ({"same_property": "maybe"}, "same_property = 'maybe' is unknown, expected yes, no"),
         ({"position": "middle"}, "position = 'middle' is unknown, expected end, inside"),
         ({"restitution": 1.2}, "restitution = 1.2 is outside 0 to 1"),
         ({"hardening_1": 1.0}, "hardening_1 = 1 is outside 0 to 1"),

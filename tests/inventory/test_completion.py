@@ -124,10 +124,20 @@ def test_mass_from_area_and_storeys():
     assert "mass_1" in row["derived"].split()
 
 
-def test_yield_displacement_from_coefficient():
-    # a period of 2 pi makes u_y = C_y g
-    row = _completed(**SIZES, period_1=2 * np.pi, yield_coefficient_1=0.1)
-    assert_allclose(row["yield_displacement_1"], 0.980665, rtol=1e-14)
+@pytest.mark.parametrize(
+    ("size", "effective"),
+    # 3 (N + 1) / (2 (2 N + 1)); all the mass where neither height nor storeys are known
+    [
+        ({"storeys_1": 1.0}, 1.0),
+        ({"storeys_1": 3.0}, 6 / 7),
+        ({"height_1": 30.0}, 11 / 14),
+        ({}, 1.0),
+    ],
+)
+def test_yield_displacement_from_coefficient(size, effective):
+    # a period of 2 pi makes u_y = C_y g / effective; the coefficient is a share of the whole weight
+    row = _completed(**size, storeys_2=3.0, period_1=2 * np.pi, yield_coefficient_1=0.1)
+    assert_allclose(row["yield_displacement_1"], 0.980665 / effective, rtol=1e-14)
     assert "yield_displacement_1" in row["derived"].split()
     assert "yield_displacement_2" not in row["derived"].split()
 

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from per_obspy.inventory.contact_height import (
     contact_mass,
     contact_participation,
+    effective_mass_ratio,
     floor_offset,
     floors_misaligned,
 )
@@ -25,6 +26,45 @@ def test_participation_at_the_roof():
 def test_one_storey_is_an_oscillator():
     assert contact_participation(1, 3.0, 3.0) == 1.0
     assert contact_mass(2e5, 1, 3.0, 3.0) == 2e5
+
+
+def _first_mode(stiffness):
+    """Return omega² and the shape of the first mode of a shear building of unit masses."""
+    above = np.append(stiffness[1:], 0.0)
+    matrix = np.diag(stiffness + above) - np.diag(above[:-1], 1) - np.diag(above[:-1], -1)
+    values, shapes = np.linalg.eigh(matrix)
+    return values[0], shapes[:, 0]
+
+
+@pytest.mark.parametrize("storeys", [1, 2, 3, 6, 10, 30])
+def test_effective_mass_of_a_shear_building(storeys):
+    # storeys whose stiffness carries the inertia of a mode phi = 1, 2, ..., N with omega² = 1
+    shape = np.arange(1.0, storeys + 1.0)
+    stiffness = np.cumsum(shape[::-1])[::-1]
+    square, mode = _first_mode(stiffness)
+    assert_allclose(square, 1.0, rtol=1e-9)
+    effective = mode.sum() ** 2 / (mode @ mode) / storeys
+    # eigenvalues of a matrix of 30 storeys are good to 1e-12 or better
+    assert_allclose(effective_mass_ratio(storeys), effective, rtol=1e-9)
+    # its own base shear at an oscillator displacement u: the first storey's drift times stiffness
+    participation = mode.sum() / (mode @ mode)
+    base_shear = stiffness[0] * participation * mode[0]
+    assert_allclose(base_shear / storeys, effective_mass_ratio(storeys) * square, rtol=1e-9)
+
+
+def test_effective_mass_of_equal_storeys_is_a_little_larger():
+    # the assumption of a linear shape errs by 14 % at most: 8 / pi² in the limit of a uniform beam
+    for storeys in (1, 3, 10):
+        _, mode = _first_mode(np.ones(storeys))
+        effective = mode.sum() ** 2 / (mode @ mode) / storeys
+        assert 1.0 <= effective / effective_mass_ratio(storeys) < 1.14
+
+
+def test_effective_mass_falls_from_one_to_three_quarters():
+    ratio = effective_mass_ratio([1, 2, 5, 50, 1e9])
+    assert ratio[0] == 1.0
+    assert np.all(np.diff(ratio) < 0.0)
+    assert_allclose(ratio[-1], 0.75, rtol=1e-8)  # limit, off by 1/(2N)
 
 
 @pytest.mark.parametrize("storeys", [1, 2, 7, 30])

@@ -2,7 +2,15 @@
 
 import pytest
 
-from per_obspy.inventory.schema import COLUMNS, COMPLETED, EMPTY, ONE_OF, POSITIONS, SYSTEMS
+from per_obspy.inventory.schema import (
+    COLUMNS,
+    COMPLETED,
+    EMPTY,
+    ONE_OF,
+    ONE_PROPERTY,
+    POSITIONS,
+    SYSTEMS,
+)
 
 EVERY = [*COLUMNS.values(), *COMPLETED.values()]
 
@@ -34,5 +42,5 @@ def test_groups_name_columns_and_completed_columns_are_new():
 
 def test_choices_are_no_words_for_an_empty_cell():
     # would catch a value that the reader takes for a missing one
-    assert not EMPTY & {*SYSTEMS, *POSITIONS}
+    assert not EMPTY & {*SYSTEMS, *POSITIONS, *ONE_PROPERTY}
     assert {word.strip().lower() for word in EMPTY} == EMPTY

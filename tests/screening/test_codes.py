@@ -1,4 +1,8 @@
-"""Rules of codes against their clauses worked by hand, and empty cells where inputs lack."""
+"""
+Rules of codes against their clauses worked by hand, and empty cells where inputs lack.
+
+Covers per_obspy.screening.code_formulas too.
+"""
 
 import re
 from pathlib import Path
@@ -10,6 +14,7 @@ from numpy.testing import assert_allclose
 
 from per_obspy.config import Building, Codes
 from per_obspy.inventory.completion import completed_pairs
+from per_obspy.screening.code_formulas import NTC_SHARE, NTC_SIMPLIFIED
 from per_obspy.screening.codes import code_columns, code_rules
 
 REGION = Codes(ntc_zone="III", gb_intensity=8, fema_seismicity="high")
@@ -54,11 +59,34 @@ def test_the_page_of_the_documentation_names_every_rule():
     assert named == code_rules()["column"].tolist()
 
 
-def test_asce_and_eurocode_combine_by_the_root_of_the_squares():
-    assert_allclose(_rule("required_gap_asce7_event_based", _pairs()), 0.05)
-    assert_allclose(_rule("required_gap_ec8_event_based_unverified", _pairs()), 0.7 * 0.05)
-    misaligned = _pairs(floor_offset=1.0)
-    assert_allclose(_rule("required_gap_ec8_event_based_unverified", misaligned), 0.05)
+BY_PROPERTY = (
+    "required_gap_asce7_event_based",
+    "required_gap_asce7_22_event_based_unverified",
+    "required_gap_ec8_event_based_unverified",
+    "required_gap_nch433_event_based_unverified",
+)
+
+
+@pytest.mark.parametrize("name", BY_PROPERTY[:2])
+def test_asce_adds_displacements_across_a_property_line(name):
+    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.05)
+    assert_allclose(_rule(name, _pairs(same_property="no")), 0.07)
+
+
+def test_eurocode_reduces_where_floors_align():
+    name = "required_gap_ec8_event_based_unverified"
+    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.7 * 0.05)
+    assert_allclose(_rule(name, _pairs(same_property="yes", floor_offset=1.0)), 0.05)
+    assert_allclose(_rule(name, _pairs(same_property="no")), 0.7 * 0.07)
+
+
+@pytest.mark.parametrize("name", BY_PROPERTY)
+def test_an_unknown_property_asks_for_the_larger_gap(name):
+    # would catch a root of squares across a property line, which is up to 0.71 of the sum
+    one, two, empty = _rule(name, _pairs(same_property=["yes", "no", ""]))
+    (absent,) = _rule(name, _pairs())
+    assert empty == absent == two == max(one, two)
+    assert one < two
 
 
 @pytest.mark.parametrize(
@@ -107,28 +135,151 @@ def test_gb_widens_by_started_steps_above_15_m_of_the_lower_building(intensity, 
     )
 
 
+@pytest.mark.parametrize(
+    ("systems", "factor"),
+    [
+        (("concrete_frame_wall", "concrete_frame_wall"), 0.7),
+        (("concrete_wall", "concrete_wall"), 0.5),
+        (("steel_mrf", "steel_mrf"), 1.5),
+        (("ebf_brbf", "steel_mrf"), 1.5),
+        # the system that requires more decides
+        (("concrete_wall", "concrete_mrf"), 1.0),
+        (("steel_mrf", "concrete_wall"), 1.5),
+    ],
+)
+def test_gb_by_system(systems, factor):
+    size = {"height_1": 45.0, "height_2": 45.0, "storeys_1": 15.0, "storeys_2": 15.0}
+    pairs = _pairs(**size, system_1=systems[0], system_2=systems[1])
+    # 100 mm + 10 steps of 3 m above 15 m
+    assert_allclose(_rule("required_gap_gb50011_2010", pairs), factor * 0.3)
+
+
+def test_gb_asks_for_100_mm_at_least():
+    walls = _pairs(system_1="concrete_wall", system_2="concrete_wall")
+    assert_allclose(_rule("required_gap_gb50011_2010", walls), 0.1)
+
+
 def test_gb_is_empty_for_other_systems():
     assert np.isnan(_rule("required_gap_gb50011_2010", _pairs(system_2="other")))
+    assert np.isnan(_rule("required_gap_gb50011_2010", _pairs(system_1="")))
 
 
 def test_the_turkish_rule_takes_the_larger_of_height_and_displacement():
-    name = "required_gap_tbdy2018_event_based_unverified"
+    name = "required_gap_tbdy2018_event_based"
     assert_allclose(_rule(name, _pairs(), 0.0, 0.0), 0.09)  # 30 mm + 6 steps of 3 m above 6 m
     assert_allclose(_rule(name, _pairs(height_1=6.0, storeys_1=2.0), 0.0, 0.0), 0.03)
-    assert_allclose(_rule(name, _pairs(), 0.4, 0.4), 0.2)
-    assert_allclose(_rule(name, _pairs(floor_offset=1.0), 0.4, 0.4), 0.4)
+    assert_allclose(_rule(name, _pairs(), 0.3, 0.4), 0.125)
+    assert_allclose(_rule(name, _pairs(floor_offset=1.0), 0.3, 0.4), 0.25)
 
 
-def test_rules_of_sum_and_height():
-    assert_allclose(_rule("required_gap_is1893_event_based_unverified", _pairs()), 0.035)
-    assert_allclose(
-        _rule("required_gap_is1893_event_based_unverified", _pairs(floor_offset=1.0)), 0.07
-    )
-    assert_allclose(_rule("required_gap_e030_unverified", _pairs()), 0.144)
-    assert_allclose(
-        _rule("required_gap_e030_unverified", _pairs(height_1=3.0, storeys_1=1.0)), 0.03
-    )
+def test_the_worked_example_of_the_turkish_rule():
+    # Published example: reduced displacements of 18 and 24 mm, R / I = 8, 12 m high: 60 mm with
+    # floors at one level, 120 mm otherwise, and 50 mm at least
+    pairs = _pairs(height_1=12.0, height_2=12.0, storeys_1=4.0, storeys_2=4.0)
+    name, elastic = "required_gap_tbdy2018_event_based", (8 * 0.018, 8 * 0.024)
+    assert_allclose(_rule(name, pairs, *elastic), 0.060)
+    assert_allclose(_rule(name, pairs.assign(floor_offset=1.5), *elastic), 0.120)
+    assert_allclose(_rule(name, pairs, 0.0, 0.0), 0.050)
+
+
+def test_the_indian_rule_with_and_without_its_amendment():
+    printed = "required_gap_is1893_event_based_unverified"
+    amended = "required_gap_is1893_amended_event_based"
+    assert_allclose(_rule(printed, _pairs()), 0.07)
+    assert_allclose(_rule(amended, _pairs()), 0.035)
+    for name in (printed, amended):
+        assert_allclose(_rule(name, _pairs(floor_offset=1.0)), 0.07)
+
+
+@pytest.mark.parametrize(
+    ("height", "displacements", "expected"),
+    # 0.006 of 24 m; 30 mm; two thirds of the sum, which was left out and is the largest here
+    [(24.0, (0.03, 0.04), 0.144), (3.0, (0.0, 0.0), 0.03), (24.0, (0.15, 0.15), 0.2)],
+)
+def test_the_peruvian_rule_is_the_largest_of_three(height, displacements, expected):
+    pairs = _pairs(height_1=height, storeys_1=round(height / 3))
+    assert_allclose(_rule("required_gap_e030_event_based", pairs, *displacements), expected)
+
+
+@pytest.mark.parametrize(
+    ("ground", "displacement", "expected"),
+    # 24 m: 0.01 h 2 a_g S, at most 0.01 h, which also holds where a_g S is unknown
+    [(0.25, 0.0, 0.12), (0.8, 0.0, 0.24), (None, 0.0, 0.24), (0.25, 0.2, 0.4)],
+)
+def test_the_italian_rule(ground, displacement, expected):
+    codes = Codes(italy_ground=ground)
+    name = "required_gap_ntc2018_italy_event_based"
+    assert_allclose(_rule(name, _pairs(), displacement, displacement, codes), expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    # 24 m: 0.12 m on each side; displacements of 0.2 and 0.05 m where they count
+    [
+        ({"importance_1": 1.0, "importance_2": 1.0}, 0.24),
+        ({"importance_1": 1.4, "importance_2": 1.0}, 0.32),
+        ({}, 0.32),
+        ({"importance_1": 1.0, "importance_2": 1.0, "storeys_1": 9.0}, 0.32),
+    ],
+)
+def test_the_iranian_rule_by_storeys_and_importance(change, expected):
+    pairs = _pairs(**change)
+    assert_allclose(_rule("required_gap_iran2800_event_based", pairs, 0.2, 0.05), expected)
+
+
+def test_the_algerian_rules_by_edition():
+    old, new = "required_gap_rpa99_event_based_unverified", "required_gap_rpa2024_event_based"
+    assert_allclose(_rule(old, _pairs()), 0.085)
+    assert_allclose(_rule(new, _pairs()), 0.05)
+    for name in (old, new):
+        assert_allclose(_rule(name, _pairs(), 0.0, 0.001), 0.04)
+
+
+def test_the_chilean_rule_keeps_a_least_distance_on_each_side():
+    name = "required_gap_nch433_event_based_unverified"
+    # 0.002 of 24 m is 48 mm, more than 30 and 40 mm
+    assert_allclose(_rule(name, _pairs()), 0.096)
+    assert_allclose(_rule(name, _pairs(same_property="yes")), 0.048 * 2**0.5)
+    low = _pairs(height_1=3.0, storeys_1=1.0)
+    assert_allclose(_rule(name, low, 0.0, 0.02), 0.035)
+
+
+def test_the_new_zealand_and_gem_rules():
+    assert_allclose(_rule("required_gap_nzs1170_event_based_unverified", _pairs()), 0.07)
     assert_allclose(_rule("required_gap_gem", _pairs(height_2=12.0, storeys_2=4.0)), 0.48)
+
+
+@pytest.mark.parametrize("zone", list(NTC_SHARE))
+def test_mexican_rules_beside_the_one_of_2004(zone):
+    codes, other = Codes(ntc_zone=zone), _pairs(system_2="other")
+    of_2004 = _rule("required_gap_ntc2004_event_based", other, codes=codes)
+    # the current one is never halved
+    for pairs in (_pairs(), other):
+        current = _rule("required_gap_ntc2023_event_based_unverified", pairs, codes=codes)
+        assert_allclose(current, of_2004)
+    simplified = 2 * 24 * NTC_SIMPLIFIED[zone]
+    assert_allclose(_rule("required_gap_ntc2004_simplified", other, codes=codes), simplified)
+    alike = _rule("required_gap_ntc2004_simplified", _pairs(), codes=codes)
+    assert_allclose(alike, simplified / 2)
+
+
+def test_gaps_never_shrink_with_displacement_or_height():
+    # would catch a minimum in place of a maximum, and a share with the wrong sign
+    heights = np.array([3.0, 6.0, 9.0, 15.0, 24.0, 45.0])
+    # never as high as the other: between equal buildings Mexico City's gap is halved
+    size = {"height_1": heights, "height_2": 48.0, "storeys_1": heights / 3, "storeys_2": 16.0}
+    codes = Codes(ntc_zone="II", gb_intensity=7, italy_ground=0.3, fema_seismicity="high")
+    gaps = {}
+    for factor in (0.0, 1.0, 3.0):
+        displacement = np.full(len(heights), 0.05 * factor)
+        table = code_columns(_pairs(**size), displacement, displacement, codes)
+        gaps[factor] = table.filter(regex="^required_gap_").astype(float)
+        assert (gaps[factor].diff().dropna() >= 0).all(axis=None)
+    assert (gaps[1.0] >= gaps[0.0]).all(axis=None)
+    assert (gaps[3.0] >= gaps[1.0]).all(axis=None)
+    # in metres: of 15 cm on both sides no rule asks for less than a quarter or more than 2 m
+    based = gaps[3.0].filter(regex="event_based")
+    assert ((based > 0.25 * 0.15) & (based < 2.0)).all(axis=None)
 
 
 @pytest.mark.parametrize(
@@ -168,9 +319,21 @@ def test_fema_flags(change, flags):
     ("gap", "aligned", "misaligned"),
     [(0.0, 0.7, 0.4), (0.119, 0.7, 0.4), (0.2, 0.8, 0.7), (0.25, 1.0, 0.8)],
 )
-def test_nzsee_factors(gap, aligned, misaligned):
+def test_nzsee_factors_by_floors(gap, aligned, misaligned):
     assert _rule("nzsee_iep_factor_unverified", _pairs(gap=gap)) == [aligned]
     assert _rule("nzsee_iep_factor_unverified", _pairs(gap=gap, floor_offset=1.0)) == [misaligned]
+
+
+@pytest.mark.parametrize(
+    ("storeys", "factors"),
+    # near, middle and far; the smaller of both factors
+    [(9, (0.7, 0.8, 1.0)), (10, (0.7, 0.8, 1.0)), (12, (0.7, 0.8, 1.0)), (13, (0.4, 0.7, 1.0))],
+)
+def test_nzsee_factors_by_the_difference_in_storeys(storeys, factors):
+    pairs = _pairs(
+        gap=[0.1, 0.2, 0.3], height_2=3.0 * storeys, storeys_2=float(storeys), floor_offset=0.0
+    )
+    assert _rule("nzsee_iep_factor_unverified", pairs) == list(factors)
 
 
 def test_a_rule_without_its_inputs_stays_empty_instead_of_guessing():
@@ -179,12 +342,19 @@ def test_a_rule_without_its_inputs_stays_empty_instead_of_guessing():
     pairs = _pairs(**silent, period_1=0.5, period_2=0.8, system_1="", system_2="")
     row = code_columns(pairs, [0.03], [0.04], Codes()).iloc[0]
     known = row.drop("fema_p154_flags_unverified").dropna()
-    assert set(known.index) == {
-        "required_gap_asce7_event_based",
-        "required_gap_ec8_event_based_unverified",
-        "required_gap_is1893_event_based_unverified",
+    # unknown floors are not aligned, an unknown property is not one
+    expected = {
+        "asce7_event_based": 0.07,
+        "asce7_22_event_based_unverified": 0.07,
+        "ec8_event_based_unverified": 0.07,
+        "is1893_event_based_unverified": 0.07,
+        "is1893_amended_event_based": 0.07,
+        "rpa99_event_based_unverified": 0.085,
+        "rpa2024_event_based": 0.05,
+        "nzs1170_event_based_unverified": 0.07,
     }
-    assert_allclose(known.astype(float), [0.05, 0.05, 0.07])  # unknown floors are not aligned
+    assert known.index.tolist() == [f"required_gap_{name}" for name in expected]
+    assert_allclose(known.astype(float), list(expected.values()))
     assert row["fema_p154_flags_unverified"] == ""
 
 
@@ -199,6 +369,7 @@ def test_event_based_rules_keep_the_order_and_scale_of_the_buildings():
         "asce7_event_based",
         "ec8_event_based_unverified",
         "is1893_event_based_unverified",
+        "nzs1170_event_based_unverified",
     ):
         assert_allclose(double[f"required_gap_{name}"], 2 * once[f"required_gap_{name}"])
 

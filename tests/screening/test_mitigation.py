@@ -1,17 +1,19 @@
 """Measures against pounding: limits, monotony, scaling, and a comparison with the record itself."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import RegularGridInterpolator
 from screening_samples import make_station, table_of
 
 import per_obspy
+from per_obspy.screening.by_record.exact_damping import least_exact_damping
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.by_record.yielding import linearized_columns
 from per_obspy.screening.columns import RESULTS
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.mitigation import mitigation_columns
+from per_obspy.screening.mitigation import LARGEST_DAMPING, mitigation_columns
 from per_obspy.screening.values import at_contact, both, values
 
 TARGET = 1.25
@@ -120,11 +122,23 @@ def test_scaling_ground_and_gap_changes_no_ratio():
     assert_allclose(scaled["bumper_restitution"], found["bumper_restitution"], rtol=1e-6)
 
 
-def test_an_exact_demand_is_followed_in_proportion(record, table):
+def test_an_exact_demand_is_followed_by_exact_displacements(record, table):
+    # catches: the estimate where the record itself decides, and rows of both kinds exchanged
+    exact = table.assign(demand=table["demand_exact"], demand_rule="exact")
+    exact = exact.assign(gap=0.8 * exact["demand"])
+    expected = least_exact_damping(record, exact, LARGEST_DAMPING)
+    mixed = pd.concat([table, exact], ignore_index=True)
+    found = mitigation_columns(record, mixed, TARGET)["supplemental_damping"]
+    assert_array_equal(found[len(table) :], expected)
+    usual = mitigation_columns(record, table, TARGET)["supplemental_damping"]
+    assert_array_equal(found[: len(table)], usual)
+
+
+def test_another_demand_is_followed_in_proportion(record, table):
     # catches: the estimate compared with the gap, whatever the demand that decides
     usual = mitigation_columns(record, table, TARGET)["supplemental_damping"]
     halves = {"demand": 0.5 * table["demand"], "gap": 0.5 * table["gap"]}
-    smaller = mitigation_columns(record, table.assign(**halves, demand_rule="exact"), TARGET)
+    smaller = mitigation_columns(record, table.assign(**halves, demand_rule="sd"), TARGET)
     assert_allclose(smaller["supplemental_damping"], usual, rtol=1e-9)
 
 

@@ -61,6 +61,15 @@ def test_demands_are_at_contact_level():
     assert twice["sd_1"] == once["sd_1"]
 
 
+def test_code_rules_know_the_property():
+    # catches: a column of text that does not reach the rules
+    table = _table(_pairs(same_property=["yes", "no"], gap=0.1))
+    one, two = table["required_gap_asce7_event_based"]
+    radii = [table["participation_1"] * table["sd_1"], table["participation_2"] * table["sd_2"]]
+    assert_allclose(one, np.hypot(*(radius.iloc[0] for radius in radii)), rtol=1e-12)
+    assert_allclose(two, sum(radius.iloc[1] for radius in radii), rtol=1e-12)
+
+
 def test_equal_buildings_are_safe_only_if_their_periods_are_known():
     given = {"period_1": 0.7, "period_2": 0.7, "damping_1": 0.05, "damping_2": 0.05}
     known = _table(_pairs(**given, gap=0.01)).loc["p0"]
