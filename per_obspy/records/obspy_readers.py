@@ -23,7 +23,7 @@ from obspy.core.util.misc import buffered_load_entry_point
 
 from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import writing
-from per_obspy.records.archives import open_file
+from per_obspy.records.archives import read_file
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
@@ -72,9 +72,7 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
     RecordRejected
         Whatever the reader raises.
     """
-    with open_file(path) as file:
-        content = file.read()
-    return read_content(reader, content, path, **options)
+    return read_content(reader, read_file(path), path, **options)
 
 
 def read_content(reader: Callable[..., Any], content: bytes, path: Path, **options: Any) -> Any:
