@@ -32,16 +32,16 @@ from per_obspy.formats.text.vocabulary import orientation, trace
 _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"
 )
-_NUMBER = r"([-+\d.Ee*]+)"
-_NAMED_SIZE = re.compile(rf"\s*NPTS\s*=\s*{_NUMBER}\s*,\s*DT\s*=\s*{_NUMBER}", re.IGNORECASE)
-_PLAIN_SIZE = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.IGNORECASE)
+_NUMBER = r"([-+\d.Ee*]++)"
+_NAMED_SIZE = re.compile(rf"\s*+NPTS\s*+=\s*+{_NUMBER}\s*+,\s*+DT\s*+=\s*+{_NUMBER}", re.IGNORECASE)
+_PLAIN_SIZE = re.compile(rf"\s*+{_NUMBER}\s++{_NUMBER}\s*+,?\s*+NPTS\s*+,\s*+DT", re.IGNORECASE)
 #: event, date, perhaps a time of unknown zone, station, orientation
 _TITLE = re.compile(
-    r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)"
+    r"(.*?)[,\s]*+\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s++\d{1,2}:?\d{2})?\s*+,(.*),([^,]*+)"
 )
 _CORNERS = {
-    "highpass": re.compile(r"\bHP\s*=\s*(\d*\.?\d+)\s*HZ"),
-    "lowpass": re.compile(r"\bLP\s*=\s*(\d*\.?\d+)\s*HZ"),
+    "highpass": re.compile(r"\bHP\s*+=\s*+(\d{0,20}\.?\d{1,20})\s*+HZ"),
+    "lowpass": re.compile(r"\bLP\s*+=\s*+(\d{0,20}\.?\d{1,20})\s*+HZ"),
 }
 
 #: quantity and unit of the header -> unit of the samples, factor to it
