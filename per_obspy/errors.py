@@ -22,6 +22,21 @@ from difflib import get_close_matches
 from importlib.util import find_spec
 from typing import Any, NamedTuple, Self
 
+#: Characters of a message that may quote a file: damaged files have words of a million.
+LONGEST_MESSAGE = 1000
+
+
+def shortened(text: str) -> str:
+    """
+    Return a text that may quote a file, cut to ``LONGEST_MESSAGE`` characters.
+
+    Examples
+    --------
+    >>> len(shortened("9" * 1_000_000)), shortened("line 3, dt: empty")
+    (1004, 'line 3, dt: empty')
+    """
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ..."
+
 
 class PerError(Exception):
     """Any error that a user can mend, rather than an error of the program."""
@@ -40,8 +55,8 @@ class RecordRejected(PerError, ValueError):
     """
 
     def __init__(self, record: str, *reasons: str) -> None:
-        super().__init__(record, *reasons)
-        self.record, self.reasons = record, reasons
+        self.record, self.reasons = shortened(record), tuple(map(shortened, reasons))
+        super().__init__(self.record, *self.reasons)
 
     def __str__(self) -> str:
         return f"{self.record}: {'; '.join(self.reasons)}"
@@ -60,8 +75,8 @@ class CatalogError(PerError, ValueError):
     """
 
     def __init__(self, source: str, problem: str) -> None:
-        super().__init__(source, problem)
-        self.source, self.problem = source, problem
+        self.source, self.problem = source, shortened(problem)
+        super().__init__(self.source, self.problem)
 
     def __str__(self) -> str:
         return f"{self.source}: {self.problem}"

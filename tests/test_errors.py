@@ -72,3 +72,10 @@ def test_what_an_error_says(tmp_path):
     assert (
         reason_of(OSError("Corrupt snappy compressed data.")) == "Corrupt snappy compressed data."
     )
+
+
+def test_messages_quote_a_bounded_part_of_a_file():
+    # a word of a million characters once came back whole
+    for error in (RecordRejected("n" * 10**6, "w" * 10**6), CatalogError("file", "w" * 10**6)):
+        assert len(str(error)) < 2100
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)

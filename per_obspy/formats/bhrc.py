@@ -29,18 +29,18 @@ _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _POINTS_LINE, _UNIT_LINE, _RATE_LINE = 27, 10, 11, 21
 _WIDTH, _PER_LINE = 13, 10
 _STATION = re.compile(
-    rf"(.*?)\s+Station\s+{DECIMAL}\s*([NSEW])\s*{DECIMAL}\s*([NSEW])(?:\s+Altitude\s*{DECIMAL})?"
+    rf"(.*?)\s++Station\s++{DECIMAL}\s*+([NSEW])\s*+{DECIMAL}\s*+([NSEW])(?:\s++Altitude\s*+{DECIMAL})?"
 )
-_AZIMUTH = re.compile(r"\b([LT])\s*(\d{1,3})\b")
+_AZIMUTH = re.compile(r"\b([LT])\s*+(\d{1,3})\b")
 _EPICENTRE = re.compile(
-    rf"Epicenter\s+{DECIMAL}\s*([NSEW])\s*{DECIMAL}\s*([NSEW])(?:\s+FD\s*{DECIMAL})?"
+    rf"Epicenter\s++{DECIMAL}\s*+([NSEW])\s*+{DECIMAL}\s*+([NSEW])(?:\s++FD\s*+{DECIMAL})?"
 )
-_MAGNITUDE = re.compile(rf"\b(Mw|Ms|mb|ML|M)\s*{DECIMAL}")
+_MAGNITUDE = re.compile(rf"\b(Mw|Ms|mb|ML|M)\s*+{DECIMAL}")
 _TIME = re.compile(
-    rf"Origin Time\s*:\s*(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})\s+(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}"
+    rf"Origin Time\s*+:\s*+(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})\s++(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}"
 )
-_POINTS = re.compile(rf"NO\. OF POINTS\s*=\s*(\S+)\s+DURATION\s*=\s*{DECIMAL}")
-_SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECIMAL}")
+_POINTS = re.compile(rf"NO\. OF POINTS\s*+=\s*+(\S+)\s++DURATION\s*+=\s*+{DECIMAL}")
+_SENSOR = re.compile(rf"INSTR PERIOD\s*+=\s*+{DECIMAL}\s*+SEC\s++DAMPING\s*+=\s*+{DECIMAL}")
 
 
 def is_bhrc(file: WaveformFile) -> bool:

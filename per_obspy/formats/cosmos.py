@@ -35,20 +35,22 @@ from per_obspy.formats.text.vocabulary import (
 
 _TITLE = re.compile(
     r"(Raw|Uncorrected|Corrected) (acceleration|velocity|displacement)\b.*"
-    r"\(Format v0?1\.\d+ with (\d+) text lines\)"
+    r"\(Format v0?1\.\d{1,4} with (\d{1,4}) text lines\)"
 )
-_FORMAT = re.compile(r"Format\s*=\s*\(\s*(\d+)([IFE])(\d+)(?:\.\d+)?\s*\)")
-_HEADER_NUMBERS = re.compile(r"\s*100 (Integer|Real)-header values follow on\s+(\d+) lines")
-_COMMENTS = re.compile(r"\s*(\d{1,4}) Comment line\(s\) follow")
-_SAMPLES = re.compile(rf"\s*(\d+)\s+.*?\bapprox\s+{DECIMAL}\s*secs?,\s*units=\s*([^(,]*?)\s*\(")
-_CODE = re.compile(r"Code:\s*(\w+)-(\S+)\s*(.*)")
-_SCNL = re.compile(r"\|<SCNL>(\w+)\.(\w+)\.(\w+)\.(\S+)")
+_FORMAT = re.compile(r"Format\s*+=\s*+\(\s*+(\d{1,4})([IFE])(\d{1,4})(?:\.\d{1,4})?\s*+\)")
+_HEADER_NUMBERS = re.compile(r"\s*+100 (Integer|Real)-header values follow on\s++(\d{1,4}) lines")
+_COMMENTS = re.compile(r"\s*+(\d{1,4}) Comment line\(s\) follow")
+_SAMPLES = re.compile(
+    rf"\s*+(\d{{1,12}})\s++.*?\bapprox\s++{DECIMAL}\s*+secs?,\s*+units=\s*+([^(,]{{0,40}}?)\s*+\("
+)
+_CODE = re.compile(r"Code:\s*+(\w++)-(\S++)\s*+(.*)")
+_SCNL = re.compile(r"\|<SCNL>(\w++)\.(\w++)\.(\w++)\.(\S++)")
 _CHANNEL = re.compile(
-    r"Sta Cha(?:n\s*\??|:)?\s*(?:\d+|\?)?\s*:?\s*(.*?)\s*"
-    r"\(Rcrdr Chan\s*(\w*|\?)\)(?:\s*Location:\s*(.*))?"
+    r"Sta Cha(?:n\s*+\??|:)?\s*+(?:\d{1,4}+|\?)?\s*+:?\s*+(.*?)\s*+"
+    r"\(Rcrdr Chan\s*+(\w*+|\?)\)(?:\s*+Location:\s*+(.*+))?"
 )
-_FILTERED = re.compile(rf"below\s+{DECIMAL}\s*Hz.*above\s+{DECIMAL}\s*Hz")
-_SERIAL = re.compile(r"Recorder:\s*(.*?)\s*s/n\s*(\S+)")
+_FILTERED = re.compile(rf"below\s++{DECIMAL}\s*+Hz.*above\s++{DECIMAL}\s*+Hz")
+_SERIAL = re.compile(r"Recorder:\s*+(.*?)\s*+s/n\s*+(\S++)")
 _TEXT_LINES = 13
 _UNKNOWN = -999.0
 

@@ -32,8 +32,8 @@ from per_obspy.formats.text.number_blocks import is_title, titled_block
 from per_obspy.formats.text.vocabulary import trace
 
 _INCH = 0.0254  # m
-_UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s+(G/10|G)\b")
-_PROMISED = re.compile(r"NO\. OF POINTS\s*=\s*(\S+)")
+_UNITS = re.compile(r"UNITS OF UNCOR.*?\b(?:AND|IS)\s++(G/10|G)\b")
+_PROMISED = re.compile(r"NO\. OF POINTS\s*+=\s*+(\S+)")
 _UNITS_OF_UNCORRECTED = {"G": STANDARD_GRAVITY, "G/10": STANDARD_GRAVITY / 10}
 _VOLUME_1_LINES, _VOLUME_1_REALS = 13, 50
 _VOLUME_2_LINES, _VOLUME_2_REALS = 24, 100

@@ -30,9 +30,9 @@ from per_obspy.formats.text.lines import (
 from per_obspy.formats.text.vocabulary import coordinates, orientation, trace
 
 _TITLE = b"#Earthquake Information"
-_COLUMNS = re.compile(r"Time\s+(\w)\(\+\);?\s*(\w)\(\+\);?\s*(\w)\(\+\)")
+_COLUMNS = re.compile(r"Time\s++(\w)\(\+\);?\s*+(\w)\(\+\);?\s*+(\w)\(\+\)")
 _TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}})-(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
-_EXTREMES = re.compile(rf"{DECIMAL}~\s*{DECIMAL}")
+_EXTREMES = re.compile(rf"{DECIMAL}~\s*+{DECIMAL}")
 _HOURS_AHEAD = 8.0
 _TIME_ROUNDING = 0.001  # s, times have three decimals
 

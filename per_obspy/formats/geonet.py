@@ -34,17 +34,17 @@ _TEXT_LINES, _INTEGER_LINES, _HEADER_LINES = 16, 4, 26
 _INTEGERS, _REALS = 40, 60
 _POINTS_LINE, _UNIT_LINE = 9, 10
 _WIDTH, _PER_LINE = 8, 10
-_TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w+)\b")
-_ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
-_SITE = re.compile(rf"Site (\S+)\s+{_ANGLE}\s+{_ANGLE}")
+_TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w++)\b")
+_ANGLE = r"(\d{1,3})\s++(\d{1,2})\s++(\d{1,2})([NSEW])"
+_SITE = re.compile(rf"Site (\S++)\s++{_ANGLE}\s++{_ANGLE}")
 _EPICENTRE = re.compile(
-    rf"Epicentre\s+{_ANGLE}\s+{_ANGLE}.*?(?:Depth\s*{DECIMAL}\s*km)?(?:\s+M\w?\s*{DECIMAL})?\s*"
+    rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}.*?(?:Depth\s*+{DECIMAL}\s*+km)?(?:\s++M\w?\s*+{DECIMAL})?\s*+"
 )
-_POINTS = re.compile(r"Number of points\s+(\S+)")
+_POINTS = re.compile(r"Number of points\s++(\S+)")
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")
-_PEAK = re.compile(rf"Acceleration:\s*peak\s*{DECIMAL}\s*mm/s/s", re.IGNORECASE)
+_PEAK = re.compile(rf"Acceleration:\s*+peak\s*+{DECIMAL}\s*+mm/s/s", re.IGNORECASE)
 _BANDS = re.compile(rf"bands are {DECIMAL}-{DECIMAL} Hz and {DECIMAL}-{DECIMAL} Hz")
-_SENSOR = re.compile(rf"Instr Period:\s*{DECIMAL}\s*s\s+Damping:\s*{DECIMAL}")
+_SENSOR = re.compile(rf"Instr Period:\s*+{DECIMAL}\s*+s\s++Damping:\s*+{DECIMAL}")
 _MILLIMETRE = 0.001  # m
 
 

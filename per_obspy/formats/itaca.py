@@ -35,7 +35,7 @@ _HEADER_LINES = 10
 _WIDTH, _PER_LINE = 14, 5
 _TIME = re.compile(rf"(\d{{4}})-(\d{{1,2}})-(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _STATION = re.compile(r"(\S+) / (.*)")
-_CORNERS = re.compile(rf"{DECIMAL}\s*-\s*{DECIMAL}")
+_CORNERS = re.compile(rf"{DECIMAL}\s*+-\s*+{DECIMAL}")
 
 
 def is_itaca(file: WaveformFile) -> bool:

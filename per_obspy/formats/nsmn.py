@@ -37,10 +37,10 @@ from per_obspy.formats.text.vocabulary import orientation, trace
 
 _TITLE = b"STRONG GROUND MOTION RECORDS OF TURKIYE"
 _HEADER_LINES = 18
-_PLACE = re.compile(rf"{DECIMAL}\s*([NSEW])\s*-\s*{DECIMAL}\s*([NSEW])")
+_PLACE = re.compile(rf"{DECIMAL}\s*+([NSEW])\s*+-\s*+{DECIMAL}\s*+([NSEW])")
 _EVENT_TIME = re.compile(rf"(\d{{4}})/(\d{{1,2}})/(\d{{1,2}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _RECORD_TIME = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}) (\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
-_PEAKS = re.compile(rf"\(([NEU]-[SWD])\)\s*{DECIMAL}")
+_PEAKS = re.compile(rf"\(([NEU]-[SWD])\)\s*+{DECIMAL}")
 
 
 def is_nsmn(file: WaveformFile) -> bool:

@@ -32,18 +32,18 @@ from per_obspy.formats.text.vocabulary import orientation, trace
 _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT) TIME (?:SERIES|HISTORY) IN UNITS OF (G|CM/S|CM)\b"
 )
-_NUMBER = r"([-+\d.Ee*]+)"
-_NAMED_SIZE = re.compile(rf"\s*NPTS\s*=\s*{_NUMBER}\s*,\s*DT\s*=\s*{_NUMBER}", re.IGNORECASE)
-_PLAIN_SIZE = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.IGNORECASE)
+_NUMBER = r"([-+\d.Ee*]++)"
+_NAMED_SIZE = re.compile(rf"\s*+NPTS\s*+=\s*+{_NUMBER}\s*+,\s*+DT\s*+=\s*+{_NUMBER}", re.IGNORECASE)
+_PLAIN_SIZE = re.compile(rf"\s*+{_NUMBER}\s++{_NUMBER}\s*+,?\s*+NPTS\s*+,\s*+DT", re.IGNORECASE)
 #: event, date, perhaps a time of unknown zone, station, orientation
 _TITLE = re.compile(
-    r"(.*?)[,\s]*\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s+\d{1,2}:?\d{2})?\s*,(.*),([^,]*)"
+    r"(.*?)[,\s]*+\b(\d{1,2})/(\d{1,2})/(\d{4}|\d{2})\b(?:\s++\d{1,2}:?\d{2})?\s*+,(.*),([^,]*+)"
 )
 #: corners in the units line: HP=0.1 Hz LP=30.0 Hz
-_POINTS = re.compile(r"\b([HL])P\s*=\s*(\d+\.?\d*|\.\d+)\s*HZ")
+_POINTS = re.compile(r"\b([HL])P\s*+=\s*+(\d{1,20}\.?\d{0,20}|\.\d{1,20})\s*+HZ")
 #: corners in the line of sizes: 5 POLE @ 30.00000 HZ, -5 POLE @ .10000 HZ; a high-pass filter has
 #: a negative number of poles, and the line may end before the last unit
-_POLES = re.compile(r"([-+]?)(\d+)\s*POLES?\s*@\s*(\d+\.?\d*|\.\d+)")
+_POLES = re.compile(r"([-+]?)(\d{1,20})\s*+POLES?\s*+@\s*+(\d{1,20}\.?\d{0,20}|\.\d{1,20})")
 
 #: quantity and unit of the header -> unit of the samples, factor to it
 _UNITS = {

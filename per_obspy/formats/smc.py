@@ -29,11 +29,11 @@ _TEXT_LINES, _INTEGER_LINES, _NUMBER_LINES = 11, 6, 16
 _INTEGERS, _REALS = 48, 50
 _NO_INTEGER, _NO_REAL = -32768, 1e38
 _TITLE = re.compile(
-    r"[1-4] (UNCORRECTED ACCELEROGRAM|CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*"
+    r"[1-4] (UNCORRECTED ACCELEROGRAM|CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*+"
 )
 _QUANTITIES = {"VELOCITY": ("velocity", "m/s"), "DISPLACEMENT": ("displacement", "m")}
-_STATION = re.compile(r"station = (.*?)\s*component=")
-_MODEL = re.compile(r"inst type=(.*?)\s+data source = (.*)")
+_STATION = re.compile(r"station = (.*?)\s*+component=")
+_MODEL = re.compile(r"inst type=(.*?)\s++data source = (.*)")
 _CENTIMETRE = 0.01  # m
 
 

@@ -59,8 +59,8 @@ _MONTHS = (
     "DICIEMBRE",
 )
 _CLOCK = re.compile(rf"(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
-_LATITUDE = re.compile(rf"{DECIMAL}\s*LAT\.?\s*([NSEWO])")
-_LONGITUDE = re.compile(rf"{DECIMAL}\s*LONG\.?\s*([NSEWO])")
+_LATITUDE = re.compile(rf"{DECIMAL}\s*+LAT\.?\s*+([NSEWO])")
+_LONGITUDE = re.compile(rf"{DECIMAL}\s*+LONG\.?\s*+([NSEWO])")
 _MAGNITUDE = re.compile(rf"(M\w?)={DECIMAL}")
 _DAY, _HALF_DAY = 86400, 43200.0  # s
 

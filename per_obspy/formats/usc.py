@@ -29,17 +29,17 @@ from per_obspy.formats.text.vocabulary import (
     trace,
 )
 
-_VOLUME_1 = re.compile(r"FILE\s+\d+ OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
+_VOLUME_1 = re.compile(r"FILE\s++\d{1,12} OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:")
 _VOLUME_2 = "CORRECTED ACCELEROGRAM "
 _VOLUME_1_LINES, _VOLUME_2_LINES = 27, 45
-_ANGLE = r"(\d{1,3})\s+(\d{1,2})\s+(\d{1,2})([NSEW])"
-_STATION = re.compile(rf"STATION USC#\s*(\S+)\s+{_ANGLE},\s*{_ANGLE}")
-_EPICENTRE = re.compile(rf"EPICENTER\s*-\s*{_ANGLE},\s*{_ANGLE}")
-_DATE = re.compile(r"([A-Z]{3})\S* (\d{1,2}), (\d{4})\s*-\s*(\d\d)(\d\d) GMT")
-_SENSOR = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC\s+DAMPING\s*=\s*{DECIMAL}")
-_POINTS = re.compile(r"NO\. OF POINTS\s*=\s*(\S+)")
-_BANDS = re.compile(rf"BETWEEN\s*{DECIMAL}-\s*{DECIMAL} AND\s*{DECIMAL}-\s*{DECIMAL} HZ")
-_PEAK = re.compile(rf"PEAK ACCELERATION =\s*{DECIMAL}\s*CMS?/SEC/SEC")
+_ANGLE = r"(\d{1,3})\s++(\d{1,2})\s++(\d{1,2})([NSEW])"
+_STATION = re.compile(rf"STATION USC#\s*+(\S+)\s++{_ANGLE},\s*+{_ANGLE}")
+_EPICENTRE = re.compile(rf"EPICENTER\s*+-\s*+{_ANGLE},\s*+{_ANGLE}")
+_DATE = re.compile(r"([A-Z]{3})\S*+ (\d{1,2}), (\d{4})\s*+-\s*+(\d\d)(\d\d) GMT")
+_SENSOR = re.compile(rf"INSTR PERIOD\s*+=\s*+{DECIMAL}\s*+SEC\s++DAMPING\s*+=\s*+{DECIMAL}")
+_POINTS = re.compile(r"NO\. OF POINTS\s*+=\s*+(\S+)")
+_BANDS = re.compile(rf"BETWEEN\s*+{DECIMAL}-\s*+{DECIMAL} AND\s*+{DECIMAL}-\s*+{DECIMAL} HZ")
+_PEAK = re.compile(rf"PEAK ACCELERATION =\s*+{DECIMAL}\s*+CMS?/SEC/SEC")
 
 
 def is_usc(file: WaveformFile) -> bool:
@@ -127,7 +127,7 @@ def _words(text: Text, first: int) -> dict[str, Any]:
     words = {"units": "m/s2", "quantity": "acceleration", "event": event}
     words |= _station(lines, event)
     words["instrument"] = sensor_constants(_SENSOR.match(lines[9]))
-    direction = re.match(r"COMP\s+(\S+)", lines[6])
+    direction = re.match(r"COMP\s++(\S+)", lines[6])
     return words | (orientation(direction[1]) if direction else {})
 
 

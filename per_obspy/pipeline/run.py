@@ -45,7 +45,7 @@ from per_obspy.pipeline.stations import (
 )
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched
-from per_obspy.records.sources import fetched_records, input_files
+from per_obspy.records.sources import fetched_records, hash_if_readable, input_files
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
 from per_obspy.screening.warmup import compile_screening
 from per_obspy.tables.station_summary import StationSummary, write_stations
@@ -175,7 +175,7 @@ def _head(
     """Return key, configuration and inputs of a run; files with a known hash are not read."""
     files = _input_files(settings, fetched)
     inputs = {
-        os.path.relpath(path, configuration.parent): hashes.get(path) or file_hash(path)
+        os.path.relpath(path, configuration.parent): hashes.get(path) or hash_if_readable(path)
         for path in files
     }
     text = settings.model_dump_json(context={"folder": configuration.parent})

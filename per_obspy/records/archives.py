@@ -16,6 +16,9 @@ from per_obspy.errors import RecordRejected, reason_of
 
 _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
+#: Reason of a rejection of a pipe, socket, device or folder.
+IRREGULAR = "is no regular file"
+
 #: errors of the standard library for damaged, encrypted or cut archives
 _DAMAGES = (
     zipfile.BadZipFile,
@@ -75,10 +78,33 @@ def open_file(path: Path) -> BinaryIO:
     archive = _archive_of(path)
     try:
         if archive is None:
-            return path.open("rb")
+            return _regular_file(path)
         return _member(archive, path.relative_to(archive).as_posix())
     except _DAMAGES as error:
         raise RecordRejected(str(path), f"cannot be read: {reason_of(error)}") from error
+
+
+def read_file(path: Path) -> bytes:
+    """
+    Return the content of a file, or of a member of an archive as ``members`` names it.
+
+    Raises
+    ------
+    RecordRejected
+        If it cannot be read.
+    """
+    with open_file(path) as file:
+        try:
+            return file.read()
+        except OSError as error:
+            raise RecordRejected(str(path), f"cannot be read: {reason_of(error)}") from error
+
+
+def _regular_file(path: Path) -> BinaryIO:
+    """Open a file; a pipe, a socket or a device could keep its reader waiting for ever."""
+    if path.exists() and not path.is_file():
+        raise RecordRejected(str(path), IRREGULAR)
+    return path.open("rb")
 
 
 def _archive_of(path: Path) -> Path | None:

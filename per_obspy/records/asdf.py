@@ -7,7 +7,10 @@ the start (ns since 1970) as attributes (Krischer and others 2016). gmprocess ad
 """
 
 import json
+import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -20,10 +23,10 @@ from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy.constants import GAL, STANDARD_GRAVITY
-from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, PerError, RecordRejected, Rejection
 from per_obspy.records.folder import SourceContents, merged_inventory
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_bytes_with_obspy
+from per_obspy.records.obspy_readers import LARGEST_UNPACKED, read_bytes_with_obspy
 
 #: unit of the samples according to the provenance -> m/s2
 _UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
@@ -31,7 +34,7 @@ _UNITS = {"cm/s^2": GAL, "m/s^2": 1.0, "g": STANDARD_GRAVITY}
 #: First bytes of an HDF5 file, which every ASDF file is.
 ASDF_MARK = b"\x89HDF\r\n\x1a\n"
 
-_OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]*>([^<]+)<")
+_OUTPUT_UNITS = re.compile(r"<seis_prov:output_units[^>]{0,500}>([^<]{1,100})<")
 
 #: process level of waveforms that are not raw
 _PROCESSED = "corrected physical"
@@ -92,16 +95,19 @@ def read_asdf_station(
     """Read the waveforms of one station and tag, as ``records.folder.read_station`` reads files."""
     stream, rejected = Stream(), []
     for path in paths:
-        with _opened(path) as file:
-            group = file["Waveforms"].groups[station]
-            # A waveform that is refused does not stop the others
-            for name in _names(group, tag):
-                try:
-                    stream += with_metadata(_trace(file, group.variables[name]), inventory)
-                    stream[-1].stats.source = str(path)
-                except RecordRejected as rejection:
-                    record = name.split("__")[0]
-                    rejected.append(Rejection("record", record, str(path), None, rejection.reasons))
+        try:
+            with _opened(path) as file:
+                group = file["Waveforms"].groups[station]
+                # A waveform that is refused does not stop the others
+                for name in _names(group, tag):
+                    try:
+                        stream += with_metadata(_trace(file, group.variables[name]), inventory)
+                        stream[-1].stats.source = str(path)
+                    except RecordRejected as rejection:
+                        record = (name.split("__")[0], str(path), None, rejection.reasons)
+                        rejected.append(Rejection("record", *record))
+        except CatalogError as error:
+            rejected.append(Rejection("station", station, str(path), None, (error.problem,)))
     return stream, tuple(rejected)
 
 
@@ -115,7 +121,7 @@ def read_asdf_event(path: Path) -> Event:
         If it does not hold exactly one event with an origin.
     """
     with _opened(path) as file:
-        content = file["QuakeML"][:].tobytes() if "QuakeML" in file.variables else b""
+        content = _bytes(file["QuakeML"]) if "QuakeML" in file.variables else b""
     # A file without QuakeML holds no event
     try:
         events = read_bytes_with_obspy(obspy.read_events, content, str(path)) if content else []
@@ -134,17 +140,49 @@ def has_event(path: Path) -> bool:
         return "QuakeML" in file.variables
 
 
-def _opened(path: Path) -> netCDF4.Dataset:
-    """Open an ASDF file."""
+@contextmanager
+def _opened(path: Path) -> Iterator[netCDF4.Dataset]:
+    """Open an ASDF file; whatever HDF5 finds wrong with it becomes a ``CatalogError``."""
+    if not path.is_file():
+        raise CatalogError(str(path), "cannot be read as ASDF: no such file")
     try:
         file = netCDF4.Dataset(path)
-    except OSError as error:
-        raise CatalogError(str(path), f"cannot be read as ASDF: {error.strerror}") from error
-    if "file_format" not in file.ncattrs() or file.getncattr("file_format") != "ASDF":
-        file.close()
-        raise CatalogError(str(path), "is HDF5, but no ASDF file")
-    file.set_auto_maskandscale(False)  # a sample that netCDF takes for missing is a sample
-    return file
+    except Exception as error:
+        raise CatalogError(str(path), f"cannot be read as ASDF: {_damage(error)}") from error
+    # Faults below the groups show while they are read
+    try:
+        with file:
+            if "file_format" not in file.ncattrs() or file.getncattr("file_format") != "ASDF":
+                raise CatalogError(str(path), "is HDF5, but no ASDF file")
+            # A sample that netCDF takes for missing is a sample
+            file.set_auto_maskandscale(False)
+            yield file
+    except PerError:
+        raise
+    except Exception as error:
+        raise CatalogError(str(path), f"the workspace is damaged: {_damage(error)}") from error
+
+
+def _damage(error: Exception) -> str:
+    """Return what is wrong with a file on one line."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _values(variable: Any) -> Any:
+    """Return the array of a variable; one of absurd size is refused before it takes memory."""
+    size = variable.size * variable.dtype.itemsize
+    if size > LARGEST_UNPACKED:
+        problem = f"{size} bytes, at most {LARGEST_UNPACKED} are read"
+        raise RecordRejected(variable.name, problem)
+    return np.asarray(variable[:])
+
+
+def _bytes(variable: Any) -> bytes:
+    """Return the bytes that ASDF keeps as an array."""
+    content: bytes = _values(variable).tobytes()
+    return content
 
 
 def _names(group: Any, tag: str) -> list[str]:
@@ -161,19 +199,31 @@ def _inventories(group: Any, name: str) -> list[Inventory]:
     """Return the StationXML of a station, if there is any."""
     if "StationXML" not in group.variables:
         return []
-    return [
-        read_bytes_with_obspy(
-            obspy.read_inventory, group.variables["StationXML"][:].tobytes(), name
-        )
-    ]
+    content = _bytes(group.variables["StationXML"])
+    return [read_bytes_with_obspy(obspy.read_inventory, content, name)]
 
 
 def _trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
+    """Return a waveform, whatever is wrong with which rejects it alone."""
+    try:
+        return _described_trace(file, waveform)
+    except PerError:
+        raise
+    except Exception as error:
+        raise RecordRejected(
+            waveform.name, f"the workspace is damaged: {_damage(error)}"
+        ) from error
+
+
+def _described_trace(file: netCDF4.Dataset, waveform: Any) -> Trace:
     """Return a waveform with the words of its processing; without any it counts as raw."""
     identifier, tag = waveform.name.split("__")[0], _tag(waveform.name)
-    trace = Trace(np.asarray(waveform[:]))
+    rate = float(waveform.sampling_rate)
+    if not 1e-5 <= rate <= 1e5:
+        raise RecordRejected(identifier, f"sampling_rate: {rate:g} Hz is not plausible")
+    trace = Trace(_values(waveform))
     trace.id = identifier
-    trace.stats.sampling_rate = float(waveform.sampling_rate)
+    trace.stats.sampling_rate = rate
     trace.stats.starttime = UTCDateTime(ns=int(waveform.starttime))
     # The level belongs to the stream of all components, whose name lacks their letter
     level = _auxiliary(file, "StreamSupplementalStats", f"{identifier[:-1]}_{tag}")
@@ -191,14 +241,16 @@ def _describe_processed(file: netCDF4.Dataset, trace: Trace, name: str) -> None:
     # Corners of the filter, Hz
     parameters = _auxiliary(file, "TraceProcessingParameters", name)
     corners = parameters.get("corner_frequencies", {})
-    known = {key: corners[key] for key in ("highpass", "lowpass") if key in corners}
+    known = {key: float(corners[key]) for key in ("highpass", "lowpass") if key in corners}
+    if not all(map(math.isfinite, known.values())):
+        raise RecordRejected(trace.id, f"corner_frequencies: {known} are not finite")
     trace.stats.corners = AttribDict(known)
 
 
 def _output_unit(file: netCDF4.Dataset, trace: Trace, name: str) -> float:
     """Return the unit of the last step of the processing, m/s2."""
     provenance = file["Provenance"].variables.get(name) if "Provenance" in file.groups else None
-    steps = "" if provenance is None else provenance[:].tobytes().decode("utf-8", "replace")
+    steps = "" if provenance is None else _bytes(provenance).decode("utf-8", "replace")
     units = _OUTPUT_UNITS.findall(steps)
     # A unit that is missing or unknown must not be guessed
     if not units or units[-1] not in _UNITS:
@@ -216,5 +268,5 @@ def _auxiliary(file: netCDF4.Dataset, kind: str, name: str) -> dict[str, Any]:
     # Data of a stream or trace is JSON
     if groups is None or name not in groups.variables:
         return {}
-    content: dict[str, Any] = json.loads(groups.variables[name][:].tobytes())
+    content: dict[str, Any] = json.loads(_bytes(groups.variables[name]))
     return content

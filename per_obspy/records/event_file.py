@@ -6,7 +6,7 @@ from typing import NamedTuple
 import obspy
 from obspy.core.event import Event
 
-from per_obspy.errors import CatalogError, RecordRejected
+from per_obspy.errors import CatalogError, RecordRejected, reason_of
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import ASDF_MARK, read_asdf_event
@@ -56,6 +56,8 @@ def read_event_file(path: Path) -> EventFile:
         events = read_content(obspy.read_events, content, path)
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     return EventFile(path, bytes_hash(content), _only_event(events, str(path)))
 
 

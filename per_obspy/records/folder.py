@@ -4,6 +4,8 @@ A folder of records: every file that ObsPy and its plugins understand.
 StationXML may be in the same folder or elsewhere.
 """
 
+import os
+import stat
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from itertools import chain
@@ -15,7 +17,7 @@ from typing import Any, NamedTuple
 import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
-from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, reason_of
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.formats.text.station_table import (
     StationRow,
@@ -24,7 +26,7 @@ from per_obspy.formats.text.station_table import (
     read_station_table,
     read_station_text,
 )
-from per_obspy.records.archives import is_archive, members, open_file
+from per_obspy.records.archives import IRREGULAR, is_archive, members, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_content
@@ -133,7 +135,7 @@ def _read_file(path: Path) -> _File:
     # Bytes are read once and serve the hash as well
     file = _File(path)
     try:
-        content = _content(path)
+        content = read_file(path)
         # Hash, headers and metadata come from the same bytes
         file = file._replace(hash=bytes_hash(content), kind=_kind(path, content))
         if file.kind == "record":
@@ -151,19 +153,13 @@ def _read_file(path: Path) -> _File:
     return file
 
 
-def _content(path: Path) -> bytes:
-    """Return the bytes of a file or of a member of an archive."""
-    with open_file(path) as file:
-        return file.read()
-
-
 def _named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
     """Return the descriptions of stations, or the rows of a table of them, that a user named."""
     if path is None:
         return [], []
     # A table that the user named must be right
     try:
-        if path.is_file() and _kind(path, content := _content(path)) == "station table":
+        if path.is_file() and _kind(path, content := read_file(path)) == "station table":
             return [], [*read_station_table(str(path), content)]
     except RecordRejected as rejection:
         raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
@@ -223,7 +219,7 @@ def read_station(
     stream, rejected = Stream(), []
     for path in paths:
         try:
-            traces = _traces(path, _content(path), headonly=False, starttime=start, endtime=end)
+            traces = _traces(path, read_file(path), headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
             continue
@@ -264,12 +260,8 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     if not folder.exists():
         raise CatalogError(str(folder), "no such folder or file")
     # A file counts as the only one of its folder
-    if folder.is_file():
-        paths = [folder]
-    else:
-        files_inside = (path for path in folder.rglob("*") if path.is_file())
-        paths = sorted(path for path in files_inside if not is_part(path))
-    files, rejected = [], []
+    paths, rejected = ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
+    files = []
     for path in paths:
         try:
             files += members(path) if is_archive(path) else [path]
@@ -280,9 +272,56 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     return files, rejected
 
 
+def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
+    """
+    Return the files below a folder, sorted, and whatever else is there that cannot be read.
+
+    Folders that cannot be listed, links that lead nowhere or to a folder, pipes, sockets and
+    devices are rejections; the rest goes on. Part files of this package are passed over.
+
+    Raises
+    ------
+    CatalogError
+        If it is no folder.
+    """
+    if not folder.is_dir():
+        raise CatalogError(str(folder), "is neither a folder nor a regular file")
+    unlisted: list[OSError] = []
+    paths, rejected = [], []
+    # Links to folders are among the folders, and are not entered
+    for parent, folders, names in os.walk(folder, onerror=unlisted.append):
+        for path in (Path(parent, name) for name in (*folders, *names)):
+            problem = _problem(path)
+            if problem:
+                rejected.append(Rejection("file", path.name, str(path), None, (problem,)))
+            elif not path.is_dir() and not is_part(path):
+                paths.append(path)
+    # An error may come in the middle of a folder
+    for error in unlisted:
+        path = Path(error.filename or folder)
+        reason = f"the folder cannot be listed: {reason_of(error)}"
+        rejected.append(Rejection("file", path.name, str(path), None, (reason,)))
+    return sorted(paths), sorted(rejected)
+
+
+def _problem(path: Path) -> str:
+    """Return why something in a folder is neither a file nor a folder; empty if it is one."""
+    try:
+        kind = path.stat().st_mode
+    except OSError as error:
+        if path.is_symlink():
+            return f"is a link that leads nowhere: {reason_of(error)}"
+        return f"cannot be read: {reason_of(error)}"
+    # Folders behind links could hold each other
+    if stat.S_ISDIR(kind):
+        is_link = path.is_symlink()
+        return "is a link to a folder, which is not followed: name that folder" if is_link else ""
+    return "" if stat.S_ISREG(kind) else IRREGULAR
+
+
 def _read_inventory(path: Path) -> Inventory:
     """Read StationXML or FDSN station text."""
-    content = _content(path)
+    content = read_file(path)
     if _kind(path, content) == "station text":
         return read_station_text(str(path), content)
     return read_content(obspy.read_inventory, content, path)
@@ -302,7 +341,12 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
     CatalogError
         If there is none, or one cannot be read.
     """
-    paths = sorted(stationxml.rglob("*.xml")) if stationxml.is_dir() else [stationxml]
+    paths = [stationxml]
+    # What cannot be read is tried again below, for its reason
+    if stationxml.is_dir():
+        files, unread = files_below(stationxml)
+        paths = [path for path in files if path.suffix == ".xml"]
+        paths += [Path(rejection.source) for rejection in unread if _is_needed(rejection)]
     if not paths:
         raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
     try:
@@ -311,6 +355,11 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
         raise CatalogError(
             rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}"
         ) from rejection
+
+
+def _is_needed(rejection: Rejection) -> bool:
+    """Return whether something that cannot be read may hold StationXML."""
+    return rejection.source.endswith(".xml") or "cannot be listed" in rejection.reasons[0]
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:

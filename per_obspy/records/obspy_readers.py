@@ -1,20 +1,57 @@
-"""The one place where errors of ObsPy's readers, which have no common class, become a rejection."""
+"""
+The one place where ObsPy reads files: allowed formats only, and every error is a rejection.
 
+ObsPy would unpickle a Stream, fetch what looks like an address, follow names of files that a file
+holds, and unpack archives without a limit. Formats are therefore found among those listed here, and
+files are handed over as bytes.
+"""
+
+import bz2
 import glob
+import gzip
 import tarfile
-from collections.abc import Callable
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Collection
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from obspy.core.util.base import ENTRY_POINTS
+from obspy.core.util.misc import buffered_load_entry_point
+
 from per_obspy.errors import PerError, RecordRejected
-from per_obspy.records.archives import open_file
+from per_obspy.files import writing
+from per_obspy.records.archives import read_file
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"
 
-#: How files begin that ObsPy unpacks: gzip, bzip2 and zip.
-_COMPRESSED = (b"\x1f\x8b", b"BZh", b"PK\x03\x04", b"PK\x05\x06")
+#: Formats of ObsPy that may be read, by kind of plugin. Left out are PICKLE, which runs code that
+#: the file holds; CSS and NNSA_KB_CORE, which read any file that the file names; CSZ, which unpacks
+#: without a limit; SC3ML, which SCML has replaced.
+_FORMATS = {
+    "waveform": "MSEED SAC GSE2 SEISAN SACXY GSE1 Q SH_ASC SLIST TSPAIR Y SEGY SU SEG2 WAV WIN AH"
+    " PDAS KINEMETRICS_EVT GCF DMX ALSEP_PSE ALSEP_WTN ALSEP_WTH CYBERSHAKE KNET REFTEK130 RG16"
+    " AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC UNAM USC",
+    "event": "QUAKEML SCML NLLOC_HYP CMTSOLUTION CSV EVENTTXT EVT FNETMT FOCMEC GSE2 HYPODDPHA"
+    " IMS10BULLETIN MCHEDR NDK NORDIC SCARDEC ZMAP",
+    "inventory": "STATIONXML SEED RESP SCML INVENTORYXML STATIONTXT XSEED",
+}
+FORMATS = {kind: frozenset(names.split()) for kind, names in _FORMATS.items()}
+
+#: name of a reader of ObsPy -> kind of its plugins
+_KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
+
+#: Formats whose samples are in a file of the same name beside.
+_TWO_FILES = ("Q",)
+
+#: first bytes of a packed file -> what unpacks it
+_UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
+
+#: Largest size of an unpacked file: a day of three components at 200 Hz as text has 400 MB.
+LARGEST_UNPACKED = 512 * 1024**2
 
 
 def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
@@ -35,10 +72,7 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
     RecordRejected
         Whatever the reader raises.
     """
-    if path.is_file():
-        return _called(reader, glob.escape(str(path)), str(path), options)
-    with open_file(path) as file:
-        return _called(reader, file, str(path), options)
+    return read_content(reader, read_file(path), path, **options)
 
 
 def read_content(reader: Callable[..., Any], content: bytes, path: Path, **options: Any) -> Any:
@@ -50,7 +84,7 @@ def read_content(reader: Callable[..., Any], content: bytes, path: Path, **optio
     reader : callable
         ``obspy.read``, ``obspy.read_inventory`` or ``obspy.read_events``.
     content : bytes
-        Content of the file.
+        Content of the file, which may be packed by gzip or bzip2.
     path : Path
         File, or a member of an archive as ``records.archives.members`` names it.
     **options
@@ -61,21 +95,7 @@ def read_content(reader: Callable[..., Any], content: bytes, path: Path, **optio
     RecordRejected
         Whatever the reader raises.
     """
-    # ObsPy unpacks compressed files only by their path
-    if path.is_file() and _is_compressed(content):
-        return read_with_obspy(reader, path, **options)
-    try:
-        return _called(reader, BytesIO(content), str(path), options)
-    except RecordRejected as rejection:
-        if UNKNOWN_FORMAT in rejection.reasons[0]:
-            raise
-        # Some formats keep their samples in files beside, which only a path leads to
-        return read_with_obspy(reader, path, **options)
-
-
-def _is_compressed(content: bytes) -> bool:
-    """Return whether bytes are those of an archive or of a compressed file."""
-    return content.startswith(_COMPRESSED) or tarfile.is_tarfile(BytesIO(content))
+    return _called(reader, _unpacked(content, path), path, options)
 
 
 def read_bytes_with_obspy(
@@ -98,26 +118,82 @@ def read_bytes_with_obspy(
     RecordRejected
         Whatever the reader raises.
     """
-    return _called(reader, BytesIO(content), name, options)
+    return _called(reader, content, name, options)
 
 
-def _called(reader: Callable[..., Any], file: Any, name: str, options: dict[str, Any]) -> Any:
-    """Call a reader; its errors, of ObsPy's bare Exception or of any library below, reject."""
+def _unpacked(content: bytes, path: Path) -> bytes:
+    """Return bytes that gzip or bzip2 packed, up to a limit of size; any other as they are."""
+    unpackers = (opened for mark, opened in _UNPACKERS.items() if content.startswith(mark))
+    unpacker = next(unpackers, None)
+    if unpacker is None:
+        return content
+    # One byte more than allowed shows that the file is too large
     try:
-        return reader(file, **options)
+        with unpacker(BytesIO(content)) as file:
+            unpacked: bytes = file.read(LARGEST_UNPACKED + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordRejected(str(path), f"the packed file is damaged: {error}") from error
+    if len(unpacked) > LARGEST_UNPACKED:
+        problem = f"it unpacks to more than {LARGEST_UNPACKED // 1024**2} MiB: unpack it by hand"
+        raise RecordRejected(str(path), problem)
+    return unpacked
+
+
+def _called(
+    reader: Callable[..., Any], content: bytes, source: Path | str, options: dict[str, Any]
+) -> Any:
+    """Call a reader; its errors, of ObsPy's bare Exception or of any library below, reject."""
+    kind = _KINDS[reader.__name__]
+    beside = isinstance(source, Path) and source.is_file()
+    try:
+        name = options.pop("format", None) or _format(kind, content)
+        # Samples beside a file are found by its path only
+        if name is None and beside:
+            name = _detected(kind, str(source), _TWO_FILES)
+        if name not in FORMATS[kind]:
+            raise RecordRejected(str(source), _unknown(content))
+        file = glob.escape(str(source)) if name in _TWO_FILES and beside else BytesIO(content)
+        return reader(file, format=name, check_compression=False, **options)
     except PerError:
         raise
     except Exception as error:
-        raise RecordRejected(name, f"ObsPy cannot read it: {_reason(error)}") from error
+        raise RecordRejected(str(source), f"ObsPy cannot read it: {_reason(error)}") from error
+
+
+def _format(kind: str, content: bytes) -> str | None:
+    """Return the allowed format of bytes; None where none knows them."""
+    try:
+        return _detected(kind, BytesIO(content), FORMATS[kind])
+    except TypeError:
+        # Some formats are recognised in named files only
+        with tempfile.NamedTemporaryFile(prefix="per_obspy-", suffix=".tmp") as file:
+            with writing(Path(file.name)):
+                file.write(content)
+                file.flush()
+            return _detected(kind, file.name, FORMATS[kind])
+
+
+def _detected(kind: str, file: BytesIO | str, allowed: Collection[str]) -> str | None:
+    """Return the first allowed format, in ObsPy's order, whose plugin knows a file."""
+    for name, point in ENTRY_POINTS[kind].items():
+        if name not in allowed:
+            continue
+        group = f"obspy.plugin.{kind}.{name}"
+        is_format = buffered_load_entry_point(point.dist.name, group, "isFormat")
+        if is_format(file):
+            return str(name)
+        if not isinstance(file, str):
+            file.seek(0)
+    return None
+
+
+def _unknown(content: bytes) -> str:
+    """Return the reason why no format is found; an archive is opened by its name only."""
+    if zipfile.is_zipfile(BytesIO(content)) or tarfile.is_tarfile(BytesIO(content)):
+        return "it is an archive: its name must end with .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz"
+    return f"ObsPy cannot read it: {UNKNOWN_FORMAT}"
 
 
 def _reason(error: Exception) -> str:
-    """
-    Return the message of an error on one line.
-
-    A format that ObsPy does not know is a fault of the file, not an error of types.
-    """
-    reason = " ".join(str(error).split())
-    if reason.startswith("Unknown format"):
-        return UNKNOWN_FORMAT
-    return f"{type(error).__name__}: {reason}"
+    """Return the message of an error on one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

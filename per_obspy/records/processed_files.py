@@ -17,7 +17,7 @@ import numpy as np
 from obspy import Stream, Trace
 from obspy.core import AttribDict
 
-from per_obspy.errors import RecordRejected
+from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import bytes_hash, file_hash, written_whole
 
 #: words of ``trace.stats`` that a description has where the trace has them
@@ -43,6 +43,20 @@ STATS_WORDS = (
     "per_obspy",
     "processing",
 )
+
+#: words whose wrong type would stop the processing later -> their types
+_KINDS_OF_WORDS: dict[str, type | tuple[type, ...]] = {
+    "units": str,
+    "quantity": str,
+    "processing_level": str,
+    "coordinates": AttribDict,
+    "sensor_azimuth": (int, float),
+    "sensor_dip": (int, float),
+    "corners": AttribDict,
+    "per_obspy": AttribDict,
+    "processing": list,
+}
+
 _LENGTHS = {"network": 2, "station": 5, "location": 2, "channel": 3}  # of codes in MiniSEED
 
 
@@ -93,11 +107,14 @@ def read_descriptions(path: Path, content: bytes | None = None) -> list[dict[str
     RecordRejected
         If the JSON describes another file of this name.
     """
+    note_file = path.with_suffix(".json")
+    if not note_file.is_file():
+        return None
     try:
-        note = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        note = json.loads(note_file.read_text(encoding="utf-8"))
         descriptions: list[dict[str, Any]] = note["traces"]
         described_hash = note["shard"]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     # A file that changed after its description was written
     found = file_hash(path) if content is None else bytes_hash(content)
@@ -129,12 +146,27 @@ def described(stream: Stream, path: Path, content: bytes | None = None) -> Strea
     descriptions = read_descriptions(path, content)
     if descriptions is None:
         return stream
-    _require_same_lengths(stream, descriptions, path)
-    # Words come back as groups, as the plugins of the formats give them
+    # Its words are as this package wrote them, unless somebody else did
+    try:
+        _require_same_lengths(stream, descriptions, path)
+        return _with_words(stream, descriptions)
+    except PerError:
+        raise
+    except Exception as error:
+        problem = f"{path.with_suffix('.json').name} is no description of records: {error!r}"
+        raise RecordRejected(str(path), problem) from error
+
+
+def _with_words(stream: Stream, descriptions: list[dict[str, Any]]) -> Stream:
+    """Return traces with their words in groups, as the plugins of the formats give them."""
     out = stream.copy()
     for trace, words in zip(out, descriptions, strict=True):
         known = {name: _group(words[name]) for name in STATS_WORDS if name in words}
         trace.stats.update(known)
+        # ObsPy takes words of any type
+        for name, kind in _KINDS_OF_WORDS.items():
+            if name in known and not isinstance(known[name], kind):
+                raise TypeError(f"{name} is {known[name]!r}")
     return out
 
 

@@ -2,11 +2,12 @@
 
 from collections import defaultdict
 from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from obspy import Inventory, Stream, UTCDateTime
 
-from per_obspy.errors import CatalogError, Rejection
+from per_obspy.errors import CatalogError, Rejection, reason_of
 from per_obspy.records.folder import (
     SourceContents,
     merged_inventory,
@@ -49,7 +50,8 @@ def find_sds_stations(
         raise CatalogError(str(folder), "no such folder")
     # The first two parts of a name are network and station
     files: dict[str, list[Path]] = defaultdict(list)
-    for path in _day_files(folder, start, end):
+    paths, rejected = _day_files(folder, start, end)
+    for path in paths:
         network, station = path.name.split(".")[:2]
         files[f"{network}.{station}"].append(path)
     if not files:
@@ -58,19 +60,38 @@ def find_sds_stations(
     # Metadata are outside the archive
     inventories = [] if stationxml is None else read_inventories(Path(stationxml))
     stations = {name: tuple(paths) for name, paths in sorted(files.items())}
-    return SourceContents(stations, merged_inventory(inventories), ())
+    return SourceContents(stations, merged_inventory(inventories), tuple(rejected))
 
 
-def _day_files(folder: Path, start: UTCDateTime, end: UTCDateTime) -> list[Path]:
-    """Return the files of all days of a window, and of the day before it."""
+def _day_files(
+    folder: Path, start: UTCDateTime, end: UTCDateTime
+) -> tuple[list[Path], list[Rejection]]:
+    """Return the files of all days of a window and of the day before it, and unreadable folders."""
     midnight = UTCDateTime(start.year, start.month, start.day)
     last = int((end - midnight) // _DAY)
-    files = []
+    files, unlisted = [], dict[Path, Rejection]()
     # Names end with year and day of the year
     for number in range(-1, last + 1):
         day = midnight + _DAY * number
-        files += sorted(folder.glob(f"{day.year}/*/*/*.D/*.D.{day.year}.{day.julday:03d}"))
-    return files
+        paths = [folder / str(day.year)]
+        for pattern in ("*", "*", "*.D", f"*.D.{day.year}.{day.julday:03d}"):
+            paths = _listed(paths, pattern, unlisted)
+        files += sorted(paths)
+    return files, list(unlisted.values())
+
+
+def _listed(folders: list[Path], pattern: str, unlisted: dict[Path, Rejection]) -> list[Path]:
+    """Return what folders hold under a pattern; those that cannot be listed are noted."""
+    paths: list[Path] = []
+    for folder in folders:
+        try:
+            paths += [path for path in folder.iterdir() if fnmatchcase(path.name, pattern)]
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            reason = f"the folder cannot be listed: {reason_of(error)}"
+            unlisted[folder] = Rejection("file", folder.name, str(folder), None, (reason,))
+    return paths
 
 
 def read_sds_station(

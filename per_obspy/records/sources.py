@@ -20,7 +20,7 @@ from per_obspy.records.earthquakes.choice import OneEarthquake, Reader, one_eart
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
-from per_obspy.records.folder import SourceContents, find_stations, read_station
+from per_obspy.records.folder import SourceContents, files_below, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
 
@@ -168,8 +168,8 @@ def input_files(records: config.Records | None, fetched: Fetched | None) -> list
 
 
 def _files_below(place: Path) -> list[Path]:
-    """Return a file, or everything below a folder, sorted."""
-    return sorted(place.rglob("*")) if place.is_dir() else [place]
+    """Return a file, or all files below a folder, sorted."""
+    return files_below(place)[0] if place.is_dir() else [place]
 
 
 def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None:
@@ -198,11 +198,11 @@ def _hashes(paths: Iterable[Path], known: dict[Path, str]) -> tuple[str, ...]:
     """Return the hashes of files; each file is read once, and its hash added to the known ones."""
     for path in paths:
         if path not in known:
-            known[path] = _hash_if_readable(path)
+            known[path] = hash_if_readable(path)
     return tuple(known[path] for path in paths)
 
 
-def _hash_if_readable(path: Path) -> str:
+def hash_if_readable(path: Path) -> str:
     """Return the hash of a file or of a member of an archive, empty if it cannot be read."""
     try:
         with open_file(path) as file:

@@ -9,7 +9,7 @@ import pandas as pd
 import pyarrow as pa
 from pandas.api.types import is_numeric_dtype
 
-from per_obspy.errors import Rejection
+from per_obspy.errors import Rejection, shortened
 from per_obspy.files import printable, written_whole
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.columns import column_table, known_column
@@ -117,5 +117,7 @@ def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:
         # Rejections of a large inventory are never in memory as a whole
         for rejection in rejected:
             kinds[rejection.kind] += 1
-            rows.writerow(map(cell, (*rejection[:-1], "; ".join(rejection.reasons))))
+            reasons = "; ".join(map(shortened, rejection.reasons))
+            kind, name, source, row, _ = rejection
+            rows.writerow(map(cell, (kind, shortened(name), source, row, reasons)))
     return kinds

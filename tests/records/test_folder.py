@@ -1,5 +1,8 @@
 """Folders of records with StationXML."""
 
+import errno
+import os
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +53,93 @@ def test_files_that_are_no_records_are_listed_and_the_rest_goes_on(folder: Path)
     assert reasons["empty.mseed"] == "the file is empty"
     assert reasons["notes.txt"].startswith("ObsPy cannot read it: its format is unknown")
     assert {rejection.kind for rejection in contents.rejected} == {"file"}
+
+
+def rejections(folder: Path) -> dict[str, str]:
+    """Return the first reason of everything that is rejected; the station must be whole."""
+    contents = find_stations(folder)
+    assert len(contents.stations["CI.CLC"]) == 3
+    return {rejection.name: rejection.reasons[0] for rejection in contents.rejected}
+
+
+def test_what_is_neither_file_nor_folder_is_listed(folder: Path):
+    # would catch a reader that waits for ever at a pipe, and links that vanish unsaid
+    os.mkfifo(folder / "pipe.mseed")
+    (folder / "nowhere.mseed").symlink_to("gone")
+    (folder / "loop.mseed").symlink_to("loop.mseed")
+    (folder / "again").symlink_to("deep")
+    (folder / "null.mseed").symlink_to(os.devnull)
+    with socket.socket(socket.AF_UNIX) as server:
+        # the name of a socket has at most 107 characters
+        server.bind(os.path.relpath(folder / "socket"))
+    reasons = rejections(folder)
+    assert {reasons.pop(name) for name in ("pipe.mseed", "socket", "null.mseed")} == {
+        "is no regular file"
+    }
+    assert reasons.pop("nowhere.mseed").startswith("is a link that leads nowhere: No such file")
+    assert reasons.pop("loop.mseed").startswith("is a link that leads nowhere: Too many levels")
+    assert reasons == {"again": "is a link to a folder, which is not followed: name that folder"}
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO])
+def test_unreadable_folders_and_files_do_not_stop_the_others(
+    folder: Path, number: int, monkeypatch
+):
+    # rights are no obstacle to the superuser, so the system's answers are made here
+    (folder / "closed").mkdir()
+    record("HN3").write(str(folder / "closed.mseed"), format="MSEED")
+    scandir, opened = os.scandir, Path.open
+
+    def scanned(path):
+        if Path(path).name == "closed":
+            raise OSError(number, os.strerror(number), os.fspath(path))
+        return scandir(path)
+
+    def open_or_refuse(self, *arguments, **options):
+        if self.name == "closed.mseed":
+            raise OSError(number, os.strerror(number), os.fspath(self))
+        return opened(self, *arguments, **options)
+
+    monkeypatch.setattr(os, "scandir", scanned)
+    monkeypatch.setattr(Path, "open", open_or_refuse)
+    assert rejections(folder) == {
+        "closed": f"the folder cannot be listed: {os.strerror(number)}",
+        "closed.mseed": f"cannot be read: {os.strerror(number)}",
+    }
+
+
+def test_a_disk_that_fails_in_the_middle_of_a_file_rejects_the_file(folder: Path, monkeypatch):
+    opened = Path.open
+
+    class Failing:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_error: object):
+            return False
+
+        def read(self, *_size: int):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    record("HN3").write(str(folder / "bad.mseed"), format="MSEED")
+    monkeypatch.setattr(
+        Path,
+        "open",
+        lambda self, *rest, **options: (
+            Failing() if self.name == "bad.mseed" else opened(self, *rest, **options)
+        ),
+    )
+    assert rejections(folder) == {"bad.mseed": "cannot be read: Input/output error"}
+
+
+def test_a_pipe_is_no_folder_of_records_and_no_metadata(folder: Path):
+    os.mkfifo(folder / "pipe")
+    with pytest.raises(CatalogError, match="pipe: is neither a folder nor a regular file"):
+        find_stations(folder / "pipe")
+    with pytest.raises(CatalogError, match="pipe: is no StationXML: is no regular file"):
+        find_stations(folder, folder / "pipe")
+    with pytest.raises(CatalogError, match="pipe: is no regular file"):
+        read_event(folder / "pipe")
 
 
 def test_one_file_of_several_stations_serves_each(folder: Path):

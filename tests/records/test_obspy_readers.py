@@ -1,13 +1,164 @@
-"""Errors of ObsPy's readers, which become rejections of the file."""
+"""What ObsPy may read, and its errors, which become rejections of the file."""
 
+import bz2
+import gzip
+import io
+import pickle
+import tarfile
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import obspy
 import pytest
+from obspy.core.util.base import ENTRY_POINTS
 from station_files import record
 
 from per_obspy.errors import RecordRejected
-from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_with_obspy
+from per_obspy.records import obspy_readers
+from per_obspy.records.event_file import read_event
+from per_obspy.records.folder import find_stations, read_inventories
+from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy
+from per_obspy.records.summary import describe_records
+
+
+class Payload:
+    """An object that makes a file when it is unpickled."""
+
+    def __init__(self, made: Path):
+        self.made = made
+
+    def __reduce__(self):
+        return Path.touch, (self.made,)
+
+
+def pickled(made: Path) -> bytes:
+    """Return a pickle that makes a file, with the words by which ObsPy knows pickled Streams."""
+    content = pickle.dumps(("obspy.core.stream", Payload(made)))
+    assert b"obspy.core.stream" in content[:100]
+    return content
+
+
+def zipped(content: bytes) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("record.mseed", content)
+    return packed.getvalue()
+
+
+def tarred(content: bytes, mode: str = "w") -> bytes:
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode=mode) as archive:
+        member = tarfile.TarInfo("record.mseed")
+        member.size = len(content)
+        archive.addfile(member, io.BytesIO(content))
+    return packed.getvalue()
+
+
+def tarred_and_zipped(content: bytes) -> bytes:
+    return tarred(content, "w:gz")
+
+
+def nested(content: bytes) -> bytes:
+    return zipped(zipped(content))
+
+
+PACKERS: dict[str, Callable[[bytes], bytes]] = {
+    "plain": bytes,
+    "zip": zipped,
+    "tar": tarred,
+    "tgz": tarred_and_zipped,
+    "gz": gzip.compress,
+    "bz2": bz2.compress,
+    "nested": nested,
+}
+
+
+@pytest.mark.parametrize("name", ["a.pickle", "a.mseed", "a.zip", "a.tar.gz"])
+@pytest.mark.parametrize("packer", PACKERS.values(), ids=PACKERS)
+def test_no_file_runs_code(tmp_path: Path, packer: Callable[[bytes], bytes], name: str):
+    # would catch obspy.read's own search of a format, which unpickles
+    made = tmp_path / "made"
+    folder = tmp_path / "records"
+    folder.mkdir()
+    path = folder / name
+    path.write_bytes(packer(pickled(made)))
+    # Every entry: a folder, one file, info, an event, metadata, a file and bytes of a service
+    entries: list[Callable[[], object]] = [
+        lambda: find_stations(folder),
+        lambda: find_stations(path),
+        lambda: describe_records(path),
+        lambda: read_event(path),
+        lambda: read_inventories(path),
+        lambda: read_with_obspy(obspy.read, path),
+        lambda: read_bytes_with_obspy(obspy.read, path.read_bytes(), "service"),
+        lambda: read_bytes_with_obspy(obspy.read, path.read_bytes(), "service", format="PICKLE"),
+    ]
+    for entry in entries:
+        with pytest.raises(ValueError, match=r"\S"):
+            entry()
+    assert not made.exists()
+
+
+def test_the_payload_is_one(tmp_path: Path):
+    # what the test above must not see
+    obspy_formats = set(ENTRY_POINTS["waveform"])
+    assert "PICKLE" in obspy_formats - FORMATS["waveform"]
+    pickle.loads(pickled(tmp_path / "made"))
+    assert (tmp_path / "made").exists()
+
+
+def test_allowed_formats_are_all_but_those_that_reach_beyond_their_file():
+    # a format that a new ObsPy brings is read only once it has been looked at
+    left_out = {kind: set(ENTRY_POINTS[kind]) - names for kind, names in FORMATS.items()}
+    assert left_out["waveform"] == {"PICKLE", "CSS", "NNSA_KB_CORE"}
+    assert left_out["event"] == {"CSZ", "SC3ML"}
+    assert left_out["inventory"] == {"SC3ML"}
+
+
+def test_a_record_names_no_file_elsewhere(tmp_path: Path):
+    # a table of CSS names the file of its samples: any that this process may read
+    samples = tmp_path / "secret"
+    samples.write_bytes(bytes(80))
+    row = bytearray(b" " * 283)
+    fields = {0: b"STA", 7: b"HHZ", 16: b"0.00000", 79: b"20", 88: b"100.0", 143: b"s4"}
+    fields |= {148: str(tmp_path).encode()[:64], 213: b"secret", 246: b"0"}
+    for place, word in fields.items():
+        row[place : place + len(word)] = word
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / "a.wfdisc").write_bytes(bytes(row) + b"\n")
+    with pytest.raises(RecordRejected, match="its format is unknown"):
+        read_with_obspy(obspy.read, folder / "a.wfdisc")
+
+
+@pytest.mark.parametrize("packer", [gzip.compress, bz2.compress], ids=["gz", "bz2"])
+def test_packed_files_are_read_up_to_a_limit(tmp_path: Path, packer, monkeypatch):
+    content = io.BytesIO()
+    record("HN1").write(content, format="MSEED")
+    path = tmp_path / "record.mseed"
+    path.write_bytes(packer(content.getvalue()))
+    (trace,) = read_with_obspy(obspy.read, path)
+    assert trace.stats.channel == "HN1"
+    # the same file with a limit of one byte less; then cut
+    monkeypatch.setattr(obspy_readers, "LARGEST_UNPACKED", len(content.getvalue()) - 1)
+    with pytest.raises(RecordRejected, match="it unpacks to more than 0 MiB"):
+        read_with_obspy(obspy.read, path)
+    path.write_bytes(path.read_bytes()[:-12])
+    with pytest.raises(RecordRejected, match="the packed file is damaged"):
+        read_with_obspy(obspy.read, path)
+
+
+def test_archives_under_other_names_are_named(tmp_path: Path):
+    (tmp_path / "record").write_bytes(zipped(b"words"))
+    with pytest.raises(RecordRejected, match=r"it is an archive: its name must end with \.zip"):
+        read_with_obspy(obspy.read, tmp_path / "record")
+
+
+def test_samples_in_a_file_beside_are_found(tmp_path: Path):
+    record("HNZ").write(str(tmp_path / "record"), format="Q")
+    (trace,) = read_with_obspy(obspy.read, tmp_path / "record.QHD")
+    assert trace.stats.npts == record("HNZ").stats.npts
 
 
 def test_names_with_wildcards_mean_themselves(tmp_path: Path):

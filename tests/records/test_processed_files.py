@@ -1,5 +1,7 @@
 """MiniSEED files of processed records, and their descriptions."""
 
+import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +69,39 @@ def test_the_description_of_other_traces_is_refused(tmp_path: Path):
     write(processed(), tmp_path / "a.mseed")
     with pytest.raises(RecordRejected, match=r"a\.json describes other traces"):
         described(read(str(tmp_path / "a.mseed"))[:1], tmp_path / "a.mseed")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"traces": [{}, {}]},
+        {"traces": "none"},
+        {"traces": [1, 2]},
+        {"delta": "fast"},
+        {"coordinates": "here"},
+        {"corners": [0.1, 30.0]},
+        {"units": 7},
+        {"processing": "text"},
+        {"sensor_azimuth": "north"},
+    ],
+)
+def test_a_description_that_others_wrote_is_refused(tmp_path: Path, change: dict):
+    # the hash is right, the words are not
+    path = tmp_path / "a.mseed"
+    write(processed(), path)
+    note = json.loads(path.with_suffix(".json").read_text())
+    words = [{**description, **change} for description in note["traces"]]
+    path.with_suffix(".json").write_text(json.dumps({**note, "traces": words, **change}))
+    with pytest.raises(RecordRejected, match=r"a\.json is no description of records"):
+        described(read(str(path)), path)
+
+
+def test_a_pipe_or_endless_brackets_are_no_description(tmp_path: Path):
+    # would catch a reader that waits for ever, and a traceback of the parser
+    path = tmp_path / "a.mseed"
+    write_processed(processed(), path)
+    path.with_suffix(".json").write_text("[" * 200_000)
+    assert read_descriptions(path) is None
+    path.with_suffix(".json").unlink()
+    os.mkfifo(path.with_suffix(".json"))
+    assert read_descriptions(path) is None

@@ -1,5 +1,7 @@
 """SDS archives."""
 
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +86,30 @@ def test_wrong_archives_and_windows_are_refused(archive: Path):
         find_sds_stations(archive / "none", MIDNIGHT, MIDNIGHT + 1)
     with pytest.raises(CatalogError, match="no day file"):
         find_sds_stations(archive, MIDNIGHT + 1e7, MIDNIGHT + 1e7 + 1)
+
+
+def test_an_unreadable_folder_does_not_stop_the_others(archive: Path, monkeypatch):
+    # rights are no obstacle to the superuser, so the system's answer is made here
+    listed = Path.iterdir
+
+    def refused(self: Path):
+        if self.name == "ONE":
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(self))
+        return listed(self)
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    contents = find_sds_stations(archive, MIDNIGHT - 10, MIDNIGHT + 50)
+    assert list(contents.stations) == ["CI.TWO"]
+    # Two years of the window hold a folder of this station each
+    assert {rejection.name for rejection in contents.rejected} == {"ONE"}
+    for rejection in contents.rejected:
+        assert rejection.reasons == ("the folder cannot be listed: Permission denied",)
+
+
+def test_a_pipe_among_the_day_files_does_not_hang(archive: Path):
+    (path,) = archive.glob("2020/CI/ONE/HNN.D/*")
+    path.unlink()
+    os.mkfifo(path)
+    stream, (rejection,) = read(archive, "CI.ONE", MIDNIGHT - 10, MIDNIGHT + 50)
+    assert len(stream) == 1
+    assert rejection.reasons == ("is no regular file",)

@@ -25,36 +25,36 @@ _UNKNOWN = (-999.0, 0.0)
 # Line 4 (from 0): station number, coordinates, recorder, channels
 _LETTER = "([NSEW])"
 _SITE = re.compile(
-    rf"STATION (?:NO|ID)\.\s*(\S*?)\s+{DECIMAL}\s*{_LETTER}[,\s]\s*{DECIMAL}\s*{_LETTER}"
+    rf"STATION (?:NO|ID)\.\s*+(\S*?)\s++{DECIMAL}\s*+{_LETTER}[,\s]\s*+{DECIMAL}\s*+{_LETTER}"
 )
-_MODEL = re.compile(r"[NSEW][,\s]\s*[\d.]+\s*[NSEW]\s+(\S.*?)\s*S/N\s*(\w*)")
-_CHANNELS = re.compile(r"\(\s*(\d{1,3})\s*CHNS OF\s*(\d{1,3})")
+_MODEL = re.compile(r"[NSEW][,\s]\s*+[\d.]++\s*+[NSEW]\s++(\S.{0,80}?)\s*+S/N\s*+(\w*+)")
+_CHANNELS = re.compile(r"\(\s*+(\d{1,3})\s*+CHNS OF\s*+(\d{1,3})")
 
 # Lines 5, 6, 9: agency; channel and direction; instrument
 _AGENCIES = re.compile(r"\b(CGS|CDMG|CSMIP)\b")
 _CHANNEL = re.compile(
-    r"CHAN\s*(\d{1,3}):\s*(.*?)\s*(?:\(STA CHN:\s*(\d{1,3})\)\s*)?(?:LOCATION:\s*(.*))?"
+    r"CHAN\s*+(\d{1,3}):\s*+(.*?)\s*+(?:\(STA CHN:\s*+(\d{1,3})\)\s*+)?(?:LOCATION:\s*+(.*+))?"
 )
-_CONSTANTS = re.compile(rf"INSTR PERIOD\s*=\s*{DECIMAL}\s*SEC,\s*DAMPING\s*=\s*{DECIMAL}")
-_SENSITIVITY = re.compile(rf"SENSITIVITY\s*=\s*{DECIMAL}\s*V(?:DC)?/G")
+_CONSTANTS = re.compile(rf"INSTR PERIOD\s*+=\s*+{DECIMAL}\s*+SEC,\s*+DAMPING\s*+=\s*+{DECIMAL}")
+_SENSITIVITY = re.compile(rf"SENSITIVITY\s*+=\s*+{DECIMAL}\s*+V(?:DC)?/G")
 
 # Line 3: SEED names and start; lines 1 and 2: time of the record and of the origin
 _SEED = re.compile(r"[^.]*\.([A-Z0-9]{1,2})\.([A-Z0-9]{1,5})\.\S\S\.H")
 _CLOCK = (
-    r"(\d{1,2})/\s*(\d{1,2})/\s*(\d{1,4}),?\s+"
-    rf"(\d{{1,2}}):\s*(\d{{1,2}}):\s*{DECIMAL}\s*([A-Z]+)"
+    r"(\d{1,2})/\s*+(\d{1,2})/\s*+(\d{1,4}),?\s++"
+    rf"(\d{{1,2}}):\s*+(\d{{1,2}}):\s*+{DECIMAL}\s*+([A-Z]++)"
 )
-_START = re.compile(rf"(?:START|TRIGGER) TIME:\s*{_CLOCK}")
-_ORIGIN = re.compile(rf"ORIGIN[^:]*:\s*{_CLOCK}")
+_START = re.compile(rf"(?:START|TRIGGER) TIME:\s*+{_CLOCK}")
+_ORIGIN = re.compile(rf"ORIGIN[^:]*+:\s*+{_CLOCK}")
 _RECORDED = re.compile(
-    r"\b([A-Z]{3})[A-Z]*\s+(\d{1,2}),\s+(\d{4})\s+"
-    rf"(\d{{1,2}}):(\d{{1,2}})(?::{DECIMAL})?\s+([A-Z]+)"
+    r"\b([A-Z]{3})[A-Z]*+\s++(\d{1,2}),\s++(\d{4})\s++"
+    rf"(\d{{1,2}}):(\d{{1,2}})(?::{DECIMAL})?\s++([A-Z]++)"
 )
 
 # Line 8: hypocentre
-_EPICENTRE = re.compile(rf"{DECIMAL}\s*{_LETTER}[,\s]\s*{DECIMAL}\s*{_LETTER}")
-_DEPTH = re.compile(rf"\bH=\s*{DECIMAL}\s*KM")
-_MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*{DECIMAL}")
+_EPICENTRE = re.compile(rf"{DECIMAL}\s*+{_LETTER}[,\s]\s*+{DECIMAL}\s*+{_LETTER}")
+_DEPTH = re.compile(rf"\bH=\s*+{DECIMAL}\s*+KM")
+_MAGNITUDE = re.compile(rf"\b(M[A-Z]?)=?\s*+{DECIMAL}")
 
 #: time zone -> hours ahead of UTC
 _ZONES = {

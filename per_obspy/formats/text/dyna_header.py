@@ -20,7 +20,7 @@ from per_obspy.formats.text.vocabulary import coordinates, horizontal, trace
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_/^]*:")
 _TIME = re.compile(rf"(\d{{4}})/?(\d\d)/?(\d\d)[ _]?(\d\d):?(\d\d):?{DECIMAL}")
-_MODEL = re.compile(r"sensor = (.*?)\s*(?:\[.*?\])?\s*(?:\||$)")
+_MODEL = re.compile(r"sensor = (.*?)\s*+(?:\[.*?\])?\s*+(?:\||$)")
 _START = "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS"
 
 #: unit of the header -> unit of the samples, factor

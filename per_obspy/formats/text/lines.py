@@ -19,8 +19,8 @@ WaveformFile = str | Path | BinaryIO
 #: characters of a decimal number; NumPy would also take "nan", "inf" and "1_000"
 _NUMBER_LETTERS = b"0123456789+-.eE \n"
 
-#: largest numbers of characters of a line, a number and a message; damaged files may have millions
-LONGEST_LINE, LONGEST_NUMBER, _LONGEST_MESSAGE = 2000, 40, 300
+#: largest numbers of characters of a line and a number; damaged files may have millions
+LONGEST_LINE, LONGEST_NUMBER = 2000, 40
 
 #: a decimal number in a regular expression; longer runs of digits are no number
 DECIMAL = r"(-?(?>\d{1,20}(?:\.\d{0,30})?|\.\d{1,30})(?!\d))"
@@ -79,9 +79,7 @@ def _lines(content: bytes) -> list[str]:
 
 
 def refuse(text: Text, line: int, field: str, problem: str) -> NoReturn:
-    """Raise the error of a field; a problem that quotes too much of the file is cut."""
-    if len(problem) > _LONGEST_MESSAGE:
-        problem = f"{problem[:_LONGEST_MESSAGE]} ..."
+    """Raise the error of a field; it is cut where it quotes too much of the file."""
     raise RecordRejected(text.name, f"line {line + 1}, {field}: {problem}")
 
 

@@ -14,8 +14,10 @@ from per_obspy.formats.text.lines import (
     refuse,
 )
 
-_POINTS = re.compile(rf"\s*(\d+)\s+(?:ACCELEROGRAM )?POINTS\b.*?\bAT\s+{DECIMAL}\s*(PTS/SEC|SEC)\b")
-_WIDTHS = re.compile(r"\((\d+)F(\d+)\.\d+\)")
+_POINTS = re.compile(
+    rf"\s*+(\d{{1,12}})\s++(?:ACCELEROGRAM )?POINTS\b.*?\bAT\s++{DECIMAL}\s*+(PTS/SEC|SEC)\b"
+)
+_WIDTHS = re.compile(r"\((\d{1,4})F(\d{1,4})\.\d{1,4}\)")
 
 
 def is_title(line: str) -> bool:

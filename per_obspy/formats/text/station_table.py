@@ -212,7 +212,7 @@ def read_station_text(name: str, content: bytes) -> Inventory:
     # Whatever ObsPy cannot read has one kind of error
     try:
         text = io.BytesIO("\n".join(lines).encode())
-        inventory = obspy.read_inventory(text, format="STATIONTXT")
+        inventory = obspy.read_inventory(text, format="STATIONTXT", check_compression=False)
     except Exception as error:
         raise RecordRejected(name, f"is no FDSN station text: {error!s:.200}") from error
     return _with_open_starts(inventory)

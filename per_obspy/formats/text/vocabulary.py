@@ -78,7 +78,7 @@ _QUADRANT_AZIMUTHS = {
     "SE": (180.0, -1.0),
     "SW": (180.0, 1.0),
 }
-_QUADRANT = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])")
+_QUADRANT = re.compile(r"([NS])\s*+(\d{1,2}(?:\.\d*)?)\s*+([EW])")
 _DEGREES = re.compile(r"\d{1,3}(\.\d*)?")
 
 #: smallest sampling rate, Hz -> band code of SEED
