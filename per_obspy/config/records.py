@@ -8,14 +8,15 @@ from pydantic import (
 )
 
 from per_obspy.config.section import Moment, RelativePath, Section
+from per_obspy.files import code_problem
 
 
 class Columns(Section):
     """How to read a plain table of samples (``records/text_table.py``)."""
 
     file: RelativePath = Field(description="text file of samples, all rows with as many values")
-    network: str = Field("", description="SEED network code")
-    station: str = Field(description="SEED station code")
+    network: str = Field("", description="SEED network code: letters, digits, - and _")
+    station: str = Field(description="SEED station code: letters, digits, - and _")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
     longitude: float = Field(ge=-180, le=180, description="degrees east")
     units: str = Field(
@@ -44,6 +45,13 @@ class Columns(Section):
             "channels = { CODE = 0 }; the last row may be shorter); not given: columns"
         ),
     )
+
+    @model_validator(mode="after")
+    def _usable_codes(self) -> Self:
+        for channel in self.channels:
+            if problem := code_problem(self.network, self.station, "", channel):
+                raise ValueError(problem)
+        return self
 
     @model_validator(mode="after")
     def _one_interval(self) -> Self:
