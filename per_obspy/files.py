@@ -1,4 +1,4 @@
-"""Names from data, atomic writes, removal of what killed processes left, file types and hashes."""
+"""Atomic writes, removal of what killed processes left, file-type detection and SHA-256 hashes."""
 
 import errno
 import hashlib
@@ -50,18 +50,6 @@ UNWRITABLE = {
     errno.ESTALE: _LATER,
 }
 
-#: Codes of a trace in their order.
-_CODES = ("network", "station", "location", "channel")
-
-#: Letters of a code: those of SEED, and lower case and the underscore, which agencies use.
-_CODE = re.compile(r"[A-Za-z0-9_-]*")
-
-#: Longest code, letters: with all that is put around it, it still is the name of a file.
-LONGEST_CODE = 64
-
-#: Longest name of a file on usual file systems, bytes.
-_LONGEST_NAME = 255
-
 #: Bytes that are written to learn whether the disk is full.
 _PROBE = 1 << 20
 
@@ -97,71 +85,6 @@ def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
     known = kind and expected not in kind
     reason = f"it is {kind}" if known else str(error).partition("; ")[0].rstrip(".")
     return f"not a {expected}: {reason}"
-
-
-def code_problem(*codes: str) -> str:
-    """
-    Return the reason why codes from data cannot name a file; empty if they can.
-
-    Parameters
-    ----------
-    *codes : str
-        Of network and station, and of location and channel; any may be empty.
-
-    Examples
-    --------
-    >>> code_problem("BO", "AOM001"), code_problem("", "TAFT", "", "HN1")
-    ('', '')
-    >>> code_problem("XX", "../victim")
-    "station code '../victim': expected letters, digits, - and _ only"
-    """
-    # Length first: nothing long is searched or shown
-    for kind, code in zip(_CODES, codes, strict=False):
-        if len(code) > LONGEST_CODE:
-            problem = f"has {len(code)} letters, expected {LONGEST_CODE} or fewer"
-            return f"{kind} code {shortened(code)!r} {problem}"
-        if not _CODE.fullmatch(code):
-            return f"{kind} code {shortened(code)!r}: expected letters, digits, - and _ only"
-    return "" if len(codes) > 1 else f"{shortened('.'.join(codes))!r}: expected NET.STA"
-
-
-def inside(folder: Path, name: str) -> Path:
-    """
-    Return the path of a file in a folder by a name made from data.
-
-    Links are followed: the file, or where it would be, must lie in the folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Which need not exist yet.
-    name : str
-        Path seen from the folder, with ``/`` between folders.
-
-    Raises
-    ------
-    CatalogError
-        If the name leads out of the folder or is none on every system.
-
-    Examples
-    --------
-    >>> inside(Path("stations"), "CI.CLC.nc").name
-    'CI.CLC.nc'
-    >>> inside(Path("stations"), "../CI.CLC.nc")
-    Traceback (most recent call last):
-        ...
-    per_obspy.errors.CatalogError: stations: '../CI.CLC.nc' leads out of this folder
-    """
-    shown = repr(shortened(name))
-    # Windows separates folders by backslashes, and drives by colons
-    if any(category(letter)[0] == "C" or letter in "\\:" for letter in name):
-        raise CatalogError(str(folder), f"{shown} is no name of a file on every system")
-    if max(len(os.fsencode(part)) for part in name.split("/")) > _LONGEST_NAME:
-        raise CatalogError(str(folder), f"{shown} is longer than {_LONGEST_NAME} bytes")
-    path, base = folder / name, folder.resolve()
-    if not name or not path.resolve().is_relative_to(base) or path.resolve() == base:
-        raise CatalogError(str(folder), f"{shown} leads out of this folder")
-    return path
 
 
 @contextmanager
@@ -359,19 +282,6 @@ def printable(text: str) -> str:
     """
     known = text.encode("utf-8", "replace").decode("utf-8")
     return "".join(" " if category(letter)[0] == "C" else letter for letter in known)
-
-
-def shortened(text: str, length: int = 80) -> str:
-    """
-    Return the beginning of a printable text, for messages.
-
-    Examples
-    --------
-    >>> shortened("X" * 1000, 10)
-    'XXXXXXXXX…'
-    """
-    start = printable(text[:length])
-    return start if len(text) <= length else f"{start[:-1]}…"
 
 
 def file_hash(path: Path) -> str:

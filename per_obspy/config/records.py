@@ -8,7 +8,7 @@ from pydantic import (
 )
 
 from per_obspy.config.section import Moment, RelativePath, Section
-from per_obspy.files import code_problem
+from per_obspy.names import code_problem
 
 
 class Columns(Section):
@@ -152,6 +152,28 @@ class Asdf(Section):
     )
 
 
+class Archives(Section):
+    """How much the archives of a folder may unpack to."""
+
+    largest_member: int = Field(
+        512 * 2**20, gt=0, description="bytes, of one file of an archive; larger ones are left out"
+    )
+    largest_total: int = Field(
+        8 * 2**30, gt=0, description="bytes, of all files of an archive; a larger one is left out"
+    )
+    largest_ratio: float = Field(
+        200.0,
+        ge=1,
+        description=(
+            "unpacked size of an archive over its own, from 64 MiB on; one of a larger ratio is "
+            "left out"
+        ),
+    )
+    most_members: int = Field(
+        1_000_000, gt=0, description="files of an archive; one of more is left out"
+    )
+
+
 class Records(Section):
     """Where the records are; several sources may be given."""
 
@@ -182,6 +204,7 @@ class Records(Section):
             "longer where clocks of stations are wrong"
         ),
     )
+    archives: Archives = Field(Archives(), description="limits of archives in the folder")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")
     sds: Sds | None = Field(None, description="SDS archive")

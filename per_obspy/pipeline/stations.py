@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spectra, load
 from per_obspy.errors import CatalogError, Rejection, WriteError
-from per_obspy.files import content_hash, inside, is_part, remove_file
+from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
+from per_obspy.names import inside
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched

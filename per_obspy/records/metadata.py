@@ -16,9 +16,9 @@ from obspy.core.inventory import Channel, Response, Station
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
-from per_obspy.files import code_problem
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
+from per_obspy.names import code_problem
 from per_obspy.records.simulation.station_metadata import MARK
 
 #: input unit of a response -> quantity of the samples

@@ -12,7 +12,8 @@ from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.files import code_problem, opened_hash, shortened
+from per_obspy.files import opened_hash
+from per_obspy.names import code_problem, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
@@ -251,7 +252,8 @@ def _folder(records: config.Records, event: Event | None) -> OneEarthquake | Non
     """Return the records of one earthquake in the folder, None if there is no folder."""
     if not records.folder:
         return None
-    return one_earthquake(find_stations(records.folder, records.stationxml), records, event)
+    found = find_stations(records.folder, records.stationxml, records.archives)
+    return one_earthquake(found, records, event)
 
 
 def _sds(

@@ -214,8 +214,14 @@ def test_the_sections_in_the_documentation_are_valid():
     sources = []
     for block in blocks:
         records = Records(**tomllib.loads(block)["records"])
-        sources += records.model_fields_set - {"event", "stationxml", "time", "event_gap"}
-    assert sources == ["columns", "folder", "fdsn", "sds", "asdf"]
+        sources += records.model_fields_set - {
+            "event",
+            "stationxml",
+            "time",
+            "event_gap",
+            "archives",
+        }
+    assert sources == ["folder", "columns", "folder", "fdsn", "sds", "asdf"]
 
 
 def test_the_documentation_has_every_key_of_the_services():

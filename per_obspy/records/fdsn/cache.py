@@ -20,7 +20,8 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
-from per_obspy.files import code_problem, remove_dead_parts, shortened
+from per_obspy.files import remove_dead_parts
+from per_obspy.names import code_problem, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station

@@ -7,7 +7,8 @@ import obspy
 import urllib3
 
 from per_obspy.errors import RecordRejected, ServiceError
-from per_obspy.files import inside, written_whole
+from per_obspy.files import written_whole
+from per_obspy.names import inside
 from per_obspy.records.fdsn.request import Wanted, channel_parameters
 from per_obspy.records.fdsn.web import RequestTooLarge, answer, host
 from per_obspy.records.folder import station_name

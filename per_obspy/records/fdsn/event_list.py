@@ -14,7 +14,8 @@ from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
-from per_obspy.files import LONGEST_CODE, code_problem, inside, written_whole
+from per_obspy.files import written_whole
+from per_obspy.names import LONGEST_CODE, code_problem, inside
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest

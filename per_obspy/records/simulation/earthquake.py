@@ -22,7 +22,8 @@ from scipy import fft
 from per_obspy import config
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
-from per_obspy.files import inside, written_whole
+from per_obspy.files import written_whole
+from per_obspy.names import inside
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation import stochastic
 from per_obspy.records.simulation.station_metadata import (
