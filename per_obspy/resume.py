@@ -73,8 +73,20 @@ def read_status(path: Path) -> Status:
 
 def changed_outputs(path: Path, status: Status) -> list[Path]:
     """Return the outputs of a status file that are missing or no longer have their hash."""
-    files = {path.parent / name: known for name, known in status["outputs"].items()}
-    return [file for file, known in files.items() if hash_if_readable(file) != known]
+    changed = []
+    for name, known in status["outputs"].items():
+        file = path.parent / name
+        if not _is_near(path, file) or hash_if_readable(file) != known:
+            changed.append(file)
+    return changed
+
+
+def _is_near(path: Path, file: Path) -> bool:
+    """Return whether an output is in the folder of its status file, or in one beside it."""
+    try:
+        return file.resolve().is_relative_to(path.parent.resolve().parent)
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 def hash_if_readable(path: Path) -> str:

@@ -204,3 +204,20 @@ def test_facts_come_back(finished):
     assert status is not None
     assert status["note"] == "é"
     assert status == json.loads((finished / "work.json").read_text(encoding="utf-8"))
+
+
+def test_outputs_far_from_their_status_are_not_looked_at(tmp_path):
+    # hashing a device or a pipe would never end
+    status = tmp_path / "run" / "stations" / "work.json"
+    status.parent.mkdir(parents=True)
+    victim = tmp_path / "victim"
+    victim.write_text("whole")
+    far = {"../../victim": file_hash(victim), "/dev/zero": "", "\0": ""}
+    write_status(status, KEY, far, {})
+    assert len(changed_outputs(status, read_status(status))) == len(far)
+    # a folder beside that of the status is near
+    near = tmp_path / "run" / "structures" / "table.csv"
+    near.parent.mkdir()
+    near.write_text("whole")
+    write_status(status, KEY, {"../structures/table.csv": file_hash(near)}, {})
+    assert changed_outputs(status, read_status(status)) == []

@@ -8,14 +8,15 @@ from pydantic import (
 )
 
 from per_obspy.config.section import Moment, RelativePath, Section
+from per_obspy.names import code_problem
 
 
 class Columns(Section):
     """How to read a plain table of samples (``records/text_table.py``)."""
 
     file: RelativePath = Field(description="text file of samples, all rows with as many values")
-    network: str = Field("", description="SEED network code")
-    station: str = Field(description="SEED station code")
+    network: str = Field("", description="SEED network code: letters, digits, - and _")
+    station: str = Field(description="SEED station code: letters, digits, - and _")
     latitude: float = Field(ge=-90, le=90, description="degrees north")
     longitude: float = Field(ge=-180, le=180, description="degrees east")
     units: str = Field(
@@ -44,6 +45,13 @@ class Columns(Section):
             "channels = { CODE = 0 }; the last row may be shorter); not given: columns"
         ),
     )
+
+    @model_validator(mode="after")
+    def _usable_codes(self) -> Self:
+        for channel in self.channels:
+            if problem := code_problem(self.network, self.station, "", channel):
+                raise ValueError(problem)
+        return self
 
     @model_validator(mode="after")
     def _one_interval(self) -> Self:
@@ -144,6 +152,28 @@ class Asdf(Section):
     )
 
 
+class Archives(Section):
+    """How much the archives of a folder may unpack to."""
+
+    largest_member: int = Field(
+        512 * 2**20, gt=0, description="bytes, of one file of an archive; larger ones are left out"
+    )
+    largest_total: int = Field(
+        8 * 2**30, gt=0, description="bytes, of all files of an archive; a larger one is left out"
+    )
+    largest_ratio: float = Field(
+        200.0,
+        ge=1,
+        description=(
+            "unpacked size of an archive over its own, from 64 MiB on; one of a larger ratio is "
+            "left out"
+        ),
+    )
+    most_members: int = Field(
+        1_000_000, gt=0, description="files of an archive; one of more is left out"
+    )
+
+
 class Records(Section):
     """Where the records are; several sources may be given."""
 
@@ -174,6 +204,7 @@ class Records(Section):
             "longer where clocks of stations are wrong"
         ),
     )
+    archives: Archives = Field(Archives(), description="limits of archives in the folder")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")
     sds: Sds | None = Field(None, description="SDS archive")

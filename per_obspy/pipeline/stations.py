@@ -11,6 +11,7 @@ from per_obspy.config import Processing, Records, Run, Scenario, Simulation, Spe
 from per_obspy.errors import CatalogError, Rejection, WriteError
 from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
+from per_obspy.names import inside
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
@@ -109,6 +110,11 @@ def station_jobs(
         Settings.
     event : EventFile, optional
         The earthquake.
+
+    Raises
+    ------
+    CatalogError
+        If the shard of a station would not be in that folder, because a link leads out of it.
     """
     return [
         StationJob(
@@ -118,12 +124,24 @@ def station_jobs(
             event=event,
             processing=processing,
             spectra=spectra,
-            shard=shards / f"{name.strip('.')}.nc",
+            shard=inside(shards, f"{file_stem(name)}.nc"),
             hashes=source.hashes,
             reader=source.reader,
         )
         for name, source in sorted(stations.items())
     ]
+
+
+def file_stem(station: str) -> str:
+    """
+    Return the name of a station's files, without the dot of a missing network that hides a file.
+
+    Examples
+    --------
+    >>> file_stem("CI.CLC"), file_stem(".TAFT"), file_stem(".")
+    ('CI.CLC', 'TAFT', 'unnamed')
+    """
+    return station.removeprefix(".") or "unnamed"
 
 
 def finished_stations(

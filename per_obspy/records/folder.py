@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
+from per_obspy.config import Archives
 from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, reason_of
 from per_obspy.files import bytes_hash, is_part
 from per_obspy.formats.text.station_table import (
@@ -26,7 +27,7 @@ from per_obspy.formats.text.station_table import (
     read_station_table,
     read_station_text,
 )
-from per_obspy.records.archives import IRREGULAR, is_archive, members, read_file
+from per_obspy.records.archives import IRREGULAR, LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import read_content
@@ -74,7 +75,9 @@ class SourceContents(NamedTuple):
     records: tuple[RecordSpan, ...] = ()
 
 
-def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> SourceContents:
+def find_stations(
+    folder: str | Path, stationxml: str | Path | None = None, limits: Archives = LIMITS
+) -> SourceContents:
     """
     Find the stations that have records in a folder and its subfolders, from headers only.
 
@@ -86,6 +89,8 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
     stationxml : str or Path, optional
         A StationXML file, or a folder of them, in addition. FDSN station text or a table of
         stations (CSV) does where only coordinates are missing.
+    limits : Archives
+        What archives may unpack to.
 
     Raises
     ------
@@ -93,8 +98,8 @@ def find_stations(folder: str | Path, stationxml: str | Path | None = None) -> S
         If the folder is missing, empty or without any record, or the named StationXML cannot be
         read.
     """
-    files, rejected = _files(Path(folder))
-    found = [_read_file(path) for path in files]
+    files, rejected = _files(Path(folder), limits)
+    found = [_read_file(path, limits) for path in files]
     records = tuple(chain.from_iterable(file.records for file in found))
     # Metadata that is named comes before that of the folder
     inventories, rows = _named_metadata(None if stationxml is None else Path(stationxml))
@@ -130,12 +135,12 @@ class _File(NamedTuple):
     rejection: Rejection | None = None
 
 
-def _read_file(path: Path) -> _File:
+def _read_file(path: Path, limits: Archives) -> _File:
     """Read a file of a folder once: its hash, and the headers of its records or its metadata."""
     # Bytes are read once and serve the hash as well
     file = _File(path)
     try:
-        content = read_file(path)
+        content = read_file(path, limits)
         # Hash, headers and metadata come from the same bytes
         file = file._replace(hash=bytes_hash(content), kind=_kind(path, content))
         if file.kind == "record":
@@ -192,6 +197,7 @@ def read_station(
     station: str | None = None,
     start: UTCDateTime | None = None,
     end: UTCDateTime | None = None,
+    limits: Archives = LIMITS,
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Read the files of one station, with coordinates, orientation and response attached.
@@ -206,6 +212,8 @@ def read_station(
         ``"NET.STA"``: keep only its traces, for files that hold several stations.
     start, end : UTCDateTime, optional
         Read only this window, for files that hold a day.
+    limits : Archives
+        What archives may unpack to.
 
     Returns
     -------
@@ -219,7 +227,8 @@ def read_station(
     stream, rejected = Stream(), []
     for path in paths:
         try:
-            traces = _traces(path, read_file(path), headonly=False, starttime=start, endtime=end)
+            content = read_file(path, limits)
+            traces = _traces(path, content, headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
             continue
@@ -255,7 +264,7 @@ def _without_integrals(stream: Stream) -> tuple[Stream, list[Rejection]]:
     return kept, rejected
 
 
-def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
+def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]:
     """Return all files, those in archives included, and the archives that cannot be read."""
     if not folder.exists():
         raise CatalogError(str(folder), "no such folder or file")
@@ -264,7 +273,9 @@ def _files(folder: Path) -> tuple[list[Path], list[Rejection]]:
     files = []
     for path in paths:
         try:
-            files += members(path) if is_archive(path) else [path]
+            inside, unread = archive_files(path, limits) if is_archive(path) else ([path], [])
+            files += inside
+            rejected += unread
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
     if not files and not rejected:

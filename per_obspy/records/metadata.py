@@ -18,6 +18,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
+from per_obspy.names import code_problem
 from per_obspy.records.simulation.station_metadata import MARK
 
 #: input unit of a response -> quantity of the samples
@@ -28,6 +29,8 @@ _QUANTITIES = {
     "M/S": "velocity",
     "M": "displacement",
 }
+
+_CODES = ("network", "station", "location", "channel")
 
 _PLACE = ("latitude", "longitude", "elevation")
 
@@ -47,8 +50,11 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     Raises
     ------
     RecordRejected
-        If units or, for counts, the response are unknown, or StationXML contradicts itself.
+        If a code holds other letters than those of codes, units or, for counts, the response are
+        unknown, or StationXML contradicts itself.
     """
+    if problem := code_problem(*(trace.stats[name] for name in _CODES)):
+        raise RecordRejected(trace.id, problem)
     result = with_knet_words(trace) if "knet" in trace.stats else trace.copy()
     channel = _channel(result, inventory)
     if channel is not None:

@@ -63,7 +63,7 @@ def read_with_obspy(reader: Callable[..., Any], path: Path, **options: Any) -> A
     reader : callable
         ``obspy.read``, ``obspy.read_inventory`` or ``obspy.read_events``.
     path : Path
-        File, or a member of an archive as ``records.archives.members`` names it.
+        File, or a member of an archive as ``records.archives.archive_files`` names it.
     **options
         For the reader.
 
@@ -86,7 +86,7 @@ def read_content(reader: Callable[..., Any], content: bytes, path: Path, **optio
     content : bytes
         Content of the file, which may be packed by gzip or bzip2.
     path : Path
-        File, or a member of an archive as ``records.archives.members`` names it.
+        File, or a member of an archive as ``records.archives.archive_files`` names it.
     **options
         For the reader.
 

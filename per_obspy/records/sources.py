@@ -13,6 +13,7 @@ from obspy.core.event import Event
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.files import opened_hash
+from per_obspy.names import code_problem, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
@@ -100,7 +101,8 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     rejected: list[Rejection] = []
     # Of several earthquakes in the folder one is screened
     folder = _folder(records, event and event.event)
-    for found, reader in _contents(records, fetched, event and event.event, folder):
+    for contents, reader in _contents(records, fetched, event and event.event, folder):
+        found = _with_usable_names(contents)
         rejected += found.rejected
         hashes |= found.hashes
         for name, paths in found.stations.items():
@@ -123,7 +125,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
         If a path is missing or holds no record.
     """
     # Files of each station in all paths
-    found = [find_stations(path) for path in paths]
+    found = [_with_usable_names(find_stations(path)) for path in paths]
     files: dict[str, tuple[Path, ...]] = {}
     hashes: dict[Path, str] = {}
     for contents in found:
@@ -145,6 +147,19 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     }
     rejected = [rejection for contents in found for rejection in contents.rejected]
     return Sources(stations, None, tuple(rejected), hashes, [])
+
+
+def _with_usable_names(found: SourceContents) -> SourceContents:
+    """Return a source without the stations whose codes cannot name a file; each is a rejection."""
+    stations, rejected = {}, list(found.rejected)
+    # Codes become names of shards, records and figures
+    for name, paths in found.stations.items():
+        if problem := code_problem(*name.split(".", 1)):
+            source = ", ".join(sorted({str(path) for path in paths}))
+            rejected.append(Rejection("station", shortened(name), source, None, (problem,)))
+        else:
+            stations[name] = paths
+    return found._replace(stations=stations, rejected=tuple(rejected))
 
 
 def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:
@@ -237,7 +252,8 @@ def _folder(records: config.Records, event: Event | None) -> OneEarthquake | Non
     """Return the records of one earthquake in the folder, None if there is no folder."""
     if not records.folder:
         return None
-    return one_earthquake(find_stations(records.folder, records.stationxml), records, event)
+    found = find_stations(records.folder, records.stationxml, records.archives)
+    return one_earthquake(found, records, event)
 
 
 def _sds(

@@ -4,13 +4,15 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from obspy import Trace
+from obspy import Stream, Trace
 
 import per_obspy
 from per_obspy.config import Processing, Scenario, Spectra
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.spectra import plot_station, spectra_of
+from per_obspy.pipeline.stations import file_stem
 from per_obspy.progress import silent
+from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.spectra.storage import read_spectra, region, write_spectra
 
@@ -84,3 +86,29 @@ def test_figures_of_a_station_without_network_are_no_hidden_files(tmp_path, monk
     write_spectra(per_obspy.station_spectra(trace), tmp_path / "ELC.nc")
     files = plot_station(tmp_path / "ELC.nc", 0.05, 1.0, tmp_path)
     assert [file.name for file in files] == ["ELC.spectra.png", "ELC.state_space.png"]
+
+
+def test_no_station_writes_or_removes_outside_the_shards(tmp_path):
+    # a description may hold any codes
+    (tmp_path / "in").mkdir()
+    header = {"network": "XX", "station": "S001", "channel": "HNE", "delta": 0.01, "units": "m/s2"}
+    stream = Stream([Trace(np.sin(np.arange(3000) / 20), header)])
+    facts = write_processed(stream, tmp_path / "in" / "a.mseed")
+    facts["traces"][0] |= {"network": "XX_/../..", "station": "victim"}
+    write_description(tmp_path / "in" / "a.mseed", facts)
+    # files that shard and status would replace
+    for name in ("victim.nc", "victim.json"):
+        (tmp_path / name).write_text("valuable")
+    (tmp_path / "out").mkdir()
+    done, rejected = spectra(tmp_path / "in", tmp_path / "out")
+    assert done == []
+    assert "network code 'XX_/': expected letters" in rejected[0].reasons[0]
+    assert {(tmp_path / f"victim.{suffix}").read_text() for suffix in ("nc", "json")} == {
+        "valuable"
+    }
+
+
+def test_stations_with_half_of_the_codes_have_files_of_their_own():
+    names = [".ABC", "ABC.", ".", "AB.C"]
+    assert len({file_stem(name) for name in names}) == len(names)
+    assert not any(file_stem(name).startswith(".") for name in names)

@@ -62,6 +62,12 @@ class FdsnServer(ThreadingHTTPServer):
         """Spoil the next requests to a service for a station (``*`` is the list), one per fault."""
         self.faults += [(service, subject, fault) for fault in faults]
 
+    def fdsn_list(self) -> bytes:
+        """Return the list of all channels as the service sends it."""
+        text = StringIO()
+        self.inventory.write(text, format="STATIONTXT", level="channel")
+        return text.getvalue().encode()
+
     def asked(self, service: str, subject: str | None = None) -> int:
         """Return the number of requests to a service."""
         requests = [request for request in self.requests if request.service == service]

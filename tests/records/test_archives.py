@@ -10,7 +10,7 @@ import pytest
 from obspy import Stream, Trace
 
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.records.archives import members, open_file
+from per_obspy.records.archives import archive_files, open_file
 from per_obspy.records.folder import find_stations, read_station
 
 AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
@@ -107,6 +107,6 @@ def test_missing_members_are_refused(tmp_path: Path):
 def test_damaged_members_are_refused(tmp_path: Path):
     archive = pack(tmp_path / "a.zip")
     archive.write_bytes(archive.read_bytes().replace(b"NPTS", b"MPTS"))
-    assert len(members(archive)) == len(CONTENT)
+    assert len(archive_files(archive)[0]) == len(CONTENT)
     with pytest.raises(RecordRejected, match="Bad CRC-32"):
         open_file(archive / "three.AT2")

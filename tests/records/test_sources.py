@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from obspy import Stream, Trace
 
 from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
@@ -14,6 +15,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
+from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import scenario_event
 from per_obspy.records.sources import find_path_sources, find_sources, input_files
@@ -212,8 +214,14 @@ def test_the_sections_in_the_documentation_are_valid():
     sources = []
     for block in blocks:
         records = Records(**tomllib.loads(block)["records"])
-        sources += records.model_fields_set - {"event", "stationxml", "time", "event_gap"}
-    assert sources == ["columns", "folder", "fdsn", "sds", "asdf"]
+        sources += records.model_fields_set - {
+            "event",
+            "stationxml",
+            "time",
+            "event_gap",
+            "archives",
+        }
+    assert sources == ["folder", "columns", "folder", "fdsn", "sds", "asdf"]
 
 
 def test_the_documentation_has_every_key_of_the_services():
@@ -227,3 +235,54 @@ def test_the_demo_s_event_is_that_of_its_scenario():
     known = read_event(CHECKOUT / "catalogs" / "demo" / "event.xml")
     made = scenario_event(load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Demo).scenario)
     assert (known.origins, known.magnitudes) == (made.origins, made.magnitudes)
+
+
+#: Codes that would lead out of every folder in which they name a file.
+VICTIM = "../../../victim"
+
+
+def described_as(folder: Path, network: str, station: str) -> Path:
+    """Write a processed record whose description gives it codes that MiniSEED could not hold."""
+    samples = np.sin(np.arange(3000) / 20)
+    header = {"network": "XX", "station": "S001", "channel": "HNE", "delta": 0.01, "units": "m/s2"}
+    stream = Stream([Trace(samples, header)])
+    path = folder / "record.mseed"
+    facts = write_processed(stream, path)
+    facts["traces"][0] |= {"network": network, "station": station}
+    write_description(path, facts)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("network", "station"),
+    [("XX_", "/" + VICTIM), ("/etc", "passwd"), ("..", ".."), ("XX", "A" * 70), ("XX", "S\n1")],
+)
+def test_codes_that_name_no_file_are_a_row(folder: Path, network: str, station: str):
+    described_as(folder, network, station)
+    for found in (find_sources(Records(folder=folder), None), find_path_sources([folder])):
+        assert list(found.stations) == ["XX.S001", "XX.S002"]
+        (row,) = found.rejected
+        assert row.kind == "station"
+        assert row.source.endswith("record.mseed")
+        assert row.reasons[0].startswith(("network code", "station code"))
+        assert len(row.name) <= 80
+
+
+def test_codes_of_day_files_are_checked(archive: Path, simulation: Simulation):
+    start = simulation.stream[0].stats.starttime
+    day = archive / str(start.year) / "XX" / "S 1" / "HNE.D"
+    day.mkdir(parents=True)
+    (day / f"XX.S 1..HNE.D.{start.year}.{start.julday:03d}").write_bytes(b"never read")
+    window = {"start": str(start), "end": str(start + 60)}
+    found = find_sources(Records(sds=Sds(folder=archive, **window)), None)
+    assert list(found.stations) == ["XX.S001", "XX.S002"]
+    assert [row.name for row in found.rejected] == ["XX.S 1"]
+
+
+@pytest.mark.parametrize(
+    "changes", [{"network": "../.."}, {"station": VICTIM}, {"channels": {"H/E": 1}}]
+)
+def test_codes_of_tables_are_checked_with_the_configuration(tmp_path: Path, changes):
+    described = table(tmp_path).model_dump() | {"azimuths": {}} | changes
+    with pytest.raises(ValueError, match="expected letters, digits, - and _ only"):
+        Columns(**described)

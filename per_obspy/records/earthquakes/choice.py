@@ -11,6 +11,7 @@ from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import Rejection
+from per_obspy.records.archives import LIMITS
 from per_obspy.records.earthquakes.groups import (
     HOURS,
     MARGIN,
@@ -68,7 +69,8 @@ def one_earthquake(
     """
     groups = event_groups(found.records, records.event_gap)
     time, source = _time(records, event)
-    motion = partial(largest_motion, found)
+    reader = _reader(records.archives)
+    motion = partial(largest_motion, found, reader)
     group = chosen_group(groups, time, source, motion, records.event_gap)
     facts = [_facts(other, is_screened=other is group) for other in groups]
     # Everything that is not of this earthquake is listed
@@ -76,11 +78,17 @@ def one_earthquake(
     others = [record for record in found.records if record.key not in members]
     rejected = (*found.rejected, *(_rejection(record, group) for record in others))
     mixed = {record.path for record in others}
-    return OneEarthquake(_contents(found._replace(rejected=rejected), group, mixed), facts)
+    found = found._replace(rejected=rejected)
+    return OneEarthquake(_contents(found, group, mixed, reader), facts)
+
+
+def _reader(limits: config.Archives) -> Reader:
+    """Return the reader of a folder's stations, with limits of archives that are no default."""
+    return partial(read_station) if limits == LIMITS else partial(read_station, limits=limits)
 
 
 def _contents(
-    found: SourceContents, group: EventGroup, mixed: Container[Path]
+    found: SourceContents, group: EventGroup, mixed: Container[Path], reader: Reader
 ) -> tuple[tuple[SourceContents, Reader], ...]:
     """Return the stations of a group with their readers; the first contents have rejections."""
     # Stations of which only a window is read have a reader of their own
@@ -89,10 +97,10 @@ def _contents(
         limits = _station_limits(station, group, mixed)
         if limits:
             part = found._replace(stations={station: paths}, rejected=())
-            windows.append((part, partial(read_station, **limits)))
+            windows.append((part, partial(reader, **limits)))
         else:
             whole[station] = paths
-    return (found._replace(stations=whole), partial(read_station)), *windows
+    return (found._replace(stations=whole), reader), *windows
 
 
 def _station_limits(
@@ -112,11 +120,11 @@ def _station_limits(
     return {}
 
 
-def largest_motion(found: SourceContents, group: EventGroup) -> float:
+def largest_motion(found: SourceContents, reader: Reader, group: EventGroup) -> float:
     """Return the largest acceleration of a group's readable records, m/s2; 0 without any."""
     largest = 0.0
     for station, paths in station_files(group.records).items():
-        stream, _ = read_station(paths, found.inventory, station, **_limits(group))
+        stream, _ = reader(paths, found.inventory, station, **_limits(group))
         for trace in stream:
             peak, unit = peak_motion(trace)
             largest = max(largest, peak if unit == "m/s2" else 0.0)

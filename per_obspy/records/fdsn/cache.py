@@ -9,6 +9,7 @@ never asked for again, so that a killed fetch goes on where it stopped; what it 
 """
 
 from collections import defaultdict
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from obspy import Inventory, UTCDateTime
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import remove_dead_parts
+from per_obspy.names import code_problem, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
@@ -129,17 +131,18 @@ def _fetch_missing(
     """Fetch what the cache lacks; return what failed, and whether nothing is left to ask for."""
     wanted = fetched.wanted
     bases, rejected = base_urls(pool, request.providers, station_parameters(wanted))
-    offers, unlisted = _offers(pool, bases, wanted)
+    offers, unlisted, unusable = _offers(pool, bases, wanted)
     rejected += unlisted
     outcomes = _stations(pool, fetched, offers, request.connections, progress)
     complete = not rejected and all(outcome.lasting for outcome in outcomes)
+    rejected += unusable
     # Stations without a reason are in the cache
     rejected += [
         Rejection("station", outcome.station, "FDSN", None, outcome.reasons)
         for outcome in outcomes
         if outcome.reasons
     ]
-    if complete and not offers:
+    if complete and not offers and not unusable:
         rejected += _no_station(bases, wanted)
     return rejected, complete
 
@@ -161,10 +164,10 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
 
 def _offers(
     pool: urllib3.PoolManager, bases: list[str], wanted: Wanted
-) -> tuple[dict[str, list[Offer]], list[Rejection]]:
-    """Ask every service which stations it has, and return who offers what."""
+) -> tuple[dict[str, list[Offer]], list[Rejection], list[Rejection]]:
+    """Ask every service which stations it has; return offers, failed services, wrong codes."""
     offers: dict[str, list[Offer]] = defaultdict(list)
-    rejected = []
+    rejected, unusable = [], []
     for base in bases:
         url = f"{base}/fdsnws/station/1/query"
         # A service that fails costs its own stations only
@@ -174,8 +177,20 @@ def _offers(
             rejected.append(Rejection("service", host(url), url, None, (str(fault),)))
             continue
         for station in sorted(stations_inside(listed, wanted)):
-            offers[station].append(Offer(base, _channels(listed, station)))
-    return offers, rejected
+            channels = _channels(listed, station)
+            if problem := _problem(station, channels):
+                row = Rejection("station", shortened(station), url, None, (problem,))
+                unusable.append(row)
+            else:
+                offers[station].append(Offer(base, channels))
+    return offers, rejected, unusable
+
+
+def _problem(station: str, channels: Iterable[tuple[str, str]]) -> str:
+    """Return the reason why a station of a list cannot be fetched; empty if it can."""
+    names = station.split(".", 1)
+    problems = [code_problem(*names, *codes) for codes in channels] or [code_problem(*names)]
+    return next(filter(None, problems), "")
 
 
 def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:

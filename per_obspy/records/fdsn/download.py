@@ -8,6 +8,7 @@ import urllib3
 
 from per_obspy.errors import RecordRejected, ServiceError
 from per_obspy.files import written_whole
+from per_obspy.names import inside
 from per_obspy.records.fdsn.request import Wanted, channel_parameters
 from per_obspy.records.fdsn.web import RequestTooLarge, answer, host
 from per_obspy.records.folder import station_name
@@ -74,8 +75,8 @@ def fetch_station(
     # The next service is tried only where one fails
     for offer in offers:
         try:
-            _fetch_records(pool, wanted, folder / f"{station}.mseed", offer)
-            _fetch_metadata(pool, wanted, folder / f"{station}.xml", offer)
+            _fetch_records(pool, wanted, inside(folder, f"{station}.mseed"), offer)
+            _fetch_metadata(pool, wanted, inside(folder, f"{station}.xml"), offer)
         except _NoData as refusal:
             reasons.append(str(refusal))
         except (ServiceError, RecordRejected) as fault:

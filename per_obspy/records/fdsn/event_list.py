@@ -15,8 +15,10 @@ from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
 from per_obspy.files import written_whole
+from per_obspy.names import LONGEST_CODE, code_problem, inside
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.providers import base_url
+from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, answer, web_pool
 from per_obspy.records.obspy_readers import read_with_obspy
 
@@ -175,8 +177,7 @@ def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache
     ServiceError
         If the service does not answer, or with something else.
     """
-    name = "".join(letter if letter.isalnum() else "-" for letter in event_id)
-    path = cache / f"event-{name}.xml"
+    path = inside(cache, f"event-{_file_name(event_id)}.xml")
     if path.is_file():
         return path
     url = f"{base_url(provider)}/fdsnws/event/1/query"
@@ -195,6 +196,15 @@ def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache
             reason = f"answers with something else than the event: {error.problem}"
             raise ServiceError(f"{url}: {reason}") from error
     return path
+
+
+def _file_name(event_id: str) -> str:
+    """Return the part of a file's name that is an event's own, whatever letters it has."""
+    if not code_problem("", event_id):
+        return event_id
+    # Identifiers that differ in other letters only must not share a file
+    name = "".join(letter if letter.isascii() and letter.isalnum() else "-" for letter in event_id)
+    return f"{name[:LONGEST_CODE]}-{digest(event_id)}"
 
 
 def _rows_of_file(path: Path) -> list[EventRow]:

@@ -23,6 +23,7 @@ from per_obspy import config
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
 from per_obspy.files import written_whole
+from per_obspy.names import inside
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.simulation import stochastic
 from per_obspy.records.simulation.station_metadata import (
@@ -103,7 +104,7 @@ def write_simulation(simulation: Simulation, folder: str | Path) -> None:
         stream = simulation.stream.select(station=code).copy()
         for trace in stream:
             trace.data = trace.data.astype(np.int32)
-        with written_whole(target / f"{NETWORK}.{code}.mseed") as part:
+        with written_whole(inside(target, f"{NETWORK}.{code}.mseed")) as part:
             # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
             content = BytesIO()
             stream.write(content, format="MSEED", encoding="STEIM2")

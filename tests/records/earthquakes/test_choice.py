@@ -1,6 +1,7 @@
 """The earthquake of a folder that is screened."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from per_obspy.config import Records, Scenario
 from per_obspy.errors import CatalogError
 from per_obspy.records.earthquakes.choice import largest_motion, one_earthquake, peak_motion
 from per_obspy.records.earthquakes.groups import event_groups
-from per_obspy.records.folder import find_stations
+from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 from per_obspy.records.sources import Sources, find_sources
 
@@ -101,7 +102,8 @@ def test_one_earthquake_is_read_as_before(both: Path):
 
 def test_the_largest_motion_is_the_peak_of_the_strongest_record(both: Path):
     found = find_stations(both)
-    after, main = sorted(largest_motion(found, group) for group in event_groups(found.records))
+    motion = partial(largest_motion, found, partial(read_station))
+    after, main = sorted(map(motion, event_groups(found.records)))
     # magnitudes 5.0 and 6.5 at the same places
     assert 0.0 < after < main
     trace = obspy.Trace(np.array([1.0, 2.0, 6.0]), {"units": "m/s2"})

@@ -62,8 +62,8 @@ def request_to(server: FdsnServer, cache: Path, **changes: object) -> Fdsn:
 @pytest.fixture
 def ask(server: FdsnServer, tmp_path: Path) -> Ask:
     """Fetch from the server into a cache of the test."""
-    return lambda again=False, **changes: fetch(
-        request_to(server, tmp_path, **changes), again=again
+    return lambda again=False, cache=tmp_path, **changes: fetch(
+        request_to(server, cache, **changes), again=again
     )
 
 
@@ -457,3 +457,24 @@ def test_a_damaged_status_asks_again(server: FdsnServer, ask: Ask, tmp_path: Pat
     # files that have arrived stay
     assert server.asked("dataselect") == asked
     assert json.loads(status_file.read_text())["rejected"] == []
+
+
+@pytest.mark.parametrize("code", ["../../victim", "/victim", "..", "A" * 70])
+def test_codes_of_a_list_that_name_no_file_are_a_row(
+    server: FdsnServer, ask: Ask, tmp_path: Path, code: str
+):
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "victim.mseed").write_text("valuable")
+    whole_list = server.fdsn_list().replace(b"|S002|", f"|{code}|".encode())
+    server.fail("station", "*", content(whole_list))
+    fetched = ask(cache=tmp_path / "cache")
+    assert names(fetched) == ["XX.S001", "XX.S003", "XX.S004"]
+    (row,) = fetched.rejected
+    assert row.reasons[0].startswith("station code")
+    assert server.asked("dataselect") == 3
+    # nothing outside the cache, and the row is a property of the list: no second request
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "victim.mseed"]
+    assert (tmp_path / "victim.mseed").read_text() == "valuable"
+    asked = len(server.requests)
+    assert ask(cache=tmp_path / "cache").rejected == fetched.rejected
+    assert len(server.requests) == asked

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,8 @@ from obspy.core.event import Catalog, Event, Origin
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError, ServiceError
 from per_obspy.records.event_file import read_event
-from per_obspy.records.fdsn.event_list import EventRow, find_events
+from per_obspy.records.fdsn.event_list import EventRow, fetched_event, find_events
+from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 
@@ -191,3 +193,17 @@ def test_filters_that_cannot_be_applied_are_refused(
 ):
     with pytest.raises(CatalogError, match=message):
         find_events(str(write_two(tmp_path)), query)
+
+
+@pytest.mark.parametrize("wanted", ["../../xx", "a/b", "a b", "é", "x" * 300])
+def test_events_have_files_of_their_own_in_the_cache(
+    server: FdsnServer, simulation: Simulation, tmp_path: Path, wanted: str
+):
+    xml = BytesIO()
+    Catalog([simulation.event]).write(xml, format="QUAKEML")
+    server.fail("event", "*", *[content(xml.getvalue())] * 2)
+    cache, pool = tmp_path / "cache", web_pool(10.0, 0, 0.01)
+    first = fetched_event(pool, server.url, wanted, cache)
+    # an identifier that differs in a letter that no file has is another event
+    second = fetched_event(pool, server.url, wanted + "+", cache)
+    assert sorted(cache.iterdir()) == sorted([first, second])
