@@ -5,6 +5,7 @@ Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable w
 later: a service is unavailable, another run holds the output folder, or a file cannot be written.
 """
 
+import errno
 import os
 import sys
 from pathlib import Path
@@ -19,7 +20,11 @@ from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
-from per_obspy.files import UNWRITABLE, writing
+from per_obspy.files import writing
+from per_obspy.machine import machine_fault
+
+#: Errors of writing, rather than of opening files or starting processes.
+_ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 app = typer.Typer(
     name="per-obspy",
@@ -92,13 +97,14 @@ def _exit_code() -> int:
         return _failed(error, NOTHING_USABLE)
     except PerError as error:
         return _failed(error, WRONG_INPUT)
-    except MemoryError as error:
-        return _failed(TryLater(f"not enough memory: {error}; try again with more"), TRY_LATER)
-    except OSError as error:
-        # Files have a name and are looked after where they are written
-        if error.filename is not None or error.errno not in UNWRITABLE:
+    except (MemoryError, OSError) as error:
+        # Of all that is written, only the standard output has no name
+        if isinstance(error, OSError) and error.filename is None and error.errno in _ROOMLESS:
+            return _failed_output(error)
+        fault = machine_fault(error)
+        if fault is None:
             raise
-        return _failed_output(error)
+        return _failed(TryLater(f"{fault}; try again later"), TRY_LATER)
     except SystemExit as ending:
         # A reader that has enough, such as ``head``, is no failure
         if isinstance(ending.__context__, BrokenPipeError):

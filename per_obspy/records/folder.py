@@ -24,6 +24,7 @@ from per_obspy.formats.text.station_table import (
     read_station_table,
     read_station_text,
 )
+from per_obspy.machine import raise_machine_fault
 from per_obspy.records.archives import is_archive, members, open_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
@@ -314,6 +315,8 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
+    """Return the row of an unusable file; raise ``MachineFault`` if the machine cannot read it."""
+    raise_machine_fault(rejection)
     return Rejection("file", path.name, str(path), None, rejection.reasons)
 
 
