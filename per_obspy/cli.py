@@ -2,12 +2,14 @@
 Command line: each command parses its arguments, calls one function and prints.
 
 Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 try
-later: a service is unavailable, another run holds the output folder, or a file cannot be written.
+later: a service is unavailable, another run holds the output folder, a file cannot be written, or
+the machine failed otherwise, 130 interrupted.
 """
 
 import errno
 import os
 import sys
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +24,9 @@ from per_obspy.commands.screen import screen
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.machine import machine_fault
+
+#: Exit code after the interrupt key, as of programs that this signal ends.
+INTERRUPTED = 130
 
 #: Errors of writing, rather than of opening files or starting processes.
 _ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -64,7 +69,12 @@ def options(
 
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
-    code = _exit_code()
+    try:
+        code = _exit_code()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        _end_interrupted()
     try:
         with writing(Path("standard output")):
             sys.stdout.flush()
@@ -73,6 +83,13 @@ def main() -> None:
     except WriteError as error:
         code = _failed_output(error)
     raise SystemExit(code)
+
+
+def _end_interrupted() -> None:
+    """Print one word; end at once if a thread still works, which the interpreter would wait for."""
+    print("interrupted", file=sys.stderr, flush=True)
+    if threading.active_count() > 1:
+        os._exit(INTERRUPTED)
 
 
 def _drop_output() -> None:

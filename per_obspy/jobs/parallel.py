@@ -157,7 +157,7 @@ class _Watched(Generic[Task, Result]):
             return
         except PerError as error:
             found = self._substitute(task, error, str(error))
-        except Exception as error:  # noqa: BLE001 - where a worker returns, every task needs a result
+        except Exception as error:  # noqa: BLE001 - any error is a result
             found = self._substitute(task, error, f"{type(error).__name__}: {error}")
         if found is not None:
             yield found

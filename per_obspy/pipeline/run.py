@@ -392,9 +392,11 @@ def _compiling(progress: Progress) -> Iterator[None]:
     try:
         yield
         progress(COMPILING, 0, 1)
-    finally:
-        # A thread that is alive when the interpreter ends can abort it
+    except Exception:
+        # A thread that is alive when the interpreter ends can abort it; an interrupt does not wait
         thread.join()
+        raise
+    thread.join()
     progress(COMPILING, 1, 1)
 
 
