@@ -2,11 +2,14 @@
 Command line: each command parses its arguments, calls one function and prints.
 
 Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 try
-later: a service is unavailable, another run holds the output folder, or a file cannot be written.
+later: a service is unavailable, another run holds the output folder, a file cannot be written, or
+the machine failed otherwise, 130 interrupted.
 """
 
+import errno
 import os
 import sys
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -19,7 +22,14 @@ from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
-from per_obspy.files import UNWRITABLE, writing
+from per_obspy.files import writing
+from per_obspy.machine import machine_fault
+
+#: Exit code after the interrupt key, as of programs that this signal ends.
+INTERRUPTED = 130
+
+#: Errors of writing, rather than of opening files or starting processes.
+_ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 app = typer.Typer(
     name="per-obspy",
@@ -59,7 +69,12 @@ def options(
 
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
-    code = _exit_code()
+    try:
+        code = _exit_code()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        _end_interrupted()
     try:
         with writing(Path("standard output")):
             sys.stdout.flush()
@@ -68,6 +83,13 @@ def main() -> None:
     except WriteError as error:
         code = _failed_output(error)
     raise SystemExit(code)
+
+
+def _end_interrupted() -> None:
+    """Print one word; end at once if a thread still works, which the interpreter would wait for."""
+    print("interrupted", file=sys.stderr, flush=True)
+    if threading.active_count() > 1:
+        os._exit(INTERRUPTED)
 
 
 def _drop_output() -> None:
@@ -92,13 +114,14 @@ def _exit_code() -> int:
         return _failed(error, NOTHING_USABLE)
     except PerError as error:
         return _failed(error, WRONG_INPUT)
-    except MemoryError as error:
-        return _failed(TryLater(f"not enough memory: {error}; try again with more"), TRY_LATER)
-    except OSError as error:
-        # Files have a name and are looked after where they are written
-        if error.filename is not None or error.errno not in UNWRITABLE:
+    except (MemoryError, OSError) as error:
+        # Of all that is written, only the standard output has no name
+        if isinstance(error, OSError) and error.filename is None and error.errno in _ROOMLESS:
+            return _failed_output(error)
+        fault = machine_fault(error)
+        if fault is None:
             raise
-        return _failed_output(error)
+        return _failed(TryLater(f"{fault}; try again later"), TRY_LATER)
     except SystemExit as ending:
         # A reader that has enough, such as ``head``, is no failure
         if isinstance(ending.__context__, BrokenPipeError):

@@ -11,6 +11,8 @@ The errors that a user can meet.
     └── TryLater         no input is wrong: the same command succeeds later
         ├── ServiceError     a service does not answer
         ├── WriteError       a file cannot be written: the disk is full, or a right is missing
+        ├── MachineFault     memory is short, a device fails, or a process was killed
+        ├── Unfinished       such faults left stations or chunks of pairs undone
         └── FolderInUse      another run holds the output folder
 
 Wrong arguments of a function are plain ``ValueError``. Each class below is also the built-in error
@@ -165,6 +167,43 @@ class WriteError(TryLater, OSError):
 
     def __str__(self) -> str:
         return f"{self.path}: cannot be written: {self.reason}"
+
+
+class MachineFault(TryLater, OSError):
+    """
+    Work failed for a reason that lies in the machine: short memory, a failing device or network.
+
+    Parameters
+    ----------
+    reason : str
+        What failed, naming the file if there is one.
+    """
+
+
+class Unfinished(TryLater):
+    """
+    Faults of the machine left some tasks undone; the same command goes on with them.
+
+    Parameters
+    ----------
+    *faults : str
+        Name of each task and what failed.
+    """
+
+    #: Tasks that the message names.
+    SHOWN = 10
+
+    def __init__(self, *faults: str) -> None:
+        super().__init__(*faults)
+        self.faults = faults
+
+    def __str__(self) -> str:
+        others = len(self.faults) - self.SHOWN
+        more = f" and {others} more" if others > 0 else ""
+        return (
+            f"unfinished: {'; '.join(self.faults[: self.SHOWN])}{more}; all else is kept, the "
+            "same command goes on where it stopped"
+        )
 
 
 class FolderInUse(TryLater, BlockingIOError):

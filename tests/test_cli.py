@@ -7,8 +7,10 @@ Covers ``per_obspy.commands.endings``, ``per_obspy.commands.printing`` and
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from importlib.metadata import version
 from pathlib import Path
 
@@ -194,3 +196,57 @@ def test_output_that_cannot_be_written_exits_with_75():
 
 def test_no_such_command_exits_with_2(call):
     assert call("fly")[0] == 2
+
+
+@pytest.mark.parametrize(
+    "command", ["run", "report", "screen", "process", "spectra", "simulate", "pairs find"]
+)
+def test_an_empty_output_is_refused(call, tmp_path, monkeypatch, command):
+    # would catch results all over the folder of the shell, from a variable that was never set
+    monkeypatch.chdir(tmp_path)
+    code, _, errors = call(*command.split(), "input", "-o", "")
+    assert code == 2
+    assert "the path is empty" in " ".join(errors.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())
+
+
+INTERRUPTED = """
+import sys
+import time
+from per_obspy import cli
+from per_obspy.jobs.parallel import Work, results
+notes = f"open({sys.argv[2]!r} + str(__import__('os').getpid()), 'w').close()"
+task = f"{notes} or __import__('time').sleep(100)"
+
+@cli.app.command()
+def sleep(folder: str) -> None:
+    list(results([task, task], eval_work(), 2, None))
+
+def eval_work():
+    return Work(eval, lambda *_: None)
+
+if __name__ == "__main__":
+    cli.main()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_the_interrupt_key_ends_a_run_in_one_word(tmp_path):
+    # would catch a traceback of every worker, and workers that go on
+    script = tmp_path / "sleeps.py"
+    script.write_text(INTERRUPTED)
+    at_work = tmp_path / "at_work"
+    at_work.mkdir()
+    command = [sys.executable, str(script), "sleep", str(at_work) + os.sep]
+    # The key of a terminal reaches the whole group, workers as well
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while len(list(at_work.iterdir())) < 2:
+        assert running.poll() is None
+        time.sleep(0.05)
+    os.killpg(running.pid, signal.SIGINT)
+    _, errors = running.communicate()
+    assert (running.returncode, errors) == (130, "interrupted\n")
+    for file in at_work.iterdir():
+        state = Path("/proc", file.name, "stat")
+        # a process that ended may wait as a zombie until its new parent asks for it
+        assert not state.exists() or state.read_text().rsplit(")", 1)[1].split()[0] == "Z"

@@ -4,7 +4,7 @@ import csv
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,20 @@ Strict = Annotated[
     bool,
     typer.Option("--strict", help="End with exit code 3 if rows of the pair tables were lost."),
 ]
+
+
+def named_path(text: str | Path) -> Path:
+    """Return a path that was given by name: an empty one would be the folder of the shell."""
+    if not str(text).strip():
+        raise typer.BadParameter("the path is empty: name a file or folder")
+    return Path(text)
+
+
+def output_option(meaning: str) -> Any:
+    """Return the option ``--output`` with what it names."""
+    return typer.Option("--output", "-o", help=meaning, parser=named_path, metavar="PATH")
+
+
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from per_obspy.commands.endings import WRONG_INPUT, AsJson, stop_if_nothing
+from per_obspy.commands.endings import WRONG_INPUT, AsJson, output_option, stop_if_nothing
 from per_obspy.commands.printing import print_table
 from per_obspy.errors import CatalogError, require_extra
 
@@ -54,9 +54,7 @@ def find_pairs(
     footprints: Annotated[
         Path, typer.Argument(help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile.")
     ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Pair table, .parquet or .csv.")
-    ] = Path("pairs.parquet"),
+    output: Annotated[Path, output_option("Pair table, .parquet or .csv.")] = Path("pairs.parquet"),
     distance: Annotated[
         float, typer.Option(min=0.001, max=10.0, help="Largest gap of a pair, m.")
     ] = 3.0,

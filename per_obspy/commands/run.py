@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, Strict, print_and_end, stop_if_nothing
+from per_obspy.commands.endings import AsJson, Strict, output_option, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 from per_obspy.files import printable
 from per_obspy.threads import usable_processors
@@ -49,9 +49,7 @@ PLOT_DAMPING = 0.05
 
 def run(
     configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the results.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
@@ -69,9 +67,7 @@ def run(
 
 def report(
     configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the results.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -88,9 +84,7 @@ def report(
 
 def simulate(
     scenario: Annotated[Path, typer.Argument(help="TOML file of the scenario.")],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder for MiniSEED, StationXML and QuakeML.")
-    ],
+    output: Annotated[Path, output_option("Folder for MiniSEED, StationXML and QuakeML.")],
 ) -> None:
     """
     Simulate the records of a scenario earthquake.
@@ -108,9 +102,7 @@ def simulate(
 
 def spectra(
     sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="netCDF file.")] = Path(
-        "spectra.nc"
-    ),
+    output: Annotated[Path, output_option("netCDF file.")] = Path("spectra.nc"),
     damping: Annotated[
         list[float] | None, typer.Option(help="Fraction of critical; repeat for several.")
     ] = None,
@@ -171,7 +163,7 @@ def _print_stations(
 
 def process(
     sources: Annotated[list[Path], typer.Argument(help="Waveform files, archives or folders.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")],
+    output: Annotated[Path, output_option("Folder of the results.")],
     event: Annotated[Path | None, typer.Option(help="QuakeML file; no event is fine.")] = None,
     settings: Annotated[
         Path | None, typer.Option(help="TOML file with a run's processing section.")

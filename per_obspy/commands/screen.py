@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from per_obspy.commands.endings import AsJson, Strict, print_and_end, stop_if_nothing, why_nothing
+from per_obspy.commands.endings import (
+    AsJson,
+    Strict,
+    output_option,
+    print_and_end,
+    stop_if_nothing,
+    why_nothing,
+)
 from per_obspy.commands.printing import print_table, shown_progress
 from per_obspy.commands.run import print_result
 
@@ -45,9 +52,7 @@ def screen(
     configuration: Annotated[
         Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")
     ],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the results.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     PlainSerializer,
     SerializationInfo,
@@ -21,6 +22,13 @@ from pydantic_core import ErrorDetails
 
 from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.files import looks_like
+
+
+def _named(path: object) -> object:
+    """Return a path that has a name: an empty one would be the folder of the configuration."""
+    if isinstance(path, str) and not path.strip():
+        raise ValueError("the path is empty: name a file or folder, '.' for this one")
+    return path
 
 
 def _from_folder(path: Path, info: ValidationInfo) -> Path:
@@ -40,7 +48,9 @@ def _moment(text: str) -> str:
 
 
 Moment = Annotated[str, AfterValidator(_moment)]
-RelativePath = Annotated[Path, AfterValidator(_from_folder), PlainSerializer(_to_folder)]
+RelativePath = Annotated[
+    Path, BeforeValidator(_named), AfterValidator(_from_folder), PlainSerializer(_to_folder)
+]
 
 
 class Section(BaseModel):

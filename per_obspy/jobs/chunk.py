@@ -21,7 +21,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
-from per_obspy.jobs.parallel import results
+from per_obspy.jobs.parallel import Work, results
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
@@ -108,6 +108,13 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
         Number of processes.
     executor : Executor or None
         Where to work instead.
+
+    Raises
+    ------
+    WriteError
+        If a part cannot be written.
+    Unfinished
+        After all other chunks, if the machine failed at some.
     """
     resumed = list[Part]()
 
@@ -122,7 +129,8 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
                 resumed.append(earlier)
 
     # Resumed parts are passed on as soon as the next one is finished
-    for part in results(missing(), do_chunk, _failed, workers, executor):
+    work = Work(do_chunk, _failed, _name)
+    for part in results(missing(), work, workers, executor):
         yield from resumed
         resumed.clear()
         yield part
@@ -204,6 +212,13 @@ def _earlier(job: ChunkJob) -> Part | None:
     if status is None or "rejected" not in status:
         return None
     return _part(job, bool(status["outputs"]), resumed=True)
+
+
+def _name(job: ChunkJob) -> str:
+    """Return the name of a chunk in messages: its file and the lines of its pairs."""
+    rows = job.chunk.rows
+    lines = f", lines {rows.lines.min()} to {rows.lines.max()}" if rows.lines.size else ""
+    return f"pairs of {rows.source}{lines}"
 
 
 def _failed(job: ChunkJob, reason: str) -> Part:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.config import Interpolation
-from per_obspy.errors import Rejection
+from per_obspy.errors import MachineFault, Rejection
 from per_obspy.files import bytes_hash, file_hash
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.records.shakemap import read_shakemap
@@ -153,5 +153,8 @@ def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
 @lru_cache(STATIONS_KEPT)
 def read_station_once(shard: Path, digest: str) -> xr.Dataset:
     """Return a station's Dataset with its motion; a changed shard has another hash."""
-    del digest
-    return read_spectra(shard, shard.read_bytes())
+    content = shard.read_bytes()
+    # Its pairs are not at fault, and the next run makes the shard again
+    if bytes_hash(content) != digest:
+        raise MachineFault(f"{shard}: changed while the run read it")
+    return read_spectra(shard, content)

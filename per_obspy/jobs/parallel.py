@@ -3,22 +3,34 @@ Independent tasks on several processes, or on any executor; none of them can sto
 
 The exception is a machine that cannot write: the first ``WriteError`` ends the work.
 
+A fault of the data is the result of its task. A fault of the machine (:mod:`per_obspy.machine`, or
+a worker that dies) is none: the task stays undone, and ``Unfinished`` is raised after all others.
+
 A task whose worker dies takes the whole pool with it. What was under way then is done again, each
 task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
 """
 
 import os
+import signal
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
 from functools import partial
 from itertools import chain, islice
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
-from typing import TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from per_obspy.errors import PerError, WriteError
+from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
+from per_obspy.machine import machine_fault, raise_machine_fault
 from per_obspy.threads import use_one_thread
 
 Task = TypeVar("Task")
@@ -30,6 +42,29 @@ Do = Callable[[Task], Result]
 #: Return the substitute for the result of a task that failed, given the reason.
 Failed = Callable[[Task, str], Result]
 
+
+class Work(NamedTuple, Generic[Task, Result]):
+    """
+    What is done with every task.
+
+    Attributes
+    ----------
+    do : callable
+        The work itself.
+    failed : callable
+        Substitute for the result of a task whose data are at fault.
+    name : callable
+        Name of a task in messages.
+    """
+
+    do: Do[Task, Result]
+    failed: Failed[Task, Result]
+    name: Callable[[Task], str] = str
+
+
+#: Reason of a task that takes its worker with it, also when it is alone.
+DIED = "its worker process was killed, perhaps for want of memory"
+
 #: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
 
@@ -39,8 +74,7 @@ AHEAD_ELSEWHERE = 64
 
 def results(
     tasks: Iterable[Task],
-    do: Do[Task, Result],
-    failed: Failed[Task, Result],
+    work: Work[Task, Result],
     workers: int,
     executor: Executor | None,
 ) -> Iterator[Result]:
@@ -51,8 +85,8 @@ def results(
     ----------
     tasks : iterable
         Tasks, which are taken while the work goes on.
-    do, failed : callable
-        Work of a task, and the substitute for its result if it fails.
+    work : Work
+        What is done with each of them.
     workers : int
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
@@ -62,29 +96,85 @@ def results(
     ------
     WriteError
         If a task cannot write its result; tasks that have not begun are cancelled.
+    Unfinished
+        After all other tasks, if the machine failed in some.
     """
+    faults = list[str]()
+    yield from _all_results(tasks, _Watched(work, faults), workers, executor)
+    if faults:
+        raise Unfinished(*faults)
+
+
+def _all_results(
+    tasks: Iterable[Task],
+    watched: "_Watched[Task, Result]",
+    workers: int,
+    executor: Executor | None,
+) -> Iterator[Result]:
+    """Yield the results of all tasks in which the machine does not fail."""
     if executor is not None:
-        unfinished = yield from _on(executor, tasks, do, failed, AHEAD_ELSEWHERE)
-        yield from (failed(task, "its worker process died") for task in unfinished)
+        for task in (yield from _on(executor, tasks, watched, AHEAD_ELSEWHERE)):
+            watched.note(task, DIED)
         return
     remaining = iter(tasks)
     first = list(islice(remaining, 2))
     if min(workers, len(first)) <= 1:
-        yield from (_caught(task, partial(do, task), failed) for task in chain(first, remaining))
+        for task in chain(first, remaining):
+            yield from watched.result(task, partial(watched.work.do, task))
         return
     remaining = chain(first, remaining)
     for head in remaining:  # a pool, and another one after each worker that died
-        with _pool(workers) as pool:
-            unfinished = yield from _on(pool, chain([head], remaining), do, failed, AHEAD * workers)
+        with _Pool(workers) as pool:
+            unfinished = yield from _on(pool, chain([head], remaining), watched, AHEAD * workers)
         for task in unfinished:
-            yield _alone(task, do, failed)
+            yield from _alone(task, watched)
+
+
+class _Watched(Generic[Task, Result]):
+    """Work whose errors become results, if they are faults of the data, or else faults."""
+
+    def __init__(self, work: Work[Task, Result], faults: list[str]) -> None:
+        self.work = work
+        self._faults = faults
+
+    def note(self, task: Task, reason: str) -> None:
+        """Note a task in which the machine failed."""
+        self._faults.append(f"{self.work.name(task)}: {reason}")
+
+    def result(self, task: Task, get: Callable[[], Result]) -> Iterator[Result]:
+        """
+        Yield the result of a task, or its substitute; nothing if the machine failed.
+
+        Only where the machine cannot write, the other tasks fail too, and all of them stop.
+        """
+        found: Result | None
+        try:
+            found = get()
+        except (BrokenExecutor, WriteError):
+            raise
+        except TryLater as error:
+            self.note(task, str(error))
+            return
+        except PerError as error:
+            found = self._substitute(task, error, str(error))
+        except Exception as error:  # noqa: BLE001 - any error is a result
+            found = self._substitute(task, error, f"{type(error).__name__}: {error}")
+        if found is not None:
+            yield found
+
+    def _substitute(self, task: Task, error: Exception, reason: str) -> Result | None:
+        """Return the result of a task that failed; None if that was a fault of the machine."""
+        fault = machine_fault(error)
+        if fault is None:
+            return self.work.failed(task, reason)
+        self.note(task, str(fault))
+        return None
 
 
 def _on(
     executor: Executor,
     tasks: Iterable[Task],
-    do: Do[Task, Result],
-    failed: Failed[Task, Result],
+    watched: _Watched[Task, Result],
     ahead: int,
 ) -> Generator[Result, None, list[Task]]:
     """Yield results until all tasks are done or the executor is broken; return its tasks then."""
@@ -96,8 +186,8 @@ def _on(
         room = 0 if unfinished else ahead - len(pending)
         for task in islice(remaining, room):
             try:
-                pending[executor.submit(do, task)] = task
-            except BrokenProcessPool:
+                pending[executor.submit(_done, watched.work.do, task)] = task
+            except BrokenExecutor:
                 unfinished.append(task)
                 break
         if not pending:
@@ -106,8 +196,8 @@ def _on(
         for future in wait(pending, return_when=FIRST_COMPLETED).done:
             task = pending.pop(future)
             try:
-                yield _caught(task, future.result, failed)
-            except BrokenProcessPool:
+                yield from watched.result(task, future.result)
+            except BrokenExecutor:
                 unfinished.append(task)
             except WriteError as error:
                 unwritten = error
@@ -118,22 +208,64 @@ def _on(
             raise unwritten
 
 
-def _alone(task: Task, do: Do[Task, Result], failed: Failed[Task, Result]) -> Result:
-    """Return the result of a task that has a process of its own."""
+def _done(do: Do[Task, Result], task: Task) -> Result:
+    """Do a task; what an error was raised from is lost on its way out of a process."""
     try:
-        with _pool(1) as pool:
-            return _caught(task, pool.submit(do, task).result, failed)
-    except BrokenProcessPool:
-        return failed(task, "its worker process died")
+        return do(task)
+    except TryLater:
+        raise
+    except Exception as error:
+        raise_machine_fault(error)
+        raise
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    """Return fresh processes: a fork of a process that has threads can hang."""
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
+    """Yield the result of a task that has a process of its own."""
+    try:
+        with _Pool(1) as pool:
+            future = pool.submit(_done, watched.work.do, task)
+            yield from watched.result(task, future.result)
+    except BrokenExecutor:
+        watched.note(task, DIED)
+
+
+class _Pool(ProcessPoolExecutor):
+    """Processes that end with an interrupt; fresh ones, for a fork beside threads can hang."""
+
+    def __init__(self, workers: int) -> None:
+        self._others = set(active_children())
+        super().__init__(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+
+    def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Submit a task; a process that is started for it does not see the interrupt key."""
+        with _interrupts_held():
+            return super().submit(do, *arguments, **named)
+
+    def __exit__(self, kind: type[BaseException] | None, *others: Any) -> bool | None:
+        """Wait for the workers; end them first if the work was interrupted."""
+        if kind is not None and not issubclass(kind, Exception):
+            for worker in set(active_children()) - self._others:
+                worker.terminate()
+        return super().__exit__(kind, *others)
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold back the interrupt key of the terminal, which reaches workers as well as the run."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker() -> None:
     """Prepare a worker process: one thread, and an end with the process that started it."""
+    # The run ends its workers itself; until here the interrupt key was held back
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     use_one_thread()
     _end_with_parent()
 
@@ -148,19 +280,3 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
-
-
-def _caught(task: Task, work: Callable[[], Result], failed: Failed[Task, Result]) -> Result:
-    """
-    Return the result; whatever is raised becomes a reason, so that no task stops the others.
-
-    Only where the machine cannot write, the other tasks fail too, and all of them stop.
-    """
-    try:
-        return work()
-    except (BrokenProcessPool, WriteError):
-        raise
-    except PerError as error:
-        return failed(task, str(error))
-    except Exception as error:  # noqa: BLE001 - where a worker returns, every task needs a result
-        return failed(task, f"{type(error).__name__}: {error}")

@@ -18,9 +18,10 @@ import numpy as np
 import xarray as xr
 
 from per_obspy.config import Processing, Spectra
-from per_obspy.errors import CatalogError, PerError, Rejection, WriteError
+from per_obspy.errors import CatalogError, PerError, Rejection, TryLater
 from per_obspy.files import bytes_hash, file_hash, remove_file
-from per_obspy.jobs.parallel import results
+from per_obspy.jobs.parallel import Work, results
+from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.chain import process_station
 from per_obspy.records.event_file import EventFile, portable
 from per_obspy.records.folder import read_station
@@ -166,10 +167,17 @@ def do_stations(
         Number of processes; one, or a single job, needs none but this.
     executor : Executor, optional
         Where to work instead, a cluster for example.
+
+    Raises
+    ------
+    WriteError
+        If a shard cannot be written.
+    Unfinished
+        After all other stations, if the machine failed at some.
     """
     missing = list[StationJob]()
     # A key that cannot be computed costs its own station only
-    for job in results(jobs, _prepared, _failed, 1, None):
+    for job in results(jobs, Work(_prepared, _failed, _name), 1, None):
         if isinstance(job, FinishedStation):
             yield job
             continue
@@ -178,7 +186,7 @@ def do_stations(
             missing.append(job)
         else:
             yield earlier
-    yield from results(missing, do_station, _failed, workers, executor)
+    yield from results(missing, Work(do_station, _failed, _name), workers, executor)
 
 
 def _prepared(job: StationJob) -> StationJob | FinishedStation:
@@ -209,9 +217,10 @@ def _products(job: StationJob) -> Products:
     try:
         stream, unread = job.reader(job.source, job.inventory, job.station)
         products = job.product(job, stream, job.event.event if job.event else None)
-    except WriteError:
+    except TryLater:
         raise  # no property of the station
     except PerError as error:
+        raise_machine_fault(error)
         reasons = getattr(error, "reasons", None) or (str(error),)
         return Products((Rejection("station", job.station, source, None, tuple(reasons)),))
     # Records that name no file came from all files of the station
@@ -318,6 +327,11 @@ def earlier_station(status_file: Path) -> FinishedStation:
     if station is None:
         raise CatalogError(str(shard), "damaged: not as the run left it")
     return station
+
+
+def _name(job: StationJob) -> str:
+    """Return the name of a station in messages."""
+    return f"station {job.station}"
 
 
 def _failed(job: StationJob, reason: str) -> FinishedStation:

@@ -1,5 +1,9 @@
 """The one place where compiler options are chosen."""
 
+import logging
+from collections.abc import Callable
+from functools import lru_cache
+from multiprocessing import parent_process
 from typing import Any
 
 import numba
@@ -19,12 +23,39 @@ OPTIONS: dict[str, Any] = {
     "boundscheck": False,
 }
 
-kernel = numba.njit(**OPTIONS)
+
+def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles with some options, stored on disk where that is possible."""
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        try:
+            return numba.njit(**OPTIONS, **options)(function)
+        except RuntimeError as error:
+            # Neither the package's folder nor that of the user can be written
+            if "no locator available" not in str(error):
+                raise
+            _warn_without_cache()
+            return numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+
+    return compiled
+
+
+@lru_cache(1)
+def _warn_without_cache() -> None:
+    """Warn once, in the process that starts the others, that every run compiles anew."""
+    if parent_process() is None:
+        logging.getLogger("per_obspy").warning(
+            "per-obspy: compiled kernels cannot be stored, every start compiles them again for "
+            "about a minute: set NUMBA_CACHE_DIR to a folder that can be written"
+        )
+
+
+kernel = _compiler()
 
 #: For kernels that allocate no memory: without reference counts, which cost short kernels more
 #: than arithmetic.
-lean = numba.njit(**(OPTIONS | {"_nrt": False}))
+lean = _compiler(_nrt=False)
 
 #: For small kernels of inner loops, which the compiler otherwise leaves out of line as soon as
 #: their callers grow.
-inlined = numba.njit(**(OPTIONS | {"_nrt": False, "forceinline": True}))
+inlined = _compiler(_nrt=False, forceinline=True)

@@ -19,10 +19,16 @@ def number_of_rows(record: Path) -> int | None:
     Returns
     -------
     int or None
-        None if there is no record, or if it cannot be read.
+        That of the run before, if this one is unfinished; None if there is no record, or if it
+        cannot be read.
     """
     try:
-        return _rows(json.loads(record.read_text(encoding="utf-8"))["counts"])
+        content = json.loads(record.read_text(encoding="utf-8"))
+        # An unfinished run keeps the number of the one before it
+        if "counts" not in content:
+            earlier: int | None = content["earlier_rows"]
+            return earlier
+        return _rows(content["counts"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -2,8 +2,8 @@
 One run, from records to report, or one of its stages alone.
 
 Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
-``run.json`` is removed first and written last: where it is, the other results are complete,
-and a run of the same inputs does nothing.
+The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
+only then the other results are complete, and a run of the same inputs does nothing.
 """
 
 import json
@@ -46,12 +46,21 @@ from per_obspy.pipeline.stations import (
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records, hash_if_readable, input_files
-from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.resume import (
+    StatusError,
+    changed_outputs,
+    earlier_status,
+    read_status,
+    write_status,
+)
 from per_obspy.screening.warmup import compile_screening
 from per_obspy.tables.station_summary import StationSummary, write_stations
 
-#: Written last.
+#: Written first as unfinished, and last as it ends.
 RECORD = "run.json"
+
+#: State of a run that is under way, was killed, or met a fault of the machine; and its stages.
+UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
 
 #: Stage that the first run waits for.
 COMPILING = "loading kernels (the first run compiles them for a minute)"
@@ -89,6 +98,10 @@ def run(
         another run holds the output folder.
     ServiceError
         If services fail and no record is at hand.
+    WriteError
+        If the machine cannot write: the run stays unfinished.
+    Unfinished
+        If the machine failed at some stations or chunks of pairs, after all others of this stage.
     """
     configuration = configuration.resolve()
     settings = _settings(configuration)
@@ -104,7 +117,7 @@ def run(
 
         # Otherwise they are hashed while their headers are read
         check_inputs(settings)
-        earlier_rows = _forget(folder)
+        earlier_rows = _begun(folder, settings, STATIONS)
         seconds, started = dict[str, float](), now()
         with _timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
@@ -130,9 +143,10 @@ def screen(
     settings = _settings(configuration)
     folder = (output or settings.output).resolve()
     with locked_folder(folder):
+        _require_stations(folder)
         stations = stations_of_earlier_run(folder)
         check_inputs(settings)
-        earlier_rows = _forget(folder)
+        earlier_rows = _begun(folder, settings, SCREENING)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
         head = _head(settings, configuration, None, {})
@@ -222,6 +236,7 @@ def _all_stages(
     with _timed(seconds, "stations"), _compiling(progress):
         progress("stations", 0, len(found.jobs))
         stations = finished_stations(found.jobs, settings.workers, executor, progress)
+    _begun(folder, settings, SCREENING)
     # From here on no record is needed
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
@@ -230,11 +245,27 @@ def _all_stages(
     return {**record, "seconds": seconds | record["seconds"]}
 
 
-def _forget(folder: Path) -> int | None:
-    """Remove the record of an earlier run, and return the number of rows of its pair tables."""
+def _begun(folder: Path, settings: Run, stage: str) -> int | None:
+    """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
-    remove_file(folder / RECORD)
+    begun = {"name": settings.name, "state": UNFINISHED, "stage": stage, "earlier_rows": rows}
+    write_status(folder / RECORD, "", {}, begun, indent=1)
+    # A table of an earlier run would be taken for one of this run
+    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
+        remove_file(folder / name)
     return rows
+
+
+def _require_stations(folder: Path) -> None:
+    """Raise ``CatalogError`` if the latest run has not finished its stations."""
+    try:
+        record = read_status(folder / RECORD)
+    except StatusError:
+        return
+    if (record.get("state"), record.get("stage")) == (UNFINISHED, STATIONS):
+        raise CatalogError(
+            str(folder / RECORD), "the run is unfinished: some stations are missing, run again"
+        )
 
 
 def _finished_record(
@@ -260,11 +291,8 @@ def _later_stages(
     progress: Progress,
 ) -> dict[str, Any]:
     """Do the stages after the stations and return their part of ``run.json``."""
-    # Files of an earlier table would not agree with the stations
     seconds, usable = dict[str, float](), _usable(stations)
-    # A table of an earlier run would be taken for one of this run
-    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        remove_file(folder / name)
+    # The risk table, then everything that is read from it
     with _timed(seconds, "screening"):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
@@ -345,6 +373,9 @@ def _finished(file: Path) -> dict[str, Any]:
         record = read_status(file)
     except StatusError as error:
         raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+    if record.get("state") == UNFINISHED:
+        raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
+    # Other results are written again
     names = ("risk.parquet", "spectra.nc")
     needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
     changed = changed_outputs(file, {**record, "outputs": needed})
@@ -361,9 +392,11 @@ def _compiling(progress: Progress) -> Iterator[None]:
     try:
         yield
         progress(COMPILING, 0, 1)
-    finally:
-        # A thread that is alive when the interpreter ends can abort it
+    except Exception:
+        # A thread that is alive when the interpreter ends can abort it; an interrupt does not wait
         thread.join()
+        raise
+    thread.join()
     progress(COMPILING, 1, 1)
 
 

@@ -27,6 +27,7 @@ from per_obspy.formats.text.station_table import (
     read_station_table,
     read_station_text,
 )
+from per_obspy.machine import raise_machine_fault
 from per_obspy.records.archives import IRREGULAR, LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
@@ -374,6 +375,8 @@ def _is_needed(rejection: Rejection) -> bool:
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
+    """Return the row of an unusable file; raise ``MachineFault`` if the machine cannot read it."""
+    raise_machine_fault(rejection)
     return Rejection("file", path.name, str(path), None, rejection.reasons)
 
 

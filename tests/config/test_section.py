@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.config import Ensemble, Run, Simulation, load, screening_kind
+from per_obspy.config import Ensemble, Run, Simulation, checked, load, screening_kind
 from per_obspy.errors import CatalogError
 
 GOOD = 'name = "x"\noutput = "out"\n[records]\nfolder = "in"\n[pairs]\nfile = "pairs.csv"\n'
@@ -241,3 +241,9 @@ def test_the_demo_scenario_is_what_the_readme_says():
         simulation.scenario.seed,
     ) == (7.0, 24, 20)
     assert simulation.pairs.count == 2000
+
+
+def test_an_empty_path_is_refused():
+    # would catch results in the folder of the configuration itself
+    with pytest.raises(CatalogError, match="output: the path is empty: name a file or folder"):
+        checked(Run, {"name": "a", "output": "", "simulation": "b.toml"})

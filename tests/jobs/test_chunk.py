@@ -1,10 +1,12 @@
 """Chunks as jobs: each has a part or reasons, a key, and faults that cost one pair only."""
 
+import errno
 import json
 
 import pytest
 
 from per_obspy.config import Building, Interpolation, Screening
+from per_obspy.errors import Unfinished
 from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs import chunk
 from per_obspy.jobs.chunk import ChunkJob, do_chunks, rejections
@@ -94,16 +96,38 @@ def test_a_pair_that_cannot_be_computed_costs_no_other(make_jobs, monkeypatch):
     assert len(found) == 7
 
 
-def test_a_chunk_whose_work_failed_is_done_by_the_next_run(make_jobs, monkeypatch):
-    def fails(_):
-        raise MemoryError("no more")
+def _is_broken(_):
+    raise RuntimeError("no luck")
 
+
+def test_a_chunk_whose_work_failed_is_done_by_the_next_run(make_jobs, monkeypatch):
     # each row has the reason, and the status is not valid
-    monkeypatch.setattr(chunk, "do_chunk", fails)
+    monkeypatch.setattr(chunk, "do_chunk", _is_broken)
     found = reasons(done(make_jobs()))
-    assert set(found.values()) == {("MemoryError: no more",)}
+    assert set(found.values()) == {("RuntimeError: no luck",)}
     assert len(found) == 7
     monkeypatch.undo()
     parts = done(make_jobs())
     assert not any(part.resumed for part in parts)
     assert json.loads(parts[0].status.read_text())["key"]
+
+
+MACHINE = [MemoryError("no more"), OSError(errno.EIO, "Input/output error", "S1.nc")]
+
+
+@pytest.mark.parametrize("error", MACHINE)
+def test_a_chunk_at_which_the_machine_failed_has_no_result(make_jobs, monkeypatch, error):
+    # would catch 100 000 pairs that are rejected because memory was short
+    computed = chunk.do_chunk
+
+    def fails_for_one(job):
+        if job.number == 1:
+            raise error
+        return computed(job)
+
+    monkeypatch.setattr(chunk, "do_chunk", fails_for_one)
+    with pytest.raises(Unfinished, match=r"pairs.csv, lines 5 to 7: ") as unfinished:
+        done(make_jobs())
+    assert len(unfinished.value.faults) == 1
+    monkeypatch.undo()
+    assert [part.resumed for part in done(make_jobs())] == [True, False, True]

@@ -8,8 +8,9 @@ import pytest
 import xarray as xr
 
 from per_obspy.config import Processing, Scenario, Spectra
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, Unfinished
 from per_obspy.jobs import station as jobs
+from per_obspy.jobs.parallel import DIED
 from per_obspy.jobs.station import StationJob, do_stations, earlier_station
 from per_obspy.records.event_file import read_event_file
 from per_obspy.records.folder import read_station
@@ -155,12 +156,13 @@ class Poison:
 def test_a_worker_that_dies_takes_only_its_station_with_it(tmp_path):
     batch = [empty_job(f"XX.S{number}", tmp_path) for number in range(4)]
     batch[2] = batch[2]._replace(reader=partial(read_station, Poison()))
-    stations = {station.station: station for station in do_stations(batch, workers=2)}
-    # every station has a result, and only the guilty one died
-    assert set(stations) == {job.station for job in batch}
-    died = [name for name, station in stations.items() if "died" in str(station.rejected)]
-    assert died == ["XX.S2"]
-    assert stations["XX.S2"].rejected[0].reasons == ("its worker process died",)
+    stations = list[str]()
+    with pytest.raises(Unfinished) as unfinished:
+        stations.extend(station.station for station in do_stations(batch, workers=2))
+    # the guilty one has no result that a later run could take for one
+    assert unfinished.value.faults == (f"station XX.S2: {DIED}",)
+    assert sorted(stations) == ["XX.S0", "XX.S1", "XX.S3"]
+    assert not batch[2].shard.with_suffix(".json").exists()
 
 
 def _raises(job):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numba import config
+from numba.core import caching
 
 from per_obspy.kernels import _jit
 
@@ -61,3 +62,23 @@ def test_sums_keep_their_order():
     for value in values.tolist():
         expected += value
     assert total(values) == expected
+
+
+@compiled
+def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_warns(
+    monkeypatch, caplog
+):
+    # would catch a read-only installation without a home, in which no module can be imported
+    monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    _jit._warn_without_cache.cache_clear()
+    for decorator in DECORATORS:
+
+        @decorator
+        def double(value):
+            return 2.0 * value
+
+        assert double(1.5) == 3.0
+        assert double.targetoptions["nogil"]
+    (message,) = caplog.messages
+    assert "set NUMBA_CACHE_DIR to a folder that can be written" in message
+    assert "\n" not in message

@@ -196,7 +196,7 @@ def test_a_killed_run_goes_on_where_it_stopped(copied, monkeypatch):
     monkeypatch.setattr(jobs, "do_station", dies_at_the_third)
     with pytest.raises(KeyboardInterrupt):
         run(copied / "run.toml", executor=InProcess())
-    assert not (copied / "out" / "run.json").exists()
+    assert json.loads((copied / "out" / "run.json").read_text())["state"] == "unfinished"
     monkeypatch.undo()
     result = run(copied / "run.toml", executor=InProcess())
     assert result.record["counts"]["stations_resumed"] == 2
