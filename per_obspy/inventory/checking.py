@@ -29,6 +29,9 @@ LARGEST_SEPARATION = 1000.0
 #: contact heights computed.
 CONTACT_TOLERANCE = 1e-3
 
+#: The only column of numbers that may hold truth values: whether pounding was seen.
+OBSERVED = "observed"
+
 #: Position of a row in the table, and what is wrong with it.
 Fault = tuple[int, str]
 
@@ -173,17 +176,32 @@ def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
 
 def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]]:
     """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
-    # Cells that were read as numbers
-    if pd.api.types.is_numeric_dtype(values.dtype):
+    # Cells that were read as numbers; what was seen may be true or false
+    is_truth = pd.api.types.is_bool_dtype(values.dtype)
+    if is_number(values.dtype) or (is_truth and column.name == OBSERVED):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
     # Cells that are still text
     empty = _is_empty(values)
-    converted = pd.to_numeric(values.astype(str).mask(empty), errors="coerce")
+    converted = plain_numbers(values.mask(empty))
     number = converted.to_numpy(dtype=np.float64, na_value=np.nan)
     wrong = _rows(np.isnan(number) & ~empty)
     faults = [(i, f"{column.name} = {str(values.iloc[i])!r:.40} is not a number") for i in wrong]
     return number, faults + _missing(column, empty) + _out_of_range(column, number)
+
+
+def is_number(kind: object) -> bool:
+    """Return whether a column's type is that of real numbers: truth values and dates are none."""
+    is_other = pd.api.types.is_bool_dtype(kind) or pd.api.types.is_complex_dtype(kind)
+    return pd.api.types.is_numeric_dtype(kind) and not is_other
+
+
+def plain_numbers(values: pd.Series) -> pd.Series:
+    """Return cells as numbers, NaN where they are none; truth values and dates are none."""
+    if is_number(values.dtype):
+        return values
+    # As text, as pandas takes dates for nanoseconds and truth values for 0 and 1
+    return pd.to_numeric(values.astype(str).mask(values.isna()), errors="coerce")
 
 
 def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.files import written_whole
+from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.report.style import STATE_COLOURS
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
@@ -45,7 +46,7 @@ def write_pairs_layer(
     facts : mapping of str to str
         Facts that hold for all rows, for example whether the motion is simulated.
     """
-    with written_whole(path) as part:
+    with written_whole(path) as whole, literal_path(whole) as part:
         for number, table in enumerate(tables):
             points = shapely.points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
             _write(part, PAIRS, points, table, number > 0, facts)
@@ -77,7 +78,7 @@ def write_totals_layer(
         shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())
     else:
         shapes = np.array([shapely.Polygon(corners) for corners in outlines], dtype=object)
-    with written_whole(path) as part:
+    with written_whole(path) as whole, literal_path(whole) as part:
         _write(part, TOTALS, shapes, totals, False, facts)
 
 

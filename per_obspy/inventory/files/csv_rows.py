@@ -19,6 +19,7 @@ from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.csv_lines import LONGEST_NAME, header_names, row_lines
 from per_obspy.inventory.files.csv_text import check_separator, check_text
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
+from per_obspy.inventory.files.text_cells import given_text, given_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 
@@ -34,7 +35,7 @@ class CsvFile:
         self._lines = check_text(file)
         names = header_names(file)
         check_separator(file, names)
-        self.names: Sequence[str] = [name.strip() for name in names]
+        self.names: Sequence[str] = [given_text(name.strip()) for name in names]
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise CatalogError(str(file), f"column {twice} stands more than once")
@@ -56,7 +57,7 @@ class CsvFile:
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
         for block in self._blocks([IDENTIFIER]):
-            yield block.table.column(0).combine_chunks()
+            yield given_texts(block.table.column(0)).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows; lines without any content are left out."""
@@ -70,9 +71,9 @@ class CsvFile:
         """Return a column as numbers if every cell is one, else as text for the checks to come."""
         if name not in COLUMNS:
             kind = self._number_types[name]
-            return cells if kind is None else _as_numbers(cells, kind)
+            return given_texts(cells) if kind is None else _as_numbers(cells, kind)
         if COLUMNS[name].dtype == "str":
-            return cells
+            return given_texts(cells)
         return _as_numbers(cells, pa.float64()) or cells
 
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:

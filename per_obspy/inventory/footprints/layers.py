@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
+from per_obspy.inventory.footprints.gdal_paths import literal_path
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow.
 GDAL_KINDS = {
@@ -86,7 +87,7 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     _require_outlines(file, raw.geometries)
     # Longitude and latitude of every feature
     crs = _reference_system(file, raw.crs)
-    degrees = _in_degrees(shapely.force_2d(raw.geometries), crs)
+    degrees = _in_degrees(file, shapely.force_2d(raw.geometries), crs)
     # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates are
     # degrees
     stray = _on_earth(raw.geometries) & bool(crs.is_projected)
@@ -137,9 +138,12 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
     """Read a layer with GDAL."""
     try:
         # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
-            name = _layer_name(file, layer)
-            meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
+        with (
+            warnings.catch_warnings(action="ignore", category=RuntimeWarning),
+            literal_path(file) as path,
+        ):
+            name = _layer_name(file, path, layer)
+            meta, _, geometries, fields = pyogrio.raw.read(path, layer=name, force_2d=False)
     except (
         pyogrio.errors.DataSourceError,
         pyogrio.errors.DataLayerError,
@@ -152,9 +156,9 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
     return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, meta["crs"])
 
 
-def _layer_name(file: Path, layer: str | None) -> str:
-    """Return the requested layer, or the only one with geometries."""
-    kinds = {str(name): kind for name, kind in pyogrio.list_layers(file)}
+def _layer_name(file: Path, path: Path, layer: str | None) -> str:
+    """Return the requested layer of a path, or the only one with geometries."""
+    kinds = {str(name): kind for name, kind in pyogrio.list_layers(path)}
     if layer is not None:
         if layer not in kinds:
             raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")
@@ -172,7 +176,7 @@ def _layer_name(file: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> _Raw:
     """Read a GeoParquet file."""
     try:
-        table = pa.parquet.read_table(file)
+        table = pa.parquet.read_table(file.absolute())
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     # GeoParquet is described by JSON in the metadata
@@ -207,19 +211,30 @@ def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str
 
 
 def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
-    """Return the coordinate reference system of a layer."""
+    """Return the coordinate reference system of a layer, if it is one of the horizontal."""
     if crs is None:
         raise CatalogError(str(file), "no coordinate reference system (a Shapefile needs its .prj)")
     try:
-        return pyproj.CRS.from_user_input(crs)
-    except pyproj.exceptions.CRSError as error:
+        found = pyproj.CRS.from_user_input(crs)
+    except (pyproj.exceptions.CRSError, TypeError, ValueError, AttributeError) as error:
         problem = f"unknown coordinate reference system {str(crs)!r:.60}"
         raise CatalogError(str(file), problem) from error
+    # Heights, local systems of a building site and positions from the centre of the Earth
+    if not (found.is_geographic or found.is_projected):
+        problem = (
+            f"the coordinate reference system {found.name!r:.60} has no longitude and latitude"
+        )
+        raise CatalogError(str(file), f"{problem}: a geographic or projected one is expected")
+    return found
 
 
-def _in_degrees(geometries: Geometries, crs: pyproj.CRS) -> Geometries:
+def _in_degrees(file: Path, geometries: Geometries, crs: pyproj.CRS) -> Geometries:
     """Return geometries in longitude and latitude."""
-    transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
+    try:
+        transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
+    except pyproj.exceptions.ProjError as error:
+        problem = f"the coordinate reference system {crs.name!r:.60} cannot be turned into WGS 84"
+        raise CatalogError(str(file), problem) from error
     return np.asarray(
         shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
     )
