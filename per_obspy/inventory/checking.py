@@ -5,9 +5,10 @@ Each check works on whole columns. A row with a fault becomes a
 :class:`~per_obspy.errors.Rejection`; the other rows are accepted.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from typing import Self
+from unicodedata import category
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,9 @@ LARGEST_SEPARATION = 1000.0
 #: A contact height may exceed the lower building by this much, m: heights are often rounded,
 #: contact heights computed.
 CONTACT_TOLERANCE = 1e-3
+
+#: Longest name of a column, characters.
+LONGEST_NAME = 200
 
 #: The only column of numbers that may hold truth values: whether pounding was seen.
 OBSERVED = "observed"
@@ -111,9 +115,15 @@ def check_columns(names: Sequence[str], source: str) -> None:
     CatalogError
         If a required column is missing or a column occurs twice.
     """
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise CatalogError(source, f"column {twice[0]} stands more than once")
+    counts = Counter(names)
+    for name in names:
+        if len(name) > LONGEST_NAME:
+            problem = f"column {name[:20]}... has a name of {len(name)} characters"
+            raise CatalogError(source, f"{problem}, at most {LONGEST_NAME} are allowed")
+        if any(category(letter) in ("Cc", "Cs") for letter in name):
+            raise CatalogError(source, f"column {name!r} has a control character in its name")
+        if counts[name] > 1:
+            raise CatalogError(source, f"column {name} stands more than once")
     # Required columns, and groups of which one column is enough
     required = [column.name for column in COLUMNS.values() if column.required]
     missing = [name for name in required if name not in names]

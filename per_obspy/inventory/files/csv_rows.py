@@ -36,9 +36,6 @@ class CsvFile:
         names = header_names(file)
         check_separator(file, names)
         self.names: Sequence[str] = [given_text(name.strip()) for name in names]
-        if len(set(self.names)) < len(self.names):
-            twice = next(name for name in self.names if self.names.count(name) > 1)
-            raise CatalogError(str(file), f"column {twice} stands more than once")
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
+from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
 from per_obspy.inventory.checking import OBSERVED
 from per_obspy.inventory.files.csv_rows import CsvFile
+from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
 
 #: Prefix that pandas gives to a column of row numbers.
@@ -33,7 +35,8 @@ class ParquetFile:
         """Yield the identifiers of the pairs, block by block."""
         with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
             for batch in stored.iter_batches(columns=[IDENTIFIER]):
-                yield batch.column(0).cast(pa.string())
+                names, _ = plain_columns(pa.Table.from_batches([batch]))
+                yield names.column(0).cast(pa.string()).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows."""
@@ -42,9 +45,19 @@ class ParquetFile:
             for batch in stored.iter_batches(batch_size=size, columns=self.names):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
-                table = _with_numbers(pa.Table.from_batches([batch]))
-                yield RawRows(str(self.file), table, lines, ())
+                table, faults = plain_columns(pa.Table.from_batches([batch]))
+                broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
+                good = np.isin(np.arange(batch.num_rows), list(faults), invert=True)
+                rows = _with_numbers(table).filter(pa.array(good))
+                yield RawRows(str(self.file), rows, lines[good], tuple(broken))
                 line += batch.num_rows
+
+    def _rejection(
+        self, table: pa.Table, lines: NDArray[np.int64], row: int, fault: str
+    ) -> Rejection:
+        """Return the rejection of a row."""
+        name = str(table[IDENTIFIER][row].as_py())
+        return Rejection("pair", name, str(self.file), int(lines[row]), (fault,))
 
     @contextmanager
     def _readable(self) -> Iterator[None]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
+from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.footprints.gdal_paths import literal_path
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow.
@@ -26,6 +27,7 @@ GDAL_KINDS = {
     ".shp": "Shapefile",
     ".fgb": "FlatGeobuf file",
 }
+JSON_SUFFIXES = (".geojson", ".json")
 PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 
 Geometries = NDArray[np.object_]
@@ -153,7 +155,28 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
         raise CatalogError(str(file), problem) from error
     columns = dict(zip(meta["fields"], fields, strict=True))
     attributes = pd.DataFrame(columns, index=range(len(geometries)))
-    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, meta["crs"])
+    is_json = file.suffix.lower() in JSON_SUFFIXES
+    crs = (_declared_system(file) if is_json else None) or meta["crs"]
+    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, crs)
+
+
+def _declared_system(file: Path) -> str | None:
+    """Return the coordinate reference system of a GeoJSON file, for which GDAL may take WGS 84."""
+    text = file.read_bytes()
+    if b'"crs"' not in text:
+        return None
+    try:
+        declared = json.loads(text).get("crs")
+    except (ValueError, AttributeError, RecursionError) as error:
+        raise CatalogError(str(file), f"not a GeoJSON file: {error}") from error
+    if declared is None:
+        return None
+    # The name of the older standard, or its form with a code
+    try:
+        properties = declared["properties"]
+        return str(properties["name"] if "name" in properties else f"EPSG:{properties['code']}")
+    except (KeyError, TypeError):
+        return json.dumps(declared)
 
 
 def _layer_name(file: Path, path: Path, layer: str | None) -> str:
@@ -186,8 +209,10 @@ def _read_geoparquet(file: Path) -> _Raw:
             str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints"
         )
     name, geometries, crs = _geometry_column(file, table, described)
-    attributes = table.drop_columns([name]).replace_schema_metadata(None).to_pandas()
-    return _Raw(geometries, attributes, crs)
+    attributes, faults = plain_columns(table.drop_columns([name]).replace_schema_metadata(None))
+    for row, fault in faults.items():
+        raise CatalogError(str(file), f"feature {row + 1}: {fault}")
+    return _Raw(geometries, attributes.to_pandas(), crs)
 
 
 def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str, Geometries, Any]:
@@ -221,10 +246,8 @@ def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
         raise CatalogError(str(file), problem) from error
     # Heights, local systems of a building site and positions from the centre of the Earth
     if not (found.is_geographic or found.is_projected):
-        problem = (
-            f"the coordinate reference system {found.name!r:.60} has no longitude and latitude"
-        )
-        raise CatalogError(str(file), f"{problem}: a geographic or projected one is expected")
+        problem = f"coordinate reference system {found.name!r:.60} is of another kind"
+        raise CatalogError(str(file), f"{problem}, expected a geographic or projected one")
     return found
 
 
@@ -233,7 +256,7 @@ def _in_degrees(file: Path, geometries: Geometries, crs: pyproj.CRS) -> Geometri
     try:
         transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
     except pyproj.exceptions.ProjError as error:
-        problem = f"the coordinate reference system {crs.name!r:.60} cannot be turned into WGS 84"
+        problem = f"coordinate reference system {crs.name!r:.60} cannot be turned into WGS 84"
         raise CatalogError(str(file), problem) from error
     return np.asarray(
         shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
