@@ -45,6 +45,8 @@ def print_and_end(
         print(json.dumps({**known, **result.record}))
     else:
         show(result)
+    for fault in result.record.get("faults", []):
+        print(f"per-obspy: {fault}", file=sys.stderr)
     # Losses are for people and for jobs that nobody watches
     lost = result.record.get("losses", [])
     for sentence in lost:

@@ -188,7 +188,7 @@ def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]
     """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
     # Cells that were read as numbers; what was seen may be true or false
     is_truth = pd.api.types.is_bool_dtype(values.dtype)
-    if is_number(values.dtype) or (is_truth and column.name == OBSERVED):
+    if is_number(values) or (is_truth and column.name == OBSERVED):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
     # Cells that are still text
@@ -200,15 +200,16 @@ def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]
     return number, faults + _missing(column, empty) + _out_of_range(column, number)
 
 
-def is_number(kind: object) -> bool:
+def is_number(values: pd.Series) -> bool:
     """Return whether a column's type is that of real numbers: truth values and dates are none."""
+    kind = values.dtype
     is_other = pd.api.types.is_bool_dtype(kind) or pd.api.types.is_complex_dtype(kind)
     return pd.api.types.is_numeric_dtype(kind) and not is_other
 
 
 def plain_numbers(values: pd.Series) -> pd.Series:
     """Return cells as numbers, NaN where they are none; truth values and dates are none."""
-    if is_number(values.dtype):
+    if is_number(values):
         return values
     # As text, as pandas takes dates for nanoseconds and truth values for 0 and 1
     return pd.to_numeric(values.astype(str).mask(values.isna()), errors="coerce")
