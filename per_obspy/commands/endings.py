@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from per_obspy.files import printable
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -62,4 +64,4 @@ def why_nothing(rejected: Path) -> str:
     with rejected.open(encoding="utf-8", newline="") as file:
         first = next(csv.DictReader(file), None)
     example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
-    return f"nothing usable was left: see {rejected}{example}"
+    return printable(f"nothing usable was left: see {rejected}{example}")

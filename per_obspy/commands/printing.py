@@ -19,7 +19,7 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
     from rich.text import Text
 
     # Text of data is literal: no [red], no :smile:
-    table = Table(title=Text(title), title_justify="left")
+    table = Table(title=Text(printable(title)), title_justify="left")
     for column in columns:
         table.add_column(Text(printable(column)), overflow="fold")
     for row in rows:

@@ -35,7 +35,9 @@ class CsvFile:
         self._lines = check_text(file)
         names = header_names(file)
         check_separator(file, names)
-        self.names: Sequence[str] = [given_text(name.strip()) for name in names]
+        self._columns = [given_text(name.strip()) for name in names]
+        # Spreadsheets leave columns without a name
+        self.names: Sequence[str] = [name for name in self._columns if name]
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:
@@ -76,12 +78,12 @@ class CsvFile:
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
         """Yield these columns as text, some thousands of rows at a time, and the broken lines."""
         # Columns by their position, as names may be anything
-        columns = [str(position) for position in range(len(self.names))]
-        chosen = [columns[self.names.index(name)] for name in names]
+        columns = [str(position) for position in range(len(self._columns))]
+        chosen = [columns[self._columns.index(name)] for name in names]
         options = pa.csv.ConvertOptions(
             column_types=dict.fromkeys(chosen, pa.string()), include_columns=chosen
         )
-        for rows in row_lines(self.file, self.names, self._lines):
+        for rows in row_lines(self.file, self._columns, self._lines):
             table, skipped = _parsed(rows.text, columns, options)
             lines = np.delete(rows.numbers, list(skipped))
             # Lines with too few or too many cells

@@ -203,3 +203,12 @@ def test_whole_file_faults_come_before_the_first_chunk(tmp_path):
         PairInventory([empty])
     with pytest.raises(CatalogError, match="no such file"):
         PairInventory([tmp_path / "nothing.csv"])
+
+
+def test_columns_without_a_name_are_left_out(tmp_path):
+    # spreadsheets write them after the last one
+    path = tmp_path / "pairs.csv"
+    path.write_text(f"{HEADER},, \n{_row('a')},,x\n{_row('b')},,\n")
+    table, rejected = _in_chunks([path], 10)
+    assert table.columns.tolist() == HEADER.split(",")
+    assert (table["pair_id"].tolist(), rejected) == (["a", "b"], [])
