@@ -115,15 +115,7 @@ def check_columns(names: Sequence[str], source: str) -> None:
     CatalogError
         If a required column is missing or a column occurs twice.
     """
-    counts = Counter(names)
-    for name in names:
-        if len(name) > LONGEST_NAME:
-            problem = f"column {name[:20]}... has a name of {len(name)} characters"
-            raise CatalogError(source, f"{problem}, at most {LONGEST_NAME} are allowed")
-        if any(category(letter) in ("Cc", "Cs") for letter in name):
-            raise CatalogError(source, f"column {name!r} has a control character in its name")
-        if counts[name] > 1:
-            raise CatalogError(source, f"column {name} stands more than once")
+    _check_names(names, source)
     # Required columns, and groups of which one column is enough
     required = [column.name for column in COLUMNS.values() if column.required]
     missing = [name for name in required if name not in names]
@@ -135,6 +127,20 @@ def check_columns(names: Sequence[str], source: str) -> None:
         raise CatalogError(
             source, f"missing column {absent} (columns found: {found:.200}){suggestion}"
         )
+
+
+def _check_names(names: Sequence[str], source: str) -> None:
+    """Raise CatalogError if a name is too long, has a control character, or occurs twice."""
+    counts = Counter(names)
+    for name in names:
+        if len(name) > LONGEST_NAME:
+            problem = f"column {name[:20]}... has a name of {len(name)} characters"
+            raise CatalogError(source, f"{problem}, at most {LONGEST_NAME} are allowed")
+        # Line breaks, tabulators and the like
+        if any(category(letter) in ("Cc", "Cs") for letter in name):
+            raise CatalogError(source, f"column {name!r} has a control character in its name")
+        if counts[name] > 1:
+            raise CatalogError(source, f"column {name} stands more than once")
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:

@@ -167,6 +167,7 @@ def write_worst(table: Path, rows: int, path: Path) -> None:
         written_whole(path) as part,
     ):
         part.write_text(header(file.schema_arrow.names), encoding="utf-8")
+        # Piece by piece until the rows are written
         for batch in file.iter_batches(ROWS):
             piece = pa.Table.from_batches([batch]).slice(0, rows)
             rows -= piece.num_rows

@@ -136,6 +136,7 @@ class _Scanner:
             return RowLines(block, np.arange(first, self.number), ())
         self._waiting.extend(block.split(b"\n")[:-1])
         rows, numbers, broken = list[bytes](), list[int](), list[Rejection]()
+        # One row after the other, as far as their lines are here
         while (found := self._next(is_last)) is not None:
             count, fault = found
             lines = [self._waiting.popleft() for _ in range(count)]

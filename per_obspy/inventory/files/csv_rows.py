@@ -16,7 +16,12 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.files.csv_lines import LONGEST_NAME, header_names, row_lines
+from per_obspy.inventory.files.csv_lines import (
+    LONGEST_NAME,
+    RowLines,
+    header_names,
+    row_lines,
+)
 from per_obspy.inventory.files.csv_text import check_separator, check_text
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
 from per_obspy.inventory.files.text_cells import given_text, given_texts
@@ -86,15 +91,18 @@ class CsvFile:
         for rows in row_lines(self.file, self._columns, self._lines):
             table, skipped = _parsed(rows.text, columns, options)
             lines = np.delete(rows.numbers, list(skipped))
-            # Lines with too few or too many cells
-            broken = [*rows.broken]
-            for position, invalid in skipped.items():
-                broken.append(_rejection(self.file, int(rows.numbers[position]), invalid))
-            broken.sort(key=lambda line: line.row or 0)
             if len(table) != lines.size:
                 problem = f"line {rows.numbers[0]} and the next ones make no rows"
                 raise CatalogError(str(self.file), problem)
-            yield RawRows(str(self.file), table.rename_columns(list(names)), lines, tuple(broken))
+            broken = tuple(self._broken(rows, skipped))
+            yield RawRows(str(self.file), table.rename_columns(list(names)), lines, broken)
+
+    def _broken(self, rows: RowLines, skipped: dict[int, pa.csv.InvalidRow]) -> list[Rejection]:
+        """Return the broken lines and those with too few or too many cells, in their order."""
+        broken = [*rows.broken]
+        for position, invalid in skipped.items():
+            broken.append(_rejection(self.file, int(rows.numbers[position]), invalid))
+        return sorted(broken, key=lambda line: line.row or 0)
 
 
 def _parsed(
@@ -131,6 +139,7 @@ def _regrouped(blocks: Iterable[RawRows], size: int) -> Iterator[RawRows]:
         pending.append(block)
         if sum(len(rows.lines) for rows in pending) < size:
             continue
+        # Enough rows for a block or several; the rest waits
         whole = _together(pending)
         first = 0
         while len(whole.lines) - first >= size:

@@ -27,6 +27,7 @@ def plain_columns(table: pa.Table) -> tuple[pa.Table, dict[int, str]]:
     columns, faults = list[pa.ChunkedArray](), dict[int, str]()
     for field, column in zip(table.schema, table.columns, strict=True):
         plain = _plain(column)
+        # Text may be any bytes
         if pa.types.is_string(plain.type) and not _is_utf_8(plain):
             plain, wrong = _decoded(plain)
             for row in wrong:
@@ -38,12 +39,14 @@ def plain_columns(table: pa.Table) -> tuple[pa.Table, dict[int, str]]:
 def _plain(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Return a column in a plain type."""
     kind = column.type
+    # Other forms of the same text or number
     if pa.types.is_dictionary(kind):
         return _plain(pc.cast(column, kind.value_type))
     if pa.types.is_decimal(kind) or pa.types.is_float16(kind) or pa.types.is_uint64(kind):
         return column.cast(pa.float64(), safe=False)
     if pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
         return column.cast(pa.string())
+    # Plain types stay, everything else becomes text
     is_number = pa.types.is_boolean(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
     is_date = pa.types.is_date(kind) or pa.types.is_timestamp(kind)
     if is_number or is_date or pa.types.is_string(kind) or pa.types.is_null(kind):
@@ -65,6 +68,7 @@ def _decoded(column: pa.ChunkedArray) -> tuple[pa.ChunkedArray, list[int]]:
     """Return a column with question marks for undecodable bytes, and the rows that have them."""
     texts, wrong = list[str | None](), list[int]()
     for row, text in enumerate(column.cast(pa.binary()).to_pylist()):
+        # Good text comes back the same
         decoded = None if text is None else text.decode("utf-8", "replace")
         if decoded is not None and decoded.encode() != text:
             wrong.append(row)

@@ -62,6 +62,7 @@ def arrow_cells(table: pa.Table) -> pa.Table:
     for position, field in enumerate(table.schema):
         if pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
             column = pc.replace_substring_regex(table[position], _UNPRINTABLE, " ")
+            # A mark of text before formulas that are no numbers
             is_formula = pc.match_substring_regex(column, FORMULA)
             is_number = pc.match_substring_regex(column, NUMBER)
             marked = pc.binary_join_element_wise("'", column, "")

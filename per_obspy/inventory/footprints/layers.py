@@ -153,6 +153,7 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
     ) as error:
         problem = unreadable_reason(file, GDAL_KINDS[file.suffix.lower()], error)
         raise CatalogError(str(file), problem) from error
+    # What GDAL found, but for a reference system that it does not know
     columns = dict(zip(meta["fields"], fields, strict=True))
     attributes = pd.DataFrame(columns, index=range(len(geometries)))
     is_json = file.suffix.lower() in JSON_SUFFIXES
