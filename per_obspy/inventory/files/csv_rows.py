@@ -91,6 +91,7 @@ class CsvFile:
         for rows in row_lines(self.file, self._columns, self._lines):
             table, skipped = _parsed(rows.text, columns, options)
             lines = np.delete(rows.numbers, list(skipped))
+            # Every line that was given is a row or a broken one
             if len(table) != lines.size:
                 problem = f"line {rows.numbers[0]} and the next ones make no rows"
                 raise CatalogError(str(self.file), problem)
