@@ -118,7 +118,8 @@ def written_whole(path: Path) -> Iterator[Path]:
     >>> final.read_text()
     'gap'
     """
-    part = path.with_name(_part_name(path.stem, path.suffix))
+    # Libraries take relative names such as http:/x for addresses
+    part = path.absolute().with_name(_part_name(path.stem, path.suffix))
     try:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -220,7 +221,7 @@ def remove_file(path: Path) -> None:
 def temporary_folder(parent: Path) -> Iterator[Path]:
     """Give a folder that is removed afterwards, or by a later run if this process is killed."""
     with writing(parent):
-        folder = TemporaryDirectory(dir=parent, prefix=".", suffix=_part_name("", ""))
+        folder = TemporaryDirectory(dir=parent.absolute(), prefix=".", suffix=_part_name("", ""))
     # A failure is looked into while the disk is still as full as it was
     with folder as name, writing(parent):
         yield Path(name)

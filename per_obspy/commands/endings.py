@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from per_obspy.files import printable
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -59,6 +61,8 @@ def print_and_end(
         print(json.dumps({**known, **result.record}))
     else:
         show(result)
+    for fault in result.record.get("faults", []):
+        print(f"per-obspy: {fault}", file=sys.stderr)
     # Losses are for people and for jobs that nobody watches
     lost = result.record.get("losses", [])
     for sentence in lost:
@@ -74,4 +78,4 @@ def why_nothing(rejected: Path) -> str:
     with rejected.open(encoding="utf-8", newline="") as file:
         first = next(csv.DictReader(file), None)
     example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
-    return f"nothing usable was left: see {rejected}{example}"
+    return printable(f"nothing usable was left: see {rejected}{example}")

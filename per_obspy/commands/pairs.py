@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from per_obspy.commands.endings import WRONG_INPUT, AsJson, output_option, stop_if_nothing
 from per_obspy.commands.printing import print_table
 from per_obspy.errors import CatalogError, require_extra
+from per_obspy.files import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,7 +91,7 @@ def find_pairs(
         print(f"{counted}: {output}")
         reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
         for reason, count in reasons.most_common(COMMON):
-            print(f"  {count} times: {reason}")
+            print(printable(f"  {count} times: {reason}"))
     stop_if_nothing(len(table))
 
 
@@ -139,7 +140,7 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
     from per_obspy.inventory.table_checks import faults_by_column
 
     for row in rejected[:SHOWN]:
-        print(f"  line {row.row}, {row.name}: {'; '.join(row.reasons)}")
+        print(printable(f"  line {row.row}, {row.name}: {'; '.join(row.reasons)}"))
     # Where there are many, their faults by column
     if len(rejected) > SHOWN:
         faults = faults_by_column(rejected)
@@ -166,7 +167,7 @@ def _print_profile(
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
     if unused:
-        print("Unknown columns, carried along unchanged:", "; ".join(unused))
+        print("Unknown columns, carried along unchanged:", printable("; ".join(unused)))
     for suspicion in suspicions:
         print("Suspicious:", suspicion)
 

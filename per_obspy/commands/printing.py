@@ -4,6 +4,8 @@ import sys
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
+from per_obspy.files import printable
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
@@ -14,26 +16,29 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
     """Print rows as a table, numbers with three digits."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title=title, title_justify="left")
+    # Text of data is literal: no [red], no :smile:
+    table = Table(title=Text(printable(title)), title_justify="left")
     for column in columns:
-        table.add_column(column, overflow="fold")
+        table.add_column(Text(printable(column)), overflow="fold")
     for row in rows:
-        table.add_row(*(cell(value) for value in row))
+        table.add_row(*(Text(cell(value)) for value in row))
     Console(width=None if sys.stdout.isatty() else 120).print(table)
 
 
 def cell(value: object) -> str:
-    """Return a value as text: numbers with three digits, missing ones as an empty text."""
+    """Return a value as text on one line: numbers with three digits, missing ones empty."""
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
-    return str(value)
+    return printable(str(value))
 
 
 @contextmanager
 def shown_progress() -> "Iterator[Progress]":
     """Yield a progress callback: bars on a terminal, plain lines elsewhere; on standard error."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
@@ -49,7 +54,7 @@ def shown_progress() -> "Iterator[Progress]":
 
         def move(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
+                tasks[stage] = bars.add_task(escape(printable(stage)), total=total)
             bars.update(tasks[stage], completed=done, total=total)
 
         yield move

@@ -5,9 +5,10 @@ Each check works on whole columns. A row with a fault becomes a
 :class:`~per_obspy.errors.Rejection`; the other rows are accepted.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from typing import Self
+from unicodedata import category
 
 import numpy as np
 import pandas as pd
@@ -28,6 +29,12 @@ LARGEST_SEPARATION = 1000.0
 #: A contact height may exceed the lower building by this much, m: heights are often rounded,
 #: contact heights computed.
 CONTACT_TOLERANCE = 1e-3
+
+#: Longest name of a column, characters.
+LONGEST_NAME = 200
+
+#: The only column of numbers that may hold truth values: whether pounding was seen.
+OBSERVED = "observed"
 
 #: Position of a row in the table, and what is wrong with it.
 Fault = tuple[int, str]
@@ -108,9 +115,7 @@ def check_columns(names: Sequence[str], source: str) -> None:
     CatalogError
         If a required column is missing or a column occurs twice.
     """
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise CatalogError(source, f"column {twice[0]} stands more than once")
+    _check_names(names, source)
     # Required columns, and groups of which one column is enough
     required = [column.name for column in COLUMNS.values() if column.required]
     missing = [name for name in required if name not in names]
@@ -122,6 +127,20 @@ def check_columns(names: Sequence[str], source: str) -> None:
         raise CatalogError(
             source, f"missing column {absent} (columns found: {found:.200}){suggestion}"
         )
+
+
+def _check_names(names: Sequence[str], source: str) -> None:
+    """Raise CatalogError if a name is too long, has a control character, or occurs twice."""
+    counts = Counter(names)
+    for name in names:
+        if len(name) > LONGEST_NAME:
+            problem = f"column {name[:20]}... has a name of {len(name)} characters"
+            raise CatalogError(source, f"{problem}, at most {LONGEST_NAME} are allowed")
+        # Line breaks, tabulators and the like
+        if any(category(letter) in ("Cc", "Cs") for letter in name):
+            raise CatalogError(source, f"column {name!r} has a control character in its name")
+        if counts[name] > 1:
+            raise CatalogError(source, f"column {name} stands more than once")
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -173,17 +192,33 @@ def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
 
 def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]]:
     """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
-    # Cells that were read as numbers
-    if pd.api.types.is_numeric_dtype(values.dtype):
+    # Cells that were read as numbers; what was seen may be true or false
+    is_truth = pd.api.types.is_bool_dtype(values.dtype)
+    if is_number(values) or (is_truth and column.name == OBSERVED):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, _missing(column, np.isnan(number)) + _out_of_range(column, number)
     # Cells that are still text
     empty = _is_empty(values)
-    converted = pd.to_numeric(values.astype(str).mask(empty), errors="coerce")
+    converted = plain_numbers(values.mask(empty))
     number = converted.to_numpy(dtype=np.float64, na_value=np.nan)
     wrong = _rows(np.isnan(number) & ~empty)
     faults = [(i, f"{column.name} = {str(values.iloc[i])!r:.40} is not a number") for i in wrong]
     return number, faults + _missing(column, empty) + _out_of_range(column, number)
+
+
+def is_number(values: pd.Series) -> bool:
+    """Return whether a column's type is that of real numbers: truth values and dates are none."""
+    kind = values.dtype
+    is_other = pd.api.types.is_bool_dtype(kind) or pd.api.types.is_complex_dtype(kind)
+    return pd.api.types.is_numeric_dtype(kind) and not is_other
+
+
+def plain_numbers(values: pd.Series) -> pd.Series:
+    """Return cells as numbers, NaN where they are none; truth values and dates are none."""
+    if is_number(values):
+        return values
+    # As text, as pandas takes dates for nanoseconds and truth values for 0 and 1
+    return pd.to_numeric(values.astype(str).mask(values.isna()), errors="coerce")
 
 
 def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:

@@ -9,13 +9,13 @@ import pandas as pd
 from per_obspy.config import Pairs, Run, Simulation, load
 from per_obspy.config.simulation import SimulatedPairs
 from per_obspy.errors import CatalogError, did_you_mean
-from per_obspy.files import written_whole
 from per_obspy.inventory.catalogue import (
     find_inventories,
     region_around,
     stored_inventories,
     verified_file,
 )
+from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs.ground_files import StationFile
 from per_obspy.screening.ground_motion.assignment import nearest_station
@@ -50,8 +50,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
         )
     if pairs and pairs.catalog:
         return _stored(pairs, pairs.catalog, stations, settings.screening.largest_distance)
-    with written_whole(folder / "pairs.csv") as part:
-        _simulated(pair_simulation(settings), stations).to_csv(part, index=False)
+    write_pairs(_simulated(pair_simulation(settings), stations), folder / "pairs.csv")
     return [folder / "pairs.csv"]
 
 

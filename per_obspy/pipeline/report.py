@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +10,8 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Run
+from per_obspy.errors import CatalogError, PerError
+from per_obspy.files import remove_file
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.stations import simulated_motion
@@ -58,9 +61,42 @@ class RiskSummary(NamedTuple):
     totals: RegionTotals
 
 
+class Report(NamedTuple):
+    """
+    What the report has written.
+
+    Attributes
+    ----------
+    outputs : list of Path
+        Its files.
+    faults : list of str
+        Figures and layers that could not be made, each with the reason.
+    """
+
+    outputs: list[Path]
+    faults: list[str]
+
+    @contextmanager
+    def tried(self, *paths: Path) -> Iterator[None]:
+        """Note files that the block writes; a fault of the drawing leaves them out, in one line."""
+        try:
+            yield
+        except (PerError, OSError, MemoryError):
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever a library has against a picture
+            # Pictures of an earlier table are none of this one
+            for path in paths:
+                remove_file(path)
+            reason = " ".join(str(error).split())
+            self.faults.append(f"{paths[0]}: cannot be drawn: {type(error).__name__} {reason:.200}")
+        else:
+            self.outputs.extend(paths)
+
+
 class _Pieces(NamedTuple):
     """Summaries of the pieces of a risk table, in their order."""
 
+    rows: list[int]
     first_named: list[int]
     shown: list[pd.DataFrame]
     observed: list[pd.DataFrame]
@@ -69,9 +105,11 @@ class _Pieces(NamedTuple):
 
 def reported(
     settings: Run, folder: Path, stations: Sequence[FinishedStation], progress: Progress
-) -> list[Path]:
+) -> Report:
     """
-    Write the report of the results in the output folder, and return its files.
+    Write the report of the results in the output folder.
+
+    A figure or layer that cannot be made is left out, the tables are written.
 
     Parameters
     ----------
@@ -86,25 +124,25 @@ def reported(
     """
     progress("report", 0, 1)
     simulated = simulated_motion(settings, stations)
-    outputs, risk = list[Path](), folder / "risk.parquet"
+    report, risk = Report([], []), folder / "risk.parquet"
     spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
     if spectra is not None:
-        outputs.append(folder / "spectra.nc")
+        report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
     if risk.exists():
-        summary = _summary(settings, risk, folder, _facts(settings, simulated))
-        if spectra is not None:
-            outputs += _draw_figures(settings, summary, spectra, stations, folder)
+        facts = _facts(settings, simulated)
+        summary = _summary(settings, risk, folder, facts, report)
         # Totals, layers and the comparison with observations need no record
         write_totals(summary.totals.table, folder / "totals.csv")
-        outputs.append(folder / "totals.csv")
-        outputs += write_evaluation(summary.observed, folder, simulated)
+        report.outputs.append(folder / "totals.csv")
+        report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
         if settings.geopackage:
-            facts = _facts(settings, simulated)
-            _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
-            outputs += [folder / "risk.gpkg", folder / "totals.gpkg"]
+            with report.tried(folder / "totals.gpkg"):
+                _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
+        if spectra is not None:
+            _draw_figures(settings, summary, spectra, stations, folder, report)
     progress("report", 1, 1)
-    return outputs
+    return report
 
 
 def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Dataset:
@@ -114,18 +152,23 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
     return spectra
 
 
-def _summary(settings: Run, risk: Path, folder: Path, facts: dict[str, str]) -> RiskSummary:
+def _summary(
+    settings: Run, risk: Path, folder: Path, facts: dict[str, str], report: Report
+) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
     needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
     columns = None if settings.geopackage else list(dict.fromkeys(needed))
     # The layer takes the pieces one by one, and so they are noted on the way
-    pieces = _Pieces([], [], [], [])
+    pieces = _Pieces([], [], [], [], [])
     with ranked_table(risk, columns) as table:
         noted = _noted(table, settings, pieces)
         if settings.geopackage:
-            _write_pairs_layer(settings, noted, folder / "risk.gpkg", facts)
-        else:
-            deque(noted, maxlen=0)
+            with report.tried(folder / "risk.gpkg"):
+                _write_pairs_layer(settings, noted, folder / "risk.gpkg", facts)
+        # All rows, or those that a layer left when it failed; a table that fails is a fault
+        deque(noted, maxlen=0)
+        if sum(pieces.rows) != table.pairs:
+            raise CatalogError(str(risk), "cannot be read to its end: run again")
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
     return RiskSummary(
         worst,
@@ -140,6 +183,7 @@ def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.Dat
     step = -(-table.pairs // SHOWN)
     classes = list(settings.screening.classes)
     for piece in table.pieces():
+        found.rows.append(len(piece))
         rank = piece["rank"].to_numpy()
         # Rows with a record; ranks count from 1, rows from 0
         named = rank[(piece["station"] != "").to_numpy()] - 1
@@ -158,19 +202,22 @@ def _draw_figures(
     spectra: xr.Dataset,
     stations: Sequence[FinishedStation],
     folder: Path,
-) -> list[Path]:
+    report: Report,
+) -> None:
     """Draw the worst pair that has a record, and the region."""
     walk, overview = (folder / "figures" / name for name in ("worst_pair.png", "overview.png"))
-    draw_overview(summary.shown, spectra, settings.name, overview)
+    with report.tried(overview):
+        draw_overview(summary.shown, spectra, settings.name, overview)
     worst = summary.worst
     if worst is None:
-        return [overview]
+        return
     # Only here a station's motion is needed again
     name = worst["station"].strip(".")
     (station,) = (station for station in stations if station.shard and station.shard.stem == name)
     assert station.shard is not None  # chosen so
-    draw_record_to_pair(read_station_once(station.shard, station.hash), worst, walk)
-    return [walk, overview]
+    motion = read_station_once(station.shard, station.hash)
+    with report.tried(walk):
+        draw_record_to_pair(motion, worst, walk)
 
 
 def _facts(settings: Run, simulated: bool) -> dict[str, str]:

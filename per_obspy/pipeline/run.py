@@ -172,8 +172,12 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
     with locked_folder(folder):
         record = _finished(folder / RECORD)
         stations = _usable(stations_of_earlier_run(folder))
-        outputs = file_hashes(folder, reported(settings, folder, stations, progress))
-        return recorded(folder / RECORD, {**record, "outputs": record["outputs"] | outputs})
+        made = reported(settings, folder, stations, progress)
+        outputs = record["outputs"] | file_hashes(folder, made.outputs)
+        # A picture or layer that failed is made by the next run
+        key = "" if made.faults else record["key"]
+        found = {"outputs": outputs, "faults": made.faults, "key": key}
+        return recorded(folder / RECORD, {**record, **found})
 
 
 def _settings(configuration: Path) -> Run:
@@ -297,11 +301,16 @@ def _later_stages(
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with _timed(seconds, "report"):
-        outputs = [*found.outputs, *table.files, *reported(settings, folder, usable, progress)]
+        made = reported(settings, folder, usable, progress)
+        outputs = [*found.outputs, *table.files, *made.outputs]
+    outcome = _outcome(found, stations)
 
     return {
         "name": settings.name,
-        **_outcome(found, stations),
+        **outcome,
+        # A picture or layer that failed is made by the next run
+        "failed": outcome["failed"] or bool(made.faults),
+        "faults": made.faults,
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "outputs": file_hashes(folder, outputs),

@@ -15,12 +15,13 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.files import written_whole
+from per_obspy.files import printable, written_whole
+from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.report.style import STATE_COLOURS
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
 CRS = "EPSG:4326"
-GEOMETRY = "geom"
+GEOMETRY, IDENTIFIER = "geom", "fid"
 PAIRS, TOTALS, STYLES = "pairs", "totals", "layer_styles"
 
 #: Diameter of a pair's marker, worst and mildest class, millimetres on the screen.
@@ -37,7 +38,7 @@ def write_pairs_layer(
     ----------
     tables : iterable of DataFrame
         The risk table, in one piece or in several with the same columns; only one is held at a
-        time.
+        time. Columns named as another one but for the case of letters get a number.
     classes : sequence of str
         Names of the risk classes, worst first.
     path : Path
@@ -45,7 +46,7 @@ def write_pairs_layer(
     facts : mapping of str to str
         Facts that hold for all rows, for example whether the motion is simulated.
     """
-    with written_whole(path) as part:
+    with written_whole(path) as whole, literal_path(whole) as part:
         for number, table in enumerate(tables):
             points = shapely.points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
             _write(part, PAIRS, points, table, number > 0, facts)
@@ -77,7 +78,7 @@ def write_totals_layer(
         shapes = shapely.points(totals["longitude"].to_numpy(), totals["latitude"].to_numpy())
     else:
         shapes = np.array([shapely.Polygon(corners) for corners in outlines], dtype=object)
-    with written_whole(path) as part:
+    with written_whole(path) as whole, literal_path(whole) as part:
         _write(part, TOTALS, shapes, totals, False, facts)
 
 
@@ -102,8 +103,35 @@ def _write(
         layer=layer,
         append=append,
         driver="GPKG",
-        layer_options={"GEOMETRY_NAME": GEOMETRY, "DESCRIPTION": description},
+        layer_options={
+            "GEOMETRY_NAME": GEOMETRY,
+            "FID": IDENTIFIER,
+            "DESCRIPTION": printable(description),
+        },
     )
+
+
+def layer_names(columns: Iterable[str]) -> list[str]:
+    """
+    Return names of columns for a layer, which are distinct whatever the case of their letters.
+
+    The layer has an identifier ``fid`` and a geometry ``geom`` of its own. Of names that are taken
+    the later one gets a number.
+
+    Examples
+    --------
+    >>> layer_names(["gap", "Gap", "fid", "GAP"])
+    ['gap', 'Gap_2', 'fid_2', 'GAP_3']
+    """
+    taken, names = {GEOMETRY, IDENTIFIER}, list[str]()
+    for column in columns:
+        name, number = column, 1
+        while name.lower() in taken:
+            number += 1
+            name = f"{column}_{number}"
+        taken.add(name.lower())
+        names.append(name)
+    return names
 
 
 def _with_shapes(table: pd.DataFrame, shapes: NDArray[np.object_]) -> pa.Table:
@@ -111,6 +139,7 @@ def _with_shapes(table: pd.DataFrame, shapes: NDArray[np.object_]) -> pa.Table:
     plain = table.copy(deep=False)
     plain.attrs = {}
     arrow = pa.Table.from_pandas(plain, preserve_index=False)
+    arrow = arrow.rename_columns(layer_names(arrow.column_names))
     # GDAL has no null type: a column without any value counts as text
     schema = pa.schema(
         pa.field(field.name, pa.string()) if pa.types.is_null(field.type) else field

@@ -22,6 +22,7 @@ from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
     STATE_COLOURS,
+    literal,
 )
 from per_obspy.tables.processed import COLUMNS
 
@@ -69,7 +70,7 @@ def record_page(processed: Any, unfiltered: Any) -> Figure:
     _draw_amplitudes(amplitudes, processed, unfiltered)
     _write_numbers(numbers, processed)
     start = processed.stats.starttime + _pads(processed)[0]
-    figure.suptitle(f"{processed.id}   {start.strftime('%Y-%m-%d %H:%M:%S')} UTC")
+    figure.suptitle(f"{literal(processed.id)}   {start.strftime('%Y-%m-%d %H:%M:%S')} UTC")
     return figure
 
 
@@ -167,7 +168,7 @@ def _write_numbers(axes: Axes, processed: Any) -> None:
             continue
         # Numbers with their units, texts as they are
         value, unit = chosen[name], COLUMNS[name][0].strip("1")
-        text = f"{value:.4g} {unit}" if isinstance(value, float) else str(value)
+        text = f"{value:.4g} {unit}" if isinstance(value, float) else literal(str(value))
         lines += textwrap.wrap(f"{name.replace('_', ' ')}: {text}", 68, subsequent_indent="    ")
     axes.set_axis_off()
     style: dict[str, Any] = {"va": "top", "fontsize": 8, "family": "monospace"}

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from per_obspy.checks import FloatArray
-from per_obspy.report.style import MOTION_COLOUR, save
+from per_obspy.report.style import MOTION_COLOUR, literal, save
 from per_obspy.spectra.bilinear import bilinear_response
 
 #: Colours of components, in their order (Okabe & Ito 2008).
@@ -33,7 +33,8 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
     figure = Figure(figsize=(13.0, 4.2), layout="constrained")
     radius, velocity, ratio = figure.subplots(1, 3)
     # More components than colours begin again
-    for index, name in enumerate(station["channel"].to_numpy()):
+    for index, channel in enumerate(station["channel"].to_numpy()):
+        name = literal(str(channel))
         colour = COMPONENT_COLOURS[index % len(COMPONENT_COLOURS)]
         _draw_component((radius, velocity, ratio), chosen, index, name, colour)
 
@@ -46,9 +47,8 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         axes.legend(fontsize=8)
 
     # The damping is that of the stored spectra
-    figure.suptitle(
-        f"{station['station'].item()}, damping {float(chosen['damping']):.0%}, usable periods only"
-    )
+    name = literal(str(station["station"].item()))
+    figure.suptitle(f"{name}, damping {float(chosen['damping']):.0%}, usable periods only")
     save(figure, path, station.attrs["simulated"] == "true")
 
 

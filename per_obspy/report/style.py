@@ -43,6 +43,18 @@ def title_name(name: str) -> str:
     return "\n".join(wrap(text, LINE_WIDTH))
 
 
+def literal(text: str) -> str:
+    r"""
+    Return a text that matplotlib draws as it is: dollar signs begin no formula.
+
+    Examples
+    --------
+    >>> print(literal("$x_$"))
+    \$x_\$
+    """
+    return printable(text).replace("$", r"\$")
+
+
 def fit_titles(figure: Figure) -> None:
     """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
     figure.draw_without_rendering()

@@ -19,7 +19,7 @@ from per_obspy.screening.region.ensemble import (
     ensemble_rejections,
     ensemble_rows,
 )
-from per_obspy.tables.parts import bounded_database
+from per_obspy.tables.parts import bounded_database, parquet_rows
 from per_obspy.tables.risk import ROWS, write_worst
 from per_obspy.tables.table_files import write_described, write_rejected
 
@@ -66,7 +66,7 @@ _ORDERED = f"""
     COPY (
         SELECT row_number() OVER () AS rank, *
         FROM (
-            SELECT * FROM read_parquet($rows)
+            SELECT * FROM rows
             ORDER BY probability DESC, expected_impact_velocity DESC, expected_amplification DESC,
                 pair_id
         )
@@ -107,37 +107,35 @@ def write_ensemble(
         _join(scenarios, joined)
         _write_rows(scenarios, joined, rows)
         with bounded_database(room) as database, written_whole(table) as part:
-            paths = {"rows": str(rows), "path": str(part)}
-            database.execute(_ORDERED, {**paths, "statement": statement})
+            database.register("rows", parquet_rows([rows]))
+            database.execute(_ORDERED, {"path": str(part), "statement": statement})
         kinds = write_rejected(_rejections(scenarios, joined), rejected)
     # The worst rows as text, and the meaning of every column
     write_worst(table, csv_rows, text)
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
     write_described(described.values(), columns)
-    counts = {"pairs": pq.read_metadata(table).num_rows, "rejected_pair": kinds["pair"]}
+    counts = {"pairs": pq.read_metadata(table.absolute()).num_rows, "rejected_pair": kinds["pair"]}
     return files, counts
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
     """Write one row for each name of a pair, as ``ensemble_rows`` of the screening takes them."""
-    tables = {
-        f"table{number}": str(table)
-        for number, table in enumerate(scenarios.tables.values())
-        if table is not None
-    }
+    tables = list(scenarios.tables.values())
     with bounded_database(path.parent) as database:
-        query = _join_query(list(scenarios.tables.values()))
-        database.execute(query, {**tables, "path": str(path)})
+        for number, table in enumerate(tables):
+            if table is not None:
+                database.register(f"table{number}", parquet_rows([table]))
+        database.execute(_join_query(tables), {"path": str(path)})
 
 
 def _join_query(tables: list[Path | None]) -> str:
-    """Return the query that joins risk tables by pair; ``$table0`` and so on are their files."""
+    """Return the query that joins risk tables by pair, which are ``table0`` and so on."""
     # Without any table there is still a header
     nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
     rows += [
         f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)}, {_SEVERITY}"
-        f" FROM read_parquet($table{number})"
+        f" FROM table{number}"
         for number, table in enumerate(tables)
         if table
     ]

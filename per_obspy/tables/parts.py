@@ -17,6 +17,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from pyarrow.dataset import Dataset, dataset
+from pyarrow.fs import LocalFileSystem
 
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.ranking import KEYS
@@ -31,10 +33,7 @@ TOGETHER = 10_000
 #: Column with the number of the part to which a row belongs.
 _PART = "order_part"
 
-_ORDER = (
-    f"SELECT {_PART} FROM read_parquet($parts, union_by_name=true)"
-    f" ORDER BY {', '.join(KEYS)}, pair_id"
-)
+_ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 
 @contextmanager
@@ -50,6 +49,27 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
             # when there are two
             database.execute("SET disabled_optimizers = 'statistics_propagation'")
             yield database
+
+
+def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) -> Dataset:
+    """
+    Return Parquet files for a database, which reads them row by row.
+
+    Databases take signs such as ``[``, ``*`` and ``?`` in a path for wildcards, and would read
+    other files than these.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        All with these columns in the same types.
+    columns : sequence of str, optional
+        All of the first file if not given.
+    """
+    schema = pq.read_schema(files[0].absolute())
+    if columns is not None:
+        schema = pa.schema([schema.field(name) for name in columns])
+    paths = [str(file.absolute()) for file in files]
+    return dataset(paths, schema=schema, format="parquet", filesystem=LocalFileSystem())
 
 
 def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
@@ -80,7 +100,7 @@ def joined_schema(parts: Sequence[Path]) -> pa.Schema:
     """Return every column of the parts but those of the order; differing types are joined."""
     types: dict[str, set[pa.DataType]] = {}
     for part in parts:
-        for field in pq.read_schema(part):
+        for field in pq.read_schema(part.absolute()):
             types.setdefault(field.name, set()).add(field.type)
     order = {*KEYS, _PART}
     return pa.schema([(name, _common(kinds)) for name, kinds in types.items() if name not in order])
@@ -101,7 +121,8 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
     """
     # Order of the whole: for each row the part in which it is the next one
     with bounded_database(parts[0].parent) as database:
-        found = database.execute(_ORDER, {"parts": [str(part) for part in parts]}).fetchnumpy()
+        database.register("parts", parquet_rows(parts, [_PART, *KEYS, "pair_id"]))
+        found = database.execute(_ORDER).fetchnumpy()
     order = np.asarray(found[_PART], dtype=np.int64)
     rows = {_number(part): _Rows(part, schema) for part in parts}
     for first in range(0, order.size, size):
@@ -136,8 +157,8 @@ class _Rows:
 
 def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
     """Yield the row groups of a part with the columns of the whole."""
-    for index in range(pq.read_metadata(part).num_row_groups):
-        with pq.ParquetFile(part) as file:
+    for index in range(pq.read_metadata(part.absolute()).num_row_groups):
+        with pq.ParquetFile(part.absolute()) as file:
             table = file.read_row_group(index, use_threads=False)
         table = table.drop_columns([*KEYS, _PART])
         yield table if table.schema.equals(schema) else _conforming(table, schema)
@@ -156,7 +177,7 @@ def _conforming(table: pa.Table, schema: pa.Schema) -> pa.Table:
 
 def _number(part: Path) -> int:
     """Return the number of a part."""
-    with pq.ParquetFile(part) as file:
+    with pq.ParquetFile(part.absolute()) as file:
         number: int = file.read_row_group(0, columns=[_PART])[_PART][0].as_py()
     return number
 

@@ -17,16 +17,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
+from per_obspy.inventory.files.text_cells import arrow_cells, header
 from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, text_columns
 from per_obspy.tables.table_files import write_columns
 
 #: Rows that are read and written together.
 ROWS = 50_000
-
-_WORST = (
-    "COPY (SELECT * FROM read_parquet($table) WHERE rank <= $rows ORDER BY rank)"
-    " TO $path (FORMAT csv, HEADER)"
-)
 
 
 class RiskFiles(NamedTuple):
@@ -121,6 +117,7 @@ def _write_rows(
     """Write ranked rows as Parquet, the worst as CSV too; count their states and stations."""
     states, stations, first = Counter[str](), Counter[str](), next(rows)
     dictionaries = text_columns(first.schema)
+    text.write_text(header(first.column_names), encoding="utf-8")
     with (
         bounded_database(table.parent) as database,
         pq.ParquetWriter(table, first.schema, use_dictionary=dictionaries) as writer,
@@ -132,7 +129,7 @@ def _write_rows(
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
-                _append_csv(database, piece.slice(0, csv_rows - before), text, header=before == 0)
+                _append_csv(database, piece.slice(0, csv_rows - before), text)
     return states, stations
 
 
@@ -145,15 +142,15 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
         before += rows.num_rows
 
 
-def _append_csv(
-    database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path, header: bool
-) -> None:
-    """Append rows to a CSV file, the first of them with the header."""
-    # The database writes a file of its own, which is appended to the others
+def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
+    """Append rows to a CSV file that has a header."""
+    # Names of columns may differ in case only, or be anything: the database numbers them
+    numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
+    # It writes a file of its own, which is appended to the others
     piece = path.with_suffix(".piece")
-    database.register("piece", rows)
+    database.register("piece", numbered)
     try:
-        query = f"COPY piece TO $path (FORMAT csv, HEADER {str(header).lower()})"
+        query = "COPY piece TO $path (FORMAT csv, HEADER false)"
         database.execute(query, {"path": str(piece)})
         with path.open("ab") as whole, piece.open("rb") as lines:
             shutil.copyfileobj(lines, whole)
@@ -163,9 +160,19 @@ def _append_csv(
 
 
 def write_worst(table: Path, rows: int, path: Path) -> None:
-    """Write the rows of a ranked Parquet table up to a rank as CSV."""
-    with bounded_database(path.parent) as database, written_whole(path) as part:
-        database.execute(_WORST, {"table": str(table), "rows": rows, "path": str(part)})
+    """Write the first rows of a ranked Parquet table as CSV."""
+    with (
+        bounded_database(path.parent) as database,
+        pq.ParquetFile(table.absolute()) as file,
+        written_whole(path) as part,
+    ):
+        part.write_text(header(file.schema_arrow.names), encoding="utf-8")
+        # Piece by piece until the rows are written
+        for batch in file.iter_batches(ROWS):
+            piece = pa.Table.from_batches([batch]).slice(0, rows)
+            rows -= piece.num_rows
+            if piece.num_rows:
+                _append_csv(database, piece, part)
 
 
 @contextmanager
@@ -180,5 +187,5 @@ def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[R
     columns : sequence of str, optional
         Columns that are read, all if not given; those that the table lacks are left out.
     """
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path.absolute()) as file:
         yield RankedTable(file, None if columns is None else list(columns))

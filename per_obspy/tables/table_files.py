@@ -7,15 +7,12 @@ from pathlib import Path
 
 import pandas as pd
 import pyarrow as pa
-from pandas.api.types import is_numeric_dtype
 
 from per_obspy.errors import Rejection, shortened
-from per_obspy.files import printable, written_whole
+from per_obspy.files import written_whole
+from per_obspy.inventory.files.text_cells import cell, cells
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.columns import column_table, known_column
-
-#: Beginnings of a text that a spreadsheet takes for a formula.
-FORMULA_STARTS = ("=", "+", "-", "@")
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
@@ -44,37 +41,9 @@ def _type(field: pa.Field) -> pa.DataType:
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write a table as CSV."""
-    plain = _plain(table)
-    texts = [name for name, column in plain.items() if not is_numeric_dtype(column)]
-    for name in texts:
-        plain[name] = plain[name].map(cell)
+    """Write a table as CSV; no text of it is a formula to a spreadsheet."""
     with written_whole(path) as part:
-        plain.to_csv(part, index=False)
-
-
-def cell(value: object) -> object:
-    """
-    Return a text that a spreadsheet takes as text, on one line; numbers and the like as they are.
-
-    Examples
-    --------
-    >>> cell("=1+1"), cell("-12.5"), cell("CI.CLC" + chr(10) + "x"), cell(0.5)
-    ("'=1+1", '-12.5', 'CI.CLC x', 0.5)
-    """
-    if not isinstance(value, str):
-        return value
-    text = printable(value)
-    return f"'{text}" if text.startswith(FORMULA_STARTS) and not _is_number(text) else text
-
-
-def _is_number(text: str) -> bool:
-    """Return whether a text is a number, which no spreadsheet takes for a formula."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+        cells(table).to_csv(part, index=False)
 
 
 def write_parquet(table: pd.DataFrame, path: Path) -> None:

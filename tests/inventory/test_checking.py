@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.checking import checked_pairs
+from per_obspy.inventory.checking import check_columns, checked_pairs
 from per_obspy.inventory.schema import COLUMNS, COMPLETED, ONE_OF, SYSTEMS
 
 
@@ -198,3 +198,22 @@ def test_rejections_are_shared_by_every_copy_of_the_table():
     # would catch a plain tuple, which pandas copies element by element in every operation
     pairs = checked_pairs(pd.DataFrame([_row(), _row(pair_id="b", gap=-1.0)]), "pairs.csv")
     assert pairs.assign(more=1).copy().attrs["rejected"] is pairs.attrs["rejected"]
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        (
+            "x" * 10_000,
+            r"column x{20}\.\.\. has a name of 10000 characters, at most 200",
+        ),
+        ("a\x07b", r"column 'a\\x07b' has a control character in its name"),
+        ("a\nb", "has a control character"),
+        ("gap", "column gap stands more than once"),
+    ],
+)
+def test_names_of_columns_that_no_file_should_have(name, problem):
+    names = [*COLUMNS, name]
+    with pytest.raises(CatalogError, match=problem) as error:
+        check_columns(names, "table")
+    assert "\n" not in str(error.value)

@@ -11,6 +11,7 @@ import subprocess
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from per_obspy.config import Run, load
@@ -192,3 +193,44 @@ def test_a_full_disk_ends_a_run_in_one_line(call, whole, tmp_path, small_disk, r
 
 def test_the_configuration_of_these_tests_writes_in_its_own_folder(whole):
     assert load(whole / "run.toml", Run).output == whole / "out"
+
+
+def write_town(folder: Path) -> Path:
+    """Write footprints of two rows of houses."""
+    shapely, pyogrio = (pytest.importorskip(name) for name in ("shapely", "pyogrio"))
+    houses = [shapely.box(10 + x * 1e-4, 50, 10 + (x + 0.9) * 1e-4, 50.0001) for x in range(40)]
+    path = folder / "town.gpkg"
+    fields = [np.full(len(houses), 9.0)]
+    pyogrio.raw.write(
+        path, shapely.to_wkb(houses), fields, ["height"], geometry_type="Polygon", crs="EPSG:4326"
+    )
+    return path
+
+
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+@pytest.mark.parametrize("size", [0, 1_000])
+def test_pairs_without_room(call, tmp_path, kind, size):
+    command = ["pairs", write_town(tmp_path), "-o", tmp_path / f"pairs.{kind}"]
+    with no_room(size):
+        ending = call(*command)
+    check_ending(ending, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["town.gpkg"]
+    assert call(*command)[0] == 0
+
+
+@pytest.mark.parametrize("size", [60_000, 80_000])
+def test_a_layer_without_room(call, copied, monkeypatch, size):
+    # would catch a layer that is taken for one that cannot be drawn: the machine has no room
+    configuration = copied / "run.toml"
+    configuration.write_text("geopackage = true\n" + configuration.read_text())
+    before = (copied / "out" / "risk.csv").read_bytes()
+    # The spectra are larger than the layer and there already
+    monkeypatch.setattr(report, "write_spectra", lambda *_: None)
+    with no_room(size):
+        ending = call("report", configuration)
+    check_ending(ending, copied)
+    assert "risk.gpkg: cannot be written" in ending[2]
+    assert not list(copied.rglob("*.gpkg"))
+    assert (copied / "out" / "risk.csv").read_bytes() == before
+    assert call("report", configuration)[0] == 0
+    assert (copied / "out" / "risk.gpkg").exists()

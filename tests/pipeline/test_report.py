@@ -2,8 +2,11 @@
 
 import json
 import shutil
+from collections.abc import Iterator
+from pathlib import Path
 
 import pandas as pd
+import pyarrow as pa
 import pyogrio
 import pytest
 from pyarrow import parquet
@@ -11,11 +14,11 @@ from pyarrow import parquet
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline import report as report_stage
-from per_obspy.pipeline.report import _summary
+from per_obspy.pipeline.report import Report, _summary
 from per_obspy.pipeline.run import report, run
 from per_obspy.tables import risk
 
-from .small_run import InProcess, write_configuration
+from .small_run import InProcess, plain_figure, write_configuration
 
 PAIRS = '[pairs]\nfile = "pairs.csv"\n'
 
@@ -58,7 +61,8 @@ def test_a_report_needs_a_finished_run(copied):
 
 
 def summary(folder):
-    return _summary(load(folder / "run.toml", Run), folder / "out" / "risk.parquet", folder, {})
+    settings, table = load(folder / "run.toml", Run), folder / "out" / "risk.parquet"
+    return _summary(settings, table, folder, {}, Report([], []))
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
@@ -112,3 +116,89 @@ def test_the_layer_of_the_pairs_holds_the_whole_table(copied):
     information = pyogrio.read_info(copied / "out" / "risk.gpkg", layer="pairs")
     assert information["features"] == len(table)
     assert list(information["fields"]) == list(table)
+
+
+#: Names of carried columns that a layer, a database or a figure keeps for itself.
+HOSTILE = [
+    "fid",
+    "geom",
+    "GEOMETRY",
+    "Gap",
+    "Rank",
+    "State",
+    "map",
+    "index",
+    "rowid",
+    "=a()",
+    "\u202e",
+]
+
+
+def test_hostile_names_and_values_reach_every_file(copied, call):
+    # would catch a crash of the last step: of GDAL, of mathtext, of rich, of UTF-8
+    pairs = pd.read_csv(copied / "pairs.csv")
+    texts = ["$x_$", "[/red]", "=1+1", "\u202egap", "\x1b[31mred", ":smile:"]
+    ids = [f"{text} {number}" for number, text in enumerate(texts * 10)]
+    hostile = pairs.assign(pair_id=ids, **dict.fromkeys(HOSTILE, texts * 10))
+    hostile = hostile.assign(tags=[{"a": [1]}] * 60, seen=[True, None, False] * 20)
+    table = pa.Table.from_pandas(hostile, preserve_index=False)
+    # Text that is not UTF-8 in the last row
+    notes = pa.array([b"fine"] * 59 + [b"\xff"]).view(pa.string())
+    parquet.write_table(table.append_column("note", notes), copied / "hostile [1].parquet")
+    text = PAIRS.replace("pairs.csv", "hostile [1].parquet") + "geopackage = true\n"
+    write_configuration(copied, text)
+    head = (copied / "run.toml").read_text().replace("geopackage = true\n", "")
+    (copied / "run.toml").write_text("geopackage = true\n" + head)
+    folder = copied / "out [2]"
+    code, output, errors = call("run", copied / "run.toml", "-o", folder)
+    assert code == 0, errors
+    record = json.loads((folder / "run.json").read_text())
+    assert (record["faults"], record["failed"]) == ([], False)
+    assert record["counts"]["pairs"] == 59
+    assert "note is not UTF-8" in (folder / "rejected.csv").read_text()
+    risk_table = pd.read_parquet(folder / "risk.parquet")
+    assert set(risk_table["pair_id"]) == set(ids[:-1])
+    assert {*HOSTILE, "tags", "seen", "note"} <= set(risk_table)
+    # the layer has all of them, under names of its own where GDAL needs them
+    layer = pyogrio.read_info(folder / "risk.gpkg", layer="pairs")
+    assert layer["features"] == 59
+    assert {"fid_2", "geom_2", "Gap_2", "Rank_2", "State_2", "map"} <= set(layer["fields"])
+    assert (folder / "figures" / "worst_pair.png").exists()
+    # the console is literal, without characters that steer a terminal
+    worst = risk_table["pair_id"].iloc[0].split()[0].lstrip("\u202e\x1b")
+    assert worst[:4] in output
+    assert not {"\x1b", "\u202e"} & set(output)
+
+
+@pytest.mark.parametrize("failing", ["draw_overview", "_write_pairs_layer"])
+def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, failing):
+    # would catch a traceback after all the work, totals of some rows, and an old picture
+    text = (copied / "run.toml").read_text()
+    (copied / "run.toml").write_text("geopackage = true\n" + text)
+    for name in ("draw_overview", "draw_record_to_pair"):
+        monkeypatch.setattr(report_stage, name, plain_figure)
+    monkeypatch.setattr(risk, "ROWS", 25)
+    assert call("report", copied / "run.toml")[0] == 0
+    totals = (copied / "out" / "totals.csv").read_bytes()
+
+    def fails(*arguments):
+        # A layer fails amid the rows
+        for argument in arguments:
+            if isinstance(argument, Iterator):
+                next(argument)
+        raise ValueError("$x_$\nExpected\nend of text")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(report_stage, failing, fails)
+        code, _, errors = call("report", copied / "run.toml")
+    (line,) = [line for line in errors.splitlines() if line.startswith("per-obspy: ")]
+    assert code == 0
+    assert line.endswith("cannot be drawn: ValueError $x_$ Expected end of text")
+    path = Path(line.removeprefix("per-obspy: ").partition(": cannot")[0])
+    assert not path.exists()
+    assert (copied / "out" / "totals.csv").read_bytes() == totals
+    assert json.loads((copied / "out" / "run.json").read_text())["key"] == ""
+    # made by the next report
+    assert call("report", copied / "run.toml")[0] == 0
+    assert path.exists()
+    assert json.loads((copied / "out" / "run.json").read_text())["faults"] == []

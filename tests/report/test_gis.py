@@ -10,7 +10,7 @@ import pyogrio
 import pytest
 import shapely
 
-from per_obspy.report.gis import class_style, write_pairs_layer, write_totals_layer
+from per_obspy.report.gis import class_style, layer_names, write_pairs_layer, write_totals_layer
 from per_obspy.screening.region.outlines import box_outlines
 from per_obspy.screening.region.totals import grid_cells, totals
 
@@ -145,3 +145,24 @@ def test_a_layer_that_cannot_be_finished_leaves_the_old_one(tmp_path):
         write_pairs_layer(broken(), CLASSES, path, FACTS)
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["risk.gpkg"]
+
+
+NAMES = ["fid", "FID", "geom", "Gap", "RANK", "geometry", "map", "rowid", "q\"'`]", "", "x" * 200]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_name_of_a_carried_column_has_a_place_in_the_layer(tmp_path, name):
+    # would catch a layer that fails at a name which GDAL or SQLite keeps for itself
+    table = TABLE.assign(gap=0.1, **{name: ["$x_$", "[/red]", "\u202ex"]})
+    write_pairs_layer([table.iloc[:2], table.iloc[2:]], CLASSES, tmp_path / "risk.gpkg", FACTS)
+    meta, _, _, fields = pyogrio.raw.read(tmp_path / "risk.gpkg", layer="pairs")
+    read = dict(zip(meta["fields"], fields, strict=True))
+    assert [*read] == layer_names(table.columns)
+    assert read[layer_names(table.columns)[-1]].tolist() == ["$x_$", "[/red]", "\u202ex"]
+    assert read["gap"].tolist() == [0.1] * 3
+
+
+def test_names_of_a_layer_differ_in_more_than_case():
+    names = layer_names(["a", "A", "a_2", "A_2", "FID", "fid", "fid_2"])
+    assert len({name.lower() for name in names} | {"fid", "geom"}) == len(names) + 2
+    assert names[0] == "a"

@@ -4,7 +4,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from per_obspy.report.style import DOTS_PER_INCH, STATE_COLOURS, save
+from per_obspy.files import printable
+from per_obspy.report.style import DOTS_PER_INCH, STATE_COLOURS, literal, save
 
 
 def _figure():
@@ -44,3 +45,15 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
 def test_every_state_has_a_colour_of_its_own():
     assert list(STATE_COLOURS) == ["yes", "possible", "no"]
     assert len(set(STATE_COLOURS.values())) == 3
+
+
+@pytest.mark.parametrize("text", ["$x_$", "$", r"\$x_$", "a$b$c", "x\u202ey\n"])
+def test_names_of_data_are_literal(tmp_path, text):
+    # would catch text that is read as a formula, which fails when the figure is drawn
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], label=literal(text))
+    axes.legend()
+    figure.suptitle(literal(text))
+    save(figure, tmp_path / "figure.png", simulated=False)
+    assert literal(text).replace(r"\$", "$") == printable(text)

@@ -1,12 +1,16 @@
 """The risk table on disk: ranks, text of the worst rows, pieces, single rows."""
 
+import csv
 import json
+from pathlib import Path
 
+import duckdb
 import numpy as np
 import pandas as pd
 import pytest
 from pyarrow import parquet
 
+from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.screening.ranking import KEYS, in_order
 from per_obspy.tables import risk
 from per_obspy.tables.parts import write_part
@@ -76,8 +80,14 @@ def test_text_of_the_worst_rows_does_not_depend_on_pieces(
     # the database that reads the whole table
     monkeypatch.setattr(risk, "ROWS", size)
     write_risk(parts, tmp_path, FACTS, csv_rows)
-    write_worst(tmp_path / "risk.parquet", csv_rows, tmp_path / "expected.csv")
-    assert (tmp_path / "risk.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
+    path = tmp_path / "risk.parquet"
+    query = f"COPY (SELECT * FROM '{path}' WHERE rank <= {csv_rows} ORDER BY rank) TO $path"
+    duckdb.execute(f"{query} (FORMAT csv, HEADER)", {"path": str(tmp_path / "expected.csv")})
+    expected = (tmp_path / "expected.csv").read_bytes()
+    assert (tmp_path / "risk.csv").read_bytes() == expected
+    # the same from the whole table
+    write_worst(path, csv_rows, tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == expected
     assert sorted(path.name for path in tmp_path.glob(".*")) == []
 
 
@@ -103,3 +113,67 @@ def test_a_row_is_found_in_whichever_group_it_is(parts, expected, tmp_path, monk
             assert table.row(index)["pair_id"] == expected["pair_id"][index]
         with pytest.raises(IndexError):
             table.row(COUNT)
+
+
+#: Names of folders that are patterns, addresses or worse to one library or another.
+FOLDERS = ["run [2]", "out*", "a?b", "{x,y}", "it's", "new\nline", "a!b", "http:", "a::b", "%41"]
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize("is_relative", [False, True])
+def test_names_of_folders_are_literal(rows, expected, tmp_path, monkeypatch, name, is_relative):
+    # would catch the rows of the folder that the name matches as a pattern: run 2, out1, acb
+    for other in ("run 2", "out1", "acb", "x", "A"):
+        write_part(in_order(rows.head(3), np.zeros(3)), 5, tmp_path / other / "000000.parquet")
+        write_part(in_order(rows.head(3), np.zeros(3)), 6, tmp_path / other / "risk.parquet")
+    monkeypatch.chdir(tmp_path)
+    folder = Path(name) if is_relative else tmp_path / name
+    write_part(in_order(rows, np.zeros(COUNT)), 0, folder / "000000.parquet")
+    write_risk([folder / "000000.parquet"], folder, FACTS, csv_rows=COUNT)
+    write_worst(folder / "risk.parquet", COUNT, folder / "again.csv")
+    with ranked_table(folder / "risk.parquet", ["pair_id"]) as table:
+        pairs = pd.concat(table.pieces())["pair_id"].tolist()
+    assert pairs == expected["pair_id"].tolist()
+    assert (folder / "again.csv").read_bytes() == (folder / "risk.csv").read_bytes()
+
+
+NAMES = ["pair_id", "gap", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
+
+
+def test_no_text_of_the_table_is_a_formula_and_pairs_join_again(tmp_path):
+    # would catch formulas in identifiers, carried columns and headers, and pairs that a table made
+    # of risk.csv names otherwise than the inventory
+    texts = [
+        "=1+1",
+        "+a",
+        "-b",
+        "@c",
+        "\tx",
+        "'=d",
+        "''-e",
+        "\uff1df",
+        "-1",
+        "plain, quoted",
+        " =g",
+    ]
+    count = len(texts)
+    table = pd.DataFrame({"pair_id": texts, "state": "yes", "station": "XX.A", "=note()": texts})
+    table = table.assign(gap=0.1, probability=0.5, demand_ratio=0.1, height_1=-0.0, height_2=9.0)
+    table = table.assign(**{name: -1.0 - np.arange(count) / 1e5 for name in NAMES[2:]})
+    table = table.assign(height_1=9.0, Gap=1, gap_=2)
+    write_part(in_order(table, np.zeros(count)), 0, tmp_path / "part.parquet")
+    write_risk([tmp_path / "part.parquet"], tmp_path, FACTS, csv_rows=COUNT)
+    with (tmp_path / "risk.csv").open(encoding="utf-8", newline="") as file:
+        written = list(csv.reader(file))
+    for text in (cell for row in written for cell in row):
+        is_number = text.lstrip("-").replace(".", "").isdecimal()
+        assert is_number or not text.strip().startswith(("=", "+", "-", "@", "\uff1d"))
+    assert "-1.00001" in {cell for row in written for cell in row}
+    # names that differ in case only stay what they are
+    assert {"gap", "Gap", "gap_", "'=note()"} <= set(written[0])
+    # as a pair table
+    ids = [text.strip() for text in texts]
+    again = read_pairs(tmp_path / "risk.csv")
+    assert again.attrs["rejected"] == ()
+    assert set(again["pair_id"]) == set(ids)
+    assert {text.strip() for text in again["=note()"]} == set(ids)

@@ -87,3 +87,11 @@ def test_totals_as_text_are_the_totals(risk, tmp_path):
     write_totals(table, tmp_path / "totals.csv")
     read = pd.read_csv(tmp_path / "totals.csv", keep_default_na=False)
     pd.testing.assert_frame_equal(read, table, check_dtype=False, rtol=1e-12)
+
+
+def test_names_of_areas_are_no_formulas(tmp_path):
+    # areas and pairs are named by a carried column and by the inventory
+    table = pd.DataFrame({"area": ["=1+1", "north"], "worst_pair": ["@a", "-b"], "pairs": [1, 2]})
+    write_totals(table, tmp_path / "totals.csv")
+    text = (tmp_path / "totals.csv").read_text()
+    assert text == "area,worst_pair,pairs\n'=1+1,'@a,1\nnorth,'-b,2\n"

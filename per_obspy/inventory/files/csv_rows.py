@@ -1,11 +1,11 @@
 """
 CSV files of pairs as blocks of raw rows.
 
-Each row has its line in the file, and lines that are no rows become rejections.
+Each row has its line in the file, and lines that are no rows become rejections: every line of the
+file is in one of them, or blank.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -16,13 +16,15 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.files.csv_text import (
-    check_separator,
-    check_text,
-    line_breaks,
-    open_quotation,
+from per_obspy.inventory.files.csv_lines import (
+    LONGEST_NAME,
+    RowLines,
+    header_names,
+    row_lines,
 )
+from per_obspy.inventory.files.csv_text import check_separator, check_text
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
+from per_obspy.inventory.files.text_cells import given_text, given_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 
@@ -35,16 +37,12 @@ class CsvFile:
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        self._quoted = check_text(file)
-        # Names of the columns from the header
-        options = _skipping(lambda _: "skip")
-        with self._readable():
-            self._raw_names = list(pa.csv.open_csv(file, _ORDERED, options).schema.names)
-        check_separator(file, self._raw_names)
-        self.names: Sequence[str] = [name.strip() for name in self._raw_names]
-        if len(set(self.names)) < len(self.names):
-            twice = next(name for name in self.names if self.names.count(name) > 1)
-            raise CatalogError(str(file), f"column {twice} stands more than once")
+        self._lines = check_text(file)
+        names = header_names(file)
+        check_separator(file, names)
+        self._columns = [given_text(name.strip()) for name in names]
+        # Spreadsheets leave columns without a name
+        self.names: Sequence[str] = [name for name in self._columns if name]
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:
@@ -54,152 +52,122 @@ class CsvFile:
             name: [pa.int64(), pa.float64()] for name in unknown
         }
         # Drop every type that a cell contradicts
-        for batch in self._batches([], *unknown) if unknown else ():
-            for name, cells in zip(unknown, batch.columns, strict=True):
+        for block in self._blocks(unknown) if unknown else ():
+            for name, cells in zip(unknown, block.table.columns, strict=True):
                 types = possible[name]
                 possible[name] = [kind for kind in types if _as_numbers(cells, kind) is not None]
         return {name: types[0] if types else None for name, types in possible.items()}
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
-        for batch in self._batches([], IDENTIFIER):
-            yield batch.column(0)
+        for block in self._blocks([IDENTIFIER]):
+            yield given_texts(block.table.column(0)).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows; lines without any content are left out."""
-        broken: list[Rejection] = []
-        next_row = 2
-        swallowed = 0
-        for table in _regrouped(self._batches(broken, *self.names), size):
-            # Rows as the reader counts them, without those that it skipped
-            rows = _row_numbers(next_row, len(table), broken)
-            next_row = int(rows[-1]) + 1
-            # Lines in the file: the line breaks inside the cells before a row are added
-            breaks = line_breaks(table) if self._quoted else np.zeros(len(table), dtype=np.int64)
-            offset = swallowed + np.concatenate([[0], np.cumsum(breaks)])
-            lines, swallowed = rows + offset[:-1], int(offset[-1])
-            # Lines that are no rows, and rows that may contain other lines
-            rejected = [_moved(line, rows, offset) for line in _taken(broken, next_row)]
-            rejected += self._torn(table, lines, breaks)
-            yield self._block(table, lines, breaks, tuple(rejected))
-        if broken:
-            yield self._block_without_rows(broken, swallowed)
-
-    def _block(
-        self,
-        table: pa.Table,
-        lines: NDArray[np.int64],
-        breaks: NDArray[np.int64],
-        rejected: tuple[Rejection, ...],
-    ) -> RawRows:
-        """Return the rows with content and without line breaks, numbers converted."""
-        full = _has_content(table) & (breaks == 0)
-        cells = pa.table({name: self._converted(name, table[name]) for name in self.names})
-        return RawRows(str(self.file), cells.filter(pa.array(full)), lines[full], rejected)
-
-    def _block_without_rows(self, broken: list[Rejection], swallowed: int) -> RawRows:
-        """Return the broken lines after the last row, counting line breaks in cells before them."""
-        empty = pa.table({name: pa.array([], pa.string()) for name in self.names})
-        moved = [line._replace(row=(line.row or 0) + swallowed) for line in broken]
-        return RawRows(str(self.file), empty, np.zeros(0, np.int64), tuple(moved))
-
-    def _torn(
-        self, table: pa.Table, lines: NDArray[np.int64], breaks: NDArray[np.int64]
-    ) -> Iterator[Rejection]:
-        """Yield the rows whose cells contain further lines, which may have been rows themselves."""
-        for i in np.flatnonzero(breaks).tolist():
-            cells = {name: table[name][i].as_py() for name in self.names}
-            column = next(name for name, cell in cells.items() if "\n" in cell)
-            # A break at the end of a cell contains no line
-            contained = sum(cell.rstrip("\n").count("\n") for cell in cells.values())
-            fault = f"{column} has a line break: is a quotation mark not closed?"
-            reason = f"{fault} {contained} further lines are lost"
-            yield Rejection("pair", cells[IDENTIFIER], str(self.file), int(lines[i]), (reason,))
+        for rows in _regrouped(self._blocks(self.names), size):
+            full = _has_content(rows.table)
+            cells = {name: self._converted(name, rows.table[name]) for name in self.names}
+            table = pa.table(cells).filter(pa.array(full))
+            yield rows._replace(table=table, lines=rows.lines[full])
 
     def _converted(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
         """Return a column as numbers if every cell is one, else as text for the checks to come."""
         if name not in COLUMNS:
             kind = self._number_types[name]
-            return cells if kind is None else _as_numbers(cells, kind)
+            return given_texts(cells) if kind is None else _as_numbers(cells, kind)
         if COLUMNS[name].dtype == "str":
-            return cells
+            return given_texts(cells)
         return _as_numbers(cells, pa.float64()) or cells
 
-    def _batches(self, broken: list[Rejection], *names: str) -> Iterator[pa.RecordBatch]:
-        """Yield columns as text, and append lines that are no rows to a list as they are met."""
-
-        def skip(row: pa.csv.InvalidRow) -> str:
-            reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
-            identifier = row.text.split(",")[0]
-            broken.append(Rejection("pair", identifier, str(self.file), row.number, (reason,)))
-            return "skip"
-
-        # The header may have blanks around names
-        raw = [self._raw_names[self.names.index(name)] for name in names]
-        as_text = pa.csv.ConvertOptions(
-            column_types=dict.fromkeys(raw, pa.string()), include_columns=raw
+    def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
+        """Yield these columns as text, some thousands of rows at a time, and the broken lines."""
+        # Columns by their position, as names may be anything
+        columns = [str(position) for position in range(len(self._columns))]
+        chosen = [columns[self._columns.index(name)] for name in names]
+        options = pa.csv.ConvertOptions(
+            column_types=dict.fromkeys(chosen, pa.string()), include_columns=chosen
         )
-        with self._readable():
-            reader = pa.csv.open_csv(
-                self.file,
-                read_options=_ORDERED,
-                parse_options=_skipping(skip),
-                convert_options=as_text,
-            )
-            for batch in reader:
-                yield batch.rename_columns(list(names))
+        for rows in row_lines(self.file, self._columns, self._lines):
+            table, skipped = _parsed(rows.text, columns, options)
+            lines = np.delete(rows.numbers, list(skipped))
+            # Every line that was given is a row or a broken one
+            if len(table) != lines.size:
+                problem = f"line {rows.numbers[0]} and the next ones make no rows"
+                raise CatalogError(str(self.file), problem)
+            broken = tuple(self._broken(rows, skipped))
+            yield RawRows(str(self.file), table.rename_columns(list(names)), lines, broken)
 
-    @contextmanager
-    def _readable(self) -> Iterator[None]:
-        """Turn a fault of the reader into one of the file."""
-        try:
-            yield
-        except pa.ArrowInvalid as error:
-            problem = open_quotation(self.file) or f"not a CSV table: {error}"
-            raise CatalogError(str(self.file), problem) from error
+    def _broken(self, rows: RowLines, skipped: dict[int, pa.csv.InvalidRow]) -> list[Rejection]:
+        """Return the broken lines and those with too few or too many cells, in their order."""
+        broken = [*rows.broken]
+        for position, invalid in skipped.items():
+            broken.append(_rejection(self.file, int(rows.numbers[position]), invalid))
+        return sorted(broken, key=lambda line: line.row or 0)
 
 
-#: With threads, the reader does not number the rows.
-_ORDERED = pa.csv.ReadOptions(use_threads=False)
+def _parsed(
+    text: bytes, columns: list[str], options: pa.csv.ConvertOptions
+) -> tuple[pa.Table, dict[int, pa.csv.InvalidRow]]:
+    """Return rows as a table of text, and the invalid ones by their position."""
+    skipped: dict[int, pa.csv.InvalidRow] = {}
+
+    def skip(row: pa.csv.InvalidRow) -> str:
+        skipped[row.number - 1] = row
+        return "skip"
+
+    if not text:
+        empty = [pa.array([], pa.string()) for _ in options.include_columns]
+        return pa.table(empty, names=options.include_columns), skipped
+    # With threads, the reader does not number the rows; a block is read in one piece
+    reading = pa.csv.ReadOptions(use_threads=False, column_names=columns, block_size=len(text) + 1)
+    parsing = pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=skip)
+    table = pa.csv.read_csv(pa.BufferReader(text), reading, parsing, options)
+    return table, skipped
 
 
-def _skipping(handler: Callable[[pa.csv.InvalidRow], str]) -> pa.csv.ParseOptions:
-    """Return options that keep empty lines and hand lines that are no rows to a function."""
-    return pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=handler)
+def _rejection(file: Path, line: int, row: pa.csv.InvalidRow) -> Rejection:
+    """Return the rejection of a line with too few or too many cells."""
+    reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
+    name = row.text.split(",")[0][:LONGEST_NAME]
+    return Rejection("pair", name, str(file), line, (reason,))
 
 
-def _regrouped(batches: Iterable[pa.RecordBatch], size: int) -> Iterator[pa.Table]:
-    """Yield the same rows in tables of so many rows."""
-    pending: list[pa.RecordBatch] = []
-    for batch in batches:
-        pending.append(batch)
-        while sum(map(len, pending)) >= size:
-            table = pa.Table.from_batches(pending)
-            pending = table.slice(size).to_batches()
-            yield table.slice(0, size)
-    if sum(map(len, pending)):
-        yield pa.Table.from_batches(pending)
+def _regrouped(blocks: Iterable[RawRows], size: int) -> Iterator[RawRows]:
+    """Yield the same rows in blocks of so many, each with the broken lines before its end."""
+    pending: list[RawRows] = []
+    for block in blocks:
+        pending.append(block)
+        if sum(len(rows.lines) for rows in pending) < size:
+            continue
+        # Enough rows for a block or several; the rest waits
+        whole = _together(pending)
+        first = 0
+        while len(whole.lines) - first >= size:
+            yield _part(whole, first, first + size)
+            first += size
+        pending = [_part(whole, first, None)]
+    if any(len(rows.lines) or rows.broken for rows in pending):
+        yield _together(pending)
 
 
-def _row_numbers(first: int, count: int, broken: list[Rejection]) -> NDArray[np.int64]:
-    """Return the numbers of so many rows from the first on, leaving out the skipped lines."""
-    skipped = [line.row for line in broken if line.row is not None]
-    numbers = np.arange(first, first + count + len(skipped))
-    rows: NDArray[np.int64] = np.setdiff1d(numbers, skipped)[:count]
-    return rows
+def _together(blocks: Sequence[RawRows]) -> RawRows:
+    """Return consecutive blocks as a single one."""
+    table = pa.concat_tables([rows.table for rows in blocks])
+    lines = np.concatenate([rows.lines for rows in blocks])
+    broken = tuple(line for rows in blocks for line in rows.broken)
+    return RawRows(blocks[0].source, table, lines, broken)
 
 
-def _taken(broken: list[Rejection], row: int) -> tuple[Rejection, ...]:
-    """Remove the skipped lines before a row from their list and return them."""
-    taken = tuple(line for line in broken if line.row is not None and line.row < row)
-    del broken[: len(taken)]
-    return taken
-
-
-def _moved(rejection: Rejection, rows: NDArray[np.int64], offset: NDArray[np.int64]) -> Rejection:
-    """Return a skipped line with its line in the file, counting line breaks in cells before it."""
-    row = rejection.row or 0
-    return rejection._replace(row=row + int(offset[np.searchsorted(rows, row)]))
+def _part(rows: RawRows, first: int, end: int | None) -> RawRows:
+    """Return rows from the first to before the end, with the broken lines between them."""
+    # A broken line goes with the row after it
+    last_before = rows.lines[first - 1] if first else 0
+    last = np.inf if end is None else rows.lines[end - 1]
+    broken = [line for line in rows.broken if last_before < (line.row or 0) < last]
+    length = None if end is None else end - first
+    table = rows.table.slice(first, length)
+    return RawRows(rows.source, table, rows.lines[first:end], tuple(broken))
 
 
 def _has_content(table: pa.Table) -> NDArray[np.bool_]:

@@ -3,11 +3,6 @@
 import codecs
 from pathlib import Path
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-from numpy.typing import NDArray
-
 from per_obspy.errors import CatalogError
 from per_obspy.files import looks_like
 
@@ -18,9 +13,9 @@ BLOCK = 1 << 20
 OTHER_SEPARATORS = {";": "semicolons", "\t": "tabulators", "|": "vertical bars"}
 
 
-def check_text(file: Path) -> bool:
+def check_text(file: Path) -> int:
     """
-    Check that a file is text in UTF-8 and return whether it contains quotation marks.
+    Check that a file is text in UTF-8 and return the number of its lines.
 
     Raises
     ------
@@ -30,19 +25,26 @@ def check_text(file: Path) -> bool:
     if kind := looks_like(file):
         raise CatalogError(str(file), f"not a CSV table: it is {kind}")
     # Decode block by block, so that a file of any size fits
-    decoder, quoted = codecs.getincrementaldecoder("utf-8")(), False
+    decoder, lines, last = codecs.getincrementaldecoder("utf-8")(), 0, b""
     try:
         with file.open("rb") as stream:
             while block := stream.read(BLOCK):
                 decoder.decode(block)
-                quoted = quoted or b'"' in block
+                lines, last = lines + _line_ends(block, last), block[-1:]
                 if b"\0" in block:
                     problem = "not a CSV table: it holds zero bytes, as no text does"
                     raise CatalogError(str(file), problem)
         decoder.decode(b"", final=True)
     except UnicodeDecodeError as error:
         raise CatalogError(str(file), _undecodable(file)) from error
-    return quoted
+    # The last line may lack its end
+    return lines + (last not in (b"\n", b"\r"))
+
+
+def _line_ends(block: bytes, before: bytes) -> int:
+    """Return the number of line ends of any kind in a block; ``before`` is the byte before it."""
+    pairs = block.count(b"\r\n") + (before == b"\r" and block.startswith(b"\n"))
+    return block.count(b"\n") + block.count(b"\r") - pairs
 
 
 def _undecodable(file: Path) -> str:
@@ -57,15 +59,6 @@ def _undecodable(file: Path) -> str:
     return "the end is not UTF-8"
 
 
-def open_quotation(file: Path) -> str:
-    """Return the first line with a quotation mark that is not closed on it; empty if none."""
-    with file.open(encoding="utf-8") as text:
-        for number, line in enumerate(text, start=1):
-            if line.count('"') % 2 and (line.startswith('"') or ',"' in line):
-                return f"line {number} has a quotation mark that is not closed on it"
-    return ""
-
-
 def check_separator(file: Path, names: list[str]) -> None:
     """
     Check that the columns of a header are separated by commas.
@@ -78,11 +71,3 @@ def check_separator(file: Path, names: list[str]) -> None:
     for sign, kind in OTHER_SEPARATORS.items():
         if len(names) == 1 and sign in names[0]:
             raise CatalogError(str(file), f"columns are separated by {kind}, commas are expected")
-
-
-def line_breaks(table: pa.Table) -> NDArray[np.int64]:
-    """Return the number of line breaks inside the cells of each row, as an open quotation makes."""
-    breaks = np.zeros(len(table), dtype=np.int64)
-    for column in table.columns:
-        breaks += np.asarray(pc.count_substring(column, "\n"), dtype=np.int64)
-    return breaks

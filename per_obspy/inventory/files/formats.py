@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
+from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
+from per_obspy.inventory.checking import OBSERVED
 from per_obspy.inventory.files.csv_rows import CsvFile
+from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
-from per_obspy.inventory.schema import COLUMNS
 
 #: Prefix that pandas gives to a column of row numbers.
 INDEX = "__index_level_"
@@ -23,26 +25,39 @@ class ParquetFile:
 
     def __init__(self, file: Path) -> None:
         self.file = file
+        # Relative names such as http:/x are addresses to the reader
+        self._path = file.absolute()
         with self._readable():
-            names = pa.parquet.read_schema(file).names
+            names = pa.parquet.read_schema(self._path).names
         self.names: Sequence[str] = [name for name in names if not name.startswith(INDEX)]
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
-        with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
+        with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
             for batch in stored.iter_batches(columns=[IDENTIFIER]):
-                yield batch.column(0).cast(pa.string())
+                names, _ = plain_columns(pa.Table.from_batches([batch]))
+                yield names.column(0).cast(pa.string()).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows."""
         line = 2
-        with self._readable(), pa.parquet.ParquetFile(self.file) as stored:
+        with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
             for batch in stored.iter_batches(batch_size=size, columns=self.names):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
-                table = _with_numbers(pa.Table.from_batches([batch]))
-                yield RawRows(str(self.file), table, lines, ())
+                table, faults = plain_columns(pa.Table.from_batches([batch]))
+                broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
+                good = np.isin(np.arange(batch.num_rows), list(faults), invert=True)
+                rows = _with_numbers(table).filter(pa.array(good))
+                yield RawRows(str(self.file), rows, lines[good], tuple(broken))
                 line += batch.num_rows
+
+    def _rejection(
+        self, table: pa.Table, lines: NDArray[np.int64], row: int, fault: str
+    ) -> Rejection:
+        """Return the rejection of a row."""
+        name = str(table[IDENTIFIER][row].as_py())
+        return Rejection("pair", name, str(self.file), int(lines[row]), (fault,))
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
@@ -56,13 +71,12 @@ class ParquetFile:
 
 def _with_numbers(table: pa.Table) -> pa.Table:
     """
-    Return the table with 0 and 1 for booleans in columns of numbers.
+    Return the table with 0 and 1 for booleans in the column ``observed``.
 
-    Some programs write the column ``observed`` as booleans.
+    Some programs write it so; in other columns of numbers a boolean is a mistake.
     """
     for i, column in enumerate(table.schema):
-        is_number = column.name in COLUMNS and COLUMNS[column.name].dtype == "float64"
-        if is_number and pa.types.is_boolean(column.type):
+        if column.name == OBSERVED and pa.types.is_boolean(column.type):
             table = table.set_column(i, column.name, table[i].cast(pa.float64()))
     return table
 

@@ -6,6 +6,7 @@ import pandas as pd
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import written_whole
+from per_obspy.inventory.files.text_cells import cells
 
 
 def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
@@ -17,7 +18,7 @@ def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
     pairs : DataFrame
         By the schema.
     path : str or Path
-        ``.csv`` or ``.parquet``.
+        ``.csv``, with texts as :mod:`.text_cells` has them, or ``.parquet``.
 
     Raises
     ------
@@ -25,12 +26,12 @@ def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
         If the suffix is another one.
     """
     file = Path(path)
-    plain = pairs.copy()
-    plain.attrs = {}  # rejected rows have a file of their own
     if file.suffix.lower() not in (".csv", ".parquet"):
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected .csv or .parquet")
     with written_whole(file) as part:
         if file.suffix.lower() == ".csv":
-            plain.to_csv(part, index=False)
+            cells(pairs).to_csv(part, index=False)
         else:
+            plain = pairs.copy(deep=False)
+            plain.attrs = {}  # rejected rows have a file of their own
             plain.to_parquet(part, index=False)

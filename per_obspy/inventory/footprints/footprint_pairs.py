@@ -12,7 +12,7 @@ import shapely
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.checking import Rejections, checked_pairs
+from per_obspy.inventory.checking import Rejections, checked_pairs, plain_numbers
 from per_obspy.inventory.contact_height import floor_offset
 from per_obspy.inventory.footprints.importers import imported
 from per_obspy.inventory.footprints.layers import Geometries, Layer, read_layer
@@ -197,8 +197,8 @@ def _with_heights(table: pd.DataFrame) -> pd.DataFrame:
     for i in (1, 2):
         if f"storey_height_{i}" in table:
             # Text that is no number is left to the checks
-            storeys = pd.to_numeric(table.get(f"storeys_{i}", unknown), errors="coerce")
-            storey_height = pd.to_numeric(table[f"storey_height_{i}"], errors="coerce")
+            storeys = plain_numbers(table.get(f"storeys_{i}", unknown))
+            storey_height = plain_numbers(table[f"storey_height_{i}"])
             height = table.get(f"height_{i}", unknown)
             table[f"height_{i}"] = height.fillna(storeys * storey_height)
             table = table.drop(columns=f"storey_height_{i}")

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
+from per_obspy.inventory.files.plain_columns import plain_columns
+from per_obspy.inventory.footprints.gdal_paths import literal_path
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow.
 GDAL_KINDS = {
@@ -25,6 +27,7 @@ GDAL_KINDS = {
     ".shp": "Shapefile",
     ".fgb": "FlatGeobuf file",
 }
+JSON_SUFFIXES = (".geojson", ".json")
 PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 
 Geometries = NDArray[np.object_]
@@ -86,7 +89,7 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     _require_outlines(file, raw.geometries)
     # Longitude and latitude of every feature
     crs = _reference_system(file, raw.crs)
-    degrees = _in_degrees(shapely.force_2d(raw.geometries), crs)
+    degrees = _in_degrees(file, shapely.force_2d(raw.geometries), crs)
     # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates are
     # degrees
     stray = _on_earth(raw.geometries) & bool(crs.is_projected)
@@ -137,9 +140,12 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
     """Read a layer with GDAL."""
     try:
         # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
-            name = _layer_name(file, layer)
-            meta, _, geometries, fields = pyogrio.raw.read(file, layer=name, force_2d=False)
+        with (
+            warnings.catch_warnings(action="ignore", category=RuntimeWarning),
+            literal_path(file) as path,
+        ):
+            name = _layer_name(file, path, layer)
+            meta, _, geometries, fields = pyogrio.raw.read(path, layer=name, force_2d=False)
     except (
         pyogrio.errors.DataSourceError,
         pyogrio.errors.DataLayerError,
@@ -147,14 +153,36 @@ def _read_gdal(file: Path, layer: str | None) -> _Raw:
     ) as error:
         problem = unreadable_reason(file, GDAL_KINDS[file.suffix.lower()], error)
         raise CatalogError(str(file), problem) from error
+    # What GDAL found, but for a reference system that it does not know
     columns = dict(zip(meta["fields"], fields, strict=True))
     attributes = pd.DataFrame(columns, index=range(len(geometries)))
-    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, meta["crs"])
+    is_json = file.suffix.lower() in JSON_SUFFIXES
+    crs = (_declared_system(file) if is_json else None) or meta["crs"]
+    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, crs)
 
 
-def _layer_name(file: Path, layer: str | None) -> str:
-    """Return the requested layer, or the only one with geometries."""
-    kinds = {str(name): kind for name, kind in pyogrio.list_layers(file)}
+def _declared_system(file: Path) -> str | None:
+    """Return the coordinate reference system of a GeoJSON file, for which GDAL may take WGS 84."""
+    text = file.read_bytes()
+    if b'"crs"' not in text:
+        return None
+    try:
+        declared = json.loads(text).get("crs")
+    except (ValueError, AttributeError, RecursionError) as error:
+        raise CatalogError(str(file), f"not a GeoJSON file: {error}") from error
+    if declared is None:
+        return None
+    # The name of the older standard, or its form with a code
+    try:
+        properties = declared["properties"]
+        return str(properties["name"] if "name" in properties else f"EPSG:{properties['code']}")
+    except (KeyError, TypeError):
+        return json.dumps(declared)
+
+
+def _layer_name(file: Path, path: Path, layer: str | None) -> str:
+    """Return the requested layer of a path, or the only one with geometries."""
+    kinds = {str(name): kind for name, kind in pyogrio.list_layers(path)}
     if layer is not None:
         if layer not in kinds:
             raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")
@@ -172,7 +200,7 @@ def _layer_name(file: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> _Raw:
     """Read a GeoParquet file."""
     try:
-        table = pa.parquet.read_table(file)
+        table = pa.parquet.read_table(file.absolute())
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     # GeoParquet is described by JSON in the metadata
@@ -182,8 +210,10 @@ def _read_geoparquet(file: Path) -> _Raw:
             str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints"
         )
     name, geometries, crs = _geometry_column(file, table, described)
-    attributes = table.drop_columns([name]).replace_schema_metadata(None).to_pandas()
-    return _Raw(geometries, attributes, crs)
+    attributes, faults = plain_columns(table.drop_columns([name]).replace_schema_metadata(None))
+    for row, fault in faults.items():
+        raise CatalogError(str(file), f"feature {row + 1}: {fault}")
+    return _Raw(geometries, attributes.to_pandas(), crs)
 
 
 def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str, Geometries, Any]:
@@ -207,19 +237,28 @@ def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str
 
 
 def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
-    """Return the coordinate reference system of a layer."""
+    """Return the coordinate reference system of a layer, if it is one of the horizontal."""
     if crs is None:
         raise CatalogError(str(file), "no coordinate reference system (a Shapefile needs its .prj)")
     try:
-        return pyproj.CRS.from_user_input(crs)
-    except pyproj.exceptions.CRSError as error:
+        found = pyproj.CRS.from_user_input(crs)
+    except (pyproj.exceptions.CRSError, TypeError, ValueError, AttributeError) as error:
         problem = f"unknown coordinate reference system {str(crs)!r:.60}"
         raise CatalogError(str(file), problem) from error
+    # Heights, local systems of a building site and positions from the centre of the Earth
+    if not (found.is_geographic or found.is_projected):
+        problem = f"coordinate reference system {found.name!r:.60} is of another kind"
+        raise CatalogError(str(file), f"{problem}, expected a geographic or projected one")
+    return found
 
 
-def _in_degrees(geometries: Geometries, crs: pyproj.CRS) -> Geometries:
+def _in_degrees(file: Path, geometries: Geometries, crs: pyproj.CRS) -> Geometries:
     """Return geometries in longitude and latitude."""
-    transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
+    try:
+        transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
+    except pyproj.exceptions.ProjError as error:
+        problem = f"coordinate reference system {crs.name!r:.60} cannot be turned into WGS 84"
+        raise CatalogError(str(file), problem) from error
     return np.asarray(
         shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
     )

@@ -75,7 +75,9 @@ def _read(source: str) -> pd.DataFrame:
     """Return the table of a CSV file as it is."""
     try:
         check_text(Path(source))
-        table = pd.read_csv(source, comment="#", skipinitialspace=True)
+        # An open file, as pandas fetches names that are addresses and unpacks others
+        with Path(source).open(encoding="utf-8") as file:
+            table = pd.read_csv(file, comment="#", skipinitialspace=True)
     except (OSError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise CatalogError(source, f"cannot be read as CSV: {reason_of(error)}") from error
     check_separator(Path(source), list(map(str, table.columns)))

@@ -6,6 +6,7 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from per_obspy.errors import CatalogError
+from per_obspy.inventory.files import csv_lines
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk, read_pairs
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note,zone"
@@ -59,9 +60,12 @@ def test_chunks_hold_what_the_whole_file_holds(csv, size):
     ]  # fmt: skip
 
 
+OPEN = "a quotation mark is not closed"
+
+
 @pytest.mark.parametrize("size", [1, 2, 100])
-def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, size):
-    # the reader takes everything up to the next mark, or to the end, for one cell
+def test_a_quotation_mark_that_is_not_closed_loses_its_own_row_only(tmp_path, size):
+    # would catch every row up to the next mark, or to the end, taken for one cell
     path = tmp_path / "pairs.csv"
     rows = [
         _row("a"),
@@ -74,34 +78,70 @@ def test_a_quotation_mark_that_is_not_closed_loses_no_row_in_silence(tmp_path, s
     ]
     path.write_text("\n".join([HEADER, *rows, _row("f", zone='"3'), _row("g"), ""]))
     table, rejected = _in_chunks([path], size)
-    assert table["pair_id"].tolist() == ["a", "e"]
-    reason = "{} has a line break: is a quotation mark not closed? {} further lines are lost"
+    assert table["pair_id"].tolist() == ["a", "c", "d", "e", "g"]
     assert [(rejection.name, rejection.row, *rejection.reasons) for rejection in rejected] == [
         ("short", 3, "2 columns, the header has 10"),
-        ("b", 4, reason.format("note", 2)),
+        ("b", 4, OPEN),
         ("short too", 7, "1 columns, the header has 10"),
-        ("f", 9, reason.format("zone", 1)),
+        ("f", 9, OPEN),
     ]
 
 
-def test_a_quotation_mark_that_swallows_a_block_of_the_reader_is_found(tmp_path):
-    # blocks have 1 MB: here the reader itself gives up, without a line; the last block is read to
-    # its end
+@pytest.mark.parametrize("position", [0, 5000, 19_000])
+def test_a_quotation_mark_among_many_rows_loses_its_own_row_only(tmp_path, position):
+    # blocks have 1 MB: would catch the 3 997 rows that one mark took away
     rows = [_row(f"p{i}", note="x" * 100) for i in range(20_000)]
     path = tmp_path / "pairs.csv"
-    path.write_text(
-        "\n".join([HEADER, *rows[:19_000], _row("open", note='"x'), *rows[19_000:], ""])
-    )
+    text = [HEADER, *rows[:position], _row("open", note='"x'), *rows[position:], ""]
+    path.write_text("\n".join(text))
     table, rejected = _in_chunks([path], 7000)
-    assert (len(table), [(rejection.name, rejection.row) for rejection in rejected]) == (
-        19_000,
-        [("open", 19_002)],
-    )
-    path.write_text("\n".join([HEADER, *rows[:5000], _row("open", note='"x'), *rows[5000:], ""]))
-    with pytest.raises(
-        CatalogError, match=r"pairs\.csv: line 5002 has a quotation mark that is not closed on it"
-    ):
-        read_pairs(path)
+    assert table["pair_id"].tolist() == [f"p{i}" for i in range(20_000)]
+    line = position + 2
+    assert [(rejection.name, rejection.row) for rejection in rejected] == [("open", line)]
+
+
+@pytest.mark.parametrize("size", [1, 1000])
+@pytest.mark.parametrize("ending", ["\n", "\r", "\r\n"])
+@pytest.mark.parametrize("block", [7, 1 << 20])
+def test_every_line_is_read_rejected_or_blank(tmp_path, monkeypatch, size, ending, block):
+    # would catch rows lost at the border of a block inside a quotation, and wrong line numbers
+    monkeypatch.setattr(csv_lines, "BLOCK", block)
+    lines = [HEADER]
+    good, bad = {}, {}
+
+    def add(name, text, is_good=True):
+        (good if is_good else bad)[name] = len(lines) + 1
+        lines.extend(text.split("\n"))
+
+    for i in range(8):
+        add(f"a{i}", _row(f"a{i}"))
+        add(f"break{i}", _row(f"break{i}", note='"first\n\nsecond, ""third"""'))
+        lines.append("")
+        add(f"open{i}", _row(f"open{i}", note='"open'), is_good=False)
+        add(f"after{i}", _row(f"after{i}", note='"x"y'), is_good=False)
+        add(f"short{i}", f"short{i},2", is_good=False)
+        add(f"inch{i}", _row(f"inch{i}", note='5" wall'))
+    path = tmp_path / "pairs.csv"
+    path.write_bytes(ending.join(lines).encode())
+    chunks = [chunk.rows for chunk in PairInventory([path]).chunks(size)]
+    names = [name for rows in chunks for name in rows.table["pair_id"].to_pylist()]
+    numbers = [int(line) for rows in chunks for line in rows.lines]
+    assert dict(zip(names, numbers, strict=True)) == good
+    broken = [line for rows in chunks for line in rows.broken]
+    assert {line.name: line.row for line in broken} == bad
+    assert len(broken) == len(bad)
+    notes = {note for rows in chunks for note in rows.table["note"].to_pylist()}
+    assert notes == {"shop", 'first  second, "third"', '5" wall'}
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path):
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([HEADER, _row("a"), _row("b"), ""]))
+    inventory = PairInventory([path])
+    path.write_text("\n".join([HEADER, _row("a"), ""]))
+    message = "3 lines, of which 2 were read: was the file changed meanwhile"
+    with pytest.raises(CatalogError, match=message):
+        list(inventory.chunks(10))
 
 
 def test_a_quotation_mark_inside_a_cell_is_text(tmp_path):
@@ -163,3 +203,12 @@ def test_whole_file_faults_come_before_the_first_chunk(tmp_path):
         PairInventory([empty])
     with pytest.raises(CatalogError, match="no such file"):
         PairInventory([tmp_path / "nothing.csv"])
+
+
+def test_columns_without_a_name_are_left_out(tmp_path):
+    # spreadsheets write them after the last one
+    path = tmp_path / "pairs.csv"
+    path.write_text(f"{HEADER},, \n{_row('a')},,x\n{_row('b')},,\n")
+    table, rejected = _in_chunks([path], 10)
+    assert table.columns.tolist() == HEADER.split(",")
+    assert (table["pair_id"].tolist(), rejected) == (["a", "b"], [])

@@ -1,5 +1,7 @@
 """Files of pairs by their suffix, and Parquet files: booleans, row numbers, damage."""
 
+import datetime
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -75,3 +77,32 @@ def test_an_index_of_pandas_is_a_column_or_left_out(table, tmp_path):
         "longitude_2", "latitude_2", "height_2",
     ]  # fmt: skip
     assert_frame_equal(found, table[found.columns], check_dtype=False)
+
+
+#: Values of a column that are no numbers, although programs turn them into some.
+NO_NUMBERS = [
+    [True, False, True],
+    [True, None, False],
+    pd.to_datetime(["2020-01-01"] * 3),
+    pd.to_timedelta([1, 2, 3], unit="s"),
+    [datetime.date(2020, 1, 1)] * 3,
+    ["true", "yes", "TRUE"],
+]
+
+
+@pytest.mark.parametrize("values", NO_NUMBERS)
+@pytest.mark.parametrize("name", ["gap", "height_1", "longitude_2", "mass_1"])
+def test_truth_values_and_dates_are_no_numbers(table, tmp_path, name, values):
+    # would catch a gap of 1 m that is a yes, and heights in nanoseconds since 1970
+    wrong = table.assign(**{name: values})
+    kinds = [".parquet", ".csv"]
+    for kind in kinds:
+        path = tmp_path / f"wrong{kind}"
+        wrong.to_parquet(path) if kind == ".parquet" else wrong.to_csv(path, index=False)
+        found = read_pairs(path)
+        given = pd.Series(values).notna()
+        reasons = [row.reasons for row in found.attrs["rejected"]]
+        assert sum("is not a number" in reason[0] for reason in reasons) == given.sum()
+        if name in found:
+            assert found[name].isna().all()
+    assert read_pairs(wrong).attrs["rejected"] != ()

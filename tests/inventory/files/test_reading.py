@@ -164,7 +164,7 @@ def test_names_that_are_no_text(write, tmp_path):
 def test_a_table_of_broken_lines_alone_says_so_line_by_line(write):
     pairs = read_pairs(write(f"{HEADER}\n{GOOD.replace('corner', chr(34) + 'corner')}\n008,0.1\n"))
     assert pairs.empty
-    assert [rejection.row for rejection in pairs.attrs["rejected"]] == [2]
+    assert [rejection.row for rejection in pairs.attrs["rejected"]] == [2, 3]
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -144,3 +144,59 @@ def test_several_layers_need_a_name(write):
     ):
         read_layer(path, "harbour")
     assert len(read_layer(path, "new_town").polygons) == 2
+
+
+#: A name that no database has, one of heights, one from the centre of the Earth, one of the Moon.
+SYSTEMS = [
+    ("EPSG:999999", "unknown coordinate reference system 'EPSG:999999'"),
+    ("junk", "unknown coordinate reference system 'junk'"),
+    ("EPSG:5703", "coordinate reference system 'NAVD88 height' is of another kind"),
+    ("EPSG:4978", "coordinate reference system 'WGS 84' is of another kind"),
+    ("IAU_2015:30100", "cannot be turned into WGS 84"),
+]
+
+
+@pytest.mark.parametrize(("crs", "problem"), SYSTEMS)
+def test_reference_systems_without_places_on_the_earth(tmp_path, crs, problem):
+    with pytest.raises(CatalogError, match=problem) as error:
+        read_layer(_write_geoparquet(tmp_path / "town.parquet", crs=crs))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("declared", "problem"),
+    [
+        ({"type": "name", "properties": {"name": "EPSG:999999"}}, "unknown .* 'EPSG:999999'"),
+        ({"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::999999"}}, "unknown"),
+        ({"type": "EPSG", "properties": {"code": 999999}}, "unknown .* 'EPSG:999999'"),
+        ({"type": "link", "properties": {"href": "http://127.0.0.1/"}}, "unknown"),
+        ("junk", "unknown"),
+    ],
+)
+def test_an_unknown_system_of_geojson_is_not_taken_for_degrees(write, declared, problem):
+    # GDAL takes WGS 84 then: would catch footprints elsewhere
+    path = write(HOUSES, "town.geojson")
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"crs": declared}))
+    with pytest.raises(CatalogError, match=problem):
+        read_layer(path)
+    known = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
+    path.write_text(json.dumps(content | {"crs": known}))
+    assert len(read_layer(path).polygons) == len(HOUSES)
+
+
+@pytest.mark.parametrize("prj", ["junk", "", "GEOGCS[", 'LOCAL_CS["site"]'])
+def test_a_projection_file_that_is_none(write, prj):
+    path = write(HOUSES, "town.shp")
+    path.with_suffix(".prj").write_text(prj)
+    with pytest.raises(CatalogError, match=r"town\.shp: .*(reference system|not a Shapefile)"):
+        read_layer(path)
+
+
+def test_text_of_geoparquet_that_is_not_utf_8(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet")
+    table = pa.parquet.read_table(path)
+    text = pa.array([b"\xff"] * 4, pa.binary()).view(pa.string())
+    pa.parquet.write_table(table.append_column("building_id", text), path)
+    with pytest.raises(CatalogError, match="feature 1: building_id is not UTF-8"):
+        read_layer(path)

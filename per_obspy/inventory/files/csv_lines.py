@@ -1,0 +1,227 @@
+"""
+Lines of a CSV file joined to rows, every line accounted for.
+
+A quoted cell may contain line breaks. A quotation mark that is never closed would take the rows
+after it for one cell: such a row is left out by itself, and the next line is a row again.
+"""
+
+import csv
+import re
+from codecs import BOM_UTF8
+from collections import deque
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.inventory.files.csv_text import BLOCK
+from per_obspy.inventory.schema import COLUMNS
+
+#: Most lines of one row; a quotation over more of them is one that is not closed.
+LONGEST_ROW = 100
+
+#: Longest line, bytes.
+LONGEST_LINE = 8 << 20
+
+#: Longest name of a row in messages, bytes.
+LONGEST_NAME = 80
+
+OPEN = "a quotation mark is not closed"
+AFTER = "text follows a closing quotation mark"
+
+# Text inside of quotation marks, in which two of them stand for one; cells; what may follow them
+_INSIDE = rb'(?:[^"]|"")*+'
+_CELL = rb'(?:"%b"|[^",][^,]*+|)' % _INSIDE
+_CELLS = rb"(?:,%b)*+" % _CELL
+
+#: A line whose quotations are all closed, and one whose last cell is not.
+_WHOLE = re.compile(rb"%b%b" % (_CELL, _CELLS))
+_OPENING = re.compile(rb'(?:%b,)*+"%b' % (_CELL, _INSIDE))
+
+#: A further line of a quotation, which closes it; or which does not, or opens the next one.
+_CLOSING = re.compile(rb'%b"%b' % (_INSIDE, _CELLS))
+_BETWEEN = re.compile(rb'%b(?:"%b,"%b)?+' % (_INSIDE, _CELLS, _INSIDE))
+
+
+class RowLines(NamedTuple):
+    """
+    Consecutive rows of a CSV file as text.
+
+    Attributes
+    ----------
+    text : bytes
+        One line per row; line breaks inside of cells have become blanks.
+    numbers : (n_rows,) ndarray of int
+        Line of the file on which each row begins; the header is line 1.
+    broken : tuple of Rejection
+        Lines between the rows whose quotation marks are wrong.
+    """
+
+    text: bytes
+    numbers: NDArray[np.int64]
+    broken: tuple[Rejection, ...]
+
+
+def header_names(file: Path) -> list[str]:
+    """
+    Return the names in the first line of a file.
+
+    Raises
+    ------
+    CatalogError
+        If a quotation mark of the line is not closed.
+    """
+    first = next(_blocks(file)).partition(b"\n")[0]
+    if not _WHOLE.fullmatch(first):
+        problem = OPEN if _OPENING.fullmatch(first) else AFTER
+        raise CatalogError(str(file), f"line 1: {problem}")
+    return _cells(first)
+
+
+def row_lines(file: Path, names: Sequence[str], lines: int) -> Iterator[RowLines]:
+    """
+    Yield the rows after the header, some thousands at a time.
+
+    Parameters
+    ----------
+    file : Path
+        Checked by :func:`~.csv_text.check_text`.
+    names : sequence of str
+        Columns of the header.
+    lines : int
+        Number of lines of the file.
+
+    Raises
+    ------
+    CatalogError
+        If the lines that were read are not those that the file had.
+    """
+    scanner, blocks = _Scanner(file, names), _blocks(file)
+    # The header is line 1
+    yield scanner.rows(next(blocks).partition(b"\n")[2])
+    for block in blocks:
+        yield scanner.rows(block)
+    yield scanner.rows(b"", is_last=True)
+    if scanner.number != lines + 1:
+        read = scanner.number - 1
+        problem = f"{lines} lines, of which {read} were read: was the file changed meanwhile?"
+        raise CatalogError(str(file), problem)
+
+
+class _Scanner:
+    """
+    Joins lines to rows, block by block.
+
+    Attributes
+    ----------
+    number : int
+        Number of the next line of the file.
+    """
+
+    def __init__(self, file: Path, names: Sequence[str]) -> None:
+        self.number = 2
+        self._file, self._names = file, names
+        # Lines of a row that goes on in the next block
+        self._waiting: deque[bytes] = deque()
+
+    def rows(self, block: bytes, is_last: bool = False) -> RowLines:
+        """Return the rows of some whole lines, and of those that waited for them."""
+        # Most blocks have no quotation mark: each line is a row
+        if b'"' not in block and not self._waiting:
+            first, self.number = self.number, self.number + block.count(b"\n")
+            return RowLines(block, np.arange(first, self.number), ())
+        self._waiting.extend(block.split(b"\n")[:-1])
+        rows, numbers, broken = list[bytes](), list[int](), list[Rejection]()
+        # One row after the other, as far as their lines are here
+        while (found := self._next(is_last)) is not None:
+            count, fault = found
+            lines = [self._waiting.popleft() for _ in range(count)]
+            if fault:
+                broken.append(self._rejection(lines[0], fault))
+            else:
+                rows.append(b" ".join(lines) + b"\n")
+                numbers.append(self.number)
+            self.number += count
+        return RowLines(b"".join(rows), np.array(numbers, dtype=np.int64), tuple(broken))
+
+    def _next(self, is_last: bool) -> tuple[int, str] | None:
+        """Return the number of lines of the next row and its fault; None if more are needed."""
+        if not self._waiting:
+            return None
+        first = self._waiting[0]
+        if b'"' not in first or _WHOLE.fullmatch(first):
+            return 1, ""
+        if not _OPENING.fullmatch(first):
+            return 1, AFTER
+        # Go on to the line that closes the quotation
+        for count, line in enumerate(islice(self._waiting, 1, LONGEST_ROW), start=2):
+            if _CLOSING.fullmatch(line):
+                return self._closed(list(islice(self._waiting, count)))
+            if self._is_row(line) or not _BETWEEN.fullmatch(line):
+                return 1, OPEN
+        return (1, OPEN) if is_last or len(self._waiting) >= LONGEST_ROW else None
+
+    def _closed(self, lines: list[bytes]) -> tuple[int, str]:
+        """Return how many of the lines of a closed quotation are the next row, and its fault."""
+        cells = _cells(b"\n".join(lines))
+        named = dict(zip(self._names, cells, strict=False))
+        # Only carried columns have text of several lines
+        wrong = [name for name, cell in named.items() if "\n" in cell and name in COLUMNS]
+        if len(cells) == len(self._names) and wrong:
+            return len(lines), f"{wrong[0]} has a line break"
+        if len(cells) != len(self._names) or self._is_row(lines[-1]):
+            return 1, OPEN
+        return len(lines), ""
+
+    def _is_row(self, line: bytes) -> bool:
+        """Return whether a line inside a quotation is a row by itself: its gap is a number."""
+        if line.count(b",") < len(self._names) - 1:
+            return False
+        cells = dict(zip(self._names, _cells(line), strict=False))
+        try:
+            float(cells["gap"])
+        except (KeyError, ValueError):
+            return False
+        return True
+
+    def _rejection(self, line: bytes, fault: str) -> Rejection:
+        """Return the rejection of the next line."""
+        name = line.partition(b",")[0].strip(b'" ')[:LONGEST_NAME].decode("utf-8", "replace")
+        return Rejection("pair", name, str(self._file), self.number, (fault,))
+
+
+def _cells(row: bytes) -> list[str]:
+    """Return the cells of a row; none if one of them is longer than any cell should be."""
+    try:
+        return next(csv.reader([row.decode("utf-8", "replace")]), [])
+    except csv.Error:
+        return []
+
+
+def _blocks(file: Path) -> Iterator[bytes]:
+    """Yield whole lines, which all end with a line feed, without a mark of the byte order."""
+    rest = b""
+    with file.open("rb") as stream:
+        if stream.read(len(BOM_UTF8)) != BOM_UTF8:
+            stream.seek(0)
+        while block := stream.read(BLOCK):
+            rest += block
+            # A carriage return at the end may belong to a line feed that follows
+            end = 1 + max(rest.rfind(b"\n"), rest.rfind(b"\r", 0, -1))
+            if end:
+                yield _with_line_feeds(rest[:end])
+                rest = rest[end:]
+            elif len(rest) > LONGEST_LINE:
+                problem = f"a line is longer than {LONGEST_LINE >> 20} MB"
+                raise CatalogError(str(file), problem)
+    if rest:
+        yield _with_line_feeds(rest if rest.endswith(b"\r") else rest + b"\n")
+
+
+def _with_line_feeds(text: bytes) -> bytes:
+    """Return text whose lines all end with a line feed."""
+    return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text

@@ -1,0 +1,43 @@
+"""Paths that GDAL takes literally, whatever characters they have."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pyogrio.util import vsi_path
+
+
+@contextmanager
+def literal_path(path: Path) -> Iterator[Path]:
+    """
+    Give a path by which GDAL reads or writes this very file.
+
+    pyogrio takes some names for archives or addresses (``a!b``, ``zip:x``) and drops line breaks.
+    Such a file is reached by a link with a plain name, and so are the files that belong to it.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or what is to be one.
+
+    Yields
+    ------
+    Path
+        Absolute.
+    """
+    place = path.absolute()
+    if vsi_path(str(place)) == str(place) and not str(place).startswith("/vsi"):
+        yield place
+        return
+    with TemporaryDirectory(prefix="per_obspy_") as name:
+        plain = Path(name)
+        # A file that is written is reached by its folder, as its journal lies there too
+        if not place.exists():
+            (plain / "folder").symlink_to(place.parent, target_is_directory=True)
+            yield plain / "folder" / place.name
+            return
+        for part in place.parent.iterdir():
+            if part.stem == place.stem:
+                (plain / f"layer{part.suffix}").symlink_to(part)
+        yield plain / f"layer{place.suffix}"
