@@ -110,9 +110,13 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "impacts",
             "1",
-            "all in the exact history with this record and gap, slow chatter included",
+            "in the exact history, faster than 1 mm/s and than 1 % of the fastest; slower: chatter",
         ),
-        _number("impact_velocity_exact", "m/s", "largest approach velocity in that history"),
+        _number(
+            "impact_velocity_exact",
+            "m/s",
+            "largest approach velocity in that history, however slow; 0 without an impact",
+        ),
         *_per_building(
             "amplification_exact", "1", "largest radius with pounding / without, in that history"
         ),
