@@ -178,7 +178,7 @@ WHOLE = {
     # records
     "no record": (
         {"notes/a.txt": "Dear colleague"},
-        "info notes",
+        "info notes/a.txt",
         "none of its 1 files is a record; a.txt: ObsPy cannot read it: its format is unknown",
     ),
     "no such folder": ({}, "info absent", "absent: no such folder or file"),

@@ -215,7 +215,7 @@ def outcomes(rows: pd.DataFrame, sites: Sequence[Site], seed: int) -> NDArray[np
     for number, some in true.groupby("site"):
         site = sites[number]
         history = pounding_histories(site.motion, site.dt, *_arguments(some))
-        pounded[some.index] = history.impacts > 0
+        pounded[some.index] = history.impact_velocity > 0.0
     return pounded
 
 

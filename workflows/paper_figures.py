@@ -51,8 +51,9 @@ def figures(record: Record, periods: tuple[float, float], count: int, folder: Pa
         history_of(record, periods, pair.gap),
         history_of(record, periods, sum(pair.per)),
     )
+    counted = history.impacts["counted"].sum()
     paper_plots.draw_energy_exchange(
-        history, sheet(1, f"{two}, half of the critical gap, {len(history.impacts)} impacts")
+        history, sheet(1, f"{two}, half of the critical gap, {counted} impacts")
     )
     paper_plots.draw_radius_and_energies(
         apart, periods[0], MASS, sheet(2, f"T = {periods[0]:g} s, damping {DAMPING:.0%}")

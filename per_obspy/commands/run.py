@@ -36,6 +36,8 @@ WARNINGS = {
     "baseline_shift": "with a baseline shift",
     "second_event": "with a second event",
     "assumed_corners": "with assumed corners",
+    "digitised": "digitised from film",
+    "undated": "without a date",
     "record_warning": "with other warnings",
     "one_horizontal": "with one horizontal",
 }

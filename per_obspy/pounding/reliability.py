@@ -40,7 +40,8 @@ class SingleHitComparison(NamedTuple):
 
     ``status`` (n_pairs,) is that of the single hit; ``per`` are the radii without pounding,
     ``predicted`` and ``actual`` the largest radii with pounding, (2, n_pairs), m, predicted NaN
-    unless the status is ``ok``; ``impacts`` (n_pairs,) counts those of the history.
+    unless the status is ``ok``; ``impacts`` (n_pairs,) counts those of the history as
+    `PoundingMaxima` does.
     """
 
     status: NDArray[np.str_]

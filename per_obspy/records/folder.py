@@ -24,14 +24,15 @@ from per_obspy.formats.text.station_table import (
     StationRow,
     is_station_table,
     located_stations,
+    marked_open_starts,
     read_station_table,
-    read_station_text,
+    with_open_starts,
 )
 from per_obspy.machine import raise_machine_fault
 from per_obspy.records.archives import IRREGULAR, LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_content
+from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
 from per_obspy.records.processed_files import described
 
 #: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
@@ -96,8 +97,10 @@ def find_stations(
     Raises
     ------
     CatalogError
-        If the folder is missing, empty or without any record, or the named StationXML cannot be
+        If the folder or file is missing, a file is no record, or the named StationXML cannot be
         read.
+    NothingUsable
+        If the folder is empty or without any record.
     """
     files, rejected = _files(Path(folder), limits)
     found = [_read_file(path, limits) for path in files]
@@ -110,7 +113,9 @@ def find_stations(
     for kind in ("record", *_METADATA):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
     if not records:
-        raise CatalogError(str(folder), _nothing_found(files, rejected))
+        # A folder without records may fill up; a file that was named should have been one
+        nothing = NothingUsable if Path(folder).is_dir() else CatalogError
+        raise nothing(str(folder), _nothing_found(files, rejected))
     stations = station_files(records)
     # Tables of coordinates serve the stations that have records
     if rows:
@@ -151,7 +156,7 @@ def _read_file(path: Path, limits: Archives) -> _File:
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
         if file.kind == "station text":
-            return file._replace(inventory=read_station_text(str(path), content))
+            return file._replace(inventory=_read_station_text(path, content))
         if file.kind == "station table":
             return file._replace(rows=read_station_table(str(path), content))
     except RecordRejected as rejection:
@@ -335,8 +340,21 @@ def _read_inventory(path: Path) -> Inventory:
     """Read StationXML or FDSN station text."""
     content = read_file(path)
     if _kind(path, content) == "station text":
-        return read_station_text(str(path), content)
+        return _read_station_text(path, content)
     return read_content(obspy.read_inventory, content, path)
+
+
+def _read_station_text(path: Path, content: bytes) -> Inventory:
+    """Read FDSN station text, whose empty start means an open one."""
+    marked = marked_open_starts(content)
+    try:
+        inventory = read_bytes_with_obspy(
+            obspy.read_inventory, marked, str(path), format="STATIONTXT"
+        )
+    except RecordRejected as rejection:
+        reason = f"is no FDSN station text: {rejection.reasons[0]}"
+        raise RecordRejected(str(path), reason) from rejection
+    return with_open_starts(inventory)
 
 
 def merged_inventory(inventories: list[Inventory]) -> Inventory | None:

@@ -110,9 +110,13 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "impacts",
             "1",
-            "all in the exact history with this record and gap, slow chatter included",
+            "in the exact history, faster than 1 mm/s and than 1 % of the fastest; slower: chatter",
         ),
-        _number("impact_velocity_exact", "m/s", "largest approach velocity in that history"),
+        _number(
+            "impact_velocity_exact",
+            "m/s",
+            "largest approach velocity in that history, however slow; 0 without an impact",
+        ),
         *_per_building(
             "amplification_exact", "1", "largest radius with pounding / without, in that history"
         ),
@@ -172,7 +176,14 @@ ORDER = (
 )  # fmt: skip
 
 #: Flags that the processing raises for a record, which every pair of its station has.
-RECORD_FLAGS = ("baseline_shift", "second_event", "assumed_corners", "record_warning")
+RECORD_FLAGS = (
+    "baseline_shift",
+    "second_event",
+    "assumed_corners",
+    "digitised",
+    "undated",
+    "record_warning",
+)
 
 #: Flags of a pair and the meaning of each.
 FLAGS: dict[str, str] = {
@@ -222,6 +233,12 @@ FLAGS: dict[str, str] = {
     "second_event": ("the station's record holds another event: its demand may be that of both"),
     "assumed_corners": (
         "a filter corner of the station's record is assumed: neither noise nor header gives it"
+    ),
+    "digitised": (
+        "the station's record was digitised from film: short and long periods are less certain"
+    ),
+    "undated": (
+        "the start time of the station's record is unknown: it may be of another earthquake"
     ),
     "record_warning": (
         "the station's record failed another check that only warns: see stations.csv"

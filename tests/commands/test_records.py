@@ -215,8 +215,21 @@ def test_info_shows_earthquakes_and_simulated_records(simulation, tmp_path, call
     assert "9 records are SIMULATED." in out
 
 
-def test_info_of_nothing(tmp_path, call):
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({}, "the folder is empty"),
+        (
+            {"a.txt": "Dear colleague", "b.md": "# Notes"},
+            "none of its 2 files is a record; a.txt: ",
+        ),
+        ({"s.xml": "<FDSNStationXML"}, "none of its 1 files is a record; s.xml: "),
+    ],
+)
+def test_info_of_nothing(tmp_path, call, content, problem):
     (tmp_path / "records").mkdir()
+    for name, text in content.items():
+        (tmp_path / "records" / name).write_text(text)
     run_file = tmp_path / "run.toml"
     head = 'name = "x"\noutput = "out"\n[records]\nfolder = "records"\n'
     run_file.write_text(f"{head}[pairs.simulated]\ncount = 2\n")
@@ -229,7 +242,7 @@ def test_info_of_nothing(tmp_path, call):
     ):
         code, _, err = call(*command)
         assert code == 3
-        assert err.splitlines()[-1].endswith("records: the folder is empty")
+        assert f"records: {problem}" in err.splitlines()[-1]
     assert call("info", tmp_path / "absent")[0] == 2
 
 

@@ -9,10 +9,12 @@ import pytest
 
 from per_obspy.commands.run import print_result
 from per_obspy.pipeline.run import run, screen
+from per_obspy.records.processed_files import write_description, write_processed
+from per_obspy.screening.columns import RECORD_FLAGS
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
-DOUBLED, ALONE = "XX.S001", "XX.S002"
+DOUBLED, ALONE, FILM = "XX.S001", "XX.S002", "XX.S003"
 
 
 def _repeat(trace):
@@ -23,9 +25,17 @@ def _repeat(trace):
     return (obspy.Stream([trace, later])).merge(fill_value=last)[0]
 
 
+def _write_film(stream, path):
+    """Write records whose clock was never set, with the mark that readers of film give."""
+    for trace in stream:
+        trace.stats.starttime = obspy.UTCDateTime(0)
+        trace.stats.digitised = True
+    write_description(path, write_processed(stream, path))
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A run of records of which one station has a second event, another one horizontal only."""
+    """A run of stations with a second event, with one horizontal, and with undated film."""
     folder = tmp_path_factory.mktemp("warnings")
     run(write_configuration(folder), executor=InProcess())
     # The same records, two stations changed
@@ -37,7 +47,10 @@ def finished(tmp_path_factory):
             stream = obspy.Stream([_repeat(trace) for trace in stream])
         if name == ALONE:
             stream = stream.select(component="E") + stream.select(component="Z")
-        stream.write(str(path), format="MSEED")
+        if name == FILM:
+            _write_film(stream, path)
+        else:
+            stream.write(str(path), format="MSEED")
     configuration = write_folder_configuration(folder, "again", SPECTRA)
     return configuration, run(configuration, executor=InProcess())
 
@@ -57,6 +70,10 @@ def test_the_station_table_has_every_station_and_its_warnings(finished):
     assert "another event, over the peak: 1" in table.loc[DOUBLED, "warnings"]
     assert "one_horizontal" in table.loc[ALONE, "flags"].split()
     assert table["pairs"].sum() == result.record["counts"]["pairs"]
+    assert {"digitised", "undated"} <= set(table.loc[FILM, "flags"].split())
+    assert "digitised from film" in table.loc[FILM, "warnings"]
+    assert "the start time is unknown" in table.loc[FILM, "warnings"]
+    assert "undated" not in table.loc[DOUBLED, "flags"]
     # The earthquake was simulated, but the folder of records names no event
     first = pd.read_csv(result.folder.parent / "out" / "stations.csv")
     assert (first["epicentral_distance"] < first["hypocentral_distance"]).all()
@@ -73,7 +90,7 @@ def test_every_pair_has_the_flags_of_its_station(finished):
         for flags in pairs["flags"]:
             assert expected <= set(flags.split())
     explained = pd.read_csv(result.folder / "risk.columns.csv")["name"].tolist()
-    assert {"flag_second_event", "flag_baseline_shift", "flag_assumed_corners"} <= set(explained)
+    assert {f"flag_{name}" for name in RECORD_FLAGS} <= set(explained)
 
 
 def test_the_console_names_the_stations(finished, capsys):
@@ -85,6 +102,7 @@ def test_the_console_names_the_stations(finished, capsys):
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "warnings:" in line]
     assert line.startswith("warnings: 1 station with a second event (XX.S001)")
     assert f"1 with one horizontal ({ALONE})" in line
+    assert f"1 digitised from film ({FILM}), 1 without a date ({FILM})" in line
     assert line.endswith("; see stations.csv")
 
 

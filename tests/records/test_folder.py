@@ -12,7 +12,7 @@ from obspy import Stream
 from obspy.core.event import Catalog, Event, Origin
 from station_files import START, read_all, record, write_records
 
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, NothingUsable
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import find_stations, read_station
 
@@ -164,10 +164,12 @@ def test_folders_without_records_are_refused(tmp_path: Path):
     (tmp_path / "a.txt").write_text("words")
     (tmp_path / "b.txt").write_text("more words")
     problem = r"none of its 2 files is a record; a\.txt: ObsPy cannot read it"
-    with pytest.raises(CatalogError, match=problem):
+    with pytest.raises(NothingUsable, match=problem):
         find_stations(tmp_path)
-    with pytest.raises(CatalogError, match=r"none of its 1 files is a record; a\.txt"):
+    # a file that was named is wrong input
+    with pytest.raises(CatalogError, match=r"none of its 1 files is a record; a\.txt") as raised:
         find_stations(tmp_path / "a.txt")
+    assert not isinstance(raised.value, NothingUsable)
 
 
 def test_a_named_stationxml_must_be_readable(folder: Path):
@@ -321,3 +323,12 @@ def test_station_text_without_starts_serves_the_records_beside_it(tmp_path: Path
     (paths,) = contents.stations.values()
     stream, _ = read_station(paths, contents.inventory)
     assert {trace.stats.coordinates.latitude for trace in stream} == {1.0}
+
+
+@pytest.mark.parametrize("row", ["XX|A|north|2|3|Town||", "XX|A|95|2|3|Town||", "|||||||\n\n"])
+def test_station_text_that_obspy_refuses_is_a_rejected_file(folder: Path, row):
+    header = "#Network|Station|Latitude|Longitude|Elevation|SiteName|StartTime|EndTime"
+    (folder / "stations.txt").write_text(f"{header}\n{row}\n")
+    (rejection,) = find_stations(folder).rejected
+    assert rejection.name == "stations.txt"
+    assert rejection.reasons[0].startswith("is no FDSN station text: ObsPy cannot read it: ")

@@ -36,7 +36,7 @@ def test_ridgecrest_2019(real_data, tmp_path):
     exact = table[table["demand_rule"] == "exact"]
     # two codes that share no line: a gap below the exact demand is where the exact history has
     # impacts
-    assert ((exact["gap"] < exact["demand"]) == (exact["impacts"] > 0)).all()
+    assert ((exact["gap"] < exact["demand"]) == (exact["impact_velocity_exact"] > 0)).all()
     near = table[table["station"] == "CI.CCC"]["per_1"].median()
     assert (
         near > table[table["station"] == "CI.MPM"]["per_1"].median()

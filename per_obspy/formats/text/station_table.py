@@ -1,12 +1,10 @@
 """Coordinates of stations from plain text: FDSN station text and tables in CSV."""
 
 import csv
-import io
 import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import obspy
 from obspy import Inventory, UTCDateTime
 from obspy.core.inventory import Comment, Network, Station
 
@@ -192,34 +190,28 @@ def _station(code: str, row: StationRow) -> Station:
     return Station(code, row.latitude, row.longitude, elevation, comments=comments)
 
 
-def read_station_text(name: str, content: bytes) -> Inventory:
-    """
-    Read FDSN station text, whose empty start means an open one.
+def marked_open_starts(content: bytes) -> bytes:
+    r"""
+    Return FDSN station text whose empty starts hold a mark, because ObsPy refuses them.
 
-    Raises
-    ------
-    RecordRejected
-        If it cannot be read.
+    :func:`with_open_starts` takes the mark away again.
+
+    >>> marked_open_starts(b"#Network|Description|StartTime\nXX|net|")
+    b'#Network|Description|StartTime\nXX|net|0001-01-02T00:00:00.000000Z'
     """
     lines = content.decode("utf-8", "replace").splitlines()
     header = [field.strip().lower() for field in lines[0].lstrip("#").split("|")]
     start = header.index("starttime") if "starttime" in header else len(header)
-    # ObsPy refuses an empty start
+    # Comments stay as they are
     for index, line in enumerate(lines[1:], 1):
         fields = line.split("|")
         if start < len(fields) and not fields[start].strip() and not line.startswith("#"):
             lines[index] = "|".join((*fields[:start], str(_OPEN), *fields[start + 1 :]))
-    # Whatever ObsPy cannot read has one kind of error
-    try:
-        text = io.BytesIO("\n".join(lines).encode())
-        inventory = obspy.read_inventory(text, format="STATIONTXT", check_compression=False)
-    except Exception as error:
-        raise RecordRejected(name, f"is no FDSN station text: {error!s:.200}") from error
-    return _with_open_starts(inventory)
+    return "\n".join(lines).encode()
 
 
-def _with_open_starts(inventory: Inventory) -> Inventory:
-    """Return an inventory just read without the mark of open starts."""
+def with_open_starts(inventory: Inventory) -> Inventory:
+    """Return an inventory just read without the mark of :func:`marked_open_starts`."""
     for network in inventory:
         for station in network:
             for description in (station, *station.channels):

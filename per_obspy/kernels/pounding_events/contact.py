@@ -10,7 +10,9 @@ BOUNCE_LIMIT impacts in a segment.
 
 import math
 
-from per_obspy.kernels._jit import lean
+import numpy as np
+
+from per_obspy.kernels._jit import kernel, lean
 from per_obspy.kernels.pounding_events.motion import (
     APPROACH,
     BOUNCE_LIMIT,
@@ -49,6 +51,8 @@ LOG_BEFORE_1, LOG_AFTER_1, LOG_BEFORE_2, LOG_AFTER_2 = 2, 3, 4, 5
 #: impulse (N s), displacements (m)
 LOG_IMPULSE, LOG_DISPLACEMENT_1, LOG_DISPLACEMENT_2 = 6, 7, 8
 LOG_COLUMNS = 9
+#: An impact counts if its approach speed is above this (m/s) and above this share of the fastest.
+SLOWEST_COUNTED, COUNTED_SHARE = 1e-3, 1e-2
 #: Clearance below which two structures touch at the instant of another contact, relative to
 #: displacements and gap.
 TOUCH_ROUNDING = 1e-12
@@ -113,6 +117,33 @@ def apply_impact(row, log, j, time):
     log_impact(log, row, j, time, impulse, before_1, before_2)
     row[j, IMPACTS] += 1.0
     row[0, BOUNCES] += 1.0
+
+
+@kernel
+def count_impacts(rows, logs):
+    """
+    Return the number of impacts of pairs that count, chatter left out.
+
+    Parameters
+    ----------
+    rows : (n_pairs, 2, ROW_COLUMNS) ndarray
+        Of the pairs at the end of their histories; see `motion` for the columns.
+    logs : (n_pairs, n_lines, LOG_COLUMNS) ndarray
+        Logs that hold all their impacts.
+
+    Returns
+    -------
+    (n_pairs,) ndarray of int
+        Impacts above SLOWEST_COUNTED, and above COUNTED_SHARE of the pair's fastest.
+    """
+    counts = np.zeros(rows.shape[0], np.int64)
+    for pair in range(rows.shape[0]):
+        # the fastest is known at the end only
+        limit = max(SLOWEST_COUNTED, COUNTED_SHARE * rows[pair, 0, APPROACH])
+        for line in range(int(rows[pair, 0, IMPACTS])):
+            approach = logs[pair, line, LOG_BEFORE_1] - logs[pair, line, LOG_BEFORE_2]
+            counts[pair] += approach > limit
+    return counts
 
 
 @lean

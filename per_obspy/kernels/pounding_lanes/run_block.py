@@ -34,7 +34,7 @@ def prepare_block(lanes, pair, rows, cosine, sine, free_steps, duration):
 
 
 @lean
-def advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, step, last):
+def advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     is_through = True
     while step < last:
@@ -45,7 +45,7 @@ def advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, step
             # flagged lanes one by one
             for lane in range(PAIR_LANES):
                 if flags[lane]:
-                    memory = pair, rows[lane], log, deferred[lane]
+                    memory = pair, rows[lane], logs[lane], deferred[lane]
                     is_through &= treat_flagged_lane(
                         lanes, lane, flags[lane], memory, record, grounds, step, count
                     )
@@ -77,7 +77,7 @@ def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elaps
 
 
 @lean
-def run_block(record, lanes, flags, grounds, pair, deferred, rows, log, cosine, sine, free_steps):
+def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine, sine, free_steps):
     """
     Run 32 pairs through a record and the free vibration after it.
 
@@ -99,8 +99,8 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, log, cosine, 
         Rows of structures of the pairs at rest, then at the end; see `motion` for the columns. They
         hold the results: LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and
         APPROACH (m/s).
-    log : (n_lines, LOG_COLUMNS) ndarray
-        Log of impacts; without lines where impacts are not of interest.
+    logs : (PAIR_LANES, n_lines, LOG_COLUMNS) ndarray
+        Receive one line per impact as long as there is room; see `contact` for their columns.
     cosine, sine : (PAIR_LANES,) ndarray
         Of the azimuth of the axis from structure 1 to 2.
     free_steps : (PAIR_LANES,) ndarray of int
@@ -115,14 +115,14 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, log, cosine, 
     prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
     # the record
     last = (record.components.shape[1] - 1) * record.refinement
-    is_through = advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, 0, last)
+    is_through = advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, 0, last)
     # free vibration, until every pair is settled
     elapsed = 0
     while retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
         step = last
         last += SETTLING_STEPS * record.refinement
         is_through &= advance_block(
-            lanes, flags, pair, rows, log, deferred, record, grounds, step, last
+            lanes, flags, pair, rows, logs, deferred, record, grounds, step, last
         )
         elapsed += SETTLING_STEPS
     return is_through

@@ -250,7 +250,7 @@ def _treat_flagged_lane(lanes, lane, flag, memory, record, grounds, step, count)
 
 
 @lean
-def _advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, step, last):
+def _advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, step, last):
     """Carry all lanes from a step to the last one; return whether all got through."""
     is_through = True
     while step < last:
@@ -261,7 +261,7 @@ def _advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, ste
         # flagged lanes one by one
         for lane in range(PAIR_LANES):
             if flags[lane]:
-                memory = pair, rows[lane], log, deferred[lane]
+                memory = pair, rows[lane], logs[lane], deferred[lane]
                 is_through &= _treat_flagged_lane(
                     lanes, lane, flags[lane], memory, record, grounds, step, count
                 )
@@ -306,14 +306,14 @@ def _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elap
 
 @lean
 def run_without_contact(
-    record, lanes, flags, grounds, pair, deferred, rows, log, cosine, sine, free_steps
+    record, lanes, flags, grounds, pair, deferred, rows, logs, cosine, sine, free_steps
 ):
     """
     Run 32 pairs that never touch through a record and the free vibration after it.
 
     Parameters
     ----------
-    record, flags, grounds, pair, deferred, log, cosine, sine, free_steps
+    record, flags, grounds, pair, deferred, logs, cosine, sine, free_steps
         As in `run_block`.
     lanes : (LANE_ROWS_WITHOUT_CONTACT * PAIR_LANES,) ndarray
         Room for the numbers of all lanes.
@@ -335,14 +335,14 @@ def run_without_contact(
         lanes[at(RELATIVE_SO_FAR + 1, lane)] = largest
     # the record
     last = (record.components.shape[1] - 1) * record.refinement
-    is_through = _advance_block(lanes, flags, pair, rows, log, deferred, record, grounds, 0, last)
+    is_through = _advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, 0, last)
     # free vibration, until every pair is settled
     elapsed = 0
     while _retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
         step = last
         last += SETTLING_STEPS * record.refinement
         is_through &= _advance_block(
-            lanes, flags, pair, rows, log, deferred, record, grounds, step, last
+            lanes, flags, pair, rows, logs, deferred, record, grounds, step, last
         )
         elapsed += SETTLING_STEPS
     return is_through

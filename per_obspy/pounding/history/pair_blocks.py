@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from per_obspy import checks
 from per_obspy.checks import FloatArray
-from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
+from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, count_impacts
+from per_obspy.kernels.pounding_events.motion import IMPACTS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.pounding.history.tables import free_samples, refinement
@@ -15,6 +16,9 @@ from per_obspy.threads import map_in_threads
 
 #: Bytes of a line of the processor's cache.
 CACHE_LINE = 64
+
+#: Impacts of a pair for which there is room at first. Pages that stay unused take no memory.
+FIRST_ROOM = 4096
 
 #: Check of each argument of a pair; those of one structure end with its number.
 CHECKS: dict[str, Callable[[str, ArrayLike], FloatArray]] = {
@@ -126,7 +130,7 @@ def run_blocks(
     parts: NDArray[np.int64],
     free_steps: NDArray[np.int64],
     azimuth: FloatArray,
-) -> None:
+) -> NDArray[np.int64]:
     """
     Carry all pairs through a record and the free vibration after it, in blocks on all processors.
 
@@ -149,27 +153,57 @@ def run_blocks(
     azimuth : (n_pairs,) ndarray
         Of the axis from 1 to 2, rad.
 
+    Returns
+    -------
+    (n_pairs,) ndarray of int
+        Impacts that count, see `count_impacts`.
+
     Raises
     ------
     RuntimeError
         If a step has more events than any record causes.
     """
+    counts = np.zeros(len(rows), dtype=np.int64)
 
     def run(block: NDArray[np.int64]) -> None:
         """Run one block of pairs, filled up with repetitions that have no free vibration."""
-        # Copy the rows of the pairs: the kernel changes them
         filled, steps = np.resize(block, PAIR_LANES), int(parts[block[0]])
-        record, own = Record(components, steps, dt / steps), rows[filled]
+
+        # Their free vibration and direction
         free = np.where(np.arange(PAIR_LANES) < block.size, free_steps[filled], -1)
         direction = np.cos(azimuth[filled]), np.sin(azimuth[filled])
+        record = Record(components, steps, dt / steps)
 
-        # No log of impacts: only maxima are of interest
-        log = np.zeros((0, LOG_COLUMNS))
-        if not kernel(record, *_working_memory(lane_rows), own, log, *direction, free):
+        # Results of the block, without the repetitions
+        found = _run_logged(kernel, lane_rows, record, rows[filled], (*direction, free))
+        if found is None:
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
-        rows[block] = own[: block.size]
+        rows[block], counts[block] = (result[: block.size] for result in found)
 
     map_in_threads(run, pair_blocks(parts))
+    return counts
+
+
+def _run_logged(
+    kernel: Callable[..., bool],
+    lane_rows: int,
+    record: Record,
+    rows: FloatArray,
+    others: tuple[FloatArray, FloatArray, NDArray[np.int64]],
+) -> tuple[FloatArray, NDArray[np.int64]] | None:
+    """Return rows at the end and impacts that count of one block; None without end of events."""
+    room, impacts = -1, FIRST_ROOM
+    # Grow the logs until all impacts of every pair have room
+    while room < impacts:
+        room = impacts
+        logs = np.empty((PAIR_LANES, room, LOG_COLUMNS))
+        # The kernel changes its rows and the steps of free vibration
+        own, (cosine, sine, free) = rows.copy(), others
+        memory = *_working_memory(lane_rows), own, logs
+        if not kernel(record, *memory, cosine, sine, free.copy()):
+            return None
+        impacts = int(own[:, 0, IMPACTS].max())
+    return own, count_impacts(own, logs)
 
 
 def _working_memory(lane_rows: int) -> tuple[FloatArray | NDArray[np.int64], ...]:

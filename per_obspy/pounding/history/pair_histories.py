@@ -44,7 +44,9 @@ class PoundingMaxima(NamedTuple):
     displacement_maxima : (2, n_pairs) ndarray
         Largest displacement to either side of both structures, exact between samples, m.
     impacts : (n_pairs,) ndarray of int
-        Number of impacts; the last bounces of a chatter are not counted.
+        Number of impacts faster than 1 mm/s and than 1 % of the pair's fastest; slower ones are the
+        chatter of structures that are pressed together. 0 where structures only touch: whether
+        they meet at all is ``impact_velocity > 0``.
     impact_velocity : (n_pairs,) ndarray
         Largest approach speed of an impact, m/s; 0 without impact.
     """
@@ -158,11 +160,11 @@ def pounding_histories(
         components = closed_record(components)
 
     # Rows of the kernels hold the squares of the largest radii
-    rows = _run(components, step, fields, free_vibration)
+    rows, impacts = _run(components, step, fields, free_vibration)
     return PoundingMaxima(
         per=np.sqrt(rows[:, :, columns.LARGEST_RADIUS_SQUARED]).T.reshape(2, *shape),
         displacement_maxima=rows[:, :, columns.LARGEST_DISPLACEMENT].T.reshape(2, *shape),
-        impacts=rows[:, 0, columns.IMPACTS].astype(np.int64).reshape(shape),
+        impacts=impacts.reshape(shape),
         impact_velocity=rows[:, 0, columns.APPROACH].reshape(shape),
     )
 
@@ -182,8 +184,8 @@ def _components(acceleration: ArrayLike, has_azimuth: bool) -> FloatArray:
 
 def _run(
     components: FloatArray, dt: float, fields: dict[str, FloatArray], free_vibration: bool
-) -> FloatArray:
-    """Return the rows of all pairs at the end, run in blocks on all processors."""
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the rows of all pairs at the end and their impacts, from blocks on all processors."""
     table = pair_table(fields)
     parts = refinements(table, dt)
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], fields["restitution"][:, np.newaxis])
@@ -197,5 +199,5 @@ def _run(
     # Run the record and, where it is asked for, the free vibration after it
     free_steps = free_vibration_steps(fields, dt) * free_vibration
     angles = np.radians(fields["azimuth"])
-    run_blocks(run_block, LANE_ROWS, components, dt, rows, parts, free_steps, angles)
-    return rows
+    motion = components, dt, rows, parts, free_steps, angles
+    return rows, run_blocks(run_block, LANE_ROWS, *motion)

@@ -12,7 +12,11 @@ from numpy.typing import ArrayLike
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
+from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
+    LOG_COLUMNS,
+    SLOWEST_COUNTED,
+)
 from per_obspy.kernels.pounding_events.row_history import run_history
 from per_obspy.pounding.history.energies import Energies, closure_of, energies_of
 from per_obspy.pounding.history.tables import (
@@ -61,8 +65,9 @@ class PoundingHistory(NamedTuple):
     impacts : DataFrame
         One row per impact: ``time`` (s), ``left`` (index of the structure left of the gap),
         ``velocity_before_i``, ``velocity_after_i`` (m/s), ``displacement_i`` (m),
-        ``transfer_energy_i`` (J) for the left (1) and right (2) structure, ``impulse`` (N s) and
-        ``energy_loss`` (J).
+        ``transfer_energy_i`` (J) for the left (1) and right (2) structure, ``impulse`` (N s),
+        ``energy_loss`` (J), and ``counted``: whether it is faster than 1 mm/s and than 1 % of the
+        fastest of its gap, as the impacts of `PoundingMaxima` are.
     per : (n_structures,) ndarray
         Largest radius ``sqrt(u² + (v / omega)²)`` with pounding, exact between samples, m.
     displacement_maxima : (n_structures,) ndarray
@@ -270,7 +275,13 @@ def impact_table(log: FloatArray) -> pd.DataFrame:
     for i, sign in ((1, 1.0), (2, -1.0)):
         mean = 0.5 * (table[f"velocity_before_{i}"] + table[f"velocity_after_{i}"])
         table[f"transfer_energy_{i}"] = sign * table["impulse"] * mean
-    return table.assign(energy_loss=table["transfer_energy_1"] + table["transfer_energy_2"])
+    loss = table["transfer_energy_1"] + table["transfer_energy_2"]
+
+    # Chatter of structures that are pressed together does not count
+    approach = table["velocity_before_1"] - table["velocity_before_2"]
+    fastest = approach.groupby(table["left"]).transform("max")
+    counted = approach > np.maximum(SLOWEST_COUNTED, COUNTED_SHARE * fastest)
+    return table.assign(energy_loss=loss, counted=counted)
 
 
 def _checked_gaps(

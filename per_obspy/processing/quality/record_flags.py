@@ -2,11 +2,18 @@
 
 from obspy import Stream, Trace
 
+from per_obspy.constants import UNSET_DAYS
 from per_obspy.processing.filter.corners import ASSUMED_REASONS, SHIFTED_BASELINE
 from per_obspy.processing.notes import remembered
 
 #: Checks that have a flag of their own.
 NAMED_CHECKS = ("baseline_shift", "second_event")
+
+#: Flags of what the record is, whatever its checks found, with the texts of their warnings.
+KINDS = {
+    "digitised": "digitised from film: short and long periods are less certain",
+    "undated": "the start time is unknown: it is not known of which earthquake the record is",
+}
 
 
 def flags_noted(stream: Stream) -> Stream:
@@ -23,8 +30,9 @@ def flags_noted(stream: Stream) -> Stream:
     -------
     obspy Stream
         ``stats.per_obspy.record_flags`` of a record may hold ``baseline_shift``,
-        ``second_event``, ``assumed_corners`` and ``record_warning`` (another check that warns); it
-        is missing where there is none. Flags of an earlier processing stay.
+        ``second_event``, ``assumed_corners``, ``record_warning`` (another check that warns),
+        ``digitised`` and ``undated``; it is missing where there is none. The last two are in
+        ``warnings`` too. Flags of an earlier processing stay.
     """
     out = Stream()
     for trace in stream:
@@ -32,6 +40,7 @@ def flags_noted(stream: Stream) -> Stream:
         flagged = trace.copy() if flags else trace
         if flags:
             remembered(flagged, record_flags=" ".join(flags))
+            _warn_of_kind(flagged, flags)
         out += flagged
     return out
 
@@ -50,4 +59,22 @@ def record_flags(trace: Trace) -> list[str]:
             flags.add("assumed_corners")
         if SHIFTED_BASELINE in reason:
             flags.add("baseline_shift")
-    return sorted(flags)
+    return sorted(flags | _kinds(trace))
+
+
+def _kinds(trace: Trace) -> set[str]:
+    """Return the flags of film, and of a record whose clock was never set."""
+    # Zeros that the filter put before the record are no part of it
+    pads = trace.stats.get("per_obspy", {})
+    start = trace.stats.starttime + (pads.get("pad_before") or 0.0)
+    is_undated = (start.year, start.month, start.day) in UNSET_DAYS
+    kinds = {"digitised": bool(trace.stats.get("digitised")), "undated": is_undated}
+    return {name for name, is_so in kinds.items() if is_so}
+
+
+def _warn_of_kind(trace: Trace, flags: list[str]) -> None:
+    """Append the warnings of film and unset clocks to those of a trace, each once."""
+    earlier = str(trace.stats.per_obspy.get("warnings") or "")
+    texts = [KINDS[flag] for flag in flags if flag in KINDS and KINDS[flag] not in earlier]
+    if texts:
+        remembered(trace, warnings="; ".join([earlier, *texts] if earlier else texts))

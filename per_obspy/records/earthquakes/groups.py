@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from obspy import Trace, UTCDateTime
 
+from per_obspy.constants import UNSET_DAYS
 from per_obspy.errors import CatalogError
 
 #: Longest time from the first start of a group to the last, s.
@@ -31,9 +32,6 @@ CONTINUOUS = 600.0
 #: Records longer than this, s, hold hours in which other earthquakes may be: only the window of the
 #: group is read, with so many s before and after it.
 HOURS, MARGIN = 3600.0, 60.0
-
-#: Days on which clocks stand that were never set: ObsPy's default, and that of GPS receivers.
-_UNSET = {(1970, 1, 1), (1980, 1, 1), (1980, 1, 6)}
 
 _DAY = 86400.0
 
@@ -68,7 +66,7 @@ class RecordSpan(NamedTuple):
     @property
     def is_dated(self) -> bool:
         """Whether the day of the record is known."""
-        return (self.start.year, self.start.month, self.start.day) not in _UNSET
+        return (self.start.year, self.start.month, self.start.day) not in UNSET_DAYS
 
     @property
     def has_time(self) -> bool:

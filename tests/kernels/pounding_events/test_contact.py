@@ -64,6 +64,15 @@ class TestImpact:
         assert row[0, motion.IMPACTS] == row[0, motion.BOUNCES] == 2.0
         assert_allclose(row[0, motion.APPROACH], 0.8, rtol=1e-14)
 
+    def test_counts_above_both_limits_only(self):
+        # catches: a limit that counts itself, lines beyond the last impact, limits of another pair
+        speeds = [[1.0, 0.01, 0.010001, 9.0], [0.01, 0.001, 0.0010001, 0.002]]
+        rows, logs = np.zeros((2, 2, motion.ROW_COLUMNS)), np.zeros((2, 4, contact.LOG_COLUMNS))
+        logs[:, :, contact.LOG_BEFORE_1] = speeds
+        rows[:, 0, motion.IMPACTS] = 3, 4
+        rows[:, 0, motion.APPROACH] = 1.0, 0.01
+        assert_array_equal(contact.count_impacts(rows, logs), [2, 3])
+
 
 class TestRow:
     def test_an_impact_passes_through_touching_structures(self):

@@ -173,11 +173,11 @@ def test_the_exact_history_first_touches_at_the_largest_relative_displacement():
     apart, touching = (
         pounding_histories(
             ground, DT, period_1, 0.05, 1.0, period_2, 0.05, 1.0, gap * factor, 0.65
-        ).impacts
+        ).impact_velocity
         for factor in (1 + 1e-9, 1 - 1e-6)
     )
-    assert np.all(apart == 0)
-    assert np.all(touching >= 1)
+    assert np.all(apart == 0.0)
+    assert np.all(touching > 0.0)
 
 
 def test_surface():

@@ -310,3 +310,15 @@ class TestBadInput:
         wall = Structure(1.0, 0.05, np.inf, participation=0.0)
         with pytest.raises(ValueError, match="infinite"):
             pounding_history(shaking(1.0), DT, [wall, wall], 0.1, 0.5)
+
+
+def test_impacts_of_each_gap_are_counted_against_its_fastest():
+    # catches: one limit for a complete row, whose fast gap would hide all impacts of a slow one
+    row = [Structure(1.5, 0.05, 4.0), Structure(0.6, 0.05, 1.0), Structure(0.9, 0.05, 2.0)]
+    impacts = pounding_history(shaking(6.0), DT, row, 0.0, 0.65).impacts
+    assert not impacts["counted"].all()
+    for _, of_gap in impacts.groupby("left"):
+        speed = of_gap["velocity_before_1"] - of_gap["velocity_before_2"]
+        least = max(0.001, 0.01 * speed.max())
+        assert_array_equal(of_gap["counted"], speed > least)
+    assert impacts["left"].nunique() == 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
 from per_obspy.config import Processing
@@ -14,8 +14,8 @@ from per_obspy.screening.columns import RECORD_FLAGS
 TABLE = {-10.0: 0.5, 5.5: 0.1}
 
 
-def _trace(**known):
-    return Trace(np.zeros(3), {"per_obspy": AttribDict(known)})
+def _trace(start="2019-07-06T03:19:53", **known):
+    return Trace(np.zeros(3), {"starttime": UTCDateTime(start), "per_obspy": AttribDict(known)})
 
 
 @pytest.mark.parametrize(
@@ -44,6 +44,27 @@ def test_flags_of_a_record(known, flags):
     assert noted.stats.per_obspy.get("record_flags", "") == " ".join(flags)
     # a step changes its own copy only
     assert dict(trace.stats.per_obspy) == before
+
+
+@pytest.mark.parametrize("start", ["1970-01-01", "1980-01-06T00:00:12", "1980-01-01"])
+def test_a_clock_that_was_never_set_is_a_flag_and_a_warning(start):
+    (noted,) = flags_noted(Stream([_trace(start, warnings="late trigger 3")]))
+    assert record_flags(noted) == ["undated"]
+    assert noted.stats.per_obspy.warnings.startswith("late trigger 3; the start time is unknown")
+    # a file that is read back and processed again has each warning once
+    (again,) = flags_noted(Stream([noted]))
+    assert again.stats.per_obspy.warnings == noted.stats.per_obspy.warnings
+    # zeros of the filter begin a day earlier
+    padded = _trace(UTCDateTime(start) - 60.0, pad_before=60.0)
+    assert record_flags(padded) == ["undated"]
+
+
+def test_film_is_a_flag_and_a_warning():
+    film = _trace()
+    film.stats.digitised = True
+    (noted,) = flags_noted(Stream([film]))
+    assert record_flags(noted) == ["digitised"]
+    assert "film" in noted.stats.per_obspy.warnings
 
 
 def test_a_silent_header_is_an_assumed_corner(earthquake):
