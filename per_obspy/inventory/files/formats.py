@@ -35,6 +35,8 @@ class ParquetFile:
         """Yield the identifiers of the pairs, block by block."""
         with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
             for batch in stored.iter_batches(columns=[IDENTIFIER]):
+                if pa.types.is_nested(batch.schema.field(0).type):
+                    batch.column(0).cast(pa.string())  # lists and the like are no names
                 names, _ = plain_columns(pa.Table.from_batches([batch]))
                 yield names.column(0).cast(pa.string()).combine_chunks()
 
