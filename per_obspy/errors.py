@@ -23,21 +23,36 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib.util import find_spec
 from typing import Any, NamedTuple, Self
+from unicodedata import category
 
 #: Characters of a message that may quote a file: damaged files have words of a million.
 LONGEST_MESSAGE = 1000
 
 
-def shortened(text: str) -> str:
+def printable(text: str) -> str:
     """
-    Return a text that may quote a file, cut to ``LONGEST_MESSAGE`` characters.
+    Return a text on one line: control characters become blanks, undecodable bytes question marks.
 
     Examples
     --------
-    >>> len(shortened("9" * 1_000_000)), shortened("line 3, dt: empty")
-    (1004, 'line 3, dt: empty')
+    >>> printable("CI.CLC" + chr(10) + "=A1")
+    'CI.CLC =A1'
     """
-    return text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ..."
+    known = text.encode("utf-8", "replace").decode("utf-8")
+    return "".join(" " if category(letter)[0] == "C" else letter for letter in known)
+
+
+def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
+    """
+    Return the beginning of a text that may quote a file, on one line.
+
+    Examples
+    --------
+    >>> len(shortened("9" * 1_000_000)), shortened("line 3, dt: empty"), shortened("X" * 99, 5)
+    (1000, 'line 3, dt: empty', 'XXXX…')
+    """
+    start = printable(text[:length])
+    return start if len(text) <= length else f"{start[:-1]}…"
 
 
 class PerError(Exception):

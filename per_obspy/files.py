@@ -12,7 +12,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
-from unicodedata import category
 
 from per_obspy.errors import CatalogError, PerError, WriteError
 
@@ -270,19 +269,6 @@ def _is_running(process: int, machine: str | None) -> bool:
     except (PermissionError, OverflowError):
         return True
     return True
-
-
-def printable(text: str) -> str:
-    """
-    Return a text on one line: control characters become blanks, undecodable bytes question marks.
-
-    Examples
-    --------
-    >>> printable("CI.CLC" + chr(10) + "=A1")
-    'CI.CLC =A1'
-    """
-    known = text.encode("utf-8", "replace").decode("utf-8")
-    return "".join(" " if category(letter)[0] == "C" else letter for letter in known)
 
 
 def file_hash(path: Path) -> str:

@@ -3,8 +3,7 @@
 import re
 from pathlib import Path
 
-from per_obspy.errors import CatalogError
-from per_obspy.files import printable
+from per_obspy.errors import CatalogError, shortened
 
 #: Codes of a trace in their order.
 _CODES = ("network", "station", "location", "channel")
@@ -14,6 +13,9 @@ _CODE = re.compile(r"[A-Za-z0-9_-]*")
 
 #: Longest code, letters: with all that is put around it, it still is the name of a file.
 LONGEST_CODE = 64
+
+#: Letters of a wrong name that a message has.
+SHOWN = 80
 
 #: Longest name of a file on usual file systems, and longest path inside a folder, bytes.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1024
@@ -42,10 +44,10 @@ def code_problem(*codes: str) -> str:
     for kind, code in zip(_CODES, codes, strict=False):
         if len(code) > LONGEST_CODE:
             problem = f"has {len(code)} letters, expected {LONGEST_CODE} or fewer"
-            return f"{kind} code {shortened(code)!r} {problem}"
+            return f"{kind} code {shortened(code, SHOWN)!r} {problem}"
         if not _CODE.fullmatch(code):
-            return f"{kind} code {shortened(code)!r}: expected letters, digits, - and _ only"
-    return "" if len(codes) > 1 else f"{shortened('.'.join(codes))!r}: expected NET.STA"
+            return f"{kind} code {shortened(code, SHOWN)!r}: expected letters, digits, - and _ only"
+    return "" if len(codes) > 1 else f"{shortened('.'.join(codes), SHOWN)!r}: expected NET.STA"
 
 
 def inside(folder: Path, name: str) -> Path:
@@ -76,10 +78,11 @@ def inside(folder: Path, name: str) -> Path:
     per_obspy.errors.CatalogError: stations: '../CI.CLC.nc' leads out of this folder
     """
     if problem := name_problem(name):
-        raise CatalogError(str(folder), f"{shortened(name)!r} {problem}")
+        raise CatalogError(str(folder), f"{shortened(name, SHOWN)!r} {problem}")
+    # Links inside the folder may lead elsewhere
     path, base = folder / name, folder.resolve()
     if not path.resolve().is_relative_to(base) or path.resolve() == base:
-        raise CatalogError(str(folder), f"{shortened(name)!r} leads out of this folder")
+        raise CatalogError(str(folder), f"{shortened(name, SHOWN)!r} leads out of this folder")
     return path
 
 
@@ -106,16 +109,3 @@ def name_problem(name: str) -> str:
         return f"is longer than {_LONGEST_NAME} bytes, or {_LONGEST_PATH} with its folders"
     # An absolute name has an empty first part
     return "leads out of this folder" if {"", ".", ".."} & set(parts) else ""
-
-
-def shortened(text: str, length: int = 80) -> str:
-    """
-    Return the beginning of a printable text, for messages.
-
-    Examples
-    --------
-    >>> shortened("X" * 1000, 10)
-    'XXXXXXXXX…'
-    """
-    start = printable(text[:length])
-    return start if len(text) <= length else f"{start[:-1]}…"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.files import printable
+from per_obspy.errors import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,8 +12,7 @@ from typer.core import TyperGroup
 
 from per_obspy.commands.endings import WRONG_INPUT, AsJson, output_option, stop_if_nothing
 from per_obspy.commands.printing import print_table
-from per_obspy.errors import CatalogError, require_extra
-from per_obspy.files import printable
+from per_obspy.errors import CatalogError, printable, require_extra
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

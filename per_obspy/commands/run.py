@@ -8,7 +8,7 @@ import typer
 
 from per_obspy.commands.endings import AsJson, Strict, output_option, print_and_end, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
-from per_obspy.files import printable
+from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:

@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import IO, Any, BinaryIO, NamedTuple
 
 from per_obspy.config import Archives
-from per_obspy.errors import PerError, RecordRejected, Rejection, reason_of
+from per_obspy.errors import PerError, RecordRejected, Rejection, reason_of, shortened
 from per_obspy.files import writing
-from per_obspy.names import name_problem, shortened
+from per_obspy.names import SHOWN, name_problem
 
 _ZIP, _TAR = (".zip",), (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
 
@@ -249,7 +249,7 @@ class _Archive(ABC):
 
     def _reject(self, name: str, reason: str) -> None:
         """Add a row for a member that is not read."""
-        shown = shortened(name)
+        shown = shortened(name, SHOWN)
         row = Rejection("file", shown, f"{self.path}/{shown}", None, (reason,))
         self.rejected.append(row)
 
@@ -379,7 +379,7 @@ def _tar_members(headers: "_Headers", length: int) -> Iterator[_Member]:
             packed.members.clear()
             is_whole = info.offset_data + info.size <= length
             if info.size < 0 or not (is_whole or _tar_problem(info)):
-                raise tarfile.ReadError(f"{shortened(info.name)!r} is cut")
+                raise tarfile.ReadError(f"{shortened(info.name, SHOWN)!r} is cut")
             if not info.isdir():
                 yield _Member(info.name, info.size, info.offset_data, _tar_problem(info))
         # Damage in the middle ends the walk like the end itself

@@ -236,6 +236,7 @@ def read_station(
             content = read_file(path, limits)
             traces = _traces(path, content, headonly=False, starttime=start, endtime=end)
         except RecordRejected as rejection:
+            raise_machine_fault(rejection)
             rejected.append(_rejected_file(path, rejection))
             continue
         # A trace that is refused does not stop the others of its file
@@ -393,8 +394,7 @@ def _is_needed(rejection: Rejection) -> bool:
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
-    """Return the row of an unusable file; raise ``MachineFault`` if the machine cannot read it."""
-    raise_machine_fault(rejection)
+    """Return the row of an unusable file."""
     return Rejection("file", path.name, str(path), None, rejection.reasons)
 
 

@@ -11,9 +11,9 @@ from obspy import Inventory, Stream
 from obspy.core.event import Event
 
 from per_obspy import config
-from per_obspy.errors import RecordRejected, Rejection
+from per_obspy.errors import RecordRejected, Rejection, shortened
 from per_obspy.files import opened_hash
-from per_obspy.names import code_problem, shortened
+from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
@@ -156,7 +156,7 @@ def _with_usable_names(found: SourceContents) -> SourceContents:
     for name, paths in found.stations.items():
         if problem := code_problem(*name.split(".", 1)):
             source = ", ".join(sorted({str(path) for path in paths}))
-            rejected.append(Rejection("station", shortened(name), source, None, (problem,)))
+            rejected.append(Rejection("station", shortened(name, SHOWN), source, None, (problem,)))
         else:
             stations[name] = paths
     return found._replace(stations=stations, rejected=tuple(rejected))

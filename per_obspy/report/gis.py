@@ -15,7 +15,8 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-from per_obspy.files import printable, written_whole
+from per_obspy.errors import printable
+from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.report.style import STATE_COLOURS
 

@@ -5,7 +5,8 @@ from textwrap import wrap
 
 from matplotlib.figure import Figure
 
-from per_obspy.files import printable, written_whole
+from per_obspy.errors import printable
+from per_obspy.files import written_whole
 
 #: State of a pair -> colour (Okabe & Ito 2008, distinct for colour-blind readers too).
 STATE_COLOURS = {"yes": "#D55E00", "possible": "#E69F00", "no": "#009E73"}

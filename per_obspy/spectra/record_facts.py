@@ -9,7 +9,7 @@ import xarray as xr
 from obspy import Stream, Trace
 from scipy.integrate import cumulative_trapezoid
 
-from per_obspy.files import printable
+from per_obspy.errors import printable
 
 #: Part of the step in ``stats.processing`` of records processed by others.
 PASSED_THROUGH = "passed through"

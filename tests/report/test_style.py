@@ -4,7 +4,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from per_obspy.files import printable
+from per_obspy.errors import printable
 from per_obspy.report.style import DOTS_PER_INCH, STATE_COLOURS, literal, save
 
 

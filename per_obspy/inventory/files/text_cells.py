@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pandas.api.types import is_numeric_dtype
 
-from per_obspy.files import printable
+from per_obspy.errors import printable
 
 # Signs of a formula, also in full width; blanks before them and apostrophes as they are written
 _SIGNS = "[=+\\-@\uff1d\uff0b\uff0d\uff20]"
@@ -26,7 +26,7 @@ MARKED = rf"^'+\s*{_SIGNS}"
 #: Text that is a number, with a sign or without.
 NUMBER = r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$"
 
-#: Characters that become blanks: those of control and format, as in :func:`~.files.printable`.
+#: Characters that become blanks: those of control and format, as in :func:`~.errors.printable`.
 _UNPRINTABLE = r"\pC"
 
 _FORMULA, _NUMBER = re.compile(FORMULA), re.compile(NUMBER, re.ASCII)

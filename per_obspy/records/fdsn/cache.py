@@ -19,9 +19,9 @@ import urllib3
 from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
-from per_obspy.errors import RecordRejected, Rejection, ServiceError
+from per_obspy.errors import RecordRejected, Rejection, ServiceError, shortened
 from per_obspy.files import remove_dead_parts
-from per_obspy.names import code_problem, shortened
+from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
@@ -179,7 +179,7 @@ def _offers(
         for station in sorted(stations_inside(listed, wanted)):
             channels = _channels(listed, station)
             if problem := _problem(station, channels):
-                row = Rejection("station", shortened(station), url, None, (problem,))
+                row = Rejection("station", shortened(station, SHOWN), url, None, (problem,))
                 unusable.append(row)
             else:
                 offers[station].append(Offer(base, channels))
