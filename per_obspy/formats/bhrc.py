@@ -29,7 +29,8 @@ _TITLE = "* VOL1DS FILE:"
 _HEADER_LINES, _POINTS_LINE, _UNIT_LINE, _RATE_LINE = 27, 10, 11, 21
 _WIDTH, _PER_LINE = 13, 10
 _STATION = re.compile(
-    rf"(.*?)\s++Station\s++{DECIMAL}\s*+([NSEW])\s*+{DECIMAL}\s*+([NSEW])(?:\s++Altitude\s*+{DECIMAL})?"
+    rf"(.*?)\s++Station\s++{DECIMAL}\s*+([NSEW])\s*+{DECIMAL}\s*+([NSEW])"
+    rf"(?:\s++Altitude\s*+{DECIMAL})?"
 )
 _AZIMUTH = re.compile(r"\b([LT])\s*+(\d{1,3})\b")
 _EPICENTRE = re.compile(
