@@ -38,8 +38,8 @@ _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w++)\b")
 _ANGLE = r"(\d{1,3})\s++(\d{1,2})\s++(\d{1,2})([NSEW])"
 _SITE = re.compile(rf"Site (\S++)\s++{_ANGLE}\s++{_ANGLE}")
 _EPICENTRE = re.compile(
-    rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}.*?(?:Depth\s*+{DECIMAL}\s*+km)?"
-    rf"(?:\s++M\w?\s*+{DECIMAL})?\s*+"
+    rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}"
+    rf".*?(?:Depth\s*+{DECIMAL}\s*+km)?(?:\s++M\w?\s*+{DECIMAL})?\s*+"
 )
 _POINTS = re.compile(r"Number of points\s++(\S+)")
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")

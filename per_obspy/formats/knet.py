@@ -4,10 +4,14 @@ from obspy import Trace
 
 from per_obspy.constants import GAL
 from per_obspy.errors import RecordRejected
+from per_obspy.formats.text.lines import is_ended
 from per_obspy.formats.text.vocabulary import coordinates, orientation
 
 #: KiK-net numbers its sensors: 1 in the borehole, 2 at the surface
 _SENSORS = "12"
+
+#: characters of a column of samples
+_WIDTH = 9
 
 
 def with_knet_words(record: Trace) -> Trace:
@@ -40,11 +44,34 @@ def with_knet_words(record: Trace) -> Trace:
     return trace
 
 
+def require_whole_numbers(content: bytes, name: str) -> None:
+    """
+    Refuse a file that ends inside its last number, which ObsPy would read as a smaller one.
+
+    Parameters
+    ----------
+    content : bytes
+        Of a K-NET file.
+    name : str
+        Of the file, for the message.
+
+    Raises
+    ------
+    RecordRejected
+        If the last line has no end and stops inside a column.
+    """
+    *_, line_before, last = [b"", b"", *content.rstrip(b"\x00\r\n ").splitlines()]
+    if not is_ended(content) and (len(line_before.rstrip()) - len(last)) % _WIDTH:
+        problem = f"last number: the file ends inside a column after {last[-_WIDTH:]!r}"
+        raise RecordRejected(name, problem)
+
+
 def _refuse_cut(record: Trace) -> None:
-    """Refuse a record that is shorter than its header promises by more than a sample."""
+    """Refuse a record that is shorter than its header promises."""
     promised = record.stats.knet.duration
     seconds = record.stats.npts * record.stats.delta
-    if seconds < promised - record.stats.delta:
+    # Half a sample is rounding
+    if seconds < promised - record.stats.delta / 2:
         raise RecordRejected(
             record.id, f"the header promises {promised:g} s, the file holds {seconds:g} s"
         )

@@ -62,6 +62,8 @@ _CLOCK = re.compile(rf"(\d{{1,2}}):(\d{{1,2}}):{DECIMAL}")
 _LATITUDE = re.compile(rf"{DECIMAL}\s*+LAT\.?\s*+([NSEWO])")
 _LONGITUDE = re.compile(rf"{DECIMAL}\s*+LONG\.?\s*+([NSEWO])")
 _MAGNITUDE = re.compile(rf"(M\w?)={DECIMAL}")
+_PEAK_PLACES = "ACEL. MAX., C1-C6, EN LA MUESTRA"
+_MISSING_LINES = 5  # at most, where peaks are earlier than in the header
 _DAY, _HALF_DAY = 86400, 43200.0  # s
 
 
@@ -89,6 +91,7 @@ def read_unam(file: WaveformFile, **_unused: Any) -> Stream:
     # One column per channel
     samples, dt = _size(text, fields, channels)
     values = _samples(text, first, samples, channels)
+    _refuse_missing_lines(text, fields, values)
     directions = _values(text, fields, "ORIENTACION C1-C6 (rumbo;orientacion)", channels)
     peaks = _peaks(text, fields, channels)
     common = _common_words(text, fields)
@@ -133,6 +136,33 @@ def _refuse_surplus(text: Text, line: int, samples: int) -> None:
     last = text.lines[line - 1]
     if any(surplus != last for surplus in text.lines[line:]):
         no_more(text, line, samples)
+
+
+def _refuse_missing_lines(text: Text, fields: Fields, values: FloatArray) -> None:
+    """
+    Refuse peaks a few samples earlier than in the header: lines before them are missing.
+
+    The lines that fill up a file would otherwise take their place in the count. Samples are counted
+    from 1, in older files from 0; peaks elsewhere are those of another processing.
+    """
+    field = fields.get(_PEAK_PLACES)
+    words = field.value.split("/")[1:] if field else []
+    is_known = len(words) == values.shape[1] and all(word.strip().isdecimal() for word in words)
+    if field is None or not is_known:
+        return
+    # Shifts at which each channel has its peak: 0 or 1 in a whole file, the same in all channels
+    columns = zip(words, np.abs(values).T, strict=True)
+    shifts = [_peak_shifts(column, int(word[:12])) for word, column in columns]
+    common = {0, 1}.intersection(*shifts)
+    if all(shifts) and not common:
+        refuse(text, field.line, _PEAK_PLACES, f"{field.value}, but lines before are missing")
+
+
+def _peak_shifts(column: FloatArray, promised: int) -> set[int]:
+    """Return by how many samples the peak of a channel is later than promised; few at most."""
+    first = max(promised - 1 - _MISSING_LINES, 0)
+    peaks = np.flatnonzero(column[first : promised + 1] == column.max())
+    return {first + int(index) + 1 - promised for index in peaks}
 
 
 def _peaks(text: Text, fields: Fields, channels: int) -> list[float]:

@@ -84,7 +84,8 @@ def _promised_samples(text: Text, line: int) -> int:
 
 def _shifted(text: Text) -> Text:
     """Return the file without its first column, FORTRAN's blank for the line printer."""
-    return Text(text.name, [line[1:] if line.startswith(" ") else line for line in text.lines])
+    lines = [line[1:] if line.startswith(" ") else line for line in text.lines]
+    return text._replace(lines=lines)
 
 
 def _volume_2(text: Text, first: int) -> tuple[Trace, int]:

@@ -23,6 +23,7 @@ from obspy.core.util.misc import buffered_load_entry_point
 
 from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import writing
+from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.records.archives import read_file
 
 #: Reason of a rejection where no format plugin knows a file.
@@ -152,6 +153,8 @@ def _called(
             name = _detected(kind, str(source), _TWO_FILES)
         if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
+        if name == "KNET":
+            require_whole_numbers(content, str(source))
         file = glob.escape(str(source)) if name in _TWO_FILES and beside else BytesIO(content)
         return reader(file, format=name, check_compression=False, **options)
     except PerError:

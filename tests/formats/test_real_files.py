@@ -17,7 +17,8 @@ from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected
 from per_obspy.formats.csmip import read_spectra
-from per_obspy.formats.knet import with_knet_words
+from per_obspy.formats.knet import require_whole_numbers, with_knet_words
+from per_obspy.records.obspy_readers import read_content
 from per_obspy.spectra.elastic import response_spectra
 
 pytestmark = pytest.mark.real_data
@@ -227,3 +228,21 @@ def test_damaged_real_files_are_refused_or_read(real_data: Path, name: str):
         except RecordRejected:
             continue
         assert all(np.isfinite(trace.data).all() for trace in stream)
+
+
+def test_a_cut_k_net_file_is_refused_or_whole(real_data: Path):
+    # would catch a sample that the count may lack, and one that lost its last digits
+    path = real_data / "records" / "aomori2018_knet" / "AOM0011801241951.EW"
+    content = path.read_bytes()
+    (whole,) = obspy.read(str(path))
+    for cut in range(1, 16):
+        try:
+            require_whole_numbers(content[:-cut], path.name)
+            (trace,) = obspy.read(io.BytesIO(content[:-cut]), format="KNET")
+            samples = with_knet_words(trace).data
+        except RecordRejected:
+            continue
+        np.testing.assert_array_equal(samples, whole.data)
+    # every path to ObsPy asks
+    with pytest.raises(RecordRejected, match="last number: the file ends inside a column"):
+        read_content(obspy.read, content[:-3], path)

@@ -30,11 +30,13 @@ class Text(NamedTuple):
     """
     A file as lines without their ends.
 
-    Line numbers count from 0 in the code and from 1 in messages.
+    Line numbers count from 0 in the code and from 1 in messages. A file whose last line has no end
+    may have been cut inside its last number.
     """
 
     name: str
     lines: list[str]
+    is_ended: bool = True
 
 
 def head(file: WaveformFile, size: int) -> bytes:
@@ -63,14 +65,26 @@ def read_text(file: WaveformFile) -> Text:
     line is dropped. A line of more than ``LONGEST_LINE`` characters is refused.
     """
     if hasattr(file, "read"):
-        text = Text(str(getattr(file, "name", "open file")), _lines(file.read()))
+        name, content = str(getattr(file, "name", "open file")), file.read()
     else:
-        text = Text(str(file), _lines(Path(file).read_bytes()))
+        name, content = str(file), Path(file).read_bytes()
+    text = Text(name, _lines(content), is_ended(content))
     # Searching and padding take time and memory that grow with the longest line
     for line, content in enumerate(text.lines):
         if len(content) > LONGEST_LINE:
             refuse(text, line, "line", f"{len(content)} characters, at most {LONGEST_LINE}")
     return text
+
+
+def is_ended(content: bytes) -> bool:
+    r"""
+    Check whether something ends the last word of a file; zeros may fill a place that was never cut.
+
+    >>> is_ended(b"0.12\r\n"), is_ended(b"0.1"), is_ended(b"0.1\0\0")
+    (True, False, False)
+    """
+    padding = content[len(content.rstrip(b"\x00\x1a\r\n ")) :]
+    return bool(padding.strip(b"\x00"))
 
 
 def _lines(content: bytes) -> list[str]:
@@ -157,14 +171,22 @@ def fixed_block(text: Text, start: int, samples: int, width: int, per_line: int)
     # A line that is not full lacks a number; padding many of them would fill the memory
     if any(len(row) <= full - width for row in rows[:-1]):
         _refuse_fixed(text, start, rows, samples, width, per_line)
+    if start + len(rows) == len(text.lines) and not text.is_ended:
+        _refuse_short_column(text, rows, width)
+    values = _columns(rows, samples, width, full)
+    if values is None:
+        _refuse_fixed(text, start, rows, samples, width, per_line)
+    return values
+
+
+def _columns(rows: list[str], samples: int, width: int, full: int) -> FloatArray | None:
+    """Return the numbers of a block in columns; None if there is anything else."""
     # Pad every line to its full length, so that number i begins at character i * width
     block = "".join([row.ljust(full) for row in rows]).encode("latin-1")
     values = _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
     # Only blanks may follow the last number, and only letters of numbers may stand anywhere
     surplus = block[samples * width :].strip()
-    if values is None or surplus or block.translate(None, _NUMBER_LETTERS):
-        _refuse_fixed(text, start, rows, samples, width, per_line)
-    return values
+    return None if surplus or block.translate(None, _NUMBER_LETTERS) else values
 
 
 def block_lines(samples: int, per_line: int) -> int:
@@ -210,10 +232,47 @@ def free_block(text: Text, start: int, stop: int | None, samples: int | None) ->
     # Search for the wrong word only when there is one
     if values is None:
         _refuse_free(text, start, rows)
+    if stop is None and not text.is_ended:
+        _refuse_another_form(text, rows)
     if samples is not None and len(values) != samples:
         problem = f"the header promises {samples}, the file holds {len(values)}"
         refuse(text, start + len(rows) - 1, "samples", problem)
     return values
+
+
+def _refuse_short_column(text: Text, rows: list[str], width: int) -> None:
+    """Refuse a last number that ends at another place of its column than the first one."""
+    first_end = len(rows[0][:width].rstrip())
+    if (len(rows[-1]) - first_end) % width:
+        _refuse_cut(text, f"{rows[-1][-width:]!r} ends before its column")
+
+
+def _refuse_another_form(text: Text, rows: list[str]) -> None:
+    """Refuse a last number that is not written like the last numbers of the other lines."""
+    endings = [row.split()[-1] for row in rows if row.strip()]
+    forms = {_form(word) for word in endings}
+    # Whole numbers have no form that shows their end
+    if len(forms) > 1 or forms == {(-1, 0)}:
+        _refuse_cut(text, f"{endings[-1]!r} may be a part of one")
+
+
+def _form(word: str) -> tuple[int, int]:
+    """
+    Return the numbers of decimals, -1 where there is no point, and of characters of the exponent.
+
+    >>> _form("-1.250E-03"), _form("12."), _form("7")
+    ((3, 3), (0, 0), (-1, 0))
+    """
+    mantissa, _, exponent = word.upper().partition("E")
+    _, point, decimals = mantissa.partition(".")
+    return len(decimals) if point else -1, len(exponent)
+
+
+def _refuse_cut(text: Text, problem: str) -> NoReturn:
+    """Refuse a file that may have been cut inside its last number."""
+    mend = "get the file again, or end its last line if it is whole"
+    problem = f"{problem}, without an end of line after it: {mend}"
+    refuse(text, len(text.lines) - 1, "last number", problem)
 
 
 def _block_rows(text: Text, start: int, lines: int, samples: int) -> list[str]:
