@@ -1,4 +1,4 @@
-"""Names from data: codes of stations, and paths that must lie in their folder."""
+"""Names from data: codes of stations, paths that must lie in their folder, public addresses."""
 
 import re
 from pathlib import Path
@@ -119,3 +119,22 @@ def shortened(text: str, length: int = 80) -> str:
     """
     start = printable(text[:length])
     return start if len(text) <= length else f"{start[:-1]}…"
+
+
+def public_url(address: str) -> str:
+    """
+    Return an address without user, password, query and fragment; other text as it is.
+
+    Examples
+    --------
+    >>> public_url("https://me:secret@example.org:8080/query?token=secret")
+    'https://example.org:8080/query'
+    >>> public_url("USGS")
+    'USGS'
+    """
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        return address
+    # A password may hold any letter, even / and ?
+    place = rest.rpartition("@")[2]
+    return f"{scheme}://{re.split('[?#]', place, maxsplit=1)[0]}"

@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import obspy
-import urllib3
 from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
 from per_obspy.files import remove_dead_parts
-from per_obspy.names import code_problem, shortened
+from per_obspy.names import code_problem, public_url, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
@@ -35,7 +34,7 @@ from per_obspy.records.fdsn.request import (
     stations_inside,
     wanted_around,
 )
-from per_obspy.records.fdsn.web import answer, host, web_pool
+from per_obspy.records.fdsn.web import WebPool, answer, host, web_pool
 from per_obspy.records.folder import SourceContents, find_stations
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.resume import earlier_status, write_status
@@ -90,7 +89,7 @@ def fetch(
     ServiceError
         If services fail and the cache has no station at all, or the window is not over yet.
     """
-    pool = web_pool(request.timeout, request.retries, request.wait)
+    pool = _pool(request)
     fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
@@ -116,7 +115,13 @@ def fetch(
     return fetched
 
 
-def _requested(pool: urllib3.PoolManager, request: config.Fdsn, event: Path | None) -> Fetched:
+def _pool(request: config.Fdsn) -> WebPool:
+    """Return connections with the patience of a request."""
+    limits = (request.longest_answer, request.largest_answer)
+    return web_pool(request.timeout, request.retries, request.wait, *limits)
+
+
+def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetched:
     """Return the place of a request in the cache, with its event and nothing rejected yet."""
     if event is None and request.event_id:
         event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
@@ -126,7 +131,7 @@ def _requested(pool: urllib3.PoolManager, request: config.Fdsn, event: Path | No
 
 
 def _fetch_missing(
-    pool: urllib3.PoolManager, request: config.Fdsn, fetched: Fetched, progress: Progress
+    pool: WebPool, request: config.Fdsn, fetched: Fetched, progress: Progress
 ) -> tuple[list[Rejection], bool]:
     """Fetch what the cache lacks; return what failed, and whether nothing is left to ask for."""
     wanted = fetched.wanted
@@ -163,7 +168,7 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
 
 
 def _offers(
-    pool: urllib3.PoolManager, bases: list[str], wanted: Wanted
+    pool: WebPool, bases: list[str], wanted: Wanted
 ) -> tuple[dict[str, list[Offer]], list[Rejection], list[Rejection]]:
     """Ask every service which stations it has; return offers, failed services, wrong codes."""
     offers: dict[str, list[Offer]] = defaultdict(list)
@@ -174,12 +179,12 @@ def _offers(
         try:
             listed = _listed(pool, url, wanted)
         except (ServiceError, RecordRejected) as fault:
-            rejected.append(Rejection("service", host(url), url, None, (str(fault),)))
+            rejected.append(Rejection("service", host(url), public_url(url), None, (str(fault),)))
             continue
         for station in sorted(stations_inside(listed, wanted)):
             channels = _channels(listed, station)
             if problem := _problem(station, channels):
-                row = Rejection("station", shortened(station), url, None, (problem,))
+                row = Rejection("station", shortened(station), public_url(url), None, (problem,))
                 unusable.append(row)
             else:
                 offers[station].append(Offer(base, channels))
@@ -193,13 +198,13 @@ def _problem(station: str, channels: Iterable[tuple[str, str]]) -> str:
     return next(filter(None, problems), "")
 
 
-def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:
+def _listed(pool: WebPool, url: str, wanted: Wanted) -> Inventory:
     """Return the channels that a service has of a request."""
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
         return Inventory()
     inventory: Inventory = read_bytes_with_obspy(
-        obspy.read_inventory, content, url, format="STATIONTXT"
+        obspy.read_inventory, content, public_url(url), format="STATIONTXT"
     )
     return inventory
 
@@ -217,7 +222,7 @@ def _channels(inventory: Inventory, station: str) -> tuple[tuple[str, str], ...]
 
 
 def _stations(
-    pool: urllib3.PoolManager,
+    pool: WebPool,
     fetched: Fetched,
     offers: dict[str, list[Offer]],
     connections: int,
@@ -246,4 +251,4 @@ def _no_station(bases: list[str], wanted: Wanted) -> list[Rejection]:
     place = f"{wanted.radius:.3g} degrees of {wanted.latitude:g}, {wanted.longitude:g}"
     channels = f"channels {','.join(wanted.channels)} from {wanted.start} to {wanted.end}"
     reason = f"no station within {place} has {channels}"
-    return [Rejection("service", host(base), base, None, (reason,)) for base in bases]
+    return [Rejection("service", host(base), public_url(base), None, (reason,)) for base in bases]
