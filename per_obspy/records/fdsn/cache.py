@@ -2,15 +2,17 @@
 Records from FDSN web services, kept in a folder that any later run reads without the network.
 
 A cache holds ``event-ID.xml`` and one folder for each window and choice of channels, with
-``NET.STA.mseed`` and ``NET.STA.xml`` of every station. Files appear whole or not at all and are
-never asked for again, so that a killed fetch goes on where it stopped; what it left half written
-(``.….part.…``) is passed over and removed. ``complete-….json``, a status file of
-:mod:`per_obspy.resume`, is written when a request has nothing left to ask for.
+``NET.STA.mseed`` and ``NET.STA.xml`` of every station, and ``NET.STA.json`` with their hashes and
+the channels asked for. Files appear whole or not at all and are asked for again only if they have
+changed, so that a killed fetch goes on where it stopped; what it left half written (``.….part.…``)
+is passed over and removed. ``complete-….json``, a status file of :mod:`per_obspy.resume`, is
+written when a request has nothing left to ask for.
 """
 
 from collections import defaultdict
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,11 +21,11 @@ from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError
-from per_obspy.files import remove_dead_parts
+from per_obspy.files import is_part, remove_dead_parts
 from per_obspy.names import code_problem, public_url, shortened
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
-from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
+from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station, station_status
 from per_obspy.records.fdsn.event_list import fetched_event
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
@@ -37,7 +39,14 @@ from per_obspy.records.fdsn.request import (
 from per_obspy.records.fdsn.web import WebPool, answer, host, web_pool
 from per_obspy.records.folder import SourceContents, find_stations
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
-from per_obspy.resume import earlier_status, write_status
+from per_obspy.resume import (
+    Status,
+    StatusError,
+    changed_outputs,
+    earlier_status,
+    read_status,
+    write_status,
+)
 
 
 class Fetched(NamedTuple):
@@ -95,9 +104,9 @@ def fetch(
     # A complete request is answered from the cache
     key = digest((fetched.wanted, request.providers))
     status_file = request.cache / f"complete-{key}.json"
-    status = None if again else earlier_status(status_file, key)
-    if status is not None:
-        return fetched._replace(rejected=tuple(map(Rejection.stored, status["rejected"])))
+    known = None if again else _known_rejections(earlier_status(status_file, key))
+    if known is not None:
+        return fetched._replace(rejected=known)
 
     # Everything else needs the services
     end = fetched.wanted.end
@@ -108,7 +117,7 @@ def fetch(
     remove_dead_parts(request.cache)
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
-        write_status(status_file, key, {}, {"rejected": rejected})
+        write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
     fetched = fetched._replace(rejected=tuple(rejected))
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
@@ -152,19 +161,60 @@ def _fetch_missing(
     return rejected, complete
 
 
+def _known_rejections(status: Status | None) -> tuple[Rejection, ...] | None:
+    """Return the rejections of a complete request; None if it is none or its status is damaged."""
+    try:
+        return None if status is None else tuple(map(Rejection.stored, status["rejected"]))
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _cached_hashes(folder: Path) -> dict[str, str]:
+    """Return the hashes of all files of stations, seen from the cache."""
+    hashes = dict[str, str]()
+    for path in sorted(folder.glob("*.json")):
+        with suppress(StatusError):
+            outputs = read_status(path)["outputs"]
+            hashes |= {f"{folder.name}/{name}": known for name, known in outputs.items()}
+    return hashes
+
+
 def fetched_stations(fetched: Fetched) -> SourceContents:
-    """Return the cached stations of a request, as ``records.folder.find_stations`` does."""
-    if not any(fetched.folder.glob("*.mseed")):
-        return SourceContents({}, None, fetched.rejected)
+    """
+    Return the cached stations of a request, as ``records.folder.find_stations`` does.
+
+    A station whose files are not as they were fetched is a rejection.
+    """
+    names = {path.stem for path in fetched.folder.glob("*.mseed") if not is_part(path)}
+    names |= {path.stem for path in fetched.folder.glob("*.json") if not is_part(path)}
+    damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
+    rejected = (*fetched.rejected, *damaged)
+    broken = {row.name for row in damaged}
+    if not names - broken:
+        return SourceContents({}, None, rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
+    # Half a file of a killed fetch has another stem
     stations = {}
     for name, paths in found.stations.items():
-        # Half a file of a killed fetch has another stem
         whole = tuple(path for path in paths if path.stem == name)
-        if whole and name in inside:
+        if whole and name in inside and name not in broken:
             stations[name] = whole
-    return SourceContents(stations, found.inventory, fetched.rejected, found.hashes)
+    return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _damage(folder: Path, name: str) -> Rejection | None:
+    """Return the row of a cached station whose files are not as they were fetched, else None."""
+    path = station_status(folder / f"{name}.mseed")
+    try:
+        changed = changed_outputs(path, read_status(path))
+        reason = f"{changed[0].name} is not as it was fetched" if changed else ""
+    except StatusError as error:
+        reason = f"{path.name} cannot be read: {shortened(str(error))}"
+    if not reason:
+        return None
+    reason = f"{reason}; it is fetched again when the services answer"
+    return Rejection("station", name, str(folder / f"{name}.mseed"), None, (reason,))
 
 
 def _offers(

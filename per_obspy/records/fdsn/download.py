@@ -6,12 +6,13 @@ from typing import NamedTuple
 import obspy
 
 from per_obspy.errors import RecordRejected, ServiceError
-from per_obspy.files import written_whole
+from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import inside, public_url
-from per_obspy.records.fdsn.request import Wanted, channel_parameters
+from per_obspy.records.fdsn.request import Wanted, channel_parameters, digest
 from per_obspy.records.fdsn.web import RequestTooLarge, WebPool, answer, host, whole_answer
 from per_obspy.records.folder import station_name
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
+from per_obspy.resume import StatusError, hash_if_readable, read_status, write_status
 
 #: Times that an answer without an announced end is compared with the next.
 _COMPARISONS = 3
@@ -58,7 +59,8 @@ def fetch_station(
     """
     Download a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``.
 
-    A file that exists is not requested again.
+    A file that is as it was fetched is not requested again; ``NET.STA.json`` has the hashes of both
+    and the channels that were asked for.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ class _NoData(ServiceError):
 
 def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> None:
     """Download the records of a station unless they are there."""
-    if path.is_file():
+    if _is_whole(path, wanted):
         return
     url = f"{offer.base}/fdsnws/dataselect/1/query"
     parameters = _parameters(wanted, path.stem)
@@ -111,7 +113,7 @@ def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> N
                 problem = f"answers with something else than channel {'.'.join(codes)}"
                 raise RecordRejected(public_url(url), problem)
             content += alone
-    _write(path, content)
+    _write(path, content, wanted, offer)
 
 
 def _channels(content: bytes, url: str, station: str) -> set[tuple[str, str]]:
@@ -157,7 +159,7 @@ def _framed(pool: WebPool, url: str, parameters: dict[str, str]) -> bytes:
 
 def _fetch_metadata(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> None:
     """Download the metadata of a station unless they are there."""
-    if path.is_file():
+    if _is_whole(path, wanted):
         return
     url = f"{offer.base}/fdsnws/station/1/query"
     content = answer(pool, url, _parameters(wanted, path.stem) | {"level": "response"})
@@ -168,7 +170,7 @@ def _fetch_metadata(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> 
     # An answer for another station must not enter the cache under this name
     found = {f"{network.code}.{station.code}" for network in inventory for station in network}
     _check(shown, path.stem, found)
-    _write(path, content)
+    _write(path, content, wanted, offer)
 
 
 def _parameters(wanted: Wanted, station: str) -> dict[str, str]:
@@ -185,6 +187,37 @@ def _check(url: str, station: str, found: set[str]) -> None:
         )
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, content: bytes, wanted: Wanted, offer: Offer) -> None:
+    """Write a file of a station, and then its hash into the status of the station."""
+    outputs = {name: known for name, known in _outputs(path, wanted).items() if name != path.name}
     with written_whole(path) as part:
         part.write_bytes(content)
+    outputs[path.name] = bytes_hash(content)
+    # The word shard makes the status a description, which a folder of records passes over
+    facts = {"shard": outputs.get(f"{path.stem}.mseed"), "channels": offer.channels}
+    write_status(station_status(path), _key(path, wanted), outputs, facts)
+
+
+def station_status(path: Path) -> Path:
+    """Return the status file of a station, with hashes and channels, by one of its files."""
+    return path.with_suffix(".json")
+
+
+def _is_whole(path: Path, wanted: Wanted) -> bool:
+    """Return whether a file is as it was fetched by the same request."""
+    known = _outputs(path, wanted).get(path.name)
+    return bool(known) and hash_if_readable(path) == known
+
+
+def _outputs(path: Path, wanted: Wanted) -> dict[str, str]:
+    """Return the hashes in the status of a station; empty if it is missing or of other work."""
+    try:
+        status = read_status(station_status(path))
+    except StatusError:
+        return {}
+    return dict(status["outputs"]) if status["key"] == _key(path, wanted) else {}
+
+
+def _key(path: Path, wanted: Wanted) -> str:
+    """Return the hash of the request for a station."""
+    return digest(_parameters(wanted, path.stem))

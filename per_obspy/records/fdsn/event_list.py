@@ -13,13 +13,14 @@ from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
-from per_obspy.files import written_whole
+from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import LONGEST_CODE, code_problem, inside, public_url
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest
 from per_obspy.records.fdsn.web import NotFound, WebPool, answer, web_pool
 from per_obspy.records.obspy_readers import read_with_obspy
+from per_obspy.resume import earlier_status, write_status
 
 #: Patience with a service that lists events: s, retries, s.
 _PATIENCE = (60.0, 3, 1.0)
@@ -177,7 +178,8 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
         If the service does not answer, or with something else.
     """
     path = inside(cache, f"event-{_file_name(event_id)}.xml")
-    if path.is_file():
+    status_file = path.with_suffix(".json")
+    if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
@@ -194,6 +196,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
         except CatalogError as error:
             reason = f"answers with something else than the event: {error.problem}"
             raise ServiceError(f"{public_url(url)}: {reason}") from error
+    write_status(status_file, digest(event_id), {path.name: bytes_hash(content)}, {})
     return path
 
 
