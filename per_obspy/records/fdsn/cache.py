@@ -185,6 +185,7 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
 
     A station whose files are not as they were fetched is a rejection.
     """
+    # A station has records, or a status whose records are gone
     names = {path.stem for path in fetched.folder.glob("*.mseed") if not is_part(path)}
     names |= {path.stem for path in fetched.folder.glob("*.json") if not is_part(path)}
     damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
@@ -206,6 +207,7 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
 def _damage(folder: Path, name: str) -> Rejection | None:
     """Return the row of a cached station whose files are not as they were fetched, else None."""
     path = station_status(folder / f"{name}.mseed")
+    # Files without a status may be cut
     try:
         changed = changed_outputs(path, read_status(path))
         reason = f"{changed[0].name} is not as it was fetched" if changed else ""

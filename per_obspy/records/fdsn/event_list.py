@@ -181,6 +181,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     status_file = path.with_suffix(".json")
     if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
+    # Anything but a whole file is fetched
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
         content = answer(pool, url, {"eventid": event_id, "format": "quakeml"})

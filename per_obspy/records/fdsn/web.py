@@ -197,6 +197,7 @@ def _redirected(pool: WebPool, url: str, parameters: Mapping[str, str]) -> urlli
     """Return the response at the end of the redirections."""
     fields: dict[str, str] | None = dict(parameters)
     target = url
+    # Each step is a request of its own, apart from the retries
     for _ in range(_MOST_REDIRECTIONS + 1):
         address, headers = _address(pool, target, url)
         response = pool.connections.request(
@@ -257,6 +258,7 @@ def _refusal(response: urllib3.BaseHTTPResponse, shown: str) -> ServiceError:
     if response.status in (_TOO_LARGE, _URI_TOO_LONG):
         problem = f"refuses to answer so much at once (HTTP {response.status})"
         return RequestTooLarge(f"{shown}: {problem}")
+    # The page of the service may name the reason
     page = _one_line(response.read1(_PAGE).decode("utf-8", "replace"))
     message = f"{shown}: HTTP {response.status}: {page}"
     if response.status in PASSING_FAULTS:
