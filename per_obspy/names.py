@@ -1,4 +1,4 @@
-"""Names from data: codes of stations, and paths that must lie in their folder."""
+"""Names from data: codes of stations, paths that must lie in their folder, public addresses."""
 
 import re
 from pathlib import Path
@@ -109,3 +109,22 @@ def name_problem(name: str) -> str:
         return f"is longer than {_LONGEST_NAME} bytes, or {_LONGEST_PATH} with its folders"
     # An absolute name has an empty first part
     return "leads out of this folder" if {"", ".", ".."} & set(parts) else ""
+
+
+def public_url(address: str) -> str:
+    """
+    Return an address without user, password, query and fragment; other text as it is.
+
+    Examples
+    --------
+    >>> public_url("https://me:secret@example.org:8080/query?token=secret")
+    'https://example.org:8080/query'
+    >>> public_url("USGS")
+    'USGS'
+    """
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        return address
+    # A password may hold any letter, even / and ?
+    place = rest.rpartition("@")[2]
+    return f"{scheme}://{re.split('[?#]', place, maxsplit=1)[0]}"

@@ -1,14 +1,18 @@
 """Where records come from."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import (
     Field,
+    PlainSerializer,
     model_validator,
 )
 
 from per_obspy.config.section import Moment, RelativePath, Section
-from per_obspy.names import code_problem
+from per_obspy.names import code_problem, public_url
+
+#: A provider of services, which records of a run show without user and password.
+Provider = Annotated[str, PlainSerializer(public_url)]
 
 
 class Columns(Section):
@@ -87,7 +91,7 @@ class Window(Section):
 class Fdsn(Window):
     """Records from FDSN web services around an epicentre; what was fetched stays in the cache."""
 
-    providers: tuple[str, ...] = Field(
+    providers: tuple[Provider, ...] = Field(
         min_length=1,
         description=(
             "in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator"
@@ -95,7 +99,9 @@ class Fdsn(Window):
     )
     cache: RelativePath = Field(description="folder that keeps what was fetched")
     event_id: str | None = Field(None, description="of the event service, instead of records.event")
-    event_provider: str = Field("USGS", description="ObsPy's name or base URL of the event service")
+    event_provider: Provider = Field(
+        "USGS", description="ObsPy's name or base URL of the event service"
+    )
     latitude: float | None = Field(
         None, ge=-90, le=90, description="centre, degrees north; not given: epicentre"
     )
@@ -120,6 +126,12 @@ class Fdsn(Window):
         description="SEED codes, * and ? allowed; accelerometers",
     )
     timeout: float = Field(60.0, gt=0, description="s without an answer, or without more of it")
+    longest_answer: float = Field(
+        600.0, gt=0, description="s, of one attempt in all; a slower answer is given up"
+    )
+    largest_answer: int = Field(
+        256 * 2**20, gt=0, description="bytes after unpacking; a larger answer is given up"
+    )
     retries: int = Field(
         5, ge=0, description="after a fault that may pass (429, 5xx, time-out, cut answer)"
     )

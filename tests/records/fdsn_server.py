@@ -271,3 +271,33 @@ def shortened(handler: _Handler, body: bytes) -> None:
 def content(wrong: bytes) -> Fault:
     """Answer 200 with something else."""
     return lambda handler, _: handler.reply(200, wrong)
+
+
+def unframed(part: float) -> Fault:
+    """Send part of the records without any length and hang up, as HTTP 1.0 does at the end."""
+
+    def answer(handler: _Handler, body: bytes) -> None:
+        handler.send_response(200)
+        handler.send_header("Connection", "close")
+        handler.end_headers()
+        handler.wfile.write(body[: int(part * len(body)) // 512 * 512])
+        handler.close_connection = True
+
+    return answer
+
+
+def endless(piece: bytes, seconds: float, **headers: str) -> Fault:
+    """Send a piece again and again with a pause after each, until the client hangs up."""
+
+    def answer(handler: _Handler, _: bytes) -> None:
+        handler.send_response(200)
+        for name, value in headers.items():
+            handler.send_header(name.replace("_", "-"), value)
+        handler.send_header("Connection", "close")
+        handler.end_headers()
+        handler.close_connection = True
+        while True:
+            handler.wfile.write(piece)
+            time.sleep(seconds)
+
+    return answer

@@ -2,29 +2,30 @@
 Records from FDSN web services, kept in a folder that any later run reads without the network.
 
 A cache holds ``event-ID.xml`` and one folder for each window and choice of channels, with
-``NET.STA.mseed`` and ``NET.STA.xml`` of every station. Files appear whole or not at all and are
-never asked for again, so that a killed fetch goes on where it stopped; what it left half written
-(``.….part.…``) is passed over and removed. ``complete-….json``, a status file of
-:mod:`per_obspy.resume`, is written when a request has nothing left to ask for.
+``NET.STA.mseed`` and ``NET.STA.xml`` of every station, and ``NET.STA.json`` with their hashes and
+the channels asked for. Files appear whole or not at all and are asked for again only if they have
+changed, so that a killed fetch goes on where it stopped; what it left half written (``.….part.…``)
+is passed over and removed. ``complete-….json``, a status file of :mod:`per_obspy.resume`, is
+written when a request has nothing left to ask for.
 """
 
 from collections import defaultdict
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import obspy
-import urllib3
 from obspy import Inventory, UTCDateTime
 
 from per_obspy import config
 from per_obspy.errors import RecordRejected, Rejection, ServiceError, shortened
-from per_obspy.files import remove_dead_parts
-from per_obspy.names import SHOWN, code_problem
+from per_obspy.files import is_part, remove_dead_parts
+from per_obspy.names import SHOWN, code_problem, public_url
 from per_obspy.progress import Progress, silent
 from per_obspy.records.event_file import EventFile, read_event_file
-from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station
+from per_obspy.records.fdsn.download import Offer, Outcome, fetch_station, station_status
 from per_obspy.records.fdsn.event_list import fetched_event
 from per_obspy.records.fdsn.providers import base_urls
 from per_obspy.records.fdsn.request import (
@@ -35,10 +36,17 @@ from per_obspy.records.fdsn.request import (
     stations_inside,
     wanted_around,
 )
-from per_obspy.records.fdsn.web import answer, host, web_pool
+from per_obspy.records.fdsn.web import WebPool, answer, host, web_pool
 from per_obspy.records.folder import SourceContents, find_stations
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
-from per_obspy.resume import earlier_status, write_status
+from per_obspy.resume import (
+    Status,
+    StatusError,
+    changed_outputs,
+    earlier_status,
+    read_status,
+    write_status,
+)
 
 
 class Fetched(NamedTuple):
@@ -90,15 +98,15 @@ def fetch(
     ServiceError
         If services fail and the cache has no station at all, or the window is not over yet.
     """
-    pool = web_pool(request.timeout, request.retries, request.wait)
+    pool = _pool(request)
     fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
     key = digest((fetched.wanted, request.providers))
     status_file = request.cache / f"complete-{key}.json"
-    status = None if again else earlier_status(status_file, key)
-    if status is not None:
-        return fetched._replace(rejected=tuple(map(Rejection.stored, status["rejected"])))
+    known = None if again else _known_rejections(earlier_status(status_file, key))
+    if known is not None:
+        return fetched._replace(rejected=known)
 
     # Everything else needs the services
     end = fetched.wanted.end
@@ -109,14 +117,20 @@ def fetch(
     remove_dead_parts(request.cache)
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
-        write_status(status_file, key, {}, {"rejected": rejected})
+        write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
     fetched = fetched._replace(rejected=tuple(rejected))
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
 
 
-def _requested(pool: urllib3.PoolManager, request: config.Fdsn, event: Path | None) -> Fetched:
+def _pool(request: config.Fdsn) -> WebPool:
+    """Return connections with the patience of a request."""
+    limits = (request.longest_answer, request.largest_answer)
+    return web_pool(request.timeout, request.retries, request.wait, *limits)
+
+
+def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetched:
     """Return the place of a request in the cache, with its event and nothing rejected yet."""
     if event is None and request.event_id:
         event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
@@ -126,7 +140,7 @@ def _requested(pool: urllib3.PoolManager, request: config.Fdsn, event: Path | No
 
 
 def _fetch_missing(
-    pool: urllib3.PoolManager, request: config.Fdsn, fetched: Fetched, progress: Progress
+    pool: WebPool, request: config.Fdsn, fetched: Fetched, progress: Progress
 ) -> tuple[list[Rejection], bool]:
     """Fetch what the cache lacks; return what failed, and whether nothing is left to ask for."""
     wanted = fetched.wanted
@@ -147,23 +161,66 @@ def _fetch_missing(
     return rejected, complete
 
 
+def _known_rejections(status: Status | None) -> tuple[Rejection, ...] | None:
+    """Return the rejections of a complete request; None if it is none or its status is damaged."""
+    try:
+        return None if status is None else tuple(map(Rejection.stored, status["rejected"]))
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _cached_hashes(folder: Path) -> dict[str, str]:
+    """Return the hashes of all files of stations, seen from the cache."""
+    hashes = dict[str, str]()
+    for path in sorted(folder.glob("*.json")):
+        with suppress(StatusError):
+            outputs = read_status(path)["outputs"]
+            hashes |= {f"{folder.name}/{name}": known for name, known in outputs.items()}
+    return hashes
+
+
 def fetched_stations(fetched: Fetched) -> SourceContents:
-    """Return the cached stations of a request, as ``records.folder.find_stations`` does."""
-    if not any(fetched.folder.glob("*.mseed")):
-        return SourceContents({}, None, fetched.rejected)
+    """
+    Return the cached stations of a request, as ``records.folder.find_stations`` does.
+
+    A station whose files are not as they were fetched is a rejection.
+    """
+    # A station has records, or a status whose records are gone
+    names = {path.stem for path in fetched.folder.glob("*.mseed") if not is_part(path)}
+    names |= {path.stem for path in fetched.folder.glob("*.json") if not is_part(path)}
+    damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
+    rejected = (*fetched.rejected, *damaged)
+    broken = {row.name for row in damaged}
+    if not names - broken:
+        return SourceContents({}, None, rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
+    # Half a file of a killed fetch has another stem
     stations = {}
     for name, paths in found.stations.items():
-        # Half a file of a killed fetch has another stem
         whole = tuple(path for path in paths if path.stem == name)
-        if whole and name in inside:
+        if whole and name in inside and name not in broken:
             stations[name] = whole
-    return SourceContents(stations, found.inventory, fetched.rejected, found.hashes)
+    return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _damage(folder: Path, name: str) -> Rejection | None:
+    """Return the row of a cached station whose files are not as they were fetched, else None."""
+    path = station_status(folder / f"{name}.mseed")
+    # Files without a status may be cut
+    try:
+        changed = changed_outputs(path, read_status(path))
+        reason = f"{changed[0].name} is not as it was fetched" if changed else ""
+    except StatusError as error:
+        reason = f"{path.name} cannot be read: {shortened(str(error))}"
+    if not reason:
+        return None
+    reason = f"{reason}; it is fetched again when the services answer"
+    return Rejection("station", name, str(folder / f"{name}.mseed"), None, (reason,))
 
 
 def _offers(
-    pool: urllib3.PoolManager, bases: list[str], wanted: Wanted
+    pool: WebPool, bases: list[str], wanted: Wanted
 ) -> tuple[dict[str, list[Offer]], list[Rejection], list[Rejection]]:
     """Ask every service which stations it has; return offers, failed services, wrong codes."""
     offers: dict[str, list[Offer]] = defaultdict(list)
@@ -174,12 +231,13 @@ def _offers(
         try:
             listed = _listed(pool, url, wanted)
         except (ServiceError, RecordRejected) as fault:
-            rejected.append(Rejection("service", host(url), url, None, (str(fault),)))
+            rejected.append(Rejection("service", host(url), public_url(url), None, (str(fault),)))
             continue
         for station in sorted(stations_inside(listed, wanted)):
             channels = _channels(listed, station)
             if problem := _problem(station, channels):
-                row = Rejection("station", shortened(station, SHOWN), url, None, (problem,))
+                shown = shortened(station, SHOWN)
+                row = Rejection("station", shown, public_url(url), None, (problem,))
                 unusable.append(row)
             else:
                 offers[station].append(Offer(base, channels))
@@ -193,13 +251,13 @@ def _problem(station: str, channels: Iterable[tuple[str, str]]) -> str:
     return next(filter(None, problems), "")
 
 
-def _listed(pool: urllib3.PoolManager, url: str, wanted: Wanted) -> Inventory:
+def _listed(pool: WebPool, url: str, wanted: Wanted) -> Inventory:
     """Return the channels that a service has of a request."""
     content = answer(pool, url, station_parameters(wanted) | {"level": "channel", "format": "text"})
     if not content:
         return Inventory()
     inventory: Inventory = read_bytes_with_obspy(
-        obspy.read_inventory, content, url, format="STATIONTXT"
+        obspy.read_inventory, content, public_url(url), format="STATIONTXT"
     )
     return inventory
 
@@ -217,7 +275,7 @@ def _channels(inventory: Inventory, station: str) -> tuple[tuple[str, str], ...]
 
 
 def _stations(
-    pool: urllib3.PoolManager,
+    pool: WebPool,
     fetched: Fetched,
     offers: dict[str, list[Offer]],
     connections: int,
@@ -246,4 +304,4 @@ def _no_station(bases: list[str], wanted: Wanted) -> list[Rejection]:
     place = f"{wanted.radius:.3g} degrees of {wanted.latitude:g}, {wanted.longitude:g}"
     channels = f"channels {','.join(wanted.channels)} from {wanted.start} to {wanted.end}"
     reason = f"no station within {place} has {channels}"
-    return [Rejection("service", host(base), base, None, (reason,)) for base in bases]
+    return [Rejection("service", host(base), public_url(base), None, (reason,)) for base in bases]

@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import obspy
-import urllib3
 from obspy import UTCDateTime
 from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
 
 from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
-from per_obspy.files import written_whole
-from per_obspy.names import LONGEST_CODE, code_problem, inside
+from per_obspy.files import bytes_hash, written_whole
+from per_obspy.names import LONGEST_CODE, code_problem, inside, public_url
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.providers import base_url
 from per_obspy.records.fdsn.request import digest
-from per_obspy.records.fdsn.web import NotFound, answer, web_pool
+from per_obspy.records.fdsn.web import NotFound, WebPool, answer, web_pool
 from per_obspy.records.obspy_readers import read_with_obspy
+from per_obspy.resume import earlier_status, write_status
 
 #: Patience with a service that lists events: s, retries, s.
 _PATIENCE = (60.0, 3, 1.0)
@@ -87,14 +87,14 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
         select = selection(source, query)
         rows = list(filter(select, _rows_of_file(Path(source))))
     elif source.startswith(("http://", "https://")) and ".geojson" in source:
-        select = selection(source, query)
+        select = selection(public_url(source), query)
         rows = list(filter(select, _rows_of_answer(source, _feed_rows, {})))
     elif Path(source).suffix.lower() in FILES and "://" not in source:
         raise CatalogError(source, "no such file")
     else:
         # Everything else is the base URL or the name of an event service, which selects itself
         for name in ("starttime", "endtime"):
-            _time(source, name, query)
+            _time(public_url(source), name, query)
         url = f"{base_url(source)}/fdsnws/event/1/query"
         rows = _rows_of_answer(url, _text_rows, {**query, "format": "text"})
     return sorted(rows, key=lambda row: row.time, reverse=True)
@@ -155,13 +155,13 @@ def _distance(row: EventRow, latitude: float, longitude: float) -> float:
     return float(locations2degrees(row.latitude, row.longitude, latitude, longitude))
 
 
-def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache: Path) -> Path:
+def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> Path:
     """
     Return the QuakeML file of an event in the cache; it is fetched if it is not there.
 
     Parameters
     ----------
-    pool : urllib3.PoolManager
+    pool : WebPool
         From :func:`per_obspy.records.fdsn.web.web_pool`.
     provider : str
         FDSN event service.
@@ -178,15 +178,17 @@ def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache
         If the service does not answer, or with something else.
     """
     path = inside(cache, f"event-{_file_name(event_id)}.xml")
-    if path.is_file():
+    status_file = path.with_suffix(".json")
+    if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
+    # Anything but a whole file is fetched
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
         content = answer(pool, url, {"eventid": event_id, "format": "quakeml"})
     except NotFound:
         content = b""
     if not content:
-        raise CatalogError(url, f"has no event {event_id}")
+        raise CatalogError(public_url(url), f"has no event {event_id}")
     # Only an answer that can be read as one event stays in the cache
     with written_whole(path) as part:
         part.write_bytes(content)
@@ -194,7 +196,8 @@ def fetched_event(pool: urllib3.PoolManager, provider: str, event_id: str, cache
             read_event(part)
         except CatalogError as error:
             reason = f"answers with something else than the event: {error.problem}"
-            raise ServiceError(f"{url}: {reason}") from error
+            raise ServiceError(f"{public_url(url)}: {reason}") from error
+    write_status(status_file, digest(event_id), {path.name: bytes_hash(content)}, {})
     return path
 
 
@@ -227,7 +230,7 @@ def _rows_of_answer(
         return rows(content)
     except (ValueError, KeyError, TypeError, IndexError) as error:
         reason = f"answers with something else than a list of events: {_reason(error)}"
-        raise ServiceError(f"{url}: {reason}") from error
+        raise ServiceError(f"{public_url(url)}: {reason}") from error
 
 
 def _reason(error: Exception) -> str:

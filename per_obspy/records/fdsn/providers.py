@@ -3,11 +3,11 @@
 import re
 from collections.abc import Iterable, Mapping
 
-import urllib3
 from obspy.clients.fdsn.header import URL_MAPPINGS
 
 from per_obspy.errors import CatalogError, Rejection, ServiceError
-from per_obspy.records.fdsn.web import answer
+from per_obspy.names import public_url
+from per_obspy.records.fdsn.web import WebPool, answer
 
 #: routers -> query URL, fixed parameters (of an answer with base URLs) and parameters that they
 #: understand
@@ -54,13 +54,14 @@ def base_url(provider: str) -> str:
     if provider.upper() not in URL_MAPPINGS:
         names = ", ".join(sorted(URL_MAPPINGS))
         raise CatalogError(
-            provider, f"is no base URL, no router ({', '.join(ROUTERS)}) and none of {names}"
+            public_url(provider),
+            f"is no base URL, no router ({', '.join(ROUTERS)}) and none of {names}",
         )
     return str(URL_MAPPINGS[provider.upper()])
 
 
 def base_urls(
-    pool: urllib3.PoolManager, providers: Iterable[str], selection: Mapping[str, str]
+    pool: WebPool, providers: Iterable[str], selection: Mapping[str, str]
 ) -> tuple[list[str], list[Rejection]]:
     """
     Return the base URLs of providers in their order, each once.
@@ -69,7 +70,7 @@ def base_urls(
 
     Parameters
     ----------
-    pool : urllib3.PoolManager
+    pool : WebPool
         From :func:`per_obspy.records.fdsn.web.web_pool`.
     providers : iterable of str
         ObsPy's names, base URLs, or the names of ``ROUTERS``.
@@ -96,7 +97,7 @@ def base_urls(
     return list(urls), rejected
 
 
-def _routed(pool: urllib3.PoolManager, router: str, selection: Mapping[str, str]) -> list[str]:
+def _routed(pool: WebPool, router: str, selection: Mapping[str, str]) -> list[str]:
     """Return the base URLs in the answer of a router."""
     url, fixed, understood = ROUTERS[router]
     parameters = {name: selection[name] for name in understood if name in selection}

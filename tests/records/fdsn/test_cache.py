@@ -478,3 +478,63 @@ def test_codes_of_a_list_that_name_no_file_are_a_row(
     asked = len(server.requests)
     assert ask(cache=tmp_path / "cache").rejected == fetched.rejected
     assert len(server.requests) == asked
+
+
+def spoiled(path: Path, how: str) -> None:
+    """Cut a file at a MiniSEED record, change a byte of it, or remove it."""
+    whole = path.read_bytes()
+    if how == "gone":
+        path.unlink()
+    else:
+        changed = whole[:700] + bytes([whole[700] ^ 1]) + whole[701:]
+        path.write_bytes(whole[: len(whole) // 2 // 512 * 512] if how == "cut" else changed)
+
+
+@pytest.mark.parametrize("how", ["cut", "changed", "gone"])
+@pytest.mark.parametrize("suffix", ["mseed", "xml"])
+def test_a_damaged_file_is_fetched_again(server: FdsnServer, ask: Ask, suffix: str, how: str):
+    path = ask().folder / f"XX.S002.{suffix}"
+    whole, before = path.read_bytes(), len(server.requests)
+    spoiled(path, how)
+    # offline, it is a row and never a record
+    server.fail("station", "*", status(503))
+    offline = fetched_stations(ask(retries=0))
+    assert list(offline.stations) == ["XX.S001", "XX.S003", "XX.S004"]
+    assert f"XX.S002.{suffix} is not as it was fetched" in offline.rejected[-1].reasons[0]
+    # only its own file is asked for again, after the two lists
+    found = fetched_stations(ask())
+    assert (list(found.stations), found.rejected) == (STATIONS, ())
+    assert len(server.requests) == before + 3
+    if suffix == "mseed":
+        assert path.read_bytes() == whole
+
+
+def test_all_files_damaged_are_rows(ask: Ask):
+    fetched = ask()
+    for name in STATIONS:
+        spoiled(fetched.folder / f"{name}.mseed", "cut")
+    found = fetched_stations(fetched)
+    assert (found.stations, [row.name for row in found.rejected]) == ({}, STATIONS)
+
+
+def test_the_channels_that_were_asked_for_are_kept(ask: Ask):
+    status = json.loads((ask().folder / "XX.S001.json").read_text())
+    assert sorted(status["channels"]) == [["", "HNE"], ["", "HNN"], ["", "HNZ"]]
+    assert sorted(status["outputs"]) == ["XX.S001.mseed", "XX.S001.xml"]
+
+
+@pytest.mark.parametrize("rejected", [None, 1, "why", [1], [["station"]], [None]])
+def test_a_complete_status_of_other_content_asks_again(ask: Ask, tmp_path: Path, rejected):
+    ask()
+    (status_file,) = tmp_path.glob("complete-*.json")
+    known = json.loads(status_file.read_text())
+    status_file.write_text(json.dumps(known | {"rejected": rejected}))
+    assert (names(ask()), ask().rejected) == (STATIONS, ())
+
+
+def test_a_damaged_event_is_fetched_again(server: FdsnServer, ask: Ask, tmp_path: Path):
+    ask()
+    (path,) = tmp_path.glob("event-*.xml")
+    path.write_bytes(path.read_bytes()[:300])
+    assert names(ask()) == STATIONS
+    assert server.asked("event") == 2

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from fdsn_server import FdsnServer, serving, shortened, status
+from fdsn_server import FdsnServer, serving, shortened, status, unframed
 from obspy import read, read_inventory
 
 from per_obspy.config import Fdsn, Scenario
@@ -86,3 +86,21 @@ def test_another_station_is_refused(server: FdsnServer, wanted: Wanted, tmp_path
     server.extra["dataselect"] = records.replace(b"S001", b"S002")
     outcome = download(wanted, tmp_path, server.url)
     assert "answers with XX.S002 instead of XX.S001" in outcome.reasons[0]
+
+
+@pytest.mark.parametrize("parts", [(0.4, 1.0, 1.0), (0.4, 0.4)])
+def test_a_cut_at_a_record_without_a_length_loses_no_channel(server, wanted, tmp_path, parts):
+    # the first is cut, then two whole answers agree; or two cut ones do and channels are missing
+    server.fail("dataselect", "S001", *map(unframed, parts))
+    assert download(wanted, tmp_path, server.url).reasons == ()
+    found = read(str(tmp_path / "XX.S001.mseed"))
+    sent = server.stream.select(station="S001")
+    assert sorted(trace.id for trace in found) == sorted(trace.id for trace in sent)
+
+
+def test_answers_that_are_cut_at_different_places_wait(server, wanted, tmp_path: Path):
+    server.fail("dataselect", "S001", *[unframed(part) for part in (0.4, 0.5, 0.6, 0.7)])
+    outcome = download(wanted, tmp_path, server.url)
+    assert "cut at different places" in outcome.reasons[0]
+    assert not outcome.lasting
+    assert not list(tmp_path.iterdir())

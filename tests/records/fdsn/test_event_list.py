@@ -206,4 +206,4 @@ def test_events_have_files_of_their_own_in_the_cache(
     first = fetched_event(pool, server.url, wanted, cache)
     # an identifier that differs in a letter that no file has is another event
     second = fetched_event(pool, server.url, wanted + "+", cache)
-    assert sorted(cache.iterdir()) == sorted([first, second])
+    assert sorted(cache.glob("*.xml")) == sorted([first, second])
