@@ -123,10 +123,28 @@ def written_whole(path: Path) -> Iterator[Path]:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             yield part
-            # Readers see the old file or the whole new one, never a half
+            # Readers see the old file or the whole new one, never a half, also after a power cut
+            _sync(part)
             part.replace(path)
+            _sync_folder(path.parent)
     finally:
         _remove_part(part)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file is on the disk."""
+    handle = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on the disk, where the system can do that."""
+    if os.name == "posix":
+        with suppress(OSError):
+            _sync(folder)
 
 
 def _remove_part(part: Path) -> None:

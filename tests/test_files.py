@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -180,3 +181,19 @@ def test_the_hash_of_values_depends_on_them_and_not_on_their_order():
     content = {"a": 1, "b": [1.5, None]}
     assert content_hash(content) == content_hash(dict(reversed(content.items())))
     assert content_hash(content) != content_hash(content | {"a": 2})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders are synchronised on POSIX only")
+def test_file_and_folder_are_on_the_disk_around_the_renaming(tmp_path, monkeypatch):
+    # would catch an empty file of the final name after a power cut
+    steps = []
+    synced = os.fsync
+
+    def noted(handle):
+        steps.append((os.fstat(handle).st_mode & 0o170000, (tmp_path / "table.csv").exists()))
+        synced(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    with written_whole(tmp_path / "table.csv") as part:
+        part.write_text("gap")
+    assert steps == [(stat.S_IFREG, False), (stat.S_IFDIR, True)]

@@ -1,5 +1,7 @@
 """Conversion of counts to m/s2 by the full response, the sensitivity, or the reader's factor."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from obspy import Stream, Trace
@@ -24,6 +26,10 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: The pre-filter falls from 1 to 0 in this band, fractions of the Nyquist frequency: above it
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
+
+
+#: Spectral lines that are divided by the response at a time.
+BLOCK = 2**18
 
 
 def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
@@ -135,16 +141,22 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     length = next_fast_len(2 * trace.stats.npts, real=True)
     frequencies = rfftfreq(length, trace.stats.delta)
     try:
-        response = _interpolated(trace.stats.response, frequencies)
+        response_at = _interpolated(trace.stats.response, frequencies)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    amplitudes = rfft(trace.data - trace.data.mean(), length)
-    spectrum = amplitudes * cosine_sac_taper(frequencies, flimit=band) / response
-    trace.data = irfft(spectrum, length)[: trace.stats.npts]
+    spectrum = rfft(trace.data - trace.data.mean(), length)
+    # Block by block: taper and response of a day take more memory than the record
+    for first in range(0, frequencies.size, BLOCK):
+        block = slice(first, first + BLOCK)
+        spectrum[block] *= cosine_sac_taper(frequencies[block], flimit=band)
+        spectrum[block] /= response_at(frequencies[block])
+    trace.data = irfft(spectrum, length, overwrite_x=True)[: trace.stats.npts].copy()
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
 
 
-def _interpolated(response: Response, frequencies: FloatArray) -> NDArray[np.complex128]:
+def _interpolated(
+    response: Response, frequencies: FloatArray
+) -> Callable[[FloatArray], NDArray[np.complex128]]:
     """
     Return the response to acceleration, counts/(m/s2), interpolated from a thousand frequencies.
 
@@ -162,4 +174,4 @@ def _interpolated(response: Response, frequencies: FloatArray) -> NDArray[np.com
     # Logarithm of the response: amplitude as real part, phase as imaginary part
     logarithm = np.log(np.abs(values)) + 1j * np.unwrap(np.angle(values))
     smooth = CubicSpline(lines, logarithm)
-    return np.asarray(np.exp(smooth(np.maximum(frequencies, low))))
+    return lambda values: np.asarray(np.exp(smooth(np.maximum(values, low))))

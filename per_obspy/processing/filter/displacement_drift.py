@@ -82,11 +82,13 @@ def _displacement_spectrum(
 ) -> tuple[FloatArray, NDArray[np.complex128]]:
     """Return frequencies, Hz, and spectrum of the displacement of a padded record."""
     points = length // thin
-    frequencies = rfftfreq(length, dt)[: points // 2 + 1]
+    # The low frequencies alone: a view would hold all of them
+    frequencies = rfftfreq(length, dt)[: points // 2 + 1].copy()
     angular = 2 * np.pi * np.where(frequencies > 0, frequencies, np.inf)
     padded = np.pad(acceleration, (side, length - acceleration.size - side))
     # The inverse transform has fewer points by the factor of thinning
-    return frequencies, -rfft(padded)[: frequencies.size] / (angular**2 * thin)
+    spectrum = rfft(padded, overwrite_x=True)[: frequencies.size]
+    return frequencies, -spectrum / (angular**2 * thin)
 
 
 @lru_cache(maxsize=4)

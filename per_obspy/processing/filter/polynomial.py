@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial.legendre import legvander
 from obspy import Stream
 
 from per_obspy.checks import FloatArray
@@ -56,10 +56,35 @@ def trend_removed(stream: Stream, order: int = 1) -> Stream:
     """
     out = stream.copy()
     for trace in out:
-        place = np.linspace(-1, 1, trace.stats.npts)
-        trace.data = trace.data - Polynomial.fit(place, trace.data, order, domain=[-1, 1])(place)
+        trace.data = trace.data - trend(trace.data, order)
         noted(trace, f"polynomial trend of order {order} removed", trend_order=order)
     return out
+
+
+def trend(data: FloatArray, order: int) -> FloatArray:
+    """
+    Return the least-squares polynomial of evenly spaced samples.
+
+    Parameters
+    ----------
+    data : (n_samples,) ndarray
+        Any unit.
+    order : int
+        Of the polynomial.
+
+    Returns
+    -------
+    (n_samples,) ndarray
+        In the unit of the data.
+
+    Notes
+    -----
+    Legendre polynomials are nearly orthogonal there, so that the normal equations are as accurate
+    as an orthogonal decomposition, which takes the memory of a dozen records.
+    """
+    basis = legvander(np.linspace(-1, 1, data.size), order)
+    coefficients = np.linalg.solve(basis.T @ basis, basis.T @ data)
+    return np.asarray(basis @ coefficients)
 
 
 def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:

@@ -3,12 +3,12 @@
 from statistics import median
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from obspy import Trace
 from obspy.signal.trigger import pk_baer
 from scipy.signal import butter, sosfilt
 
 from per_obspy.checks import FloatArray
+from per_obspy.processing.filter.polynomial import trend
 
 TINY = np.finfo(float).tiny
 
@@ -71,9 +71,7 @@ def _band_passed(samples: FloatArray, dt: float) -> FloatArray:
     """Return the samples between 1 and 20 Hz, filtered causally so that no wave arrives early."""
     corners = [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)]
     sections = butter(2, corners, "bandpass", fs=1 / dt, output="sos")
-    place = np.linspace(-1, 1, samples.size)
-    trend = Polynomial.fit(place, samples, 1)(place)
-    return np.asarray(sosfilt(sections, samples - trend))
+    return np.asarray(sosfilt(sections, samples - trend(samples, 1)))
 
 
 def aic_onset(samples: FloatArray) -> int:

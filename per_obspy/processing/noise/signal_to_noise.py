@@ -75,9 +75,11 @@ def noise_spectra(
     signal = acceleration[first : first + significant_samples(acceleration[first:])]
     # Amplitudes of both at the same frequencies; few lengths, so that smoothing weights are reused
     length = 2 ** int(np.ceil(np.log2(2 * max(noise.size, signal.size))))
-    amplitudes = dt * np.abs(rfft(_tapered_windows(signal, noise, length)))
     centres = _centres(dt)
-    smooth = konno_ohmachi(amplitudes, 1 / (length * dt), centres, bandwidth)
+    smooth = [
+        konno_ohmachi(_amplitudes(part, dt, length), 1 / (length * dt), centres, bandwidth)
+        for part in (signal, noise)
+    ]
     # Noise over the length of the signal; carried on below one cycle in its window
     frequencies = np.array(centres)
     scaled = smooth[1] * np.sqrt(signal.size / noise.size)
@@ -86,12 +88,9 @@ def noise_spectra(
     return NoiseSpectra(frequencies, smooth[0], scaled)
 
 
-def _tapered_windows(signal: FloatArray, noise: FloatArray, length: int) -> FloatArray:
-    """Return signal and noise, tapered, in two rows of a length, zeros behind them."""
-    windows = np.zeros((2, length))
-    for row, part in zip(windows, (signal, noise), strict=True):
-        row[: part.size] = part * tukey(part.size, TAPERED)
-    return windows
+def _amplitudes(part: FloatArray, dt: float, length: int) -> FloatArray:
+    """Return the Fourier amplitudes of a tapered part of a record with zeros behind it."""
+    return np.asarray(dt * np.abs(rfft(part * tukey(part.size, TAPERED), length)))
 
 
 def significant_samples(acceleration: FloatArray) -> int:

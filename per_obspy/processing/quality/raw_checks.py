@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from obspy import Stream, Trace
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
-from scipy.signal import detrend
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
+from per_obspy.processing.filter.polynomial import trend
 from per_obspy.processing.noise.signal_to_noise import SIGNIFICANT
 from per_obspy.processing.quality.findings import Finding, above, below
 
@@ -62,7 +62,7 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield Finding("levels", "reject", reason)
     else:
         yield from _recorder_findings(trace, checks)
-        yield from _shaking_findings(detrend(trace.data), trace.stats.delta, checks)
+        yield from _shaking_findings(trace.data - trend(trace.data, 1), trace.stats.delta, checks)
         yield from header_findings(trace, checks)
 
 
@@ -80,7 +80,7 @@ def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield from above("counter_use", checks.counter_use, use, meaning)
     still = longest_standstill(samples, dt)
     yield from above("dropout", checks.dropout, still, "dropout, s without change:")
-    spike = largest_spike(detrend(samples), dt)
+    spike = largest_spike(samples - trend(samples, 1), dt)
     yield from above("spike", checks.spike, spike, "spike or step, over its vicinity:")
 
 

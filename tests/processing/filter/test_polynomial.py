@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from obspy import Stream, Trace
 
-from per_obspy.processing.filter.polynomial import mean_removed, trend_removed
+from per_obspy.processing.filter.polynomial import mean_removed, trend, trend_removed
 
 
 def stream(samples, dt=0.01):
@@ -36,3 +36,13 @@ def test_inputs_stay_unchanged():
     mean_removed(given)
     trend_removed(given)
     assert given == before
+
+
+@pytest.mark.parametrize("order", [1, 2, 5])
+def test_the_trend_is_that_of_an_orthogonal_decomposition(order):
+    # would catch normal equations that lose digits
+    samples = 1e6 + np.linspace(0, 1e3, 20_000) ** 2 + np.random.default_rng(2).normal(size=20_000)
+    place = np.linspace(-1, 1, samples.size)
+    expected = np.polynomial.Polynomial.fit(place, samples, order)(place)
+    # both round at 1e-16 of the largest sample; the equations are conditioned below 100
+    assert_allclose(trend(samples, order), expected, rtol=1e-12)

@@ -1,8 +1,11 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from obspy.signal.konnoohmachismoothing import konno_ohmachi_smoothing
 
+from per_obspy.processing.noise import smoothing
 from per_obspy.processing.noise.smoothing import konno_ohmachi
 
 STEP = 0.05
@@ -31,3 +34,19 @@ def test_smoothing_is_linear(factor):
     smooth = konno_ohmachi(spectra, STEP, CENTRES, 20.0)
     scaled = konno_ohmachi(factor * spectra, STEP, CENTRES, 20.0)
     assert_allclose(scaled, factor * smooth, rtol=1e-12)
+
+
+def test_a_long_spectrum_is_smoothed_as_a_short_one_in_little_memory(monkeypatch):
+    # would catch weights of a day of samples that take gigabytes
+    lines, centres = 2**15, tuple(np.geomspace(0.05, 90, 200).tolist())
+    amplitudes = np.random.default_rng(1).uniform(size=(2, lines))
+    stored = konno_ohmachi(amplitudes, 100 / lines, centres, 20.0)
+    monkeypatch.setattr(smoothing, "MOST_STORED", 1)
+    tracemalloc.start()
+    found = konno_ohmachi(amplitudes, 100 / lines, centres, 20.0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # The same products summed in another order: 2**15 positive terms, rounded at 1e-16 each
+    assert_allclose(found, stored, rtol=1e-12)
+    # A few arrays of one window, rather than 40 weights with their places for each line
+    assert peak < 8 * 8 * lines
