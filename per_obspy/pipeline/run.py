@@ -146,6 +146,7 @@ def screen(
         _require_stations(folder)
         stations = stations_of_earlier_run(folder)
         check_inputs(settings)
+        earthquakes = _earlier_earthquakes(folder)
         earlier_rows = _begun(folder, settings, SCREENING)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
@@ -154,7 +155,7 @@ def screen(
         rejected = all_rejections([], stations)
         with _compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
-        record["started"] = started
+        record |= {"started": started, "earthquakes": earthquakes}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
@@ -247,6 +248,15 @@ def _all_stages(
     record["earthquakes"] = found.earthquakes
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}
+
+
+def _earlier_earthquakes(folder: Path) -> list[Any]:
+    """Return the earthquakes of the run that left the stations; none where it has no record."""
+    try:
+        found = read_status(folder / RECORD).get("earthquakes")
+    except StatusError:
+        return []
+    return found if isinstance(found, list) else []
 
 
 def _begun(folder: Path, settings: Run, stage: str) -> int | None:

@@ -1,5 +1,6 @@
 """All sources of a configuration under one contract: stations, their files, and their readers."""
 
+import logging
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial, reduce
@@ -18,12 +19,15 @@ from per_obspy.progress import Progress, silent
 from per_obspy.records.archives import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
 from per_obspy.records.earthquakes.choice import OneEarthquake, Reader, one_earthquake
+from per_obspy.records.earthquakes.groups import event_groups
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, files_below, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
+
+log = logging.getLogger(__name__)
 
 
 class StationSource(NamedTuple):
@@ -133,6 +137,8 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
         for name, station_files in contents.stations.items():
             files[name] = (*files.get(name, ()), *station_files)
 
+    _warn_of_several_earthquakes(found)
+
     # Metadata beside one of the paths serves stations of all
     inventories = [contents.inventory for contents in found if contents.inventory]
     inventory = reduce(add, inventories) if inventories else None
@@ -160,6 +166,20 @@ def _with_usable_names(found: SourceContents) -> SourceContents:
         else:
             stations[name] = paths
     return found._replace(stations=stations, rejected=tuple(rejected))
+
+
+def _warn_of_several_earthquakes(found: Iterable[SourceContents]) -> None:
+    """Log a warning where records of different earthquakes will be processed together."""
+    records = [record for contents in found for record in contents.records]
+    groups = event_groups(records)
+    if len(groups) > 1:
+        starts = ", ".join(group.label for group in groups)
+        log.warning(
+            "records of %d earthquakes are used together, they start %s: "
+            "name the files of one of them",
+            len(groups),
+            starts,
+        )
 
 
 def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:

@@ -80,7 +80,10 @@ RESULTS: dict[str, Column] = {
             "distance", "m", "from the station to the middle of the pair, along the great circle"
         ),
         _number("azimuth_used", "degrees", "of the ground motion, the same for both buildings"),
-        _text("azimuth_rule", "given; worst: of all for this demand; station: its only horizontal"),
+        _text(
+            "azimuth_rule",
+            "given; worst: that of the largest demand by demand_rule; station: its only horizontal",
+        ),
         *_per_building(
             "per",
             "m",

@@ -13,13 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fdsn_server import serving
 
-from per_obspy.config import Run, load
+from per_obspy.config import Run, Scenario, load
 from per_obspy.errors import WriteError
 from per_obspy.files import is_part
 from per_obspy.jobs import station as jobs
 from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
+from per_obspy.records.simulation.earthquake import simulate
 
 from .small_run import (
     InProcess,
@@ -34,6 +36,21 @@ RUN = "workers = 1\n"
 ENSEMBLE = (
     'name = "e"\noutput = "joined"\n[[scenario]]\nname = "a"\nrun = "run.toml"\nweight = 1.0\n'
 )
+
+
+FETCHED = """\
+name = "fetched"
+output = "out"
+workers = 1
+[pairs.simulated]
+count = 4
+[records.fdsn]
+providers = ["{url}"]
+cache = "cache"
+event_id = "xx1"
+event_provider = "{url}"
+wait = 0.01
+"""
 
 
 @contextmanager
@@ -115,6 +132,21 @@ def test_other_commands_end_alike(call, copied, name):
         ending = call(*command)
     check_ending(ending, copied)
     assert call(*command)[0] == 0
+
+
+@pytest.mark.parametrize("command", ["fetch", "run"])
+@pytest.mark.parametrize("size", [0, 300, 3_000])
+def test_records_that_cannot_be_fetched_into_the_cache_come_later(call, tmp_path, command, size):
+    # would catch a station that a full disk makes one without data: the event, StationXML and
+    # records do not fit, in this order
+    with serving(simulate(Scenario(stations=2, dt=0.02, magnitude=5.0))) as server:
+        (tmp_path / "run.toml").write_text(FETCHED.format(url=server.url))
+        with no_room(size):
+            ending = call(command, tmp_path / "run.toml")
+        check_ending(ending, tmp_path)
+        code, _, errors = call("fetch", tmp_path / "run.toml")
+    assert code == 0, errors
+    assert len(list((tmp_path / "cache").rglob("*.mseed"))) == 2
 
 
 def test_a_station_that_cannot_be_written_waits_for_the_next_run(tmp_path, monkeypatch):

@@ -115,6 +115,8 @@ def test_a_screening_alone_writes_the_same_table(finished, tmp_path):
     again = screen(configuration, folder, executor=InProcess())
     assert (folder / "stations.csv").read_bytes() == before
     assert again.record["warnings"] == result.record["warnings"]
+    # of which earthquake the stations are
+    assert again.record["earthquakes"] == result.record["earthquakes"] != []
 
 
 def test_a_lost_station_table_is_written_again(finished, tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
@@ -286,3 +286,18 @@ def test_codes_of_tables_are_checked_with_the_configuration(tmp_path: Path, chan
     described = table(tmp_path).model_dump() | {"azimuths": {}} | changes
     with pytest.raises(ValueError, match="expected letters, digits, - and _ only"):
         Columns(**described)
+
+
+def test_records_of_several_earthquakes_among_paths_are_a_warning(tmp_path: Path, caplog):
+    # would catch: two earthquakes processed as one without a word
+    first, second = tmp_path / "first.mseed", tmp_path / "second.mseed"
+    for path, start in ((first, "2020-01-01T10:00:00"), (second, "2020-01-01T11:00:00")):
+        trace = Trace(np.arange(500.0), {"network": "XX", "station": "A", "channel": "HNE"})
+        trace.stats.starttime = UTCDateTime(start)
+        trace.write(str(path), format="MSEED")
+    find_path_sources([first])
+    assert not caplog.records
+    find_path_sources([first, second])
+    assert "2 earthquakes are used together, they start 2020-01-01T10:00, 2020-01-01T11:00" in (
+        caplog.text
+    )

@@ -134,3 +134,14 @@ def test_completed_values_are_in_the_row(station, name):
     pairs = make_pairs([{"period_1": np.nan}])
     table, _ = _rows(pairs, station)
     assert table[name].iloc[0] == completed_pairs(pairs, Building())[name].iloc[0]
+
+
+@pytest.mark.parametrize("way", [{}, {"period_1": np.nan}])
+def test_the_axis_of_an_unknown_azimuth_is_the_worst_for_the_demand_that_decides(station, way):
+    # would catch: an axis along which the demand of the row is not the largest
+    azimuths = [np.nan, *range(0, 360, 15)]
+    rows, _ = _rows(make_pairs([{**way, "azimuth": azimuth} for azimuth in azimuths]), station)
+    rows = rows.loc[[f"P{number}" for number in range(len(azimuths))]]
+    assert rows["demand_rule"].iloc[0] == ("srss" if way else "exact")
+    # estimates try whole degrees, which these are
+    assert (rows["demand"].iloc[1:] <= rows["demand"].iloc[0] * (1 + 1e-12)).all()
