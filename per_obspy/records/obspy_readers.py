@@ -24,6 +24,7 @@ from obspy.core.util.misc import buffered_load_entry_point
 from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import writing
 from per_obspy.formats.knet import require_whole_numbers
+from per_obspy.formats.sac import require_coordinates
 from per_obspy.records.archives import read_file
 
 #: Reason of a rejection where no format plugin knows a file.
@@ -31,9 +32,10 @@ UNKNOWN_FORMAT = "its format is unknown"
 
 #: Formats of ObsPy that may be read, by kind of plugin. Left out are PICKLE, which runs code that
 #: the file holds; CSS and NNSA_KB_CORE, which read any file that the file names; CSZ, which unpacks
-#: without a limit; SC3ML, which SCML has replaced.
+#: without a limit; GSE1 and GSE2, whose decoder writes beyond its memory for damaged files; SC3ML,
+#: which SCML has replaced.
 _FORMATS = {
-    "waveform": "MSEED SAC GSE2 SEISAN SACXY GSE1 Q SH_ASC SLIST TSPAIR Y SEGY SU SEG2 WAV WIN AH"
+    "waveform": "MSEED SAC SEISAN SACXY Q SH_ASC SLIST TSPAIR Y SEGY SU SEG2 WAV WIN AH"
     " PDAS KINEMETRICS_EVT GCF DMX ALSEP_PSE ALSEP_WTN ALSEP_WTH CYBERSHAKE KNET REFTEK130 RG16"
     " AFAD BHRC COSMOS CSMIP_V1 CSMIP_V2 CWB DYNA GEONET ITACA NSMN PEER_AT2 RENADIC SMC UNAM USC",
     "event": "QUAKEML SCML NLLOC_HYP CMTSOLUTION CSV EVENTTXT EVT FNETMT FOCMEC GSE2 HYPODDPHA"
@@ -153,8 +155,11 @@ def _called(
             name = _detected(kind, str(source), _TWO_FILES)
         if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
+        # What ObsPy would not notice, or not survive
         if name == "KNET":
             require_whole_numbers(content, str(source))
+        if name == "SAC":
+            require_coordinates(content, str(source))
         file = glob.escape(str(source)) if name in _TWO_FILES and beside else BytesIO(content)
         return reader(file, format=name, check_compression=False, **options)
     except PerError:

@@ -38,6 +38,10 @@ _HEAD = 10_000
 _SPECTRAL, _MAP = ("period", "latitude", "longitude"), ("latitude", "longitude")
 
 
+#: Bytes that are read at once.
+PIECE = 2**20
+
+
 class _Grid(NamedTuple):
     """
     A grid file.
@@ -232,11 +236,16 @@ def _text(path: Path) -> str:
 
 
 def _unpacked(path: Path) -> bytes:
-    """Return the bytes of a file, unpacked if gzip packed it; no more than one above the limit."""
+    """Return the bytes of a file, unpacked if gzip packed it; few above the limit."""
     with path.open("rb") as file:
         packed = file.read(2) == b"\x1f\x8b"
+    pieces, size = [], 0
     with gzip.open(path) if packed else path.open("rb") as file:
-        return file.read(LARGEST_FILE + 1)
+        # Memory grows with the file, not with the limit
+        while size <= LARGEST_FILE and (piece := file.read(PIECE)):
+            pieces.append(piece)
+            size += len(piece)
+    return b"".join(pieces)
 
 
 def _root(source: str, text: str) -> ElementTree.Element:

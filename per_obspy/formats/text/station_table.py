@@ -96,19 +96,24 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
         text = content.decode("latin-1")
     # Lines are counted from 1; empty ones are passed over
     lines = text.splitlines()
-    places = _places(_fields(lines[0] if lines else ""))
+    places = _places(_line_fields(name, 1, lines[0] if lines else ""))
     if missing := [column for column in _REQUIRED if column not in places]:
         raise RecordRejected(name, f"line 1: no column {', '.join(missing)}")
     # Every other line is a station or a comment
     rows = []
     for number, line in enumerate(lines[1:], 2):
         if line.strip() and not line.startswith("#"):
-            try:
-                fields = _fields(line, lines[0])
-            except csv.Error as error:
-                raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
+            fields = _line_fields(name, number, line, lines[0])
             rows.append(_row(f"line {number}", name, fields, places))
     return tuple(rows)
+
+
+def _line_fields(name: str, number: int, line: str, header: str | None = None) -> list[str]:
+    """Return the fields of a numbered line; what cannot be divided is refused."""
+    try:
+        return _fields(line, header)
+    except csv.Error as error:
+        raise RecordRejected(name, f"line {number}: {error!s:.100}") from error
 
 
 def _fields(line: str, header: str | None = None) -> list[str]:
