@@ -67,6 +67,24 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     )
 
 
+def demand_at_site(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
+    """
+    Return the governing demand of pairs at their sites, m: what their probability rests on.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record.
+    table : Table
+        As of :func:`record_motion`.
+    screening : Screening
+        As of :func:`record_motion`.
+    """
+    site, demand = site_demand(station, table, screening), values(table, "demand")
+    exact = median_at_site(demand, site.weight, site.ln_ratio, site.ln_field)
+    return np.where(is_exact(table), exact, demand * np.exp(site.ln_ratio))
+
+
 def is_exact(table: Table) -> NDArray[np.bool_]:
     """Return where the exact demand decides."""
     return np.asarray(table["demand_rule"] == "exact")
