@@ -1,8 +1,9 @@
 """
 Measure the calibration of the probability of pounding: 100 000 pairs in simulated motion.
 
-Run: ``python workflows/calibration.py``; prints the tables of docs/calibration.md, writes them into
-it and draws its figures.
+Run: ``python workflows/calibration.py``; prints the tables of the simulated part of
+docs/calibration.md, writes them into it and draws its figures. The part on real records is that of
+``calibration_real.py``.
 """
 
 import argparse
@@ -14,7 +15,9 @@ from calibration_figures import draw_demands, draw_reliability
 from calibration_scores import by_place, demands, page
 from paper_records import CHECKOUT
 
-MEASURED = "## Measured"  # the heading below which the page is the script's
+MEASURED = (
+    "## Measured in simulated earthquakes"  # the heading below which the page is the script's
+)
 
 
 def main() -> None:

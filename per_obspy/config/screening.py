@@ -45,7 +45,38 @@ class Interpolation(Section):
         0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7"
     )
     log_std_weight: float = Field(
-        5.0, gt=0, description="number of stations that this value counts as"
+        5.0,
+        gt=2,
+        description="number of stations that this value counts as; above 2, or Student's t "
+        "distribution of the motion has no deviation",
+    )
+    distance_slope: float = Field(
+        -1.3,
+        ge=-5,
+        le=0,
+        description="expected change of ln PER per ln of the distance to the hypocentre, which "
+        "stations correct",
+    )
+    distance_slope_std: float = Field(
+        0.5, gt=0, description="standard deviation of this slope between earthquakes"
+    )
+    demand_log_std: float = Field(
+        0.55,
+        ge=0,
+        description="log-standard deviation of an exact demand about the demand that the motion "
+        "between stations lets expect, far from the pair's record (docs/calibration.md)",
+    )
+    demand_length: float = Field(
+        4000.0,
+        gt=0,
+        description="m; distance from the record at which what is special in its demand of a "
+        "pair has faded to 1/e of the way from 1 to demand_persistence",
+    )
+    demand_persistence: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="correlation of what is special in the demand of a pair at places far apart",
     )
     vs30_clustered: bool = Field(
         False, description="Vs30 varies smoothly over the region (Jayaram & Baker, case 2)"

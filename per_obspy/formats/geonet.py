@@ -37,10 +37,9 @@ _WIDTH, _PER_LINE = 8, 10
 _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w++)\b")
 _ANGLE = r"(\d{1,3})\s++(\d{1,2})\s++(\d{1,2})([NSEW])"
 _SITE = re.compile(rf"Site (\S++)\s++{_ANGLE}\s++{_ANGLE}")
-_EPICENTRE = re.compile(
-    rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}"
-    rf".*?(?:Depth\s*+{DECIMAL}\s*+km)?(?:\s++M\w?\s*+{DECIMAL})?\s*+"
-)
+_EPICENTRE = re.compile(rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}")
+_DEPTH = re.compile(rf"Depth\s*+{DECIMAL}\s*+km")
+_MAGNITUDE = re.compile(rf"\sM\w?\s*+{DECIMAL}")
 _POINTS = re.compile(r"Number of points\s++(\S+)")
 _UNIT = re.compile(rf"units of {DECIMAL} mm/s/s")
 _PEAK = re.compile(rf"Acceleration:\s*+peak\s*+{DECIMAL}\s*+mm/s/s", re.IGNORECASE)
@@ -173,16 +172,15 @@ def _described(lines: list[str]) -> dict[str, Any]:
 def _event(lines: list[str]) -> dict[str, Any]:
     """Return name, hypocentre and magnitude of the event."""
     epicentre = _EPICENTRE.match(lines[8])
-    parts = epicentre.groups("") if epicentre else ("",) * 10
-    # Groups: four parts of each angle, depth in km, magnitude
-    depth = float(parts[8]) if parts[8] else None
-    place = epicentre_place(*_angles(parts[:8])) if epicentre else {}
+    depth, magnitude = (pattern.search(lines[8]) for pattern in (_DEPTH, _MAGNITUDE))
+    # Groups: four parts of each angle; depth in km
+    place = epicentre_place(*_angles(epicentre.groups(""))) if epicentre else {}
     return {
         "name": lines[6].strip() or None,
         "latitude": place.get("latitude"),
         "longitude": place.get("longitude"),
-        "depth": metres(depth),
-        "magnitude": float(parts[9]) if parts[9] else None,
+        "depth": metres(float(depth[1])) if depth else None,
+        "magnitude": float(magnitude[1]) if magnitude else None,
     }
 
 

@@ -40,7 +40,9 @@ RESULTS: dict[str, Column] = {
         ),
         _text("risk_class", "by demand ratio; names and thresholds are in the configuration"),
         _text(
-            "state", "yes: gap < demand; possible: likely enough, or a derived input decides; no"
+            "state",
+            "yes: gap < demand carried to the site; possible: likely enough, or a derived input "
+            "decides; no",
         ),
         _number(
             "probability", "1", "of pounding in this event, with what is uncertain of the pair"

@@ -39,6 +39,7 @@ from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, risk_class
 from per_obspy.screening.uncertainty.exact_demand import record_probability
+from per_obspy.screening.uncertainty.record_motion import demand_at_site
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -48,6 +49,7 @@ INTERMEDIATE = (
     "other_site_class",
     "linearized_converged",
     "motion_from_other_site_class",
+    "demand_at_site",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
 
@@ -137,6 +139,7 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
     table |= mitigation_columns(station, table, screening.target_amplification)
     raised = raised_by_record(table, dataset, screening)
     table["probability"] = record_probability(station, table, screening)
+    table["demand_at_site"] = demand_at_site(station, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in pairs}
 
@@ -173,9 +176,11 @@ def _motions(
 def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the table with all columns that need no record: state, class, flags, code rules."""
     gap, demand = values(table, "gap"), values(table, "demand")
-    # possible: likely enough, or an assumed period could turn a no into a yes
+    # yes: by the demand at the site, as the probability; possible: likely enough, or an assumed
+    # period could turn a no into a yes
     likely = values(table, "probability") >= screening.possible_from
-    state = pounding_state(gap, demand, period_is_derived(table) | likely)
+    there = values(table, "demand_at_site")
+    state = pounding_state(gap, there, period_is_derived(table) | likely)
     ratio = demand_ratio(gap, demand)
     named = risk_class(ratio, screening.classes)
     table = table.assign(demand_ratio=ratio, state=state, risk_class=named)

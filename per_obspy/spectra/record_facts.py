@@ -1,4 +1,4 @@
-"""Facts of the records behind the spectra of a station: peaks, sources, warnings and flags."""
+"""Facts of the records of a station: peaks, sources, hypocentre, warnings and flags."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -23,6 +23,9 @@ MEANINGS = {
     "warnings": "failed checks that do not reject",
     "notes": "failed checks without consequence",
 }
+
+#: Words of a hypocentre: degrees, and m.
+PLACE = ("longitude", "latitude", "depth")
 
 #: Dimensions, values and attributes of a variable of a Dataset.
 Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
@@ -68,6 +71,30 @@ def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
     for name, text in texts.items():
         variables[name] = ((), printable(text), {"long_name": MEANINGS[name]})
     return xr.Dataset(variables)
+
+
+def header_hypocentre(traces: Iterable[Trace]) -> dict[str, float]:
+    """
+    Return the hypocentre in the headers of records: the first one with place and depth.
+
+    Parameters
+    ----------
+    traces : iterable of Trace
+        Records of one earthquake, in the words of ``formats/text/vocabulary.py``.
+
+    Returns
+    -------
+    dict
+        ``hypocentre_longitude``, ``hypocentre_latitude``, ``hypocentre_depth``, degrees and m;
+        empty where no header has all three.
+    """
+    for trace in traces:
+        event = trace.stats.get("event") or {}
+        place = np.array([event.get(name, np.nan) for name in PLACE], dtype=np.float64)
+        # Headers write 0, 0 for an unknown place
+        if np.isfinite(place).all() and place[:2].any():
+            return {f"hypocentre_{name}": float(place[i]) for i, name in enumerate(PLACE)}
+    return {}
 
 
 def _noted(trace: Trace, name: str) -> str:

@@ -34,7 +34,12 @@ from per_obspy.spectra.azimuthal import (
 )
 from per_obspy.spectra.elastic import response_spectra
 from per_obspy.spectra.horizontals import north_and_east
-from per_obspy.spectra.record_facts import Variable, peak_motions, record_facts
+from per_obspy.spectra.record_facts import (
+    Variable,
+    header_hypocentre,
+    peak_motions,
+    record_facts,
+)
 
 #: Attributes of the coordinates of a station, as CF asks for them.
 COORDINATES = {
@@ -386,6 +391,7 @@ def _attributes(horizontals: list[Trace]) -> dict[str, Any]:
         "time_coverage_end": str(first.endtime),
         "horizontals": len(horizontals),
         "simulated": str(_is_simulated(horizontals)).lower(),
+        **header_hypocentre(horizontals),
     }
     # The box of ACDD is a point, if the station's place is known
     known = first.get("coordinates", {})

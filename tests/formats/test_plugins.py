@@ -417,3 +417,39 @@ def test_a_count_of_more_than_six_digits_is_not_rounded():
     assert changed != sample.text
     with pytest.raises(RecordRejected, match="the header promises 1000001 on 125001 lines"):
         read(sample, changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "hypocentre", "magnitude"),
+    [
+        # 42 41 33 S, 173 01 19 E
+        ("geonet_v1a", (-42.6925, 173.021944, 15_000.0), 7.82),
+        ("geonet_v2a", (-42.6925, 173.021944, 15_000.0), 7.82),
+        ("dyna", (38.1, 23.54, 9_000.0), 4.6),
+        ("afad", (38.1, 23.54, 9_000.0), 4.6),
+    ],
+)
+def test_headers_give_the_whole_hypocentre(name: str, hypocentre: tuple, magnitude: float):
+    # would catch a depth behind words that a pattern skips
+    for trace in read(SAMPLES[name], SAMPLES[name].text):
+        event = trace.stats.event
+        # degrees of the header to six decimals
+        assert (event.latitude, event.longitude, event.depth) == pytest.approx(hypocentre, abs=1e-6)
+        assert event.magnitude == magnitude
+
+
+@pytest.mark.parametrize(
+    ("lines", "ground"),
+    [
+        ("VS30_M/S: 387\nSITE_CLASSIFICATION_EC8: B*\n", {"vs30": 387.0, "site_class": "B*"}),
+        ("VS30_M/S: None\nSITE_CLASSIFICATION_EC8: unknown\n", {}),
+        ("VS30_M/S: \nSITE_CLASSIFICATION_EC8: \n", {}),
+        ("VS30_M/S: 0\n", {}),
+    ],
+)
+@pytest.mark.parametrize("name", ["dyna", "afad"])
+def test_ground_in_the_header_is_read_and_unknown_words_are_none(name, lines, ground):
+    sample = SAMPLES[name]
+    (trace,) = read(sample, sample.text.replace("DATE_TIME_FIRST", f"{lines}DATE_TIME_FIRST", 1))
+    found = {word: trace.stats[word] for word in ("vs30", "site_class") if word in trace.stats}
+    assert found == ground

@@ -118,6 +118,6 @@ def test_stations_of_two_earthquakes_have_no_common_hypocentre(stations):
         for name in HYPOCENTRE:
             station.spectra.attrs.pop(name, None)
     unknown = ground_files(stations, (), Interpolation())[0].key
-    for depth, station in enumerate(stations[:2]):
-        station.spectra.attrs |= dict.fromkeys(HYPOCENTRE, 0.5) | {"hypocentre_depth": float(depth)}
+    for degrees, station in enumerate(stations[:2]):
+        station.spectra.attrs |= dict.fromkeys(HYPOCENTRE, float(degrees))
     assert ground_files(stations, (), Interpolation())[0].key == unknown

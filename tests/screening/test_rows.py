@@ -145,3 +145,21 @@ def test_the_axis_of_an_unknown_azimuth_is_the_worst_for_the_demand_that_decides
     assert rows["demand_rule"].iloc[0] == ("srss" if way else "exact")
     # estimates try whole degrees, which these are
     assert (rows["demand"].iloc[1:] <= rows["demand"].iloc[0] * (1 + 1e-12)).all()
+
+
+def test_state_and_probability_rest_on_the_same_motion():
+    # certain buildings between two stations, the nearer one with three times the motion: a demand
+    # of the record closes gaps that the motion at the site leaves open
+    loud, quiet = make_station("TWO", scale=3.0), make_station("ONE", latitude=10.06)
+    given = {"damping_1": 0.05, "damping_2": 0.05, "latitude_1": 10.028, "latitude_2": 10.028}
+    demand = _rows(make_pairs([given]), loud, quiet)[0]["demand"].item()
+    shares = np.linspace(0.2, 1.5, 14)
+    pairs = make_pairs([{**given, "gap": share * demand} for share in shares])
+    rows, _ = _rows(pairs, loud, quiet)
+    assert set(rows["demand_rule"]) == {"exact"}
+    # the median demand at the site divides yes from the rest, and likely from unlikely
+    yes, probability = rows["state"] == "yes", rows["probability"]
+    assert (yes == (probability > 0.5)).all()
+    assert (~yes & (rows["gap"] < rows["demand"])).any()
+    # no pair that is a yes is less likely than one that is none
+    assert probability[yes].min() > probability[~yes].max()

@@ -5,7 +5,7 @@ import pytest
 from obspy import Stream, Trace
 from obspy.core import AttribDict
 
-from per_obspy.spectra.record_facts import peak_motions, record_facts
+from per_obspy.spectra.record_facts import header_hypocentre, peak_motions, record_facts
 
 
 def _trace(channel, source="", **known):
@@ -55,3 +55,20 @@ def test_records_processed_by_others_are_marked():
     trace = _trace("HNN")
     trace.stats.processing = ["per_obspy: processed already, passed through"]
     assert record_facts(Stream([trace]), [trace])["record_level"].item() == "processed by others"
+
+
+def _located(**event):
+    """Return a trace whose header has an event."""
+    trace = _trace("HNN")
+    trace.stats.event = AttribDict(event)
+    return trace
+
+
+def test_a_hypocentre_is_that_of_the_first_header_that_has_all_of_it():
+    known = {"longitude": 142.5, "latitude": 41.0, "depth": 30_000.0}
+    traces = [_trace("HNN"), _located(longitude=1.0, latitude=2.0, depth=None), _located(**known)]
+    assert header_hypocentre(traces) == {f"hypocentre_{name}": known[name] for name in known}
+    # nothing is guessed: no depth, no place, 0 and 0 for unknown, no event
+    assert header_hypocentre(traces[:2]) == {}
+    assert header_hypocentre([_located(longitude=0.0, latitude=0.0, depth=5.0)]) == {}
+    assert header_hypocentre([_located(longitude=np.nan, latitude=0.0, depth=5.0)]) == {}

@@ -167,3 +167,14 @@ def test_periods_default_to_those_of_the_configuration():
     expected = np.geomspace(settings.shortest, settings.longest, settings.count)
     assert_array_equal(station["period"], expected)
     assert station["damping"].values.tolist() == list(settings.dampings)
+
+
+def test_the_hypocentre_of_the_header_is_that_of_the_station(station):
+    # would catch headers whose earthquake no field of stations learns of
+    assert "hypocentre_depth" not in station.attrs
+    stream = _stream()
+    for trace in stream:
+        trace.stats.event = {"longitude": 142.5, "latitude": 41.0, "depth": 30_000.0}
+    known = per_obspy.station_spectra(stream, PERIODS, (0.05,)).attrs
+    found = [known[f"hypocentre_{name}"] for name in ("longitude", "latitude", "depth")]
+    assert found == [142.5, 41.0, 30_000.0]

@@ -78,7 +78,9 @@ def test_pairs_that_touch_pound_and_are_told_so(calibration, at_stations):
 
 def test_the_tables_replace_the_measured_part_of_their_page(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("By hand.\n\n## Measured\n\nlong ago\n", encoding="utf-8")
+    page.write_text(
+        "By hand.\n\n## Measured in simulated earthquakes\n\nlong ago\n", encoding="utf-8"
+    )
     command = [
         sys.executable,
         str(WORKFLOWS / "calibration.py"),
@@ -93,7 +95,7 @@ def test_the_tables_replace_the_measured_part_of_their_page(tmp_path):
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    said, measured = page.read_text(encoding="utf-8").split("## Measured")
+    said, measured = page.read_text(encoding="utf-8").split("## Measured in simulated earthquakes")
     assert said == "By hand.\n\n"
     assert "1 earthquakes, 180 pairs" in measured
     assert {path.name for path in (tmp_path / "figures").glob("*.png")} == {

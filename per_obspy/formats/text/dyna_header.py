@@ -23,6 +23,9 @@ _TIME = re.compile(rf"(\d{{4}})/?(\d\d)/?(\d\d)[ _]?(\d\d):?(\d\d):?{DECIMAL}")
 _MODEL = re.compile(r"sensor = (.*?)\s*+(?:\[.*?\])?\s*+(?:\||$)")
 _START = "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS"
 
+#: words for an unknown ground, in lower case
+_UNKNOWN = ("", "none", "unknown", "null", "nan", "-")
+
 #: unit of the header -> unit of the samples, factor
 _UNITS = {
     "cm/s^2": ("m/s2", 0.01),
@@ -97,6 +100,7 @@ def _station(text: Text, fields: Fields) -> dict[str, Any]:
         "station_name": text_field(fields, "STATION_NAME"),
         "coordinates": _place(text, fields),
         "instrument": _instrument(text, fields),
+        **_ground(text, fields),
     }
 
 
@@ -106,6 +110,19 @@ def _place(text: Text, fields: Fields) -> dict[str, float | None]:
     longitude = number_field(text, fields, "STATION_LONGITUDE_DEGREE")
     elevation = number_field(text, fields, "STATION_ELEVATION_M")
     return coordinates(latitude, longitude, elevation)
+
+
+def _ground(text: Text, fields: Fields) -> dict[str, str | float | None]:
+    """Return site class and Vs30, m/s; words as ``unknown`` and ``None`` are no ground."""
+    site_class = text_field(fields, "SITE_CLASSIFICATION_EC8") or ""
+    velocity = text_field(fields, "VS30_M/S") or ""
+    measured = velocity.lower() not in _UNKNOWN
+    vs30 = number_field(text, fields, "VS30_M/S") if measured else None
+    # A velocity of 0 is how tables write an unknown one
+    return {
+        "site_class": None if site_class.lower() in _UNKNOWN else site_class,
+        "vs30": vs30 if vs30 is not None and vs30 > 0 else None,
+    }
 
 
 def _instrument(text: Text, fields: Fields) -> dict[str, Any]:

@@ -32,6 +32,8 @@ class StationMotion(NamedTuple):
         Of the stored spectra, degrees, evenly spaced over the half circle; 0 of one horizontal.
     per, sd : LogSpectra
         Logarithms of the stored PER and SD in m, by azimuth.
+    per_rotd50 : LogSpectra
+        Logarithm of the stored median PER over the azimuths, in one row; of one horizontal its PER.
     """
 
     north: FloatArray
@@ -43,6 +45,7 @@ class StationMotion(NamedTuple):
     azimuths: FloatArray
     per: LogSpectra
     sd: LogSpectra
+    per_rotd50: LogSpectra
 
 
 def station_motion(station: xr.Dataset) -> StationMotion:
@@ -69,8 +72,9 @@ def station_motion(station: xr.Dataset) -> StationMotion:
         sensor_azimuth=sensor_azimuth,
         usable_periods=(shortest, longest),
         azimuths=azimuths,
-        per=_log_spectra(station, "per"),
-        sd=_log_spectra(station, "sd"),
+        per=_by_azimuth(station, "per"),
+        sd=_by_azimuth(station, "sd"),
+        per_rotd50=_median_over_azimuths(station),
     )
 
 
@@ -82,13 +86,23 @@ def nearest_azimuth(station: StationMotion, table: Table) -> NDArray[np.intp]:
     return row
 
 
-def _log_spectra(station: xr.Dataset, name: str) -> LogSpectra:
+def _by_azimuth(station: xr.Dataset, name: str) -> LogSpectra:
     """Return the stored PER (``per``) or SD (``sd``) by azimuth; one horizontal has one azimuth."""
     by_azimuth = f"{name}_azimuthal"
     if by_azimuth in station:
-        stored = station[by_azimuth].to_numpy()
-    else:
-        stored = station[name].to_numpy()[:1]
+        return _log_spectra(station, station[by_azimuth].to_numpy())
+    return _log_spectra(station, station[name].to_numpy()[:1])
+
+
+def _median_over_azimuths(station: xr.Dataset) -> LogSpectra:
+    """Return the stored RotD50 of PER in one row, or the PER of the only horizontal."""
+    if "per_rotd50" in station:
+        return _log_spectra(station, station["per_rotd50"].to_numpy()[None])
+    return _by_azimuth(station, "per")
+
+
+def _log_spectra(station: xr.Dataset, stored: NDArray[np.float32]) -> LogSpectra:
+    """Return stored radii, (n_rows, n_dampings, n_periods), on logarithmic axes."""
     # spectra are stored as float32: a radius of 0 counts as the smallest of these
     radii = np.log(np.maximum(stored.astype(np.float64), np.finfo(np.float32).tiny))
     dampings = np.log(np.maximum(station["damping"].to_numpy(), SMALLEST_DAMPING))

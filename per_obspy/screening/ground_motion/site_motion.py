@@ -26,6 +26,9 @@ from per_obspy.screening.ground_motion.sites import Sites, sites
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
 from per_obspy.screening.values import number, values
 
+#: Largest distance between epicentres of one earthquake, m: agencies differ by less.
+SAME_EARTHQUAKE = 50_000.0
+
 #: Shortest distance from the hypocentre that the trend uses, m.
 SHORTEST_DISTANCE = 1000.0
 
@@ -93,13 +96,25 @@ def hypocentre_of(attributes: Iterable[Mapping[Hashable, Any]]) -> Hypocentre | 
     Returns
     -------
     Hypocentre or None
-        None if no station knows it, or if stations recorded different earthquakes.
+        The median where agencies place it a little apart; None if no station knows it, or if
+        stations recorded different earthquakes.
     """
-    sources = set()
-    for known in attributes:
-        if HYPOCENTRE[0] in known:
-            sources.add(Hypocentre(*(float(known[name]) for name in HYPOCENTRE)))
-    return sources.pop() if len(sources) == 1 else None
+    known = [station for station in attributes if HYPOCENTRE[0] in station]
+    if not known:
+        return None
+    # Epicentres of one earthquake are near to each other
+    longitude, latitude, depth = (
+        np.array([station[name] for station in known], dtype=np.float64) for name in HYPOCENTRE
+    )
+    apart = great_circle(longitude[0], latitude[0], longitude, latitude)
+    if (apart > SAME_EARTHQUAKE).any():
+        return None
+    return Hypocentre(_middle(longitude), _middle(latitude), _middle(depth))
+
+
+def _middle(numbers: FloatArray) -> float:
+    """Return the lower median, which is one of the numbers."""
+    return float(np.sort(numbers)[(numbers.size - 1) // 2])
 
 
 def prepared_field(

@@ -1,4 +1,10 @@
-"""The trend of ln PER over the stations of a group, per period, by generalised least squares."""
+"""
+The trend of ln PER over the stations of a group, per period: Bayesian generalised least squares.
+
+The slope in ln distance has a prior, because few stations do not resolve it and all attenuation has
+it; mean and the slope in ln Vs30 have none. Prior of slope and variance are conjugate: given the
+stations every motion has Student's t distribution, whose deviation the trend keeps.
+"""
 
 from typing import NamedTuple
 
@@ -12,9 +18,12 @@ from per_obspy.screening.ground_motion.assignment import on_sphere
 from per_obspy.screening.ground_motion.sites import Sites
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle, residual_correlation
 
-#: Stations per coefficient that a slope of the trend (of ln distance, of ln Vs30) needs, and the
-#: standard deviation that the feature must exceed over them; our choice.
+#: Stations per coefficient that a slope without a prior (of ln Vs30) needs, and the standard
+#: deviation that the feature must exceed over them; our choice.
 STATIONS_PER_SLOPE, SPREAD = 6, 0.1
+
+#: Index of the feature ln distance, the first one, whose slope has a prior.
+DISTANCE = 0
 
 #: Stations whose coordinates agree to this number of decimals of a degree (1 m) are one place:
 #: their mean ln PER counts.
@@ -22,7 +31,7 @@ DECIMALS = 5
 
 
 #: Per period: coefficients (n_periods, 3), their covariance for a deviation of 1 (n_periods, 3, 3),
-#: means of the features (n_periods, 2), deviation (n_periods,).
+#: means of the features (n_periods, 2), deviation of Student's t distribution (n_periods,).
 Trend = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
@@ -69,7 +78,7 @@ def fitted_group(
     periods : (n_periods,) ndarray
         Grid, s, rising.
     settings : Interpolation
-        Assumed deviation, and the case of the spatial correlation.
+        Assumed deviation and slope, and the case of the spatial correlation.
 
     Returns
     -------
@@ -154,13 +163,14 @@ def _fitted(
     if not values.size:
         return coefficients, covariance, means, np.nan
 
-    # Design matrix X: a mean, and the slopes that these stations can resolve, about their means
-    used = _resolved_slopes(features)
+    # Design matrix X: a mean, and the slopes that these stations can have, about their means
+    used = _slopes(features)
     means[used] = features[:, used].mean(axis=0)
     design = np.column_stack([np.ones(values.size), features[:, used] - means[used]])
-    fit, uncertainty, deviation = _least_squares(design, correlation, values, settings)
+    prior = _prior(used, settings)
+    fit, uncertainty, deviation = _posterior(design, correlation, values, prior, settings)
 
-    # Unresolved slopes stay 0, and so does their covariance
+    # Other slopes are 0, and so is their covariance
     columns = np.concatenate([[0], 1 + used])
     coefficients[columns] = fit
     covariance[np.ix_(columns, columns)] = uncertainty
@@ -168,30 +178,50 @@ def _fitted(
     return coefficients, covariance, means, deviation
 
 
-def _least_squares(
-    design: FloatArray, correlation: FloatArray, values: FloatArray, settings: Interpolation
+def _prior(used: NDArray[np.intp], settings: Interpolation) -> tuple[FloatArray, FloatArray]:
+    """Return expected coefficients and their precision for a deviation of 1; 0 where unknown."""
+    expected, precision = np.zeros((2, 1 + used.size))
+    if DISTANCE in used:
+        expected[1 + DISTANCE] = settings.distance_slope
+        precision[1 + DISTANCE] = (settings.log_std / settings.distance_slope_std) ** 2
+    return expected, precision
+
+
+def _posterior(
+    design: FloatArray,
+    correlation: FloatArray,
+    values: FloatArray,
+    prior: tuple[FloatArray, FloatArray],
+    settings: Interpolation,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Solve X' C^-1 X b = X' C^-1 y: b, its covariance for a deviation of 1, and the deviation."""
+    """Solve (X' C^-1 X + P) b = X' C^-1 y + P b0: b, its covariance, and Student's deviation."""
+    expected, precision = prior
     factor = cho_factor(correlation, lower=True)
-    normal = cho_factor(design.T @ cho_solve(factor, design), lower=True)
-    coefficients: FloatArray = cho_solve(normal, design.T @ cho_solve(factor, values))
+    normal = cho_factor(design.T @ cho_solve(factor, design) + np.diag(precision), lower=True)
+    moments = design.T @ cho_solve(factor, values) + precision * expected
+    coefficients: FloatArray = cho_solve(normal, moments)
     covariance: FloatArray = cho_solve(normal, np.eye(design.shape[1]))
 
     # The deviation of the residuals e joins the assumed one s0, which counts as w stations:
-    # s^2 = (w s0^2 + e' C^-1 e) / (w + n - p)
+    # s^2 = (w s0^2 + e' C^-1 e + (b - b0)' P (b - b0)) / nu; a prior costs no degree of freedom
     residual = values - design @ coefficients
     squares = residual @ cho_solve(factor, residual)
+    squares += (precision * (coefficients - expected) ** 2).sum()
     weight = settings.log_std_weight
-    freedom = weight + residual.size - design.shape[1]
+    freedom = weight + residual.size - np.sum(precision == 0)
     variance = (weight * settings.log_std**2 + squares) / freedom
-    return coefficients, covariance, float(np.sqrt(variance))
+
+    # Student's t distribution of scale s and nu degrees of freedom: s^2 nu / (nu - 2)
+    return coefficients, covariance, float(np.sqrt(variance * freedom / (freedom - 2.0)))
 
 
-def _resolved_slopes(features: FloatArray) -> NDArray[np.intp]:
-    """Return the indices of the features whose slope these stations resolve."""
+def _slopes(features: FloatArray) -> NDArray[np.intp]:
+    """Return the features with a slope: a known distance, and others that stations resolve."""
+    # the prior makes up for stations that resolve no slope
     used: list[int] = []
     for index, values in enumerate(features.T):
         enough = values.size >= STATIONS_PER_SLOPE * (1 + len(used))
-        if enough and np.isfinite(values).all() and float(values.std()) > SPREAD:
+        resolved = enough and float(values.std()) > SPREAD
+        if np.isfinite(values).all() and (resolved or index == DISTANCE):
             used.append(index)
     return np.array(used, dtype=np.intp)

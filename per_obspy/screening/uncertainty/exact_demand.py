@@ -3,9 +3,9 @@ Probability of pounding at one station; exact demands are sampled over uncertain
 
 Where the exact demand decides and a period or a damping has a log-standard deviation, the record
 drives a sample of both buildings: periods and dampings at quasi-random nodes, the two buildings
-independently. Each demand is scaled with the motion at the site, and the probability is the mean
-over the nodes of the chance that a demand exceeds the gap. So equal buildings of uncertain period
-or damping are not certain to move as one.
+independently. Each demand is carried to the site (``site_demand.py``), and the probability is the
+mean over the nodes of the chance that a demand exceeds the gap. So equal buildings of uncertain
+period or damping are not certain to move as one.
 
 Against 4096 nodes, for 320 pairs in 18 real records (periods 0.3 to 3 s, one in three pairs of
 equal periods, log-standard deviations 0.2 or 0.3 of periods, dampings or both), the probability is
@@ -35,7 +35,13 @@ from per_obspy.screening.uncertainty.probability import (
     median_gap,
     pair_probability,
 )
-from per_obspy.screening.uncertainty.record_motion import is_exact, pair_at_site, record_motion
+from per_obspy.screening.uncertainty.record_motion import is_exact, record_motion
+from per_obspy.screening.uncertainty.site_demand import (
+    SiteDemand,
+    ln_field_demand,
+    median_at_site,
+    site_demand,
+)
 from per_obspy.screening.values import Columns, Table, chosen, values
 
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
@@ -56,6 +62,10 @@ NEGLIGIBLE = 1e-3
 
 #: Interquartile range over standard deviation of a normal variable.
 NORMAL_QUARTILES = 1.349
+
+#: Columns of a pair from which its demand at the site follows.
+COMMON = ("gap", "azimuth", "azimuth_used", "ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1",
+          "ln_per_std_2")  # fmt: skip
 
 #: Columns of one building from which the exact demand follows.
 BUILDING = ("period", "damping", "participation", "yield_displacement", "hardening", "per")
@@ -85,11 +95,14 @@ def record_probability(station: StationMotion, table: Table, screening: Screenin
     yields = can_yield(table)
     for rows, nodes in ((sampled & ~yields, NODES), (sampled & yields, NODES[:YIELDING_NODES])):
         if rows.any():
-            probability[rows] = sampled_probability(station, chosen(table, rows), nodes)
+            block = chosen(table, rows)
+            probability[rows] = sampled_probability(station, block, nodes, screening)
     return probability
 
 
-def sampled_probability(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
+def sampled_probability(
+    station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
+) -> FloatArray:
     """
     Compute the probability that the exact demand of uncertain buildings exceeds the gap.
 
@@ -101,6 +114,8 @@ def sampled_probability(station: StationMotion, table: Table, nodes: FloatArray)
         Rows of the risk table whose exact demand decides.
     nodes : (n_nodes, 4) ndarray
         Standard normal nodes of ln period and ln damping of building 1, then of building 2.
+    screening : Screening
+        For the demand at the site.
 
     Returns
     -------
@@ -113,41 +128,53 @@ def sampled_probability(station: StationMotion, table: Table, nodes: FloatArray)
     # blocks bound the memory; a pair does not depend on its block
     for first in range(0, count, size):
         rows = np.arange(first, min(first + size, count))
-        probability[rows] = _of_block(station, chosen(table, rows), nodes)
+        probability[rows] = _of_block(station, chosen(table, rows), nodes, screening)
     return probability
 
 
-def _of_block(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
+def _of_block(
+    station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
+) -> FloatArray:
     """Return the probability of pairs, at all nodes where the first ones leave a doubt."""
-    demands = _demands(station, table, nodes[:FIRST_NODES])
-    probability = _mean_chance(demands, table)
+    site = site_demand(station, table, screening)
+    demands = _demands(station, table, site, nodes[:FIRST_NODES], screening)
+    probability = _mean_chance(demands, table, site.log_std)
     doubtful = (probability > CERTAIN) & (probability < 1.0 - CERTAIN)
     # mean over all nodes, the first ones included
     if len(nodes) > FIRST_NODES and doubtful.any():
         block = chosen(table, doubtful)
-        others = _demands(station, block, nodes[FIRST_NODES:])
+        there = SiteDemand(*(column[doubtful] for column in site))
+        others = _demands(station, block, there, nodes[FIRST_NODES:], screening)
         every = np.concatenate([demands[doubtful], others], axis=1)
-        probability[doubtful] = _mean_chance(every, block)
+        probability[doubtful] = _mean_chance(every, block, there.log_std)
     return probability
 
 
-def _demands(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
-    """Return exact demands at the site, (n_pairs, n_nodes), m."""
-    azimuth = np.repeat(values(table, "azimuth_used"), len(nodes))
-    demand = exact_demand(station, _sampled_buildings(table, nodes), azimuth)
+def _demands(
+    station: StationMotion,
+    table: Table,
+    site: SiteDemand,
+    nodes: FloatArray,
+    screening: Screening,
+) -> FloatArray:
+    """Return median demands at the site of sampled buildings, (n_pairs, n_nodes), m."""
+    sample = _sampled_buildings(table, nodes)
+    demand = exact_demand(station, sample, values(sample, "azimuth_used"))
     demand = demand.reshape(-1, len(nodes))
     # equal motions leave the round-off of their difference
     moves_apart = demand > ROUND_OFF * values(table, "absolute_gap")[:, None]
-    ln_ratio, _ = pair_at_site(table)
-    return np.where(moves_apart, demand * np.exp(ln_ratio)[:, None], 0.0)
+    demand = np.where(moves_apart, demand, 0.0)
+    ln_field = ln_field_demand(station, sample, screening).reshape(demand.shape)
+    return median_at_site(demand, site.weight[:, None], site.ln_ratio[:, None], ln_field)
 
 
 def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     """Return the buildings of all pairs at all nodes, node by node within a pair."""
-    sample: Columns = {}
+    # whatever does not differ between the nodes
+    names = [name for name in COMMON if name in table]
+    names += [f"{name}_{i}" for name in BUILDING for i in (1, 2)]
+    sample: Columns = {name: np.repeat(values(table, name), len(nodes)) for name in names}
     for i in (1, 2):
-        for name in BUILDING:
-            sample[f"{name}_{i}"] = np.repeat(values(table, f"{name}_{i}"), len(nodes))
         # lognormal period and damping
         for name, node in zip(("period", "damping"), nodes.T[2 * i - 2 : 2 * i], strict=True):
             deviation = values(table, f"{name}_log_std_{i}")
@@ -158,10 +185,9 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     return sample
 
 
-def _mean_chance(demands: FloatArray, table: Table) -> FloatArray:
+def _mean_chance(demands: FloatArray, table: Table, motion_log_std: FloatArray) -> FloatArray:
     """Return the mean over the nodes of the chance that a demand exceeds an uncertain gap."""
     gap = median_gap(table)
-    _, motion_log_std = pair_at_site(table)
     known = np.hypot(gap_dispersion(table), motion_log_std)
     # nodes are smoothed as far as nothing else is uncertain
     dispersion = np.maximum(known, _smoothing(demands))[:, None]

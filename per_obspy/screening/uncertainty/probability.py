@@ -90,7 +90,8 @@ class UncertainMotion(NamedTuple):
     correlation : ndarray
         Of both responses, dimensionless.
     pair_log_std : ndarray
-        Log-standard deviation of the critical gap by the motion of both buildings.
+        Log-standard deviation of the critical gap by the motion of both buildings; of an exact
+        demand with that of its transfer from the record to the site.
     model_log_std : ndarray
         Log-standard deviation of the estimate over the exact demand.
     exact_demand : ndarray

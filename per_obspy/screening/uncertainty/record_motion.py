@@ -3,7 +3,7 @@ Uncertain motion of pairs at one station, from its record and its stored spectra
 
 Where the table holds the motion at the site relative to the record (``ln_per_ratio_i``,
 ``ln_per_std_i``), the radii are those at the site and as uncertain as their motion; an exact demand
-is scaled with the pair's (``pair_motion.py``).
+is carried to the site by ``site_demand.py``.
 """
 
 import numpy as np
@@ -13,13 +13,18 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import log_oscillator, stored_log
-from per_obspy.screening.uncertainty.pair_motion import pair_motion
 from per_obspy.screening.uncertainty.probability import (
     UncertainMotion,
     UncertainRadius,
     period_is_uncertain,
 )
-from per_obspy.screening.values import Table, at_contact, both, values
+from per_obspy.screening.uncertainty.site_demand import (
+    estimate_log_std,
+    median_at_site,
+    motion_at_site,
+    site_demand,
+)
+from per_obspy.screening.values import Table, values
 
 
 def record_motion(station: StationMotion, table: Table, screening: Screening) -> UncertainMotion:
@@ -32,8 +37,8 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
         The record, with its stored spectra.
     table : Table
         Rows of the risk table with periods, dampings, their log-standard deviations, radii,
-        correlations and demand; the motion at the site, where the table has it, of
-        :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs`.
+        correlations and demand; ``distance`` and the motion at the site, where the table has it,
+        of :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs`.
     screening : Screening
         Medians and log-standard deviations of the critical gap from PER, and of the linearized one,
         over the exact one.
@@ -45,34 +50,39 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
         buildings; :mod:`.exact_demand` samples it where they are uncertain.
     """
     first, second = (_radius(station, table, i, screening) for i in (1, 2))
-    # the exact demand and its deviation change with the motion of both buildings at the site
-    pair_ln_ratio, pair_log_std = pair_at_site(table)
-    at_site = values(table, "demand_exact") * np.exp(pair_ln_ratio)
+    # the exact demand at the site, and the error of an estimate there
+    site, exact = site_demand(station, table, screening), is_exact(table)
+    demand = np.where(exact, values(table, "demand_exact"), 0.0)
+    at_site = median_at_site(demand, site.weight, site.ln_ratio, site.ln_field)
     deviations = screening.linearized_dispersion, screening.model_dispersion
+    model_log_std = np.where(_linearized(table), *deviations)
     return UncertainMotion(
         first,
         second,
         correlation=_governing_correlation(table),
-        pair_log_std=pair_log_std,
-        model_log_std=np.where(_linearized(table), *deviations),
-        exact_demand=np.where(is_exact(table), at_site, np.nan),
+        pair_log_std=np.where(exact, site.log_std, site.field_log_std),
+        model_log_std=estimate_log_std(table, model_log_std, screening.interpolation),
+        exact_demand=np.where(exact, at_site, np.nan),
         row=nearest_azimuth(station, table),
     )
 
 
-def pair_at_site(table: Table) -> tuple[FloatArray, FloatArray]:
+def demand_at_site(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
     """
-    Return ln of the exact demand at the site over that of the record, and its deviation.
+    Return the governing demand of pairs at their sites, m: what their probability rests on.
 
     Parameters
     ----------
+    station : StationMotion
+        The record.
     table : Table
         As of :func:`record_motion`.
+    screening : Screening
+        As of :func:`record_motion`.
     """
-    ln_ratio_1, log_std_1 = _site_motion(table, 1)
-    ln_ratio_2, log_std_2 = _site_motion(table, 2)
-    ratios, log_stds = (ln_ratio_1, ln_ratio_2), (log_std_1, log_std_2)
-    return pair_motion(at_contact(table, "per"), ratios, log_stds, both(table, "period"))
+    site, demand = site_demand(station, table, screening), values(table, "demand")
+    exact = median_at_site(demand, site.weight, site.ln_ratio, site.ln_field)
+    return np.where(is_exact(table), exact, demand * np.exp(site.ln_ratio))
 
 
 def is_exact(table: Table) -> NDArray[np.bool_]:
@@ -84,7 +94,7 @@ def _radius(station: StationMotion, table: Table, i: int, screening: Screening) 
     """Return the radius of building i at contact height, with its oscillator and uncertainties."""
     # the median of the estimate over the exact demand is taken off the radius
     bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
-    ln_ratio, motion_log_std = _site_motion(table, i)
+    ln_ratio, motion_log_std = motion_at_site(table, i)
     return UncertainRadius(
         radius=values(table, f"participation_{i}") * _deciding(table, f"per_{i}") / bias,
         ln_ratio=ln_ratio,
@@ -111,15 +121,6 @@ def _governing_correlation(table: Table) -> FloatArray:
     elastic = np.where(by_record, table["correlation_record"], table["correlation"])
     linearized = values(table, "correlation_linearized")
     return np.where(_linearized(table), linearized, elastic)
-
-
-def _site_motion(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
-    """Return ln of radius i at the site over that of the record and its deviation; 0 if unknown."""
-    if "ln_per_ratio_1" not in table:
-        at_record = np.zeros_like(values(table, "gap"))
-        return at_record, at_record
-    ln_ratio, log_std = values(table, f"ln_per_ratio_{i}"), values(table, f"ln_per_std_{i}")
-    return np.nan_to_num(ln_ratio), np.nan_to_num(log_std)
 
 
 def _damping_dispersion(station: StationMotion, table: Table, i: int) -> FloatArray:

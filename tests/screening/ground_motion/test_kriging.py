@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from motion_samples import EVERY_PERIOD, SETTINGS, interpolated_motion
 from numpy.testing import assert_allclose
 
+from per_obspy.config import Interpolation
 from per_obspy.screening.ground_motion.assignment import nearest_station
 from per_obspy.screening.ground_motion.kriging import NEIGHBOURS, fitted_field, motion_at
 from per_obspy.screening.ground_motion.sites import sites
@@ -48,7 +49,8 @@ def test_a_textbooks_matrix_gives_the_same(city, column):
     # without Cholesky factors; would catch a lost term of the trend's own uncertainty
     stations, values = city
     places = sites([0.01, -0.1, 0.3], [0.02, 0.15, -0.4], "", [52e3, 61e3, 110e3])
-    motion = interpolated_motion(stations, values, PERIODS, places, SETTINGS)
+    settings = Interpolation(distance_slope_std=1e4)
+    motion = interpolated_motion(stations, values, PERIODS, places, settings)
     correlation = _correlations(stations, stations, RANGES[column])
     design = np.stack([np.ones(12), np.log(stations.source_distance)], axis=1)
     variance = _variance(correlation, design, values[:, column])
@@ -81,12 +83,15 @@ def _lagrange(correlation, design, to_place, features):
 
 
 def _variance(correlation, design, values):
-    """Return the joined variance with the hat matrix of generalised least squares."""
+    """Return the variance of Student's distribution with the hat matrix of least squares."""
     inverse = np.linalg.inv(correlation)
     hat = design @ np.linalg.inv(design.T @ inverse @ design) @ design.T @ inverse
     residual = values - hat @ values
-    # the assumed deviation of 0.6 counts as five stations
-    return (5 * 0.6**2 + residual @ inverse @ residual) / (5 + 12 - 2)
+    # the assumed deviation of 0.6 counts as five stations; nu / (nu - 2) of nu degrees of freedom,
+    # of which the slope, whose prior is all but unknown, costs none
+    freedom = 5 + 12 - 1
+    scale = (5 * 0.6**2 + residual @ inverse @ residual) / freedom
+    return scale * freedom / (freedom - 2)
 
 
 def test_the_deviation_is_that_of_the_error():
@@ -117,24 +122,28 @@ def _drawn(places, count, random):
 
 def test_far_away_the_trend_and_the_whole_deviation_are_left():
     # stations so far apart that nothing correlates: ordinary least squares and its prediction
-    # error, from a textbook
+    # error, from a textbook; seven degrees of freedom
     values = np.array([[-2.0], [-3.0], [-2.5]])
     stations = sites([0.0, 10.0, 20.0], [0.0, 0.0, 0.0])
     motion = interpolated_motion(stations, values, [1.0], sites([100.0], [50.0]), SETTINGS)
     assert_allclose(motion.ln_median, -2.5, rtol=1e-12)
-    variance = (5 * 0.6**2 + 0.5) / (5 + 3 - 1)
+    variance = (5 * 0.6**2 + 0.5) / (5 + 3 - 1) * 7 / (7 - 2)
     assert_allclose(motion.log_std, np.sqrt(variance * (1 + 1 / 3)), rtol=1e-12)
 
 
 def test_one_station_serves_and_its_assumed_deviation_grows_with_distance():
-    # would catch a division by the degrees of freedom of the data alone, which are none
+    # would catch a division by the degrees of freedom of the data alone, which are none; the
+    # assumed deviation is the scale of Student's distribution of five degrees of freedom
     motion = interpolated_motion(
         sites([0.0], [0.0]), [[-2.0]], [1.0], sites([0.0, 0.05, 90.0], [0.0] * 3), SETTINGS
     )
     assert_allclose(motion.ln_median[:, 0], -2.0, rtol=1e-12)
     near = spatial_correlation(great_circle(0.0, 0.0, 0.05, 0.0), 1.0)
     assert_allclose(
-        motion.log_std[:, 0], 0.6 * np.sqrt([0.0, 2 * (1 - near), 2.0]), rtol=1e-9, atol=1e-9
+        motion.log_std[:, 0],
+        0.6 * np.sqrt(5 / 3 * np.array([0.0, 2 * (1 - near), 2.0])),
+        rtol=1e-9,
+        atol=1e-9,
     )
 
 

@@ -45,7 +45,24 @@ def test_the_hypocentre_is_that_on_which_stations_agree():
     assert hypocentre_of([{}, one, {}, one]) == Hypocentre(20.0, 10.0, 8e3)
     # unknown, or of two earthquakes: no distance can be measured
     assert hypocentre_of([{}]) is None
-    assert hypocentre_of([one, {**one, "hypocentre_depth": 9e3}]) is None
+    assert hypocentre_of([one, {**one, "hypocentre_latitude": 11.0}]) is None
+
+
+def test_agencies_that_place_an_earthquake_a_little_apart_know_one_earthquake():
+    # headers of three networks; the order of stations does not matter
+    places = [(20.0, 10.0, 8e3), (20.05, 10.1, 12e3), (20.02, 10.02, 30e3)]
+    known = [
+        dict(
+            zip(
+                ("hypocentre_longitude", "hypocentre_latitude", "hypocentre_depth"),
+                place,
+                strict=True,
+            )
+        )
+        for place in places
+    ]
+    middle = Hypocentre(20.02, 10.02, 12e3)
+    assert hypocentre_of(known) == hypocentre_of(known[::-1]) == middle
 
 
 def test_at_a_station_its_record_is_the_motion(stations):
@@ -84,12 +101,13 @@ def test_the_deviation_grows_with_the_distance_and_every_period_has_its_own(stat
 
 
 def test_one_station_has_no_slope_and_the_assumed_deviation(stations):
-    # two places whose motion is uncorrelated differ by twice the variance: 0.6 sqrt(2) far away
+    # two places whose motion is uncorrelated differ by twice the variance, 0.6 sqrt(2) far away,
+    # times sqrt(5 / 3) of Student's distribution of five degrees of freedom
     places = _pairs(20.0, [10.0, 10.1, 80.0])
     columns = motion_at_pairs(prepared_field(stations[:1], SETTINGS), places, 0)
     assert_allclose(columns["ln_per_ratio_1"], 0.0, atol=1e-12)
     near = float(spatial_correlation(great_circle(20.0, 10.0, 20.0, 10.1), 1.0))
-    expected = 0.6 * np.sqrt([0.0, 2.0 * (1.0 - near), 2.0])
+    expected = 0.6 * np.sqrt(5.0 / 3.0 * np.array([0.0, 2.0 * (1.0 - near), 2.0]))
     assert_allclose(columns["ln_per_std_1"], expected, rtol=1e-9, atol=1e-7)
 
 
@@ -167,25 +185,59 @@ def test_one_horizontal_and_a_station_without_motion(stations):
     assert np.isfinite(columns["ln_per_std_1"]).all()
 
 
-def test_the_source_decides_the_attenuation():
-    # eight stations on a line, PER ~ 1/R from a hypocentre 20 km deep: continued beyond them, and
-    # exact between them
-    source = Hypocentre(20.0, 9.0, 20_000.0)
+def _attenuated(source, latitudes, slope):
+    """Return stations along a meridian whose PER is a power of the distance, and the distances."""
     plain = make_station("ONE")
-    latitudes = np.linspace(10.0, 11.0, 8)
-    distance = np.hypot(great_circle(20.0, 9.0, 20.0, latitudes), 20_000.0)
+    radii = plain["per_rotd50"].astype(np.float64)
+    distance = _from(source, latitudes)
     stations = [
-        plain.assign(per_rotd50=plain["per_rotd50"].astype(np.float64) * 1e5 / far).assign_coords(
-            latitude=latitude
-        )
+        plain.assign(per_rotd50=radii * (far / 1e5) ** slope).assign_coords(latitude=latitude)
         for latitude, far in zip(latitudes, distance, strict=True)
     ]
+    return stations, distance
+
+
+def _from(source, latitudes):
+    """Return distances from a hypocentre at 20 degrees east, m."""
+    along = great_circle(20.0, source.latitude, 20.0, np.asarray(latitudes))
+    return np.hypot(along, source.depth)
+
+
+def test_the_source_decides_the_attenuation():
+    # eight stations on a line with the attenuation of the prior from a hypocentre 20 km deep:
+    # continued beyond them, and exact between them
+    source = Hypocentre(20.0, 9.0, 20_000.0)
+    stations, distance = _attenuated(source, np.linspace(10.0, 11.0, 8), SETTINGS.distance_slope)
     beyond = np.array([9.5, 10.5, 12.0])
-    there = np.hypot(great_circle(20.0, 9.0, 20.0, beyond), 20_000.0)
+    expected = SETTINGS.distance_slope * np.log(_from(source, beyond) / distance[3])
     columns = motion_at_pairs(prepared_field(stations, SETTINGS, source), _pairs(20.0, beyond), 3)
-    assert_allclose(columns["ln_per_ratio_1"], np.log(distance[3] / there), atol=1e-9)
+    assert_allclose(columns["ln_per_ratio_1"], expected, atol=1e-9)
     without = motion_at_pairs(prepared_field(stations, SETTINGS), _pairs(20.0, beyond), 3)
-    assert abs(without["ln_per_ratio_1"][2] - np.log(distance[3] / there[2])) > 0.1
+    assert abs(without["ln_per_ratio_1"][2] - expected[2]) > 0.1
+
+
+def test_stations_correct_the_expected_attenuation():
+    # motion decays as 1/R: the more stations, at places that are unlike, the nearer to that
+    source, far = Hypocentre(20.0, 9.0, 20_000.0), [14.0]
+    errors = []
+    for count in (2, 8, 40):
+        stations, distance = _attenuated(source, np.linspace(9.5, 13.0, count), -1.0)
+        field = prepared_field(stations, SETTINGS, source)
+        found = motion_at_pairs(field, _pairs(20.0, far), 0)["ln_per_ratio_1"]
+        errors.append(abs(found + np.log(_from(source, far) / distance[0])).item())
+    assert errors[0] > errors[1] > errors[2]
+
+
+def test_a_single_station_attenuates_as_expected_with_the_doubt_of_its_slope():
+    # far from each other nothing correlates: variances of both places and of the slope
+    source, places = Hypocentre(20.0, 9.0, 20_000.0), [60.0]
+    stations, distance = _attenuated(source, np.array([10.0]), -1.0)
+    columns = motion_at_pairs(prepared_field(stations, SETTINGS, source), _pairs(20.0, places), 0)
+    away = np.log(_from(source, places) / distance[0])
+    assert_allclose(columns["ln_per_ratio_1"], -1.3 * away, rtol=1e-9)
+    # Student's factor of five degrees of freedom: a prior slope costs none
+    expected = np.sqrt(5.0 / 3.0 * (2.0 * 0.6**2 + (0.5 * away) ** 2))
+    assert_allclose(columns["ln_per_std_1"], expected, rtol=1e-9)
 
 
 def test_numbers_depend_neither_on_the_block_nor_on_the_process(stations):

@@ -38,13 +38,47 @@ def test_the_trend_follows_distance_and_vs30_where_stations_tell():
     )
 
 
-def test_few_stations_do_not_tell_a_slope():
-    # would catch an attenuation drawn through two points
+def test_few_stations_have_the_expected_slope_and_correct_it_as_bayes_does():
+    # two stations so far apart that nothing correlates; slope of the data -4 / ln 50
     stations = sites([0.0, 5.0], [0.0, 0.0], "", [10e3, 500e3])
-    motion = interpolated_motion(
-        stations, [[-2.0], [-6.0]], [1.0], sites([90.0], [0.0], "", 5000e3), SETTINGS
-    )
+    values, far = np.array([[-2.0], [-6.0]]), 5000e3
+    motion = interpolated_motion(stations, values, [1.0], sites([90.0], [0.0], "", far), SETTINGS)
+    # normal equation of the slope about the mean distance, with the precision of the prior
+    about = np.array([-0.5, 0.5]) * np.log(50.0)
+    precision = (SETTINGS.log_std / SETTINGS.distance_slope_std) ** 2
+    moments = about @ values[:, 0] + precision * SETTINGS.distance_slope
+    slope = moments / (about @ about + precision)
+    expected = -4.0 + slope * (np.log(far) - np.log([10e3, 500e3]).mean())
+    assert_allclose(motion.ln_median, expected, rtol=1e-9)
+
+
+def test_few_stations_do_not_tell_a_slope_in_vs30():
+    # would catch a slope drawn through two points
+    stations = sites([0.0, 5.0], [0.0, 0.0], "", np.nan, [200.0, 800.0])
+    place = sites([90.0], [0.0], "", np.nan, 1500.0)
+    motion = interpolated_motion(stations, [[-2.0], [-6.0]], [1.0], place, SETTINGS)
     assert_allclose(motion.ln_median, -4.0, rtol=1e-9)
+
+
+def test_the_deviation_is_that_of_the_error_where_few_stations_share_the_prior():
+    # known truth: slopes and variances drawn from their priors, four stations, a hidden place; this
+    # is about the arithmetic, not about earthquakes
+    random, count = np.random.default_rng(8), 4000
+    distance = np.array([20e3, 35e3, 60e3, 90e3, 200e3])
+    places = sites(10.0 * np.arange(5), np.zeros(5), "", distance)
+    # scale of the prior of the variance: inverse gamma with five degrees of freedom
+    scale = 0.6 * np.sqrt(5.0 / random.chisquare(5.0, count))
+    slope = -1.3 + 0.5 * scale / 0.6 * random.normal(size=count)
+    values = slope * np.log(distance / 50e3)[:, None] + scale * random.normal(size=(5, count))
+    known = np.arange(4)
+    motion = interpolated_motion(
+        places.at(known), values[known], np.ones(count), places.at(np.array([4]))
+    )
+    score = (motion.ln_median - values[4:]) / motion.log_std
+    # unbiased: the mean of 4000 scores within four standard errors, 0.063; their mean square, of
+    # Student's distribution of 8 degrees of freedom with kurtosis 4.5, within four of 0.03
+    assert abs(score.mean()) < 0.063
+    assert_allclose((score**2).mean(), 1.0, atol=0.12)
 
 
 def _fitted(count, log_std=0.6, log_std_weight=5.0, usable=(0.0, np.inf), scatter=1.0):
@@ -64,15 +98,18 @@ def test_uncorrelated_stations_have_their_mean_and_joined_deviation():
     assert_allclose(coefficients[:, 0], values.mean(axis=0), rtol=1e-12)
     assert_allclose(covariance[:, 0, 0], 1 / 4, rtol=1e-12)
     squares = ((values - values.mean(axis=0)) ** 2).sum(axis=0)
-    assert_allclose(deviation**2, (5 * 0.6**2 + squares) / (5 + 4 - 1), rtol=1e-12)
+    # eight degrees of freedom, of Student's distribution
+    variance = (5 * 0.6**2 + squares) / (5 + 4 - 1) * 8 / (8 - 2)
+    assert_allclose(deviation**2, variance, rtol=1e-12)
     assert_allclose(group.stations[4], values - values.mean(axis=0), atol=1e-12)
 
 
 def test_the_assumed_deviation_counts_as_so_many_stations():
     # with residuals of none the deviation is between 0 and the assumed one, and near it if weighty
-    _, light = _fitted(10, log_std_weight=1.0, scatter=0.0)
+    _, light = _fitted(10, log_std_weight=3.0, scatter=0.0)
     _, heavy = _fitted(10, log_std_weight=1e6, scatter=0.0)
-    assert_allclose(light.trend[3], 0.6 * np.sqrt(1 / 10), rtol=1e-12)
+    # variance 3 s0^2 / 12, times 12 / (12 - 2) of Student's distribution
+    assert_allclose(light.trend[3], 0.6 * np.sqrt(3 / 10), rtol=1e-12)
     assert_allclose(heavy.trend[3], 0.6, rtol=1e-5)
 
 

@@ -16,6 +16,7 @@ from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.uncertainty import exact_demand
 from per_obspy.screening.uncertainty.exact_demand import record_probability, sampled_probability
 from per_obspy.screening.uncertainty.probability import NODES
+from per_obspy.screening.uncertainty.site_demand import pair_at_site
 
 #: Two equal buildings of given dampings, at contact height of one-storey oscillators.
 EQUAL = {
@@ -104,17 +105,18 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     # demands of all nodes and gaps drawn: would catch a dispersion that replaces the sample's
     table = table_of(station, [{**EQUAL, "period_2": 1.5, **DOUBT, "gap": 0.3, "gap_std": 0.12}])
     at_site = table.assign(ln_per_ratio_1=0.2, ln_per_ratio_2=0.2, ln_per_std_1=0.3, ln_per_std_2=0)
+    at_site = at_site.assign(distance=0.0)
     # only period 1 varies
     nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.array([1.0, 0.0, 0.0, 0.0])
     demand = directional_relative_displacement(
         record.north, record.east, record.dt, 2.0 * np.exp(0.2 * nodes[:, 0]), 0.05, 1.5, 0.05, 30.0
     ).one_before_two
-    _, motion_log_std = exact_demand.pair_at_site(at_site)
+    _, motion_log_std = pair_at_site(at_site)
     random, count = np.random.default_rng(2), 200_000
     factor = np.exp(0.2 + motion_log_std * random.normal(size=count))
     pounds = random.choice(demand, count) * factor > _drawn_gap(0.3, 0.12, count, random)
     # standard error of 200 000 samples: 0.0011
-    found = sampled_probability(record, at_site, nodes)
+    found = sampled_probability(record, at_site, nodes, Screening())
     assert_allclose(found[0], np.mean(pounds), atol=0.004)
 
 

@@ -153,6 +153,7 @@ def _with_motion(station, rows, ratios=(0.0, 0.0), stds=(0.0, 0.0)):
     table = table.assign(**linearized_columns(station_motion(station), table))
     # the same motion at the site of every pair
     at_site = table.assign(
+        distance=0.0,
         ln_per_ratio_1=ratios[0],
         ln_per_ratio_2=ratios[1],
         ln_per_std_1=stds[0],

@@ -20,7 +20,13 @@ ROWS = [
      "yield_displacement_1": 2e-4},
 ]  # fmt: skip
 EXACT, GIVEN, DERIVED, YIELDING = range(4)
-SITE = {"ln_per_ratio_1": 0.4, "ln_per_ratio_2": -0.2, "ln_per_std_1": 0.5, "ln_per_std_2": 0.3}
+SITE = {
+    "distance": 0.0,
+    "ln_per_ratio_1": 0.4,
+    "ln_per_ratio_2": -0.2,
+    "ln_per_std_1": 0.5,
+    "ln_per_std_2": 0.3,
+}
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,208 @@
+"""
+Demand of pairs at their sites, from the demand of their records and the motion between stations.
+
+A record makes an exact demand of a pair; it differs from the demand that its PER lets expect by
+what is special in that record: phases, correlation of both responses, direction of shaking. Part of
+this belongs to the pair and is found at every place, the rest fades with the distance from the
+record. So the demand at the site lies between that of the record, scaled with the motion, and the
+estimate from the motion between the stations. Constants are those of leave-one-out on real records
+(docs/calibration.md).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Interpolation, Screening
+from per_obspy.pounding.correlation.white_noise import ddc_correlation
+from per_obspy.pounding.critical_gap import critical_gap
+from per_obspy.screening.by_record.exact import can_yield
+from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
+from per_obspy.screening.by_record.stored_spectra import log_oscillator, stored_log
+from per_obspy.screening.uncertainty.pair_motion import pair_motion
+from per_obspy.screening.values import Table, at_contact, both, values
+
+
+class SiteDemand(NamedTuple):
+    """
+    Exact demand of pairs at their sites, as uncertain as the motion there is; each (n_pairs,).
+
+    At the distance h of site and record the correlation of what is special in their demands is
+    ``c(h) = p + (1 - p) exp(-h / L)``. The logarithm of the demand is normal, with the median
+
+        ``weight * (ln(demand of the record) + ln_ratio) + (1 - weight) * ln_field``
+
+    (:func:`median_at_site`) and the log-standard deviation ``log_std``. At the record (h = 0), and
+    where the motion at the site is unknown, the demand is that of the record, without deviation.
+
+    Attributes
+    ----------
+    weight : ndarray
+        Of the demand of the record: c(h), 1 at the record and p far away; 1 everywhere of buildings
+        that can yield, because ``ln_field`` is the demand of linear ones.
+    ln_ratio : ndarray
+        Shift of the demand of the record: ln of the root of the sum of squares of both radii at the
+        site over that at the record, from the median motion between the stations.
+    ln_field : ndarray
+        ln of the demand in m that the motion between the stations lets expect: critical gap by PER
+        and eq. (16) at the site over ``model_median``. Radii are RotD50 where the azimuth of the
+        pair is given, because directions of shaking change from place to place, else those along
+        the worst azimuth of the record.
+    field_log_std : ndarray
+        Part of the deviation: of the pair's ln PER at the site, with Student's factor.
+    transfer_log_std : ndarray
+        Part of the deviation: of the transfer from one place to another, with the weight w
+        ``demand_log_std * sqrt(1 - 2 w c + w^2)``, which saturates with the distance.
+    log_std : ndarray
+        Root of the sum of squares of both parts.
+    """
+
+    weight: FloatArray
+    ln_ratio: FloatArray
+    ln_field: FloatArray
+    field_log_std: FloatArray
+    transfer_log_std: FloatArray
+    log_std: FloatArray
+
+
+def site_demand(station: StationMotion, table: Table, screening: Screening) -> SiteDemand:
+    """
+    Return how the exact demand of pairs at their sites follows from that of their record.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record, with its stored spectra.
+    table : Table
+        Rows of the risk table with ``azimuth``, ``azimuth_used``, radii, and ``distance`` and the
+        columns of :func:`~per_obspy.screening.ground_motion.site_motion.motion_at_pairs` where the
+        motion at the site is known.
+    screening : Screening
+        ``model_median``, and the constants of ``interpolation``.
+    """
+    settings = screening.interpolation
+    correlation = demand_correlation(table, settings)
+    weight = np.where(can_yield(table), 1.0, correlation)
+    # error of the weighted demand: 1 - 2 w c + w^2, which is 1 - c^2 where w is c
+    unexplained = 1.0 - 2.0 * weight * correlation + weight**2
+    transfer_log_std = settings.demand_log_std * np.sqrt(np.maximum(unexplained, 0.0))
+    ln_ratio, field_log_std = pair_at_site(table)
+    return SiteDemand(
+        weight=weight,
+        ln_ratio=ln_ratio,
+        ln_field=ln_field_demand(station, table, screening),
+        field_log_std=field_log_std,
+        transfer_log_std=transfer_log_std,
+        log_std=np.hypot(field_log_std, transfer_log_std),
+    )
+
+
+def median_at_site(
+    demand: FloatArray, weight: FloatArray, ln_ratio: FloatArray, ln_field: FloatArray
+) -> FloatArray:
+    """
+    Return the median demand at the site, m, of demands of the record; 0 of pairs that move as one.
+
+    Parameters
+    ----------
+    demand : ndarray
+        Exact demand of the record, m.
+    weight, ln_ratio, ln_field : ndarray
+        Of :class:`SiteDemand`, of a shape that broadcasts.
+    """
+    moves = demand > 0
+    record = np.log(np.where(moves, demand, 1.0)) + ln_ratio
+    # at the record the field counts nothing, even that of equal buildings, whose gap is 0
+    field = np.where(np.isfinite(ln_field), ln_field, record)
+    median: FloatArray = np.where(moves, np.exp(weight * record + (1.0 - weight) * field), 0.0)
+    return median
+
+
+def demand_correlation(table: Table, settings: Interpolation) -> FloatArray:
+    """Return the correlation c(h) of what is special in the demands of record and site."""
+    if "ln_per_ratio_1" not in table:
+        return np.ones_like(values(table, "gap"))
+    persistence, length = settings.demand_persistence, settings.demand_length
+    # from 1 at the record to the part that persists; where nothing is known the record counts
+    correlation = persistence + (1.0 - persistence) * np.exp(-values(table, "distance") / length)
+    known = np.isfinite(np.stack(both(table, "ln_per_ratio"))).all(axis=0)
+    return np.where(known, correlation, 1.0)
+
+
+def estimate_log_std(table: Table, log_std: FloatArray, settings: Interpolation) -> FloatArray:
+    """
+    Return the deviation of an estimate over the exact demand at the site.
+
+    Parameters
+    ----------
+    table : Table
+        As of :func:`site_demand`.
+    log_std : (n_pairs,) ndarray
+        At the record. It grows to ``demand_log_std`` far away, where that is larger.
+    settings : Interpolation
+        Constants of the correlation.
+    """
+    correlation = demand_correlation(table, settings)
+    persistence = settings.demand_persistence
+    # 0 at the record, 1 far away
+    faded = (1.0 - correlation) / max(1.0 - persistence, np.finfo(np.float64).tiny)
+    growth = np.maximum(settings.demand_log_std**2 - log_std**2, 0.0)
+    deviation: FloatArray = np.sqrt(log_std**2 + faded * growth)
+    return deviation
+
+
+def pair_at_site(table: Table) -> tuple[FloatArray, FloatArray]:
+    """Return ln of the gap by PER at the site over that at the record, and its deviation."""
+    ln_ratio_1, log_std_1 = motion_at_site(table, 1)
+    ln_ratio_2, log_std_2 = motion_at_site(table, 2)
+    ratios, log_stds = (ln_ratio_1, ln_ratio_2), (log_std_1, log_std_2)
+    return pair_motion(at_contact(table, "per"), ratios, log_stds, both(table, "period"))
+
+
+def motion_at_site(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
+    """Return ln of radius i at the site over that of the record and its deviation; 0 if unknown."""
+    if "ln_per_ratio_1" not in table:
+        at_record = np.zeros_like(values(table, "gap"))
+        return at_record, at_record
+    ln_ratio, log_std = values(table, f"ln_per_ratio_{i}"), values(table, f"ln_per_std_{i}")
+    return np.nan_to_num(ln_ratio), np.nan_to_num(log_std)
+
+
+def ln_field_demand(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
+    """
+    Return ln of the demand in m that the motion between the stations lets expect at the site.
+
+    Minus infinity of pairs that move as one: equal buildings need no gap.
+    """
+    # radii of both buildings at the site, with the correlation of eq. (16)
+    row = nearest_azimuth(station, table)
+    given = np.isfinite(values(table, "azimuth"))
+    radius_1 = _radius_at_site(station, table, 1, row, given)
+    radius_2 = _radius_at_site(station, table, 2, row, given)
+    (period_1, period_2), (damping_1, damping_2) = both(table, "period"), both(table, "damping")
+    correlation = ddc_correlation(period_1, damping_1, period_2, damping_2)
+    gap = critical_gap(radius_1, radius_2, correlation)
+    # the estimate is larger than the exact demand in the median
+    with np.errstate(divide="ignore"):
+        ln_demand: FloatArray = np.log(gap / screening.model_median)
+    return ln_demand
+
+
+def _radius_at_site(
+    station: StationMotion,
+    table: Table,
+    i: int,
+    row: NDArray[np.intp],
+    given: NDArray[np.bool_],
+) -> FloatArray:
+    """Return the radius of building i at contact height at the site, from stored spectra, m."""
+    oscillator = log_oscillator(table, i)
+    along = stored_log(station.per, row, *oscillator)
+    median = stored_log(station.per_rotd50, np.zeros_like(row), *oscillator)
+    ln_ratio, _ = motion_at_site(table, i)
+    radius: FloatArray = values(table, f"participation_{i}") * np.exp(
+        np.where(given, median, along) + ln_ratio
+    )
+    return radius
