@@ -10,7 +10,7 @@ from per_obspy.errors import MachineFault, TryLater
 
 #: Errors of the operating system that pass or have nothing to do with what a file holds.
 PASSING = {
-    *(errno.EIO, errno.ENXIO, errno.ENODEV, errno.ENOSPC, errno.EDQUOT, errno.EROFS),
+    *(errno.EIO, errno.ENXIO, errno.ENODEV, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG),
     *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN, errno.EBUSY, errno.EINTR),
     *(errno.ESTALE, errno.ETIMEDOUT, errno.ENOTCONN, errno.EHOSTDOWN, errno.ENETDOWN),
 }

@@ -24,6 +24,7 @@ def caused(error, cause):
 MACHINE = {
     "device": system_error(errno.EIO),
     "open files": system_error(errno.EMFILE),
+    "limit of size": system_error(errno.EFBIG, "kernel.nbi"),
     "vanished": system_error(errno.ENOENT),
     "memory": MemoryError(),
     "small array": np._core._exceptions._ArrayMemoryError((1000,), np.dtype(float)),

@@ -5,6 +5,7 @@ Covers per_obspy.progress too: every stage of a run counts up to its size.
 """
 
 import json
+import os
 import shutil
 from collections import defaultdict
 
@@ -20,7 +21,7 @@ from per_obspy.config import Processing
 from per_obspy.errors import FolderInUse
 from per_obspy.jobs import station as jobs
 from per_obspy.pipeline.process import process_records
-from per_obspy.pipeline.run import run
+from per_obspy.pipeline.run import report, run, screen
 from per_obspy.progress import silent
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
@@ -217,6 +218,27 @@ def test_part_files_of_a_killed_run_do_not_hinder_the_next(copied):
     assert (counts["stations"], counts["stations_resumed"], counts["chunks"]) == (3, 3, 1)
     # no process has a number above the largest of Linux, 2 ** 22
     assert not any(path.exists() for path in left)
+
+
+@pytest.mark.parametrize("again", [screen, report])
+def test_part_files_do_not_hinder_a_part_of_a_run(copied, again):
+    # would catch a name of a part file taken for a station or a chunk; 4194305 is no process
+    out = copied / "out"
+    (out / "run.json").unlink()
+    before = run(copied / "run.toml", executor=InProcess()).record["counts"]
+    writers = {"dead": "4194305", "living": str(os.getpid()), "elsewhere": "1@another-machine"}
+    parts = {name: f".XX.S003.{writer}.part.json" for name, writer in writers.items()}
+    for path in parts.values():
+        (out / "stations" / path).write_bytes(b"{half")
+        (out / "chunks" / path).write_bytes(b"{half")
+    (out / ".tmpabc.4194305.part").mkdir()
+    after = again(copied / "run.toml").record["counts"]
+    assert (after["pairs"], after["stations"]) == (before["pairs"], before["stations"])
+    # of stations only what no process can still be writing is removed
+    left = {name for name, path in parts.items() if (out / "stations" / path).exists()}
+    assert left == {"living", "elsewhere"}
+    assert not (out / "chunks" / parts["dead"]).exists()
+    assert not (out / ".tmpabc.4194305.part").exists()
 
 
 def test_changed_settings_are_not_resumed(copied):
