@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pyarrow.dataset import Dataset, dataset
 from pyarrow.fs import LocalFileSystem
 
+from per_obspy.errors import MachineFault
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.screening.ranking import KEYS
 from per_obspy.tables.table_files import as_arrow
@@ -38,7 +39,14 @@ _ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 @contextmanager
 def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Give a database of bounded memory, which leaves the rest to a temporary folder inside."""
+    """
+    Give a database of bounded memory, which leaves the rest to a temporary folder inside.
+
+    Raises
+    ------
+    MachineFault
+        If the machine has less memory than the database needs.
+    """
     with temporary_folder(folder) as room:
         settings: dict[str, str | bool | int | float | list[str]] = {
             "memory_limit": MEMORY,
@@ -48,7 +56,10 @@ def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
             # Otherwise columns without empty cells are marked so when there is one part, and not
             # when there are two
             database.execute("SET disabled_optimizers = 'statistics_propagation'")
-            yield database
+            try:
+                yield database
+            except duckdb.OutOfMemoryException as error:
+                raise MachineFault(f"{folder}: not enough memory to join the rows") from error
 
 
 def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) -> Dataset:

@@ -8,9 +8,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from per_obspy.errors import MachineFault
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables import parts
-from per_obspy.tables.parts import joined_rows, joined_schema, write_part
+from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, write_part
 
 
 def table(count, seed, first=0):
@@ -84,3 +85,12 @@ def test_columns_of_the_order_are_left_out(tmp_path):
     paths = written(tmp_path, [table(5, seed=2)])
     assert joined_schema(paths).names == list(table(5, seed=2))
     assert "order_part" in pq.read_schema(paths[0]).names
+
+
+def test_a_database_without_memory_is_a_fault_of_the_machine(tmp_path):
+    # 80 MB of numbers in the order of another column do not fit into 10 MB without a folder
+    query = "SELECT * FROM range(10000000) AS rows(number) ORDER BY hash(number)"
+    with pytest.raises(MachineFault, match="not enough memory"), bounded_database(tmp_path) as base:
+        base.execute("SET memory_limit = '10MB'")
+        base.execute("SET max_temp_directory_size = '0KB'")
+        base.execute(query).fetchall()
