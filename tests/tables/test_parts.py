@@ -90,7 +90,12 @@ def test_columns_of_the_order_are_left_out(tmp_path):
 def test_a_database_without_memory_is_a_fault_of_the_machine(tmp_path):
     # 80 MB of numbers in the order of another column do not fit into 10 MB without a folder
     query = "SELECT * FROM range(10000000) AS rows(number) ORDER BY hash(number)"
-    with pytest.raises(MachineFault, match="not enough memory"), bounded_database(tmp_path) as base:
-        base.execute("SET memory_limit = '10MB'")
-        base.execute("SET max_temp_directory_size = '0KB'")
-        base.execute(query).fetchall()
+
+    def join() -> None:
+        with bounded_database(tmp_path) as database:
+            database.execute("SET memory_limit = '10MB'")
+            database.execute("SET max_temp_directory_size = '0KB'")
+            database.execute(query).fetchall()
+
+    with pytest.raises(MachineFault, match="not enough memory"):
+        join()
