@@ -23,8 +23,8 @@ from per_obspy.report.style import (
 )
 from per_obspy.screening.values import components
 
-#: States in the order in which they are drawn: the worst on top.
-DRAWN_STATES = ("no", "possible", "yes")
+#: States in the order in which they are drawn: the likeliest on top.
+DRAWN_STATES = tuple(reversed(STATE_COLOURS))
 
 
 def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
@@ -167,7 +167,7 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
     for state in DRAWN_STATES:
         chosen = table[table["state"] == state]
         axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
-    # Pairs below the line pound
+    # The demand of the medians; the state is that of the whole population
     demand, gap = 100 * float(table["demand"].max()), 100 * float(table["gap"].max())
     axes.plot([0.0, demand], [0.0, demand], color="black", linewidth=0.8, label="gap = demand")
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)", title="gap against demand")

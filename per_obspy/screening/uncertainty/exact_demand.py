@@ -1,11 +1,10 @@
 """
-Probability of pounding at one station; exact demands are sampled over uncertain buildings.
+Population of pairs at one station; where the record supports a pair, by its exact demand.
 
-Where the exact demand decides and a period or a damping has a log-standard deviation, the record
-drives a sample of both buildings: periods and dampings at quasi-random nodes, the two buildings
-independently. Each demand is scaled with the motion at the site, and the probability is the mean
-over the nodes of the chance that a demand exceeds the gap. So equal buildings of uncertain period
-or damping are not certain to move as one.
+The record drives the buildings of every node, and their exact relative displacement is the demand
+of the node, whether periods were given or derived. So equal buildings of uncertain period or
+damping are not certain to move as one. Elsewhere, and where the estimate leaves no doubt that a
+pair of derived periods stays apart, estimates take the place of the record.
 
 Against 4096 nodes, for 320 pairs in 18 real records (periods 0.3 to 3 s, one in three pairs of
 equal periods, log-standard deviations 0.2 or 0.3 of periods, dampings or both), the probability is
@@ -16,54 +15,66 @@ nodes    32    64   128   256
 error  .069  .035  .021  .015
 ===== ===== ===== ===== =====
 
-Where the first 64 nodes leave no doubt the other 64 are spared: of such pairs 95 in 100 are wrong
-by less than .003, 99 in 100 by less than .016.
+Where the first nodes leave no doubt about contact the others are spared.
+``workflows/population_accuracy.py`` compares populations with draws of exact histories.
 """
 
 import numpy as np
-from scipy.special import ndtr
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
-from per_obspy.screening.by_record.exact import can_yield, exact_demand
+from per_obspy.screening.by_record.exact import can_yield, exact_demand, record_supports
 from per_obspy.screening.by_record.station_motion import StationMotion
-from per_obspy.screening.by_record.yielding import LARGEST_DAMPING
-from per_obspy.screening.uncertainty.probability import (
+from per_obspy.screening.uncertainty.estimated import (
+    SAMPLES,
+    UncertainMotion,
+    estimated_motion,
+    estimated_population,
+)
+from per_obspy.screening.uncertainty.nodes import (
     NODES,
     building_is_uncertain,
+    damping_at_nodes,
     gap_dispersion,
-    median_gap,
-    pair_probability,
+    period_at_nodes,
+)
+from per_obspy.screening.uncertainty.population import (
+    COLUMNS,
+    Uncertain,
+    chance_of_contact,
+    population,
 )
 from per_obspy.screening.uncertainty.record_motion import is_exact, pair_at_site, record_motion
-from per_obspy.screening.values import Columns, Table, chosen, values
+from per_obspy.screening.uncertainty.severity import RelativeMotion, impact_velocity
+from per_obspy.screening.values import Columns, Table, both, chosen, values
 
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
 YIELDING_NODES = 32
 
-#: Nodes after which a pair is certain if its probability is this near to 0 or 1.
-FIRST_NODES, CERTAIN = 64, 5e-4
+#: Nodes of touching pairs: their mean impact velocity is within 4 % of that of 128 nodes in the
+#: median, and within 15 % at nine pairs in ten (180 pairs of derived periods in 3 real records).
+TOUCHING_NODES = 16
 
-#: Oscillator pairs (pairs times nodes) that are computed together: about 10 MB.
-SAMPLES = 32_768
+#: Nodes after which a pair is certain if its probability is this near to 0 or 1.
+FIRST_NODES, CERTAIN = 32, 5e-4
+
+#: Probability by the estimate below which pairs of derived periods are not driven by the record.
+NEGLIGIBLE = 1e-4
 
 #: Demand / sum of the radii below which two oscillators move as one.
 ROUND_OFF = 1e-12
 
-#: Demand / largest demand of the pair's nodes below which its logarithm does not count in the
-#: spread of the nodes.
-NEGLIGIBLE = 1e-3
+#: Exact impact velocity at the medians / that of ``severity.py``: limits of what is believed.
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 
-#: Interquartile range over standard deviation of a normal variable.
-NORMAL_QUARTILES = 1.349
-
-#: Columns of one building from which the exact demand follows.
-BUILDING = ("period", "damping", "participation", "yield_displacement", "hardening", "per")
+#: Columns of one building, besides those at nodes, from which the exact demand follows.
+BUILDING = ("participation", "yield_displacement", "hardening", "per")
 
 
-def record_probability(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
+def record_population(station: StationMotion, table: Table, screening: Screening) -> Columns:
     """
-    Compute the probability of pounding of every pair at one station.
+    Compute the population of every pair at one station.
 
     Parameters
     ----------
@@ -76,63 +87,119 @@ def record_probability(station: StationMotion, table: Table, screening: Screenin
 
     Returns
     -------
-    probability : (n_pairs,) ndarray
-        From 0 to 1.
+    dict of (n_pairs,) ndarray
+        ``population.COLUMNS``. Where the exact demand decides and nothing is uncertain, what the
+        exact history gives.
     """
-    probability = pair_probability(record_motion(station, table, screening), station.per, table)
-    # exact demand of uncertain buildings: sampled, yielding pairs at fewer nodes
-    sampled = is_exact(table) & building_is_uncertain(table)
-    yields = can_yield(table)
-    for rows, nodes in ((sampled & ~yields, NODES), (sampled & yields, NODES[:YIELDING_NODES])):
-        if rows.any():
-            probability[rows] = sampled_probability(station, chosen(table, rows), nodes)
-    return probability
+    exact = is_exact(table)
+    result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
+    # estimates, which tell too which pairs of derived periods may touch at all
+    estimated = np.flatnonzero(~exact)
+    if estimated.size:
+        part = chosen(table, estimated)
+        motion = record_motion(station, part, screening)
+        _fill(result, estimated, estimated_population(motion, station.per, part))
+    by_record = exact | _may_touch(station, table, result["probability"])
+    # exact demands; of yielding pairs at fewer nodes, and of touching ones, which surely touch
+    sampled, yields = by_record & building_is_uncertain(table), can_yield(table)
+    touching = values(table, "gap") == 0.0
+    kinds = (
+        (by_record & ~sampled, NODES, False),
+        (sampled & touching, NODES[:TOUCHING_NODES], True),
+        (sampled & ~touching & yields, NODES[:YIELDING_NODES], True),
+        (sampled & ~touching & ~yields, NODES, True),
+    )
+    for mask, nodes, is_sampled in kinds:
+        rows = np.flatnonzero(mask)
+        size = SAMPLES // len(NODES)
+        # blocks bound the memory; a pair does not depend on its block
+        for first in range(0, rows.size, size):
+            block = rows[first : first + size]
+            part = _with_exact_demand(chosen(table, block))
+            motion = record_motion(station, part, screening)
+            found = _sampled if is_sampled else _of_certain_buildings
+            _fill(result, block, found(station, motion, part, nodes))
+    return result
 
 
-def sampled_probability(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
+def _fill(result: Columns, rows: NDArray[np.intp], part: Columns) -> None:
+    """Put the columns of some rows in place."""
+    for name, column in part.items():
+        result[name][rows] = column
+
+
+def _may_touch(station: StationMotion, table: Table, estimated: FloatArray) -> NDArray[np.bool_]:
+    """Return where the record supports a pair that an estimate decides and that may touch."""
+    known = np.isfinite(values(table, "demand_exact"))
+    likely = np.nan_to_num(estimated) >= NEGLIGIBLE
+    return known & ~is_exact(table) & record_supports(station, table) & likely
+
+
+def _with_exact_demand(table: Columns) -> Columns:
+    """Return the table with the exact demand as the one that decides."""
+    return table | {"demand_rule": np.full(len(table["gap"]), "exact", dtype=object)}
+
+
+def _of_certain_buildings(
+    station: StationMotion, motion: UncertainMotion, table: Table, nodes: FloatArray
+) -> Columns:
+    """Return the population of pairs of which at most motion and gap are uncertain."""
+    ln_ratio, log_std = pair_at_site(table)
+    demand = values(table, "demand_exact") * np.exp(ln_ratio)
+    moving = _scaled(station, motion, table, nodes[:1] * 0.0, demand[:, None])
+    uncertain = Uncertain(moving, log_std, _known_factor(table, moving, ln_ratio))
+    result = population(uncertain, table, nodes)
+    # nothing uncertain: the exact history itself
+    certain = (log_std == 0.0) & (ln_ratio == 0.0) & (gap_dispersion(table) == 0.0)
+    velocity = np.nan_to_num(values(table, "impact_velocity_exact"))
+    amplified = np.fmax(*both(table, "amplification_exact"))
+    history = {
+        "expected_impact_velocity": velocity,
+        "impact_velocity_84": velocity,
+        "expected_amplification": np.where(velocity > 0.0, np.fmax(amplified, 1.0), 1.0),
+    }
+    return result | {name: np.where(certain, history[name], result[name]) for name in history}
+
+
+def _sampled(
+    station: StationMotion, motion: UncertainMotion, table: Columns, nodes: FloatArray
+) -> Columns:
+    """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
+    _, log_std = pair_at_site(table)
+    demands = node_demands(station, table, nodes[:FIRST_NODES])
+    chance = chance_of_contact(demands, log_std, table)
+    doubtful = (chance > CERTAIN) & (chance < 1.0 - CERTAIN)
+    result: Columns = {name: np.empty(chance.size) for name in COLUMNS}
+    for mask, taken in ((~doubtful, nodes[:FIRST_NODES]), (doubtful, nodes)):
+        rows = np.flatnonzero(mask)
+        if not rows.size:
+            continue
+        block, known = chosen(table, rows), demands[rows]
+        # the first nodes are known already
+        others = node_demands(station, block, taken[FIRST_NODES:])
+        every = np.concatenate([known, others], axis=1)
+        moving = _scaled(station, motion.rows(rows), block, taken, every)
+        factor = _factor_of_yielding(station, motion.rows(rows), block)
+        uncertain = Uncertain(moving, log_std[rows], factor)
+        _fill(result, rows, population(uncertain, block, taken))
+    return result
+
+
+def node_demands(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
     """
-    Compute the probability that the exact demand of uncertain buildings exceeds the gap.
+    Return exact demands at the site at nodes of both buildings, (n_pairs, n_nodes), m.
 
     Parameters
     ----------
     station : StationMotion
         The record.
     table : Table
-        Rows of the risk table whose exact demand decides.
-    nodes : (n_nodes, 4) ndarray
-        Standard normal nodes of ln period and ln damping of building 1, then of building 2.
-
-    Returns
-    -------
-    probability : (n_pairs,) ndarray
-        From 0 to 1; of a gap of 0 the share of nodes with a demand.
+        Rows of the risk table.
+    nodes : (n_nodes, 6) ndarray
+        As ``nodes.NODES``.
     """
-    count = len(values(table, "gap"))
-    probability = np.empty(count)
-    size = max(SAMPLES // len(nodes), 1)
-    # blocks bound the memory; a pair does not depend on its block
-    for first in range(0, count, size):
-        rows = np.arange(first, min(first + size, count))
-        probability[rows] = _of_block(station, chosen(table, rows), nodes)
-    return probability
-
-
-def _of_block(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
-    """Return the probability of pairs, at all nodes where the first ones leave a doubt."""
-    demands = _demands(station, table, nodes[:FIRST_NODES])
-    probability = _mean_chance(demands, table)
-    doubtful = (probability > CERTAIN) & (probability < 1.0 - CERTAIN)
-    # mean over all nodes, the first ones included
-    if len(nodes) > FIRST_NODES and doubtful.any():
-        block = chosen(table, doubtful)
-        others = _demands(station, block, nodes[FIRST_NODES:])
-        every = np.concatenate([demands[doubtful], others], axis=1)
-        probability[doubtful] = _mean_chance(every, block)
-    return probability
-
-
-def _demands(station: StationMotion, table: Table, nodes: FloatArray) -> FloatArray:
-    """Return exact demands at the site, (n_pairs, n_nodes), m."""
+    if not len(nodes):
+        return np.empty((len(table["gap"]), 0))
     azimuth = np.repeat(values(table, "azimuth_used"), len(nodes))
     demand = exact_demand(station, _sampled_buildings(table, nodes), azimuth)
     demand = demand.reshape(-1, len(nodes))
@@ -148,38 +215,48 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     for i in (1, 2):
         for name in BUILDING:
             sample[f"{name}_{i}"] = np.repeat(values(table, f"{name}_{i}"), len(nodes))
-        # lognormal period and damping
-        for name, node in zip(("period", "damping"), nodes.T[2 * i - 2 : 2 * i], strict=True):
-            deviation = values(table, f"{name}_log_std_{i}")
-            sample[f"{name}_{i}"] *= np.exp(deviation[:, None] * node).ravel()
-        # an oscillator has less than the critical damping
-        largest = np.maximum(np.repeat(values(table, f"damping_{i}"), len(nodes)), LARGEST_DAMPING)
-        sample[f"damping_{i}"] = np.minimum(sample[f"damping_{i}"], largest)
+        period = period_at_nodes(values(table, f"period_{i}"), table, i, nodes)
+        damping = damping_at_nodes(values(table, f"damping_{i}"), table, i, nodes)
+        sample[f"period_{i}"], sample[f"damping_{i}"] = period.ravel(), damping.ravel()
     return sample
 
 
-def _mean_chance(demands: FloatArray, table: Table) -> FloatArray:
-    """Return the mean over the nodes of the chance that a demand exceeds an uncertain gap."""
-    gap = median_gap(table)
-    _, motion_log_std = pair_at_site(table)
-    known = np.hypot(gap_dispersion(table), motion_log_std)
-    # nodes are smoothed as far as nothing else is uncertain
-    dispersion = np.maximum(known, _smoothing(demands))[:, None]
-    comparable = (demands > 0) & (gap > 0)[:, None] & (dispersion > 0)
-    # lognormal demand over gap; without dispersion the demand is above the gap or not
-    ratio = np.divide(demands, gap[:, None], out=np.ones_like(demands), where=comparable)
-    margin = np.divide(np.log(ratio), dispersion, out=np.zeros_like(ratio), where=comparable)
-    chance = np.where(comparable, ndtr(margin), demands > gap[:, None])
-    mean: FloatArray = chance.mean(axis=1)
-    return mean
+def _scaled(
+    station: StationMotion,
+    motion: UncertainMotion,
+    table: Table,
+    nodes: FloatArray,
+    demand: FloatArray,
+) -> RelativeMotion:
+    """Return the motion at nodes with exact demands: velocities follow by their frequency."""
+    estimate = estimated_motion(motion, station.per, table, nodes)
+    period_1, period_2 = both(table, "period")
+    between = np.broadcast_to((2.0 * np.pi / np.sqrt(period_1 * period_2))[:, None], demand.shape)
+    # circular frequency of the relative motion; between both where an estimate has none
+    moves = estimate.demand > 0.0
+    frequency = np.divide(estimate.velocity, estimate.demand, out=between.copy(), where=moves)
+    return estimate._replace(demand=demand, velocity=frequency * demand)
 
 
-def _smoothing(demands: FloatArray) -> FloatArray:
-    """Return the log-standard deviation of a node: of all nodes over the root of their number."""
-    largest = demands.max(axis=1, keepdims=True)
-    floor = np.maximum(NEGLIGIBLE * largest, np.finfo(np.float64).tiny)
-    logs = np.log(np.maximum(demands, floor))
-    # the smaller of two measures of spread: few nodes far off do not count
-    lower, upper = np.quantile(logs, (0.25, 0.75), axis=1)
-    spread = np.minimum(logs.std(axis=1), (upper - lower) / NORMAL_QUARTILES)
-    return np.asarray(spread / np.sqrt(demands.shape[1]))
+def _known_factor(table: Table, motion: RelativeMotion, ln_ratio: FloatArray) -> FloatArray:
+    """Return the exact impact velocity over that of ``severity.py``; 1 if unknown."""
+    gap, at_record = values(table, "gap")[:, None], np.exp(-ln_ratio)[:, None]
+    estimate = impact_velocity(motion, at_record, gap)[:, 0]
+    exact = values(table, "impact_velocity_exact")
+    known = (exact > 0.0) & (estimate > 0.0)
+    factor = np.divide(exact, estimate, out=np.ones_like(exact), where=known)
+    return np.clip(factor, SMALLEST_FACTOR, LARGEST_FACTOR)
+
+
+def _factor_of_yielding(
+    station: StationMotion, motion: UncertainMotion, table: Columns
+) -> FloatArray:
+    """Return :func:`_known_factor` where a building can yield, to which no fit applies; else 1."""
+    factor, yields = np.ones(motion.row.size), np.flatnonzero(can_yield(table))
+    if yields.size:
+        block, ln_ratio = chosen(table, yields), pair_at_site(table)[0][yields]
+        demand = values(block, "demand_exact") * np.exp(ln_ratio)
+        median = np.zeros((1, NODES.shape[1]))
+        moving = _scaled(station, motion.rows(yields), block, median, demand[:, None])
+        factor[yields] = _known_factor(block, moving, ln_ratio)
+    return factor

@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
-from per_obspy.screening.by_record.stored_spectra import log_oscillator, stored_log
+from per_obspy.screening.uncertainty.estimated import UncertainMotion, UncertainRadius
 from per_obspy.screening.uncertainty.pair_motion import pair_motion
-from per_obspy.screening.uncertainty.probability import (
-    UncertainMotion,
-    UncertainRadius,
-    period_is_uncertain,
-)
 from per_obspy.screening.values import Table, at_contact, both, values
 
 
@@ -41,21 +36,18 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     Returns
     -------
     UncertainMotion
-        Its rows are those of the stored PER of the station. The exact demand is that of certain
-        buildings; :mod:`.exact_demand` samples it where they are uncertain.
+        Its rows are those of the stored PER of the station. Where the exact demand decides the
+        radii are those of PER, without the error of an estimate.
     """
-    first, second = (_radius(station, table, i, screening) for i in (1, 2))
-    # the exact demand and its deviation change with the motion of both buildings at the site
-    pair_ln_ratio, pair_log_std = pair_at_site(table)
-    at_site = values(table, "demand_exact") * np.exp(pair_ln_ratio)
+    first, second = (_radius(table, i, screening) for i in (1, 2))
+    _, pair_log_std = pair_at_site(table)
     deviations = screening.linearized_dispersion, screening.model_dispersion
+    model_log_std = np.where(_linearized(table), *deviations)
     return UncertainMotion(
         first,
         second,
         correlation=_governing_correlation(table),
-        pair_log_std=pair_log_std,
-        model_log_std=np.where(_linearized(table), *deviations),
-        exact_demand=np.where(is_exact(table), at_site, np.nan),
+        log_std=np.hypot(pair_log_std, np.where(is_exact(table), 0.0, model_log_std)),
         row=nearest_azimuth(station, table),
     )
 
@@ -80,16 +72,15 @@ def is_exact(table: Table) -> NDArray[np.bool_]:
     return np.asarray(table["demand_rule"] == "exact")
 
 
-def _radius(station: StationMotion, table: Table, i: int, screening: Screening) -> UncertainRadius:
+def _radius(table: Table, i: int, screening: Screening) -> UncertainRadius:
     """Return the radius of building i at contact height, with its oscillator and uncertainties."""
     # the median of the estimate over the exact demand is taken off the radius
-    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
-    ln_ratio, motion_log_std = _site_motion(table, i)
+    estimate = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    bias = np.where(is_exact(table), 1.0, estimate)
+    ln_ratio, _ = _site_motion(table, i)
     return UncertainRadius(
         radius=values(table, f"participation_{i}") * _deciding(table, f"per_{i}") / bias,
         ln_ratio=ln_ratio,
-        motion_log_std=motion_log_std,
-        damping_log_std=_damping_dispersion(station, table, i),
         period=_deciding(table, f"period_{i}"),
         damping=_deciding(table, f"damping_{i}"),
     )
@@ -120,18 +111,3 @@ def _site_motion(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
         return at_record, at_record
     ln_ratio, log_std = values(table, f"ln_per_ratio_{i}"), values(table, f"ln_per_std_{i}")
     return np.nan_to_num(ln_ratio), np.nan_to_num(log_std)
-
-
-def _damping_dispersion(station: StationMotion, table: Table, i: int) -> FloatArray:
-    """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
-    single = ~is_exact(table) & ~period_is_uncertain(table)
-    row = nearest_azimuth(station, table)[single]
-    period, damping = log_oscillator(table, i)
-    period, damping = period[single], damping[single]
-    deviation = values(table, f"damping_log_std_{i}")[single]
-    # half the difference between one deviation below and above
-    low = stored_log(station.per, row, period, damping - deviation)
-    high = stored_log(station.per, row, period, damping + deviation)
-    dispersion = np.zeros(single.size)
-    dispersion[single] = np.abs(high - low) / 2.0
-    return dispersion

@@ -13,9 +13,10 @@ from per_obspy.config import Screening
 from per_obspy.pounding.history.relative import directional_relative_displacement
 from per_obspy.records.text_table import read_columns
 from per_obspy.screening.by_record.station_motion import station_motion
-from per_obspy.screening.uncertainty import exact_demand
-from per_obspy.screening.uncertainty.exact_demand import record_probability, sampled_probability
-from per_obspy.screening.uncertainty.probability import NODES
+from per_obspy.screening.uncertainty import estimated, exact_demand
+from per_obspy.screening.uncertainty.exact_demand import node_demands, record_population
+from per_obspy.screening.uncertainty.nodes import NODES
+from per_obspy.screening.uncertainty.population import COLUMNS, chance_of_contact
 
 #: Two equal buildings of given dampings, at contact height of one-storey oscillators.
 EQUAL = {
@@ -105,7 +106,7 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     table = table_of(station, [{**EQUAL, "period_2": 1.5, **DOUBT, "gap": 0.3, "gap_std": 0.12}])
     at_site = table.assign(ln_per_ratio_1=0.2, ln_per_ratio_2=0.2, ln_per_std_1=0.3, ln_per_std_2=0)
     # only period 1 varies
-    nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.array([1.0, 0.0, 0.0, 0.0])
+    nodes = ndtri((np.arange(64) + 0.5) / 64)[:, None] * np.eye(6)[0]
     demand = directional_relative_displacement(
         record.north, record.east, record.dt, 2.0 * np.exp(0.2 * nodes[:, 0]), 0.05, 1.5, 0.05, 30.0
     ).one_before_two
@@ -114,7 +115,8 @@ def test_an_uncertain_gap_and_motion_widen_every_node(station, record):
     factor = np.exp(0.2 + motion_log_std * random.normal(size=count))
     pounds = random.choice(demand, count) * factor > _drawn_gap(0.3, 0.12, count, random)
     # standard error of 200 000 samples: 0.0011
-    found = sampled_probability(record, at_site, nodes)
+    demands = node_demands(record, at_site, nodes)
+    found = chance_of_contact(demands, motion_log_std, at_site)
     assert_allclose(found[0], np.mean(pounds), atol=0.004)
 
 
@@ -143,15 +145,21 @@ def test_nothing_that_is_likely_enough_is_a_no(station):
         for doubt in (DOUBT, {"damping_1": np.nan})
     ]
     table = _table(station, rows)
-    likely = table["probability"] >= Screening().possible_from
+    likely = table["probability"] >= Screening().states.unlikely
     assert likely.any()
     assert "no" not in set(table["state"][likely])
 
 
 def test_certain_buildings_are_not_sampled(station, record, monkeypatch):
-    monkeypatch.setattr(exact_demand, "sampled_probability", None)
+    monkeypatch.setattr(exact_demand, "node_demands", None)
     table = table_of(station, [EQUAL | {"period_2": 1.3, "gap": 0.01}])
-    assert record_probability(record, table, Screening()).tolist() == [1.0]
+    assert record_population(record, table, Screening())["probability"].tolist() == [1.0]
+
+
+def _population(record, table):
+    """Return the columns of the population, (n_columns, n_pairs)."""
+    found = record_population(record, table, Screening())
+    return np.array([found[name] for name in COLUMNS])
 
 
 def test_blocks_do_not_change_a_bit(monkeypatch):
@@ -164,18 +172,20 @@ def test_blocks_do_not_change_a_bit(monkeypatch):
         for number, period in enumerate(periods)
     ]
     table = table_of(station, rows)
-    together = record_probability(record, table, Screening())
-    assert len(set(together.tolist())) > 5
+    together = _population(record, table)
+    assert len(set(together[0].tolist())) > 5
     # blocks of three pairs, and each pair in a table of its own
     monkeypatch.setattr(exact_demand, "SAMPLES", 3 * len(NODES))
-    assert_array_equal(record_probability(record, table, Screening()), together)
-    alone = [record_probability(record, table.iloc[[i]], Screening())[0] for i in range(len(table))]
-    assert_array_equal(alone, together)
+    monkeypatch.setattr(estimated, "SAMPLES", 3 * len(NODES))
+    assert_array_equal(_population(record, table), together)
+    alone = [_population(record, table.iloc[[i]])[:, 0] for i in range(len(table))]
+    assert_array_equal(np.transpose(alone), together)
 
 
 def test_a_record_of_one_horizontal_has_no_exact_demand_to_sample():
     single = make_station(channels=("HNN",))
     table = table_of(single, [{**EQUAL, **DOUBT}])
     assert not exact_demand.is_exact(table).any()
-    probability = record_probability(station_motion(single), table, Screening())
-    assert 0.0 <= probability[0] <= 1.0
+    found = record_population(station_motion(single), table, Screening())
+    assert 0.0 <= found["probability"][0] <= 1.0
+    assert np.isfinite(found["expected_impact_velocity"][0])
