@@ -33,10 +33,10 @@ OTHERS = ("kaikoura2016_geonet", "ridgecrest2019_mseed", "itaca2009", "afad2023"
 
 #: Stations of an event and pairs of a station at most, draws of a pair, and the heading below which
 #: the page is the script's.
-STATIONS, PAIRS, DRAWS, MEASURED = 2, 40, 4096, "## Measured"
+STATIONS, PAIRS, DRAWS, MEASURED = 2, 16, 4096, "## Measured"
 
 #: Draws of pairs that can yield: their histories take ten times as long.
-YIELDING_DRAWS = 512
+YIELDING_DRAWS = 256
 
 #: Given periods (s), and heights (m) from which periods are derived.
 PERIODS = ((0.5, 0.52), (0.4, 0.4), (1.2, 1.2), (0.3, 0.8), (0.7, 1.1), (2.0, 1.7), (1.0, 2.5))
@@ -92,7 +92,7 @@ def screened(station: xr.Dataset, number: int) -> pd.DataFrame:
         heights = {"height_1": height_1, "height_2": height_2}
         rows.append(heights | {"share": gap, "kind": KINDS[2]})
     random = np.random.default_rng(number)
-    table = pd.DataFrame(rows).sample(PAIRS, random_state=number).reset_index(drop=True)
+    table = pd.DataFrame(rows).sample(PAIRS, random_state=random).reset_index(drop=True)
     table["pair_id"] = [f"{index:03}" for index in range(len(table))]
     table["azimuth"] = random.uniform(0.0, 360.0, len(table))
     table["mass_2"], table["mass_1"] = np.exp(random.normal(0.0, 0.5, len(table))) * 1e6, 1e6
@@ -155,8 +155,9 @@ def compared(events: tuple[str, ...]) -> pd.DataFrame:
     """Return populations beside draws, of all pairs at all stations of some events."""
     rows = []
     for event in events:
-        for number, station in enumerate(stations(event)):
-            table, random = screened(station, number), np.random.default_rng(number + 100)
+        for station in stations(event):
+            number = len(rows)
+            table, random = screened(station, number), np.random.default_rng(number)
             names = (*COLUMNS, *(f"estimated_{name}" for name in COLUMNS), "kind", "gap", "share")
             for _, pair in table.iterrows():
                 kept = {name: pair[name] for name in names}

@@ -147,7 +147,8 @@ def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Pa
 
 def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     """Draw pairs in the colours of their states, and stations."""
-    for state in DRAWN_STATES:
+    drawn = [state for state in DRAWN_STATES if state in set(table["state"])]
+    for state in drawn:
         chosen = table[table["state"] == state]
         colour, label = STATE_COLOURS[state], f"{len(chosen)} pairs: {state}"
         axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=colour, label=label)
