@@ -147,6 +147,7 @@ def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Pa
 
 def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     """Draw pairs in the colours of their states, and stations."""
+    # states that a pair has
     drawn = [state for state in DRAWN_STATES if state in set(table["state"])]
     for state in drawn:
         chosen = table[table["state"] == state]

@@ -43,4 +43,4 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
 
 def test_every_state_has_a_colour_of_its_own():
     assert list(STATE_COLOURS) == ["yes", "likely", "possible", "unlikely", "no"]
-    assert len(set(STATE_COLOURS.values())) == 3
+    assert len(set(STATE_COLOURS.values())) == len(STATE_COLOURS)

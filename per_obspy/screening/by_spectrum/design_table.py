@@ -180,6 +180,7 @@ def _rows(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening) -
     first, second = _oscillators(pairs)
     displacement = displacement_at(spectrum, *first), displacement_at(spectrum, *second)
     demand = spectral_demand(pairs, displacement)
+    # resampled periods reach beyond the spectrum
     population = estimated_population(*uncertain_design_motion(spectrum, pairs, demand), pairs)
     rule = np.where(demand.squares_decide, "sd_srss", "sd_white_noise").astype(object)
     table = pairs.assign(spectrum=spectrum.name, demand_rule=rule)

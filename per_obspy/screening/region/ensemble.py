@@ -196,12 +196,20 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
         severity = rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64)
         beyond = np.nan_to_num(severity - unknown)
         columns[name] = unknown + _weighted_sum(beyond.T, weight / weight.sum())
-    # The scenario that is worst for each pair; the likeliest of those without impact
-    velocity = rows[[f"expected_impact_velocity_{name}" for name in weights]].to_numpy(np.float64)
-    order = np.lexsort((pounding, np.nan_to_num(velocity)), axis=1)
-    worst = np.array(list(weights), dtype=object)[order[:, -1]]
+    # in the order of the table
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
-    return rows.assign(**columns, worst_scenario=worst)[names].reset_index(drop=True)
+    return rows.assign(**columns, worst_scenario=_worst(rows, weights))[names].reset_index(
+        drop=True
+    )
+
+
+def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.object_]:
+    """Return the scenario of the hardest impact of each pair; the likeliest of equal ones."""
+    probability = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
+    velocity = rows[[f"expected_impact_velocity_{name}" for name in weights]].to_numpy(np.float64)
+    # the last key decides; the first scenario of those alike
+    order = np.lexsort((-probability, -np.nan_to_num(velocity)), axis=1)
+    return np.array(list(weights), dtype=object)[order[:, 0]]
 
 
 def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:

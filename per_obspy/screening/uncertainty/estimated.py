@@ -137,6 +137,7 @@ def estimated_motion(
     """
     period_1, damping_1, radius_1 = _at_nodes(motion.first, motion.row, spectra, pairs, 1, nodes)
     period_2, damping_2, radius_2 = _at_nodes(motion.second, motion.row, spectra, pairs, 2, nodes)
+    # eq. (16), shifted as that which governs at the medians
     by_noise = ddc_correlation(period_1, damping_1, period_2, damping_2)
     first, second = motion.first, motion.second
     at_medians = ddc_correlation(first.period, first.damping, second.period, second.damping)

@@ -93,33 +93,37 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     """
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
-    # estimates, which tell too which pairs of derived periods may touch at all
+    # estimates, which show too which pairs of derived periods may touch at all
     estimated = np.flatnonzero(~exact)
     if estimated.size:
         part = chosen(table, estimated)
         motion = record_motion(station, part, screening)
         _fill(result, estimated, estimated_population(motion, station.per, part))
+    # exact demands in blocks, which bound the memory; a pair does not depend on its block
     by_record = exact | _may_touch(station, table, result["probability"])
-    # exact demands; of yielding pairs at fewer nodes, and of touching ones, which surely touch
-    sampled, yields = by_record & building_is_uncertain(table), can_yield(table)
-    touching = values(table, "gap") == 0.0
-    kinds = (
-        (by_record & ~sampled, NODES, False),
-        (sampled & touching, NODES[:TOUCHING_NODES], True),
-        (sampled & ~touching & yields, NODES[:YIELDING_NODES], True),
-        (sampled & ~touching & ~yields, NODES, True),
-    )
-    for mask, nodes, is_sampled in kinds:
-        rows = np.flatnonzero(mask)
-        size = SAMPLES // len(NODES)
-        # blocks bound the memory; a pair does not depend on its block
+    size = SAMPLES // len(NODES)
+    for mask, nodes in _kinds(table):
+        rows = np.flatnonzero(by_record & mask)
         for first in range(0, rows.size, size):
             block = rows[first : first + size]
             part = _with_exact_demand(chosen(table, block))
             motion = record_motion(station, part, screening)
-            found = _sampled if is_sampled else _of_certain_buildings
-            _fill(result, block, found(station, motion, part, nodes))
+            found = _of_certain_buildings if nodes is None else _sampled
+            _fill(result, block, found(station, motion, part, NODES if nodes is None else nodes))
     return result
+
+
+def _kinds(table: Table) -> list[tuple[NDArray[np.bool_], FloatArray | None]]:
+    """Return masks of pairs, each with its nodes of both buildings; None of certain buildings."""
+    uncertain, yields = building_is_uncertain(table), can_yield(table)
+    touching = values(table, "gap") == 0.0
+    # fewer nodes of yielding pairs, and of touching ones, which surely touch
+    return [
+        (~uncertain, None),
+        (uncertain & touching, NODES[:TOUCHING_NODES]),
+        (uncertain & ~touching & yields, NODES[:YIELDING_NODES]),
+        (uncertain & ~touching & ~yields, NODES),
+    ]
 
 
 def _fill(result: Columns, rows: NDArray[np.intp], part: Columns) -> None:
@@ -144,6 +148,7 @@ def _of_certain_buildings(
     station: StationMotion, motion: UncertainMotion, table: Table, nodes: FloatArray
 ) -> Columns:
     """Return the population of pairs of which at most motion and gap are uncertain."""
+    # the only demand, at the site
     ln_ratio, log_std = pair_at_site(table)
     demand = values(table, "demand_exact") * np.exp(ln_ratio)
     moving = _scaled(station, motion, table, nodes[:1] * 0.0, demand[:, None])
@@ -165,6 +170,7 @@ def _sampled(
     station: StationMotion, motion: UncertainMotion, table: Columns, nodes: FloatArray
 ) -> Columns:
     """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
+    # first nodes
     _, log_std = pair_at_site(table)
     demands = node_demands(station, table, nodes[:FIRST_NODES])
     chance = chance_of_contact(demands, log_std, table)
@@ -215,6 +221,7 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     for i in (1, 2):
         for name in BUILDING:
             sample[f"{name}_{i}"] = np.repeat(values(table, f"{name}_{i}"), len(nodes))
+        # lognormal period and damping
         period = period_at_nodes(values(table, f"period_{i}"), table, i, nodes)
         damping = damping_at_nodes(values(table, f"damping_{i}"), table, i, nodes)
         sample[f"period_{i}"], sample[f"damping_{i}"] = period.ravel(), damping.ravel()
@@ -242,6 +249,7 @@ def _known_factor(table: Table, motion: RelativeMotion, ln_ratio: FloatArray) ->
     """Return the exact impact velocity over that of ``severity.py``; 1 if unknown."""
     gap, at_record = values(table, "gap")[:, None], np.exp(-ln_ratio)[:, None]
     estimate = impact_velocity(motion, at_record, gap)[:, 0]
+    # both must hit at the medians
     exact = values(table, "impact_velocity_exact")
     known = (exact > 0.0) & (estimate > 0.0)
     factor = np.divide(exact, estimate, out=np.ones_like(exact), where=known)
@@ -253,6 +261,7 @@ def _factor_of_yielding(
 ) -> FloatArray:
     """Return :func:`_known_factor` where a building can yield, to which no fit applies; else 1."""
     factor, yields = np.ones(motion.row.size), np.flatnonzero(can_yield(table))
+    # at the medians of both buildings, where the exact history is known
     if yields.size:
         block, ln_ratio = chosen(table, yields), pair_at_site(table)[0][yields]
         demand = values(block, "demand_exact") * np.exp(ln_ratio)

@@ -40,6 +40,7 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
         radii are those of PER, without the error of an estimate.
     """
     first, second = (_radius(table, i, screening) for i in (1, 2))
+    # by the motion of both buildings, and by the error of an estimate
     _, pair_log_std = pair_at_site(table)
     deviations = screening.linearized_dispersion, screening.model_dispersion
     model_log_std = np.where(_linearized(table), *deviations)

@@ -84,6 +84,7 @@ def amplification(
     received : pair of (n_pairs, 1) ndarray
         Change of velocity of building 1 and of 2 over the impact velocity: eq. (7), (8).
     """
+    # the larger change of velocity over the speed of its building
     largest = np.zeros_like(velocity)
     for share, speed in zip(received, (motion.speed_1, motion.speed_2), strict=True):
         change = np.broadcast_to(RADIUS_SHARE * share * velocity, velocity.shape)
