@@ -26,9 +26,9 @@ SHOWN = {
     "gap": "gap (m)",
     "demand": "demand (m)",
     "state": "pounding",
-    "impact_velocity": "impact (m/s)",
-    "amplification_1": "ampl. 1",
-    "amplification_2": "ampl. 2",
+    "probability": "probability",
+    "expected_impact_velocity": "impact (m/s)",
+    "expected_amplification": "ampl.",
 }
 
 #: Flags of stations that are printed, with their meanings.
@@ -226,11 +226,13 @@ def _print_counts(record: dict[str, Any]) -> None:
         print(_simulated_line(counts))
     for line in _earthquake_lines(record.get("earthquakes", ())):
         print(line)
+    from per_obspy.screening.ranking import STATES
+
     # Stations, pairs by state, and all rejections together
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
     print(
-        f"{counts['stations']} stations, {counts['pairs']} pairs: {counts['yes']} pounding, "
-        f"{counts['possible']} possible, {counts['no']} not; {rejected} rejected"
+        f"{counts['stations']} stations, {counts['pairs']} pairs: "
+        f"{', '.join(f'{counts[state]} {state}' for state in STATES)}; {rejected} rejected"
     )
 
 
@@ -275,9 +277,9 @@ def _print_evaluation(found: dict[str, Any]) -> None:
     """Print the agreement of the prediction with the pairs that were inspected."""
     # A share of no pairs is None and left out
     shares = {
-        "of the pounded ones were told yes": found["hit_rate"],
-        "yes or possible": found["hit_rate_with_possible"],
-        "of the others yes": found["false_alarm_rate"],
+        "of the pounded ones were yes or likely": found["hit_rate"],
+        "at least possible": found["hit_rate_with_possible"],
+        "of the others yes or likely": found["false_alarm_rate"],
     }
     words = [f"{value:.0%} {name}" for name, value in shares.items() if value is not None]
     print(f"{found['pairs']} pairs were looked at, {found['pounded']} pounded: {', '.join(words)}")

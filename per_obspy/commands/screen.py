@@ -33,11 +33,12 @@ SPECTRUM_COLUMNS = (
     "demand_rule",
     "state",
     "probability",
-    "impact_velocity",
+    "expected_impact_velocity",
 )
 ENSEMBLE_COLUMNS = (
     "rank",
     "pair_id",
+    "expected_impact_velocity",
     "probability",
     "annual_probability",
     "worst_scenario",
@@ -115,7 +116,9 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
 
 def _state_counts(table: "pd.DataFrame") -> dict[str, int]:
     """Return the number of pairs in each state."""
-    return {state: int((table["state"] == state).sum()) for state in ("yes", "possible", "no")}
+    from per_obspy.screening.ranking import STATES
+
+    return {state: int((table["state"] == state).sum()) for state in STATES}
 
 
 def _print_spectrum_result(

@@ -9,7 +9,7 @@ from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
 from per_obspy.config.run import Design, Pairs, Run, screening_kind
-from per_obspy.config.screening import Building, Codes, Interpolation, Screening, Totals
+from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
 
@@ -38,6 +38,7 @@ __all__ = [
     "SimulatedPairs",
     "Simulation",
     "Spectra",
+    "States",
     "Totals",
     "Window",
     "checked",

@@ -108,6 +108,29 @@ class Codes(Section):
     )
 
 
+class States(Section):
+    """Smallest probability of contact of each state; a pair below all of them is a ``no``."""
+
+    yes: float = Field(0.9, gt=0, le=1, description="probability from which contact is a yes")
+    likely: float = Field(0.5, gt=0, le=1, description="probability from which contact is likely")
+    possible: float = Field(
+        0.1, gt=0, le=1, description="probability from which contact is possible"
+    )
+    unlikely: float = Field(
+        0.01, gt=0, le=1, description="probability from which contact is unlikely, below it no"
+    )
+
+    @model_validator(mode="after")
+    def _descending(self) -> Self:
+        thresholds = [self.yes, self.likely, self.possible, self.unlikely]
+        if thresholds != sorted(set(thresholds), reverse=True):
+            raise ValueError(
+                f"yes > likely > possible > unlikely is required, got {self.yes:g}, "
+                f"{self.likely:g}, {self.possible:g}, {self.unlikely:g}"
+            )
+        return self
+
+
 class Screening(Section):
     """How pairs find their ground motion and how risk is named."""
 
@@ -124,15 +147,16 @@ class Screening(Section):
     model_dispersion: float = Field(
         0.35, ge=0, description="log-standard deviation of critical gap by PER / exact"
     )
-    possible_from: float = Field(
-        0.1, ge=0, le=1, description="probability from which pounding counts as possible"
-    )
+    states: States = States()
     per_to_sd: float = Field(
         1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large"
     )
-    classes: dict[str, Annotated[float, Field(gt=0, allow_inf_nan=True)]] = Field(
-        {"severe": 0.5, "high": 1.0, "moderate": 1.5, "low": float("inf")},
-        description="risk class -> largest gap/demand ratio that belongs to it, in ascending order",
+    classes: dict[str, Annotated[float, Field(ge=0, allow_inf_nan=False)]] = Field(
+        {"severe": 0.5, "high": 0.2, "moderate": 0.05, "low": 0.0},
+        description=(
+            "risk class -> smallest expected impact velocity (m/s) that belongs to it, in "
+            "descending order to 0; our own thresholds, not verified (docs/screening.md)"
+        ),
     )
     linearized_median: float = Field(
         2.7, gt=0, description="the same of the demand where the linearized gap decides"
@@ -151,10 +175,12 @@ class Screening(Section):
 
     @field_validator("classes")
     @classmethod
-    def _ascending(cls, classes: dict[str, float]) -> dict[str, float]:
+    def _descending(cls, classes: dict[str, float]) -> dict[str, float]:
         thresholds = list(classes.values())
-        if not thresholds or thresholds != sorted(thresholds):
-            raise ValueError(f"thresholds must be in ascending order, got {classes}")
+        if not thresholds or thresholds != sorted(set(thresholds), reverse=True):
+            raise ValueError(f"thresholds (m/s) must be in descending order, got {classes}")
+        if thresholds[-1] != 0.0:
+            raise ValueError(f"the last threshold must be 0 m/s, got {classes}")
         return classes
 
 

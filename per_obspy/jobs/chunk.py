@@ -23,7 +23,6 @@ from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
 from per_obspy.jobs.parallel import Work, results
 from per_obspy.resume import earlier_status, read_status, write_status
-from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
 from per_obspy.screening.rows import risk_rows
@@ -145,7 +144,7 @@ def do_chunk(job: ChunkJob) -> Part:
     # Rows that cannot be computed belong to the file of the chunk
     rejected = [row._replace(source=job.chunk.rows.source) for row in uncomputed]
     if len(rows):
-        ordered = in_order(rows, impact_velocity_that_counts(rows))
+        ordered = in_order(rows)
         write_part(ordered, job.number, job.part)
     has_part = len(rows) > 0
     return _recorded(job, job.key, has_part, [*pairs.attrs["rejected"], *rejected])

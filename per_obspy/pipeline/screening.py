@@ -17,12 +17,12 @@ from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
+from per_obspy.screening.ranking import STATES
 from per_obspy.tables.risk import write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
 KINDS = ("file", "record", "station", "service", "pair")
-STATES = ("yes", "possible", "no")
 
 
 class Screened(NamedTuple):

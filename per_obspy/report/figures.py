@@ -23,8 +23,8 @@ from per_obspy.report.style import (
 )
 from per_obspy.screening.values import components
 
-#: States in the order in which they are drawn: the worst on top.
-DRAWN_STATES = ("no", "possible", "yes")
+#: States in the order in which they are drawn: the likeliest on top.
+DRAWN_STATES = tuple(reversed(STATE_COLOURS))
 
 
 def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
@@ -147,7 +147,9 @@ def draw_overview(table: pd.DataFrame, spectra: xr.Dataset, title: str, path: Pa
 
 def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     """Draw pairs in the colours of their states, and stations."""
-    for state in DRAWN_STATES:
+    # states that a pair has
+    drawn = [state for state in DRAWN_STATES if state in set(table["state"])]
+    for state in drawn:
         chosen = table[table["state"] == state]
         colour, label = STATE_COLOURS[state], f"{len(chosen)} pairs: {state}"
         axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=colour, label=label)
@@ -167,7 +169,7 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
     for state in DRAWN_STATES:
         chosen = table[table["state"] == state]
         axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
-    # Pairs below the line pound
+    # The demand of the medians; the state is that of the whole population
     demand, gap = 100 * float(table["demand"].max()), 100 * float(table["gap"].max())
     axes.plot([0.0, demand], [0.0, demand], color="black", linewidth=0.8, label="gap = demand")
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)", title="gap against demand")

@@ -95,7 +95,7 @@ def _draw_motion(figure: Any, processed: Any, unfiltered: Any) -> None:
     for axes, (name, unit) in zip(panels, QUANTITIES.items(), strict=True):
         _draw_quantity(axes, dt, _without_pads(processed, samples), raw, unit)
         axes.set_ylabel(f"{name} ({unit})")
-        axes.axvspan(0.0, noise, color=STATE_COLOURS["possible"], alpha=0.15, linewidth=0)
+        axes.axvspan(0.0, noise, color=STATE_COLOURS["likely"], alpha=0.15, linewidth=0)
         axes.grid(alpha=0.25)
         # The next panel is the integral, which begins in the pads
         samples = cumulative_trapezoid(samples, dx=dt, initial=0)
@@ -155,7 +155,7 @@ def _draw_noise(axes: Axes, unfiltered: FloatArray, dt: float, noise: float, low
     frequency, signal = spectra.frequencies[known], spectra.signal[known]
     # In the colours of the record and of the noise window
     axes.loglog(frequency, signal, color=BUILDING_COLOURS[0], label="signal before the filter")
-    colour = STATE_COLOURS["possible"]
+    colour = STATE_COLOURS["likely"]
     axes.loglog(frequency, spectra.noise[known], color=colour, label="noise")
 
 

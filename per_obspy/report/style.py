@@ -9,7 +9,13 @@ from per_obspy.errors import printable
 from per_obspy.files import written_whole
 
 #: State of a pair -> colour (Okabe & Ito 2008, distinct for colour-blind readers too).
-STATE_COLOURS = {"yes": "#D55E00", "possible": "#E69F00", "no": "#009E73"}
+STATE_COLOURS = {
+    "yes": "#D55E00",
+    "likely": "#E69F00",
+    "possible": "#F0E442",
+    "unlikely": "#56B4E9",
+    "no": "#009E73",
+}
 
 #: Buildings 1 and 2, the ground motion, and whatever is only for comparison.
 BUILDING_COLOURS = ("#0072B2", "#CC79A7")

@@ -36,16 +36,35 @@ RESULTS: dict[str, Column] = {
     column.name: column
     for column in (
         _whole_number(
-            "rank", "", "1 is the worst: by state, probability, impact velocity, ratio, importance"
+            "rank",
+            "",
+            "1 is the worst: by expected impact velocity, amplification, probability, importance",
         ),
-        _text("risk_class", "by demand ratio; names and thresholds are in the configuration"),
+        _text(
+            "risk_class",
+            "by expected impact velocity; names and thresholds are in the configuration",
+        ),
         _text(
             "state",
-            "yes: gap < demand carried to the site; possible: likely enough, or a derived input "
-            "decides; no",
+            "by probability: yes, likely, possible, unlikely or no; thresholds are configured",
         ),
         _number(
             "probability", "1", "of pounding in this event, with what is uncertain of the pair"
+        ),
+        _number(
+            "expected_impact_velocity",
+            "m/s",
+            "mean over what is uncertain of the pair; 0 where the buildings do not touch",
+        ),
+        _number(
+            "impact_velocity_84",
+            "m/s",
+            "not exceeded in 84 of 100 outcomes of what is uncertain; 0 without contact",
+        ),
+        _number(
+            "expected_amplification",
+            "1",
+            "mean radius with / without pounding, of the more amplified building; 1 if apart",
         ),
         _number("demand", "m", "gap needed at contact height, by the rule in demand_rule"),
         _text("demand_rule", "exact, per_white_noise, per_record, linearized, srss or shakemap"),
@@ -166,8 +185,9 @@ RESULTS: dict[str, Column] = {
 
 #: The leading columns; the rest of the completed pair table follows them.
 ORDER = (
-    "rank", "pair_id", "risk_class", "state", "probability", "gap", "demand", "demand_rule",
-    "demand_ratio", "impact_velocity", "impacts", "impact_velocity_exact",
+    "rank", "pair_id", "risk_class", "state", "probability", "expected_impact_velocity",
+    "impact_velocity_84", "expected_amplification", "gap", "demand", "demand_rule", "demand_ratio",
+    "impact_velocity", "impacts", "impact_velocity_exact",
     "amplification_exact_1", "amplification_exact_2", "single_hit_status", "amplification_1",
     "amplification_2", "flags", "station", "distance", "azimuth_used", "azimuth_rule",
     "period_1", "period_2", "damping_1", "damping_2", "participation_1", "participation_2",
@@ -204,7 +224,7 @@ FLAGS: dict[str, str] = {
     "one_horizontal": "the station has one horizontal: its azimuth is used whatever the pair's",
     "derived_inputs": "the row has derived inputs, named in the column derived",
     "derived_period": (
-        "a period was derived: the demand is at least SRSS and the state is never a plain no"
+        "a period was derived: the demand is at least SRSS; state and rank follow from resampling"
     ),
     "linearized_not_converged": (
         "no ductility up to 40 was found: the linearized demand is that of 40, often too large"

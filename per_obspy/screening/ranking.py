@@ -1,35 +1,60 @@
-"""Order of pairs, the worst first, and names of risk classes."""
+"""Order of pairs by expected severity, the worst first, and names of states and risk classes."""
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.config import States
 
-#: States of a pair, worst first.
-STATES = ("yes", "possible", "no")
+#: States of a pair, likeliest first.
+STATES = ("yes", "likely", "possible", "unlikely", "no")
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
 KEYS = (
-    "order_state",
-    "order_probability",
     "order_velocity",
-    "order_ratio",
+    "order_amplification",
+    "order_probability",
     "order_importance",
     "order_occupants",
 )
 
 
-def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
+def pounding_state(probability: FloatArray, states: States) -> NDArray[np.object_]:
     """
-    Return the first class whose threshold the ratio gap / demand does not exceed.
+    Return the state of each pair, by its probability of contact alone.
 
     Parameters
     ----------
-    ratio : (n_pairs,) ndarray
-        Gap / demand, dimensionless; NaN, without a demand, belongs to the last class.
+    probability : (n_pairs,) ndarray
+        From 0 to 1.
+    states : States
+        Smallest probability of each state.
+
+    Returns
+    -------
+    state : (n_pairs,) ndarray of str
+        One of ``STATES``.
+
+    Examples
+    --------
+    >>> pounding_state(np.array([1.0, 0.9, 0.5, 0.1, 0.01, 1e-6]), States()).tolist()
+    ['yes', 'yes', 'likely', 'possible', 'unlikely', 'no']
+    """
+    named = {name: float(getattr(states, name)) for name in STATES[:-1]}
+    return _first_reached(probability, named | {STATES[-1]: 0.0})
+
+
+def risk_class(velocity: FloatArray, classes: dict[str, float]) -> NDArray[np.object_]:
+    """
+    Return the first class whose threshold an expected impact velocity reaches.
+
+    Parameters
+    ----------
+    velocity : (n_pairs,) ndarray
+        Expected impact velocity, m/s.
     classes : dict of str to float
-        Name and threshold of each class, ascending.
+        Name and smallest velocity of each class, descending to 0.
 
     Returns
     -------
@@ -38,34 +63,38 @@ def risk_class(ratio: FloatArray, classes: dict[str, float]) -> NDArray[np.objec
 
     Examples
     --------
-    >>> risk_class(np.array([0.0, 1.0, 1.1, np.nan]), {"high": 1.0, "low": np.inf}).tolist()
-    ['high', 'high', 'low', 'low']
+    >>> risk_class(np.array([0.0, 0.1, 0.2]), {"high": 0.2, "low": 0.0}).tolist()
+    ['low', 'low', 'high']
     """
-    names = np.array(list(classes), dtype=object)
-    thresholds = np.array(list(classes.values()))
-    index = np.searchsorted(thresholds, np.nan_to_num(ratio, nan=np.inf), side="left")
-    chosen: NDArray[np.object_] = names[np.minimum(index, names.size - 1)]
-    return chosen
+    return _first_reached(velocity, classes)
 
 
-def in_order(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
+def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> NDArray[np.object_]:
+    """Return the name of the first threshold, descending to 0, that is not above each number."""
+    names = np.array(list(thresholds), dtype=object)
+    falling = np.array(list(thresholds.values()))
+    index = np.searchsorted(-falling, -numbers, side="left")
+    first: NDArray[np.object_] = names[np.minimum(index, names.size - 1)]
+    return first
+
+
+def in_order(table: pd.DataFrame) -> pd.DataFrame:
     """
     Sort pairs, the worst first, and add the columns ``KEYS`` by which they are sorted.
 
     Parameters
     ----------
     table : DataFrame
-        Pairs with ``state``, ``demand_ratio``, and ``probability`` where it is known.
-    velocity : (n_pairs,) array_like
-        Impact velocity by which pairs are ordered, m/s; NaN counts as 0.
+        Pairs with their population: ``expected_impact_velocity``, ``expected_amplification`` and
+        ``probability``.
 
     Notes
     -----
-    The order is by state, probability, impact velocity and ratio gap / demand; ties are broken by
-    importance, occupants and at last the name, so that it does not depend on the order in which
-    pairs were computed.
+    The order is by expected impact velocity, then by expected amplification; ties are broken by
+    probability, importance, occupants and at last the name, so that it does not depend on the order
+    in which pairs were computed.
     """
-    keys = _order_keys(table, velocity)
+    keys = _order_keys(table)
     # lexsort sorts by its last row first
     badness = np.stack(list(keys.values()))
     order = np.lexsort(badness[::-1])
@@ -73,22 +102,19 @@ def in_order(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
     return table.assign(**keys).iloc[order].reset_index(drop=True)
 
 
-def worst_first(table: pd.DataFrame, velocity: ArrayLike) -> pd.DataFrame:
+def worst_first(table: pd.DataFrame) -> pd.DataFrame:
     """Sort pairs as :func:`in_order` does and add a column ``rank`` from 1."""
-    ordered = in_order(table, velocity).drop(columns=[*KEYS])
+    ordered = in_order(table).drop(columns=[*KEYS])
     return ordered.assign(rank=np.arange(1, len(table) + 1))
 
 
-def _order_keys(table: pd.DataFrame, velocity: ArrayLike) -> dict[str, FloatArray]:
+def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
     """Return the columns ``KEYS``; the worst pair has the smallest numbers."""
-    state = table["state"].map({state: rank for rank, state in enumerate(STATES)})
-    ratio = table["demand_ratio"].to_numpy(np.float64)
-    # Negated where more is worse; a ratio that does not exist is the best
+    # Negated, for more is worse
     keys = (
-        np.asarray(state, dtype=np.float64),
+        -_largest(table, "expected_impact_velocity"),
+        -_largest(table, "expected_amplification"),
         -_largest(table, "probability"),
-        -np.nan_to_num(np.asarray(velocity, dtype=np.float64)),
-        np.nan_to_num(ratio, nan=np.inf),
         -_largest(table, "importance_1", "importance_2"),
         -_largest(table, "occupants_1", "occupants_2"),
     )

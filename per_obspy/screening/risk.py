@@ -6,7 +6,6 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Building, Screening
-from per_obspy.screening.by_record.estimates import impact_velocity_that_counts
 from per_obspy.screening.ground_motion.assignment import stations_of
 from per_obspy.screening.ground_motion.site_motion import (
     RegionalMotion,
@@ -63,7 +62,7 @@ def risk_table(
     field = prepared_field(located, screening.interpolation, source) if located else None
     rows, unreached = risk_rows(pairs, RegionalMotion(stations, field, None), building, screening)
     # ranked as the tables of a run are
-    table = worst_first(rows, impact_velocity_that_counts(rows))
+    table = worst_first(rows)
     table = table[["rank", *(name for name in table if name != "rank")]]
     table.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *unlocated, *unreached)
     return table

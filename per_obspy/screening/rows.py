@@ -15,7 +15,7 @@ from pandas.api.types import is_numeric_dtype
 from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
+from per_obspy.screening.by_record.demand import demand_ratio
 from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import exact_decides, furthest_azimuth
 from per_obspy.screening.by_record.pair_radii import (
@@ -30,16 +30,14 @@ from per_obspy.screening.codes import code_columns, rule_columns
 from per_obspy.screening.columns import FLAGS, ORDER, RESULTS
 from per_obspy.screening.flags import (
     joined_flags,
-    period_is_derived,
     raised_by_pairs,
     raised_by_record,
 )
 from per_obspy.screening.ground_motion.assignment import assigned
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion_at_pairs
 from per_obspy.screening.mitigation import mitigation_columns
-from per_obspy.screening.ranking import KEYS, risk_class
-from per_obspy.screening.uncertainty.exact_demand import record_probability
-from per_obspy.screening.uncertainty.record_motion import demand_at_site
+from per_obspy.screening.ranking import KEYS, pounding_state, risk_class
+from per_obspy.screening.uncertainty.exact_demand import record_population
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -49,7 +47,6 @@ INTERMEDIATE = (
     "other_site_class",
     "linearized_converged",
     "motion_from_other_site_class",
-    "demand_at_site",
     *(f"equivalent_{name}_{i}" for name in ("period", "damping", "per") for i in (1, 2)),
 )
 
@@ -135,11 +132,10 @@ def _record_columns(dataset: xr.Dataset, pairs: Columns, screening: Screening) -
         demands = demand_columns(station, group, motion, azimuth_rule, screening.exact)
         parts.append((rows, demands))
     table = joined(parts)
-    # measures, flags and probability follow from the demand
+    # measures, flags and population follow from the demand
     table |= mitigation_columns(station, table, screening.target_amplification)
     raised = raised_by_record(table, dataset, screening)
-    table["probability"] = record_probability(station, table, screening)
-    table["demand_at_site"] = demand_at_site(station, table, screening)
+    table |= record_population(station, table, screening)
     table |= {f"raised_{flag}": rows for flag, rows in raised.items()}
     return {name: column for name, column in table.items() if name not in pairs}
 
@@ -176,13 +172,10 @@ def _motions(
 def _with_states_and_flags(table: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the table with all columns that need no record: state, class, flags, code rules."""
     gap, demand = values(table, "gap"), values(table, "demand")
-    # yes: by the demand at the site, as the probability; possible: likely enough, or an assumed
-    # period could turn a no into a yes
-    likely = values(table, "probability") >= screening.possible_from
-    there = values(table, "demand_at_site")
-    state = pounding_state(gap, there, period_is_derived(table) | likely)
+    # the population alone decides state and class
+    state = pounding_state(values(table, "probability"), screening.states)
+    named = risk_class(values(table, "expected_impact_velocity"), screening.classes)
     ratio = demand_ratio(gap, demand)
-    named = risk_class(ratio, screening.classes)
     table = table.assign(demand_ratio=ratio, state=state, risk_class=named)
     # flags of the record and of the pairs, joined to one text
     by_record = {flag: f"raised_{flag}" for flag in FLAGS if f"raised_{flag}" in table}

@@ -45,29 +45,13 @@ class Scenarios(NamedTuple):
     yearly: bool
 
 
-#: Severity of a pair in a risk table: the impact velocity that ranks it, the larger amplification.
-_SEVERITY = """
-    greatest(
-        coalesce(nullif(impact_velocity_exact, 'NaN'::DOUBLE), 0.0),
-        CASE WHEN demand_rule = 'exact' THEN 0.0
-        ELSE coalesce(nullif(impact_velocity, 'NaN'::DOUBLE), 0.0) END
-    ) AS impact_velocity,
-    greatest(
-        1.0,
-        nullif(amplification_exact_1, 'NaN'::DOUBLE),
-        nullif(amplification_exact_2, 'NaN'::DOUBLE),
-        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_1, 'NaN'::DOUBLE) END,
-        CASE WHEN demand_rule <> 'exact' THEN nullif(amplification_2, 'NaN'::DOUBLE) END
-    ) AS amplification
-"""
-
 #: The rows in their order, with the rank before the other columns.
 _ORDERED = f"""
     COPY (
         SELECT row_number() OVER () AS rank, *
         FROM (
             SELECT * FROM rows
-            ORDER BY probability DESC, expected_impact_velocity DESC, expected_amplification DESC,
+            ORDER BY expected_impact_velocity DESC, expected_amplification DESC, probability DESC,
                 pair_id
         )
     ) TO $path (FORMAT parquet, ROW_GROUP_SIZE {ROWS}, KV_METADATA {{per_obspy: $statement}})
@@ -134,7 +118,7 @@ def _join_query(tables: list[Path | None]) -> str:
     nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
     rows += [
-        f"SELECT {number} AS scenario, pair_id, probability, {', '.join(SAME)}, {_SEVERITY}"
+        f"SELECT {number} AS scenario, pair_id, probability, {', '.join((*SAME, *SEVERITY))}"
         f" FROM table{number}"
         for number, table in enumerate(tables)
         if table

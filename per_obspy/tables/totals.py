@@ -26,7 +26,7 @@ COLUMNS = (
     "state",
     "risk_class",
     "probability",
-    "demand_ratio",
+    "expected_impact_velocity",
     "longitude",
     "latitude",
 )

@@ -28,7 +28,7 @@ def screened(call, tmp_path):
 def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     code, out, _ = screened()
     assert code == 0
-    assert "1 pairs (1 yes, 0 possible, 0 no), 1 rejected" in out
+    assert "1 pairs (1 yes, 0 likely, 0 possible, 0 unlikely, 0 no), 1 rejected" in out
     table = pd.read_csv(tmp_path / "out" / "design.csv")
     columns = pd.read_csv(tmp_path / "out" / "design.columns.csv").set_index("name")["meaning"]
     assert columns.index.tolist() == list(table)

@@ -58,11 +58,31 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ),
         (
             GOOD + "[screening]\nclasses = { high = 2.0, low = 1.0 }\n",
-            r"screening\.classes: .*ascending",
+            r"screening\.classes: .*the last threshold must be 0 m/s",
+        ),
+        (
+            GOOD + "[screening]\nclasses = { high = 1.0, low = 2.0 }\n",
+            r"screening\.classes: .*\(m/s\) must be in descending order",
+        ),
+        (
+            GOOD + "[screening.states]\nlikely = 0.95\n",
+            r"screening\.states: .*yes > likely > possible > unlikely is required, got 0\.9, 0\.95",
+        ),
+        (
+            GOOD + "[screening.states]\nunlikely = 0.0\n",
+            r"screening\.states\.unlikely: .*greater than 0 \(got 0\.0\)",
+        ),
+        (
+            GOOD + "[screening.states]\nyes = 1.5\n",
+            r"screening\.states\.yes: .*less than or equal to 1 \(got 1\.5\)",
+        ),
+        (
+            GOOD + "[screening]\npossible_from = 0.1\n",
+            r"screening\.possible_from: unknown key",
         ),
         (
             GOOD + "[screening]\nclasses = { high = nan }\n",
-            r"screening\.classes\.high: .*greater than 0 \(got nan\)",
+            r"screening\.classes\.high: .*finite number \(got nan\)",
         ),
         (
             GOOD + "[spectra]\ndampings = [5.0]\n",

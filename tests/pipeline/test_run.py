@@ -23,6 +23,7 @@ from per_obspy.jobs import station as jobs
 from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.progress import silent
+from per_obspy.screening.ranking import STATES
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
@@ -64,7 +65,7 @@ def test_no_pair_is_lost(finished):
     table = pd.read_parquet(result.folder / "risk.parquet")
     assert len(table) + result.record["counts"]["rejected_pair"] == 60
     assert table["rank"].tolist() == list(range(1, len(table) + 1))
-    assert table["state"].isin(["yes", "possible", "no"]).all()
+    assert table["state"].isin(STATES).all()
 
 
 def test_csv_and_parquet_hold_the_same(finished):

@@ -31,7 +31,7 @@ PAIR = {
 }
 TABLE = pd.DataFrame(
     {
-        "state": ["yes", "no", "no", "possible"],
+        "state": ["yes", "no", "no", "likely"],
         "longitude": [20.0, 20.1, 20.2, 20.3],
         "latitude": [60.0, 60.1, 59.9, 60.0],
         "demand": [0.3, 0.1, 0.0, 0.2],
@@ -139,12 +139,12 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
     chart = overview[0]
     assert _points_of(chart, "yes") == [[20.0, 60.0]]
     assert _points_of(chart, "no") == [[20.1, 60.1], [20.2, 59.9]]
-    assert _points_of(chart, "possible") == [[20.3, 60.0]]
+    assert _points_of(chart, "likely") == [[20.3, 60.0]]
     assert np.asarray(chart.collections[-1].get_offsets()).tolist() == [[20.0, 10.0]]
     # a degree of longitude is half as long at 60 degrees north
     assert chart.get_aspect() == pytest.approx(2.0)
     labels = [text.get_text() for text in chart.get_legend().get_texts()]
-    assert labels == ["2 pairs: no", "1 pairs: possible", "1 pairs: yes", "stations"]
+    assert labels == ["2 pairs: no", "1 pairs: likely", "1 pairs: yes", "stations"]
     assert (chart.get_xlabel(), chart.get_ylabel()) == ("longitude (°E)", "latitude (°N)")
 
 

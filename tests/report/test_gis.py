@@ -24,6 +24,7 @@ TABLE = pd.DataFrame(
         "longitude": [-99.1, -99.2, -99.1],
         "latitude": [19.4, 19.5, 19.4],
         "demand_ratio": [0.0, np.nan, 2.0],
+        "expected_impact_velocity": [0.6, 0.1, 0.0],
         "yield_displacement_1": [np.inf, 0.1, 0.2],
         "floors_misaligned": [True, False, False],
         "probability": [0.5, 0.25, 0.0],

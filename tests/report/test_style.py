@@ -43,8 +43,8 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
 
 
 def test_every_state_has_a_colour_of_its_own():
-    assert list(STATE_COLOURS) == ["yes", "possible", "no"]
-    assert len(set(STATE_COLOURS.values())) == 3
+    assert list(STATE_COLOURS) == ["yes", "likely", "possible", "unlikely", "no"]
+    assert len(set(STATE_COLOURS.values())) == len(STATE_COLOURS)
 
 
 @pytest.mark.parametrize("text", ["$x_$", "$", r"\$x_$", "a$b$c", "x\u202ey\n"])

@@ -1,32 +1,40 @@
-"""The order of pairs: worst first by each criterion in turn, whatever order they came in."""
+"""Order of pairs: worst first by each criterion in turn; states and classes."""
 
 import numpy as np
 import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
-from per_obspy.screening.ranking import KEYS, in_order, risk_class, worst_first
+from per_obspy.config import Screening, States
+from per_obspy.screening.ranking import (
+    KEYS,
+    STATES,
+    in_order,
+    pounding_state,
+    risk_class,
+    worst_first,
+)
 
-#: From worst to best; each row is better than the one before by the criterion in its name.
+#: From worst to best; each row is better than the one before by the criterion in its name. The
+#: state has no say: a possible pair that hits hard outranks a yes.
 TABLE = pd.DataFrame(
     [
-        ("state", "yes", 0.2, 0.1, 0.9, 1.0, 1.0),
-        ("probability", "possible", 0.9, 0.1, 0.9, 1.0, 1.0),
-        ("velocity", "possible", 0.5, 0.5, 0.9, 1.0, 1.0),
-        ("ratio", "possible", 0.5, 0.2, 0.4, 1.0, 1.0),
-        ("importance", "possible", 0.5, 0.2, 0.9, 1.5, 1.0),
-        ("occupants", "possible", 0.5, 0.2, 0.9, 1.0, 90.0),
-        ("x name", "possible", 0.5, 0.2, 0.9, 1.0, 1.0),
-        ("y name", "possible", 0.5, 0.2, 0.9, 1.0, 1.0),
-        ("z no demand", "possible", 0.5, 0.2, np.nan, 9.0, 9.0),
-        ("no", "no", 0.5, np.nan, 0.1, 9.0, 9.0),
+        ("velocity", "possible", 0.2, 0.9, 1.0, 1.0, 1.0),
+        ("amplification", "likely", 0.5, 0.5, 1.8, 1.0, 1.0),
+        ("probability", "yes", 0.95, 0.5, 1.2, 1.0, 1.0),
+        ("importance", "likely", 0.5, 0.5, 1.2, 1.5, 1.0),
+        ("occupants", "likely", 0.5, 0.5, 1.2, 1.0, 90.0),
+        ("x name", "likely", 0.5, 0.5, 1.2, 1.0, 1.0),
+        ("y name", "likely", 0.5, 0.5, 1.2, 1.0, 1.0),
+        ("z touching in step", "yes", 1.0, 0.0, 1.0, 9.0, 9.0),
     ],
     columns=[
         "pair_id",
         "state",
         "probability",
-        "impact_velocity",
-        "demand_ratio",
+        "expected_impact_velocity",
+        "expected_amplification",
         "importance_2",
         "occupants_1",
     ],
@@ -36,38 +44,49 @@ TABLE = pd.DataFrame(
 @given(st.permutations(range(len(TABLE))))
 def test_the_worst_is_first_however_the_pairs_came(order):
     # would catch a criterion that is missing, turned round, or in the wrong place
-    shuffled = TABLE.iloc[list(order)]
-    ranked = worst_first(shuffled, shuffled["impact_velocity"])
+    ranked = worst_first(TABLE.iloc[list(order)])
     assert ranked["pair_id"].tolist() == TABLE["pair_id"].tolist()
     assert ranked["rank"].tolist() == list(range(1, len(TABLE) + 1))
 
 
-def test_probabilities_importance_and_occupants_may_be_unknown():
-    bare = TABLE[["pair_id", "state", "demand_ratio"]]
-    ranked = worst_first(bare, np.zeros(len(bare)))
-    assert ranked["pair_id"].iloc[0] == "state"
-    assert ranked["pair_id"].iloc[-1] == "no"
-    assert list(bare) == ["pair_id", "state", "demand_ratio"]  # the caller's table is as it was
+def test_importance_and_occupants_may_be_unknown_and_a_missing_velocity_is_none():
+    bare = TABLE[["pair_id", "expected_impact_velocity"]].copy()
+    bare.loc[0, "expected_impact_velocity"] = np.nan
+    ranked = worst_first(bare)
+    assert set(ranked["pair_id"].iloc[-2:]) == {"velocity", "z touching in step"}
+    assert list(bare) == ["pair_id", "expected_impact_velocity"]  # the caller's table is as it was
+    assert np.isfinite(in_order(bare)[[*KEYS]].to_numpy()).all()
 
 
 def test_keys_rise_from_the_worst_pair_on():
     # pieces of a table are merged by these columns
-    keys = in_order(TABLE, TABLE["impact_velocity"])[[*KEYS]].to_numpy().tolist()
+    keys = in_order(TABLE)[[*KEYS]].to_numpy().tolist()
     assert keys == sorted(keys)
 
 
 def test_no_pairs_have_an_order():
-    empty = worst_first(TABLE.iloc[:0], TABLE["impact_velocity"].iloc[:0])
+    empty = worst_first(TABLE.iloc[:0])
     assert empty.empty
     assert "rank" in empty
 
 
 def test_a_class_includes_its_threshold():
-    classes = {"severe": 0.5, "high": 1.0, "low": np.inf}
-    ratio = np.array([0.0, 0.5, np.nextafter(0.5, 1.0), 1.0, 7.0, np.nan])
-    assert risk_class(ratio, classes).tolist() == ["severe", "severe", "high", "high", "low", "low"]
+    classes = {"severe": 0.5, "high": 0.2, "low": 0.0}
+    velocity = np.array([9.0, 0.5, np.nextafter(0.5, 0.0), 0.2, 0.1, 0.0])
+    expected = ["severe", "severe", "high", "high", "low", "low"]
+    assert risk_class(velocity, classes).tolist() == expected
 
 
-def test_a_ratio_above_every_threshold_has_the_last_class():
-    # would catch an index beyond the names where the last threshold is finite
-    assert risk_class(np.array([9.0]), {"high": 1.0, "low": 2.0}).tolist() == ["low"]
+def test_a_state_includes_its_threshold():
+    thresholds = States(yes=0.8, likely=0.6, possible=0.3, unlikely=0.1)
+    reached = np.array([0.8, 0.6, 0.3, 0.1, 0.0])
+    assert pounding_state(reached, thresholds).tolist() == list(STATES)
+    below = np.nextafter(reached[:-1], 0.0)
+    assert pounding_state(below, thresholds).tolist() == list(STATES[1:])
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=20))
+def test_a_likelier_pair_never_has_a_less_likely_state(chances):
+    states = pounding_state(np.sort(np.array(chances)), Screening().states)
+    order = [STATES.index(state) for state in states]
+    assert_array_equal(order, sorted(order, reverse=True))

@@ -198,12 +198,13 @@ def test_ties_go_to_importance_then_occupants_then_name(station):
     assert table["pair_id"].tolist() == ["P2", "P1", "P0", "P3"]
 
 
-@pytest.mark.parametrize(
-    ("ratio", "name"), [(0.4, "severe"), (0.9, "high"), (1.4, "moderate"), (5.0, "low")]
-)
-def test_risk_classes_follow_the_thresholds(station, ratio, name):
-    (demand,) = _table(station, {})["demand"]
-    assert _table(station, {"gap": ratio * demand}).loc["P0", "risk_class"] == name
+def test_risk_classes_follow_the_expected_impact_velocity(station):
+    velocity = _table(station, {})["expected_impact_velocity"].iloc[0]
+    assert velocity > 0.0
+    for share, name in ((0.9, "hard"), (1.1, "soft")):
+        screening = Screening(classes={"hard": share * velocity, "soft": 0.0})
+        table = per_obspy.risk_table(station, make_pairs([{}]), screening=screening)
+        assert table["risk_class"].tolist() == [name]
 
 
 def test_a_radius_far_above_the_displacement_is_flagged():

@@ -27,13 +27,7 @@ def tables():
         }
     )
     pairs = pairs.assign(
-        demand_rule="exact",
-        impact_velocity=np.nan,
-        impact_velocity_exact=0.5,
-        amplification_1=np.nan,
-        amplification_2=np.nan,
-        amplification_exact_1=1.2,
-        amplification_exact_2=1.1,
+        expected_impact_velocity=random.uniform(0, 1, COUNT), expected_amplification=1.2
     )
     # Each lacks a pair of the other
     near = pairs.assign(probability=random.uniform(0, 1, COUNT))
@@ -59,7 +53,7 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     assert counts == {"pairs": COUNT - 2, "rejected_pair": 2}
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     assert table["rank"].tolist() == list(range(1, COUNT - 1))
-    assert table["annual_probability"].is_monotonic_decreasing
+    assert table["expected_impact_velocity"].is_monotonic_decreasing
     # joined by pandas instead: would catch rows joined by position, or scenarios that changed
     # places
     near, far = (
@@ -75,24 +69,22 @@ def test_pairs_are_joined_by_name_and_the_worst_comes_first(tables, tmp_path):
     assert_allclose(table["gap"], gaps, rtol=0)
 
 
-def test_ties_go_to_the_expected_severity_and_then_to_the_name(tables, tmp_path):
-    # would catch: certain pairs in the order of their names; velocities of the single hit where the
-    # exact demand decides
+def test_ties_go_to_the_amplification_the_probability_and_then_to_the_name(tables, tmp_path):
+    # would catch: likely pairs before hard ones
     for table in tables.values():
-        table["probability"] = 1.0
+        table["probability"], table["expected_impact_velocity"] = 0.5, 0.5
     near = tables["near"].set_index("pair_id", drop=False)
-    near.loc["p100", "impact_velocity_exact"] = 3.0
-    near.loc["p200", "amplification_exact_2"] = 4.0
-    near.loc["p300", ["demand_rule", "impact_velocity"]] = ["srss", 2.0]
-    near.loc["p400", "impact_velocity"] = 9.0
-    near.loc["p450", "impact_velocity_exact"] = np.nan
+    near.loc["p100", ["expected_impact_velocity", "probability"]] = [3.0, 0.1]
+    near.loc["p200", "expected_amplification"] = 4.0
+    near.loc["p300", "probability"] = 0.9
+    near.loc["p450", "expected_impact_velocity"] = np.nan
     _written({**tables, "near": near}, tmp_path)
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
-    assert table["pair_id"].tolist()[:5] == ["p100", "p300", "p200", "p000", "p001"]
+    assert table["pair_id"].tolist()[:5] == ["p100", "p200", "p300", "p000", "p001"]
     assert table["pair_id"].iloc[-1] == "p450"
-    # two thirds of the weight are near's, all pairs pound in both
+    # two thirds of the weight are near's
     assert_allclose(table["expected_impact_velocity"][0], (2 * 3.0 + 0.5) / 3)
-    assert_allclose(table["expected_amplification"][2], (2 * 3.0 + 0.2) / 3)
+    assert_allclose(table["expected_amplification"][1], (2 * 4.0 + 1.2) / 3)
 
 
 def test_every_file_is_written_and_every_column_described(tables, tmp_path):

@@ -22,10 +22,9 @@ def table(count, seed, first=0):
     return pd.DataFrame(
         {
             "pair_id": [f"pair {number}" for number in numbers],
-            "state": draw.choice(["yes", "possible", "no"], count),
             "probability": draw.choice([0.0, 0.5, 1.0], count),
-            "demand_ratio": draw.choice([0.0, 0.5, np.nan], count),
-            "velocity": draw.choice([0.0, 0.1, np.nan], count),
+            "expected_impact_velocity": draw.choice([0.0, 0.1, np.nan], count),
+            "expected_amplification": draw.choice([1.0, 1.5], count),
         }
     )
 
@@ -34,7 +33,7 @@ def written(folder, pieces):
     """Return the files of some pieces, each in its order."""
     paths = [folder / f"{number:06}.parquet" for number in range(len(pieces))]
     for number, (piece, path) in enumerate(zip(pieces, paths, strict=True)):
-        write_part(in_order(piece, piece["velocity"]), number, path)
+        write_part(in_order(piece), number, path)
     return paths
 
 
@@ -51,7 +50,7 @@ def test_the_whole_is_in_order(tmp_path, monkeypatch, size, cuts):
     whole = table(300, seed=1)
     edges = [0, *cuts, len(whole)]
     pieces = [whole.iloc[first:last] for first, last in pairwise(edges)]
-    expected = in_order(whole, whole["velocity"])[list(whole)]
+    expected = in_order(whole)[list(whole)]
     pd.testing.assert_frame_equal(
         read(written(tmp_path, pieces), size), expected, check_dtype=False
     )

@@ -27,9 +27,9 @@ def rows():
     # Text that CSV has to quote, empty cells, and numbers of many digits
     columns = {
         "pair_id": [f'pair "{number}", north' for number in random.permutation(COUNT)],
-        "state": random.choice(["yes", "possible", "no"], COUNT),
+        "state": random.choice(["yes", "likely", "no"], COUNT),
         "probability": random.uniform(0, 1, COUNT),
-        "demand_ratio": random.choice([0.1, 1e-17 / 3, np.nan], COUNT),
+        "expected_impact_velocity": random.choice([0.1, 1e-17 / 3, np.nan], COUNT),
         "station": random.choice(["", "XX.S001"], COUNT),
         "impacts": random.choice([0.0, 3.0, np.nan], COUNT),
     }
@@ -42,14 +42,14 @@ def parts(rows, tmp_path):
     for number, first in enumerate(range(0, COUNT, 100)):
         piece = rows.iloc[first : first + 100]
         paths.append(tmp_path / "chunks" / f"{number:06}.parquet")
-        write_part(in_order(piece, np.zeros(len(piece))), number, paths[-1])
+        write_part(in_order(piece), number, paths[-1])
     return paths
 
 
 @pytest.fixture
 def expected(rows):
     """The whole table as pandas orders it in memory."""
-    table = in_order(rows, np.zeros(COUNT)).drop(columns=list(KEYS))
+    table = in_order(rows).drop(columns=list(KEYS))
     table.insert(0, "rank", np.arange(1, COUNT + 1))
     return table
 

@@ -26,10 +26,10 @@ def risk():
     columns = {
         "rank": np.arange(1, COUNT + 1),
         "pair_id": [f"p{i}" for i in range(COUNT)],
-        "state": random.choice(["yes", "possible", "no"], COUNT),
+        "state": random.choice(["yes", "likely", "no"], COUNT),
         "risk_class": random.choice(["severe", "low"], COUNT),
         "probability": random.uniform(0, 1, COUNT),
-        "demand_ratio": random.uniform(0, 2, COUNT),
+        "expected_impact_velocity": random.uniform(0, 2, COUNT),
         "longitude": random.uniform(-67.96, -67.94, COUNT),
         "latitude": random.uniform(-20.36, -20.34, COUNT),
         "ward": random.choice(["north", "south", None], COUNT),

@@ -105,23 +105,6 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
     return Demand(np.take_along_axis(candidates, best[None], axis=0)[0], RULES[best])
 
 
-def pounding_state(
-    gap: FloatArray, demand: FloatArray, possible: NDArray[np.bool_]
-) -> NDArray[np.object_]:
-    """
-    Return yes, possible or no for each pair.
-
-    Parameters
-    ----------
-    gap, demand : (n_pairs,) ndarray
-        m.
-    possible : (n_pairs,) ndarray of bool
-        Whether pounding is likely enough, or an assumed input could turn a no into a yes.
-    """
-    states = np.where(gap < demand, "yes", np.where(possible, "possible", "no"))
-    return states.astype(object)
-
-
 def demand_ratio(gap: FloatArray, demand: FloatArray) -> FloatArray:
     """Return gap / demand: 0 when touching, NaN (an empty cell) where the demand is 0."""
     ratio: FloatArray = np.divide(

@@ -67,23 +67,6 @@ def demand_columns(
     return table | {"demand": _without_round_off(table), "estimate_over_exact": ratio}
 
 
-def impact_velocity_that_counts(table: Table) -> FloatArray:
-    """
-    Return the impact velocity by which pairs are ranked, m/s.
-
-    It is that of the exact history where this decides, else the larger of it and of the single hit.
-
-    Parameters
-    ----------
-    table : Table
-        Rows of the risk table.
-    """
-    single = np.nan_to_num(values(table, "impact_velocity"))
-    estimated = np.where(table["demand_rule"] == "exact", 0.0, single)
-    larger: FloatArray = np.fmax(values(table, "impact_velocity_exact"), estimated)
-    return larger
-
-
 def _estimated_demand(table: Table) -> Columns:
     """Return the larger of the elastic demand, too small for yielding pairs, and the linearized."""
     elastic, linearized = values(table, "demand"), values(table, "critical_gap_linearized")

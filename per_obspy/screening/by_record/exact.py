@@ -69,9 +69,25 @@ def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     """
     Return for which pairs the exact demand is the demand.
 
-    The record must hold both periods in its usable range and both horizontals; no period may be
-    derived. The worst azimuth is known of linear buildings only: where one can yield, the pair's
-    azimuth must be given.
+    The record must support the pair, and no period may be derived: the exact demand of two equal
+    derived periods is 0.
+
+    Parameters
+    ----------
+    station : StationMotion
+        The record.
+    pairs : Table
+        Completed pairs.
+    """
+    return np.asarray(record_supports(station, pairs) & ~period_is_derived(pairs))
+
+
+def record_supports(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
+    """
+    Return for which pairs the record gives an exact demand.
+
+    It must hold both periods in its usable range and both horizontals. The worst azimuth is known
+    of linear buildings only: where one can yield, the pair's azimuth must be given.
 
     Parameters
     ----------
@@ -86,8 +102,8 @@ def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     # the worst azimuth of a bilinear pair is unknown
     directed = ~can_yield(pairs) | np.isfinite(values(pairs, "azimuth"))
     two_horizontals = station.horizontals == 2
-    decides: NDArray[np.bool_] = usable & directed & ~period_is_derived(pairs) & two_horizontals
-    return decides
+    supports: NDArray[np.bool_] = usable & directed & two_horizontals
+    return supports
 
 
 def can_yield(pairs: Table) -> NDArray[np.bool_]:

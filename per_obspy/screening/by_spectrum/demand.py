@@ -3,7 +3,7 @@ Demand of pairs by the spectral displacement of both buildings, without a record
 
 These are rungs 2 and 3 of the ladder of demands. There is no PER in a spectrum: the radius is the
 spectral displacement, because the gap from it and eq. (16) is the one that is known to be closest
-to the exact one (see ``SD_MEDIAN`` in ``uncertainty/probability.py``).
+to the exact one (see ``SD_MEDIAN`` in ``uncertainty/estimated.py``).
 """
 
 from typing import NamedTuple
@@ -17,11 +17,12 @@ from per_obspy.config import Screening
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import absolute_gap, critical_gap, srss_gap
 from per_obspy.pounding.single_hit import SingleHit, single_hit
-from per_obspy.screening.by_record.demand import demand_ratio, pounding_state
+from per_obspy.screening.by_record.demand import demand_ratio
 from per_obspy.screening.codes import code_columns
 from per_obspy.screening.flags import period_is_derived
-from per_obspy.screening.ranking import risk_class
-from per_obspy.screening.values import both, values
+from per_obspy.screening.ranking import pounding_state, risk_class
+from per_obspy.screening.uncertainty.estimated import SD_MEDIAN, UncertainRadius
+from per_obspy.screening.values import Columns, Table, both, values
 
 #: Building 1 and building 2.
 Both = tuple[FloatArray, FloatArray]
@@ -74,11 +75,33 @@ def spectral_demand(pairs: pd.DataFrame, displacement: Both) -> SpectralDemand:
     return SpectralDemand(radii, correlation, by_correlation, by_squares, demand, squares_decide)
 
 
+def spectral_radius(pairs: Table, demand: SpectralDemand, i: int) -> UncertainRadius:
+    """
+    Return the radius of building i at contact height with its oscillator.
+
+    Parameters
+    ----------
+    pairs : Table
+        Completed pairs.
+    demand : SpectralDemand
+        Of the same pairs.
+    i : int
+        Building 1 or 2.
+    """
+    period = values(pairs, f"period_{i}")
+    return UncertainRadius(
+        radius=demand.radii[i - 1] / SD_MEDIAN,
+        ln_ratio=np.zeros_like(period),
+        period=period,
+        damping=values(pairs, f"damping_{i}"),
+    )
+
+
 def spectral_columns(
     pairs: pd.DataFrame,
     displacement: Both,
     demand: SpectralDemand,
-    probability: FloatArray,
+    population: Columns,
     screening: Screening,
 ) -> pd.DataFrame:
     """
@@ -92,15 +115,12 @@ def spectral_columns(
         SD of the oscillators, m.
     demand : SpectralDemand
         Of the same pairs.
-    probability : (n_pairs,) ndarray
-        Of pounding.
+    population : dict of (n_pairs,) ndarray
+        Of the pairs, see :mod:`per_obspy.screening.uncertainty.population`.
     screening : Screening
         Thresholds, risk classes and the region's values for code rules.
     """
     gap = values(pairs, "gap")
-    # possible: likely enough, or an assumed period could turn a no into a yes
-    ratio = demand_ratio(gap, demand.demand)
-    possible = period_is_derived(pairs) | (probability >= screening.possible_from)
     hit = _single_hit(pairs, demand)
     # radii and gaps of SD, then the state
     columns: dict[str, NDArray[np.generic]] = {
@@ -111,10 +131,10 @@ def spectral_columns(
         "srss_gap_sd": demand.by_squares,
         "absolute_gap_sd": absolute_gap(*demand.radii),
         "demand": demand.demand,
-        "demand_ratio": ratio,
-        "probability": probability,
-        "state": pounding_state(gap, demand.demand, possible),
-        "risk_class": risk_class(ratio, screening.classes),
+        "demand_ratio": demand_ratio(gap, demand.demand),
+        **population,
+        "state": pounding_state(population["probability"], screening.states),
+        "risk_class": risk_class(population["expected_impact_velocity"], screening.classes),
         "single_hit_status": hit.status,
         "impact_velocity": hit.impact_velocity,
         "amplification_1": hit.amplification_1,

@@ -187,31 +187,6 @@ def displacement_at(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayL
     return result
 
 
-def clipped_displacement(
-    spectrum: DesignSpectrum, period: FloatArray, damping: FloatArray
-) -> FloatArray:
-    """
-    Interpolate the spectral displacement of oscillators; beyond the grid the value at its edge.
-
-    Parameters
-    ----------
-    spectrum : DesignSpectrum
-        On its grid.
-    period, damping : (n,) ndarray
-        s; fraction of critical.
-
-    Returns
-    -------
-    displacement : (n,) ndarray
-        m.
-    """
-    return displacement_at(
-        spectrum,
-        np.clip(period, spectrum.periods[0], spectrum.periods[-1]),
-        np.clip(damping, spectrum.dampings[0], spectrum.dampings[-1]),
-    )
-
-
 def _damping_cell(
     dampings: FloatArray, damping: FloatArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:

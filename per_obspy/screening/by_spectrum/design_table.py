@@ -4,11 +4,9 @@ Table of a screening by a design or user spectrum: demands and code rules withou
 There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral
 displacement. On broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact
 one, a log-standard deviation of 0.14, and is too small in two of three cases. A gap below it is a
-yes; the probability, which knows of that error, makes others possible, and derived periods ask for
-SRSS at least.
+finding of the demand only; state, class and rank follow from the population, which knows of that
+error and resamples uncertain periods and dampings.
 """
-
-from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -18,15 +16,24 @@ from per_obspy.config import Building, Screening
 from per_obspy.errors import Rejection
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.by_spectrum.demand import spectral_columns, spectral_demand
+from per_obspy.screening.by_record.stored_spectra import LogSpectra, log_period_and_damping
+from per_obspy.screening.by_spectrum.demand import (
+    SpectralDemand,
+    spectral_columns,
+    spectral_demand,
+    spectral_radius,
+)
 from per_obspy.screening.by_spectrum.design_spectrum import (
     DesignSpectrum,
-    clipped_displacement,
     displacement_at,
     within,
 )
 from per_obspy.screening.ranking import worst_first
-from per_obspy.screening.uncertainty.probability import design_probability
+from per_obspy.screening.uncertainty.estimated import (
+    SD_DISPERSION,
+    UncertainMotion,
+    estimated_population,
+)
 from per_obspy.screening.values import both, values
 
 #: Columns of this table besides those that a risk table has as well.
@@ -59,6 +66,9 @@ LEADING = (
     "risk_class",
     "state",
     "probability",
+    "expected_impact_velocity",
+    "impact_velocity_84",
+    "expected_amplification",
     "gap",
     "demand",
     "demand_rule",
@@ -107,7 +117,7 @@ def design_table(
     rejected = _outside(spectrum, complete[~inside])
     # demand of the pairs inside the spectrum, worst first
     table = _rows(spectrum, complete[inside].reset_index(drop=True), screening)
-    ranked = worst_first(table, table["impact_velocity"])
+    ranked = worst_first(table)
     others = [name for name in ranked if name not in LEADING]
     ranked = ranked[[*LEADING, *others]]
     ranked.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)
@@ -137,13 +147,41 @@ def _outside(spectrum: DesignSpectrum, pairs: pd.DataFrame) -> tuple[Rejection, 
     return tuple(Rejection("pair", name, spectrum.name, None, tuple(why)) for name, why in named)
 
 
+def uncertain_design_motion(
+    spectrum: DesignSpectrum, pairs: pd.DataFrame, demand: SpectralDemand
+) -> tuple[UncertainMotion, LogSpectra]:
+    """
+    Return the motion of pairs under a spectrum that is certain, and the spectrum.
+
+    Parameters
+    ----------
+    spectrum : DesignSpectrum
+        On its grid; beyond it, where only resampled oscillators are, the value at its edge.
+    pairs : DataFrame
+        Completed pairs with their log-standard deviations, medians inside the spectrum.
+    demand : SpectralDemand
+        Of the same pairs.
+    """
+    count = len(pairs)
+    motion = UncertainMotion(
+        spectral_radius(pairs, demand, 1),
+        spectral_radius(pairs, demand, 2),
+        correlation=demand.correlation,
+        log_std=np.full(count, SD_DISPERSION),
+        row=np.zeros(count, dtype=np.intp),
+    )
+    # logarithms of periods and dampings, and the only spectrum
+    axes = log_period_and_damping(spectrum.periods, spectrum.dampings)
+    return motion, LogSpectra(*axes, np.log(spectrum.sd)[None])
+
+
 def _rows(spectrum: DesignSpectrum, pairs: pd.DataFrame, screening: Screening) -> pd.DataFrame:
     """Return the rows of pairs inside the spectrum, not ranked yet."""
     first, second = _oscillators(pairs)
     displacement = displacement_at(spectrum, *first), displacement_at(spectrum, *second)
     demand = spectral_demand(pairs, displacement)
     # resampled periods reach beyond the spectrum
-    probability = design_probability(partial(clipped_displacement, spectrum), pairs)
+    population = estimated_population(*uncertain_design_motion(spectrum, pairs, demand), pairs)
     rule = np.where(demand.squares_decide, "sd_srss", "sd_white_noise").astype(object)
     table = pairs.assign(spectrum=spectrum.name, demand_rule=rule)
-    return spectral_columns(table, displacement, demand, probability, screening)
+    return spectral_columns(table, displacement, demand, population, screening)

@@ -9,17 +9,11 @@ from numpy.typing import NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.screening.by_record.stored_spectra import LogSpectra
-from per_obspy.screening.by_spectrum.demand import SpectralDemand
+from per_obspy.screening.by_spectrum.demand import SpectralDemand, spectral_radius
 from per_obspy.screening.ground_motion.kriging import on_grid
+from per_obspy.screening.uncertainty.estimated import SD_DISPERSION, UncertainMotion
 from per_obspy.screening.uncertainty.pair_motion import pair_motion
-from per_obspy.screening.uncertainty.probability import (
-    SD_DISPERSION,
-    SD_MEDIAN,
-    UncertainMotion,
-    UncertainRadius,
-    period_is_uncertain,
-)
-from per_obspy.screening.values import Table, both, values
+from per_obspy.screening.values import Table, both
 
 #: Dampings between which the factor of EN 1998-1 is interpolated when dampings are resampled;
 #: beyond it is kept.
@@ -166,7 +160,7 @@ def uncertain_map_motion(
     motion: MapMotion, pairs: Table, demand: SpectralDemand
 ) -> tuple[UncertainMotion, LogSpectra]:
     """
-    Return the uncertain motion of pairs, and the spectra of those whose periods are resampled.
+    Return the uncertain motion of pairs, and the spectrum of each.
 
     The motion of a map is uncertain once for both buildings, with the correlation of their periods.
 
@@ -179,51 +173,25 @@ def uncertain_map_motion(
     demand : SpectralDemand
         Radii at contact height and their correlation.
     """
-    first, second = (_radius(motion, pairs, demand, i) for i in (1, 2))
-    count = len(demand.correlation)
-    _, pair_log_std = pair_motion(
-        (first.radius, second.radius),
-        (first.ln_ratio, second.ln_ratio),
-        (first.motion_log_std, second.motion_log_std),
-        both(pairs, "period"),
+    first, second = (spectral_radius(pairs, demand, i) for i in (1, 2))
+    period_1, period_2 = both(pairs, "period")
+    log_stds = (
+        at_period(motion.periods, motion.log_std, period_1),
+        at_period(motion.periods, motion.log_std, period_2),
     )
-    # every resampled pair has a spectrum of its own
-    resampled = period_is_uncertain(pairs)
-    row = np.zeros(count, dtype=np.intp)
-    row[resampled] = np.arange(np.count_nonzero(resampled))
+    ratios = first.ln_ratio, second.ln_ratio
+    _, pair_log_std = pair_motion(
+        (first.radius, second.radius), ratios, log_stds, (period_1, period_2)
+    )
+    # every pair has a spectrum of its own
     uncertain = UncertainMotion(
         first,
         second,
         correlation=demand.correlation,
-        pair_log_std=pair_log_std,
-        model_log_std=np.full(count, SD_DISPERSION),
-        exact_demand=np.full(count, np.nan),
-        row=row,
+        log_std=np.hypot(pair_log_std, SD_DISPERSION),
+        row=np.arange(period_1.size),
     )
-    return uncertain, _log_spectra(motion.periods, motion.ln_sd[resampled])
-
-
-def _radius(motion: MapMotion, pairs: Table, demand: SpectralDemand, i: int) -> UncertainRadius:
-    """Return the radius of building i at contact height, with its oscillator and uncertainties."""
-    period, damping = values(pairs, f"period_{i}"), values(pairs, f"damping_{i}")
-    return UncertainRadius(
-        radius=demand.radii[i - 1] / SD_MEDIAN,
-        ln_ratio=np.zeros_like(period),
-        motion_log_std=at_period(motion.periods, motion.log_std, period),
-        damping_log_std=_damping_dispersion(pairs, i),
-        period=period,
-        damping=damping,
-    )
-
-
-def _damping_dispersion(pairs: Table, i: int) -> FloatArray:
-    """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
-    damping, deviation = values(pairs, f"damping_{i}"), values(pairs, f"damping_log_std_{i}")
-    # one deviation below and above; no damping reaches the critical one
-    low = damping * np.exp(-deviation)
-    high = np.minimum(damping * np.exp(deviation), 0.999)
-    dispersion = np.log(damping_factor(low) / damping_factor(high)) / 2.0
-    return np.where(period_is_uncertain(pairs), 0.0, dispersion)
+    return uncertain, _log_spectra(motion.periods, motion.ln_sd)
 
 
 def _log_spectra(periods: FloatArray, ln_sd: FloatArray) -> LogSpectra:

@@ -27,7 +27,7 @@ from per_obspy.screening.by_spectrum.shakemap_motion import (
 )
 from per_obspy.screening.columns import ORDER, RESULTS
 from per_obspy.screening.flags import joined_flags, raised_by_pairs
-from per_obspy.screening.uncertainty.probability import pair_probability
+from per_obspy.screening.uncertainty.estimated import estimated_population
 from per_obspy.screening.values import both, values
 
 #: Longest way outside a map's edge that counts as on it: its coordinates have so many digits,
@@ -129,14 +129,14 @@ def _rows(
     """Return the rows of pairs that have a motion on the map."""
     period_1, period_2 = both(pairs, "period")
     damping_1, damping_2 = both(pairs, "damping")
-    # demand of SD, and its probability
+    # demand of SD, and the population
     sd_1 = displacement_on_map(motion, period_1, damping_1)
     sd_2 = displacement_on_map(motion, period_2, damping_2)
     demand = spectral_demand(pairs, (sd_1, sd_2))
-    probability = pair_probability(*uncertain_map_motion(motion, pairs, demand), pairs)
+    population = estimated_population(*uncertain_map_motion(motion, pairs, demand), pairs)
     # columns of a risk table with those of SD
     named = pairs.assign(demand_rule="shakemap")
-    table = spectral_columns(named, (sd_1, sd_2), demand, probability, screening)
+    table = spectral_columns(named, (sd_1, sd_2), demand, population, screening)
     missing = np.maximum(demand.demand - values(pairs, "gap"), 0.0)
     table = table.assign(flags=_flags(shakemap, table), missing_gap=missing)
     empty = {name: _empty(name) for name in ORDER if name not in table and name != "rank"}

@@ -100,9 +100,9 @@ def _scenarios(
 #: Columns, with units, in which all scenarios must agree, else equal names are not the same pair.
 SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
 
-#: Severity of pounding in a scenario, and its value where it is unknown: pairs of equal probability
-#: are ordered by what they expect of it.
-SEVERITY = {"impact_velocity": 0.0, "amplification": 1.0}
+#: Expected severity of a pair in a scenario, by which pairs are ordered, and its value where it is
+#: unknown: that without contact.
+SEVERITY = {"expected_impact_velocity": 0.0, "expected_amplification": 1.0}
 
 
 def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
@@ -120,7 +120,9 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
     # The scenarios' own columns follow the joined ones
     columns = [
-        Column("rank", "int64", "", "1 is the likeliest to pound; ties by expected severity"),
+        Column(
+            "rank", "int64", "", "1 is the worst: by expected impact velocity, then amplification"
+        ),
         Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
         Column(
             "probability",
@@ -138,16 +140,16 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
             "expected_impact_velocity",
             "float64",
             "m/s",
-            "impact velocity times probability, on average",
+            "weighted mean of those in the scenarios",
         ),
         Column(
             "expected_amplification",
             "float64",
             "1",
-            "amplification beyond 1 times probability, on average: the larger of both buildings",
+            "weighted mean of those in the scenarios; 1 without contact",
         ),
         Column(
-            "worst_scenario", "str", "", "name of the one that is likeliest to make the pair pound"
+            "worst_scenario", "str", "", "name of the one with the largest expected impact velocity"
         ),
         *(
             Column(f"probability_{name}", "float64", "1", f"of pounding in scenario {name}")
@@ -168,8 +170,8 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     Parameters
     ----------
     joined : DataFrame
-        ``pair_id``; ``probability_<name>``, ``impact_velocity_<name>`` (m/s) and
-        ``amplification_<name>`` of each scenario; and the smallest and largest value in
+        ``pair_id``; ``probability_<name>``, ``expected_impact_velocity_<name>`` (m/s) and
+        ``expected_amplification_<name>`` of each scenario; and the smallest and largest value in
         any scenario of each column of ``SAME``: ``gap``, ``gap_largest`` and so on.
     weights : mapping of str to float
         Weight of each scenario; see :func:`conditional_probability`.
@@ -186,18 +188,28 @@ def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bo
     pounding = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
     weight = np.array(list(weights.values()))
 
-    # Probabilities over all scenarios, and the scenario with the largest of each pair
+    # Probabilities and severities over all scenarios
     columns = {"probability": conditional_probability(pounding.T, weight)}
     if yearly:
         columns["annual_probability"] = annual_probability(pounding.T, weight)
     for name, unknown in SEVERITY.items():
         severity = rows[[f"{name}_{scenario}" for scenario in weights]].to_numpy(np.float64)
-        # beyond that of a pair that does not pound
-        harm = pounding * np.nan_to_num(severity - unknown)
-        columns[f"expected_{name}"] = _weighted_sum(harm.T, weight / weight.sum())
-    worst = np.array(list(weights), dtype=object)[np.argmax(pounding, axis=1)]
+        beyond = np.nan_to_num(severity - unknown)
+        columns[name] = unknown + _weighted_sum(beyond.T, weight / weight.sum())
+    # in the order of the table
     names = [name for name in ensemble_columns(weights, yearly) if name != "rank"]
-    return rows.assign(**columns, worst_scenario=worst)[names].reset_index(drop=True)
+    return rows.assign(**columns, worst_scenario=_worst(rows, weights))[names].reset_index(
+        drop=True
+    )
+
+
+def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.object_]:
+    """Return the scenario of the hardest impact of each pair; the likeliest of equal ones."""
+    probability = rows[[f"probability_{name}" for name in weights]].to_numpy(np.float64)
+    velocity = rows[[f"expected_impact_velocity_{name}" for name in weights]].to_numpy(np.float64)
+    # the last key decides; the first scenario of those alike
+    order = np.lexsort((-probability, -np.nan_to_num(velocity)), axis=1)
+    return np.array(list(weights), dtype=object)[order[:, 0]]
 
 
 def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:

@@ -19,11 +19,11 @@ class Evaluation(NamedTuple):
     pairs, pounded : int
         Pairs with an observation, and those of them that pounded.
     hit_rate : float
-        Share of the pounded pairs whose state is yes; NaN if none pounded.
+        Share of the pounded pairs whose state is yes or likely; NaN if none pounded.
     hit_rate_with_possible : float
-        Share of the pounded pairs whose state is yes or possible.
+        Share of the pounded pairs whose state is yes, likely or possible.
     false_alarm_rate : float
-        Share of the other pairs whose state is yes; NaN if all pounded.
+        Share of the other pairs whose state is yes or likely; NaN if all pounded.
     brier_score : float
         Mean squared difference of probability and observation; NaN without probabilities.
     brier_score_of_the_share : float
@@ -60,7 +60,9 @@ def evaluation(table: pd.DataFrame) -> Evaluation:
     """
     rows = table[table["observed"].notna()]
     observed = _observed(rows["observed"])
-    state, share = rows["state"].to_numpy(object), float(observed.mean())
+    share = float(observed.mean())
+    warned = rows["state"].isin(["yes", "likely"]).to_numpy()
+    with_possible = warned | (rows["state"] == "possible").to_numpy()
 
     # Probabilities and observations of the pairs that have both
     missing = pd.Series(np.nan, index=rows.index)
@@ -72,9 +74,9 @@ def evaluation(table: pd.DataFrame) -> Evaluation:
     return Evaluation(
         pairs=observed.size,
         pounded=int(observed.sum()),
-        hit_rate=_share((state == "yes")[observed == 1]),
-        hit_rate_with_possible=_share((state != "no")[observed == 1]),
-        false_alarm_rate=_share((state == "yes")[observed == 0]),
+        hit_rate=_share(warned[observed == 1]),
+        hit_rate_with_possible=_share(with_possible[observed == 1]),
+        false_alarm_rate=_share(warned[observed == 0]),
         brier_score=brier_score(seen, predicted) if known.any() else np.nan,
         brier_score_of_the_share=share * (1.0 - share),
         reliability=reliability(seen, predicted),

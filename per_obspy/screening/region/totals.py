@@ -29,9 +29,7 @@ TOTALS: dict[str, Column] = {
             "name of the area or of the cell; empty where the pair table does not tell",
         ),
         Column("pairs", "int64", "1", "pairs in the area"),
-        Column("yes", "int64", "1", "pairs whose gap is below their demand"),
-        Column("possible", "int64", "1", "pairs that may pound"),
-        Column("no", "int64", "1", "the other pairs"),
+        *(Column(state, "int64", "1", f"pairs of the state {state}") for state in STATES),
         Column(
             "expected_pounding",
             "float64",
@@ -52,9 +50,7 @@ TOTALS: dict[str, Column] = {
         ),
         Column("worst_pair", "str", "", "pair_id of the area's worst pair"),
         Column("worst_state", "str", "", "its state"),
-        Column(
-            "worst_demand_ratio", "float64", "1", "its gap / demand; empty where its demand is 0"
-        ),
+        Column("worst_expected_impact_velocity", "float64", "m/s", "its expected impact velocity"),
         Column("longitude", "float64", "degrees", "of the middle of the area's pairs, east"),
         Column("latitude", "float64", "degrees", "of the middle of the area's pairs, north"),
     )
@@ -202,7 +198,7 @@ def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str])
 def _worst_pairs(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the pair of the smallest rank of each area."""
     worst = rows.sort_values("rank").drop_duplicates("area")
-    return worst[["area", "rank", "pair_id", "state", "demand_ratio"]]
+    return worst[["area", "rank", "pair_id", "state", "expected_impact_velocity"]]
 
 
 def _probabilities(rows: pd.DataFrame) -> pd.DataFrame | None:
@@ -250,7 +246,7 @@ def _worst_of(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """Return the worst pair of each area from those of all pieces."""
     first = pd.concat(pieces).sort_values("rank").drop_duplicates("area")
     named = first.set_index("area").drop(columns="rank")
-    return named.set_axis(["worst_pair", "worst_state", "worst_demand_ratio"], axis=1)
+    return named.add_prefix("worst_").rename(columns={"worst_pair_id": "worst_pair"})
 
 
 def _expected(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:

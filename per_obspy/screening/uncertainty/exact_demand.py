@@ -1,11 +1,12 @@
 """
-Probability of pounding at one station; exact demands are sampled over uncertain buildings.
+Population of pairs at one station; where the record supports a pair, by its exact demand.
 
-Where the exact demand decides and a period or a damping has a log-standard deviation, the record
-drives a sample of both buildings: periods and dampings at quasi-random nodes, the two buildings
-independently. Each demand is carried to the site (``site_demand.py``), and the probability is the
-mean over the nodes of the chance that a demand exceeds the gap. So equal buildings of uncertain
-period or damping are not certain to move as one.
+The record drives the buildings of every node, and their exact relative displacement is the demand
+of the node, whether periods were given or derived; it is carried to the site (``site_demand.py``).
+So equal buildings of uncertain period or
+damping are not certain to move as one. Elsewhere, and where the estimate leaves no doubt whether a
+pair of derived periods touches, estimates take the place of the record: at short periods, where
+displacements follow the ground, an exact demand takes up to a hundred times as long as at 1 s.
 
 Against 4096 nodes, for 320 pairs in 18 real records (periods 0.3 to 3 s, one in three pairs of
 equal periods, log-standard deviations 0.2 or 0.3 of periods, dampings or both), the probability is
@@ -16,64 +17,99 @@ nodes    32    64   128   256
 error  .069  .035  .021  .015
 ===== ===== ===== ===== =====
 
-Where the first 64 nodes leave no doubt the other 64 are spared: of such pairs 95 in 100 are wrong
-by less than .003, 99 in 100 by less than .016.
+Where the first nodes leave no doubt about contact the others are spared.
+``workflows/population_accuracy.py`` compares populations with draws of exact histories.
 """
 
+from typing import NamedTuple
+
 import numpy as np
-from scipy.special import ndtr
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
-from per_obspy.screening.by_record.exact import can_yield, exact_demand
+from per_obspy.screening.by_record.exact import can_yield, exact_demand, record_supports
 from per_obspy.screening.by_record.station_motion import StationMotion
-from per_obspy.screening.by_record.yielding import LARGEST_DAMPING
-from per_obspy.screening.uncertainty.probability import (
+from per_obspy.screening.uncertainty.estimated import (
+    SAMPLES,
+    UncertainMotion,
+    estimated_motion,
+    estimated_population,
+)
+from per_obspy.screening.uncertainty.nodes import (
     NODES,
     building_is_uncertain,
+    damping_at_nodes,
     gap_dispersion,
-    median_gap,
-    pair_probability,
+    period_at_nodes,
+)
+from per_obspy.screening.uncertainty.population import (
+    COLUMNS,
+    Uncertain,
+    chance_of_contact,
+    population,
 )
 from per_obspy.screening.uncertainty.record_motion import is_exact, record_motion
+from per_obspy.screening.uncertainty.severity import RelativeMotion, impact_velocity
 from per_obspy.screening.uncertainty.site_demand import (
     SiteDemand,
     ln_field_demand,
     median_at_site,
     site_demand,
 )
-from per_obspy.screening.values import Columns, Table, chosen, values
+from per_obspy.screening.values import Columns, Table, both, chosen, values
 
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
 YIELDING_NODES = 32
 
-#: Nodes after which a pair is certain if its probability is this near to 0 or 1.
-FIRST_NODES, CERTAIN = 64, 5e-4
+#: Nodes of touching pairs: their mean impact velocity is within 4 % of that of 128 nodes in the
+#: median, and within 15 % at nine pairs in ten (180 pairs of derived periods in 3 real records).
+TOUCHING_NODES = 16
 
-#: Oscillator pairs (pairs times nodes) that are computed together: about 10 MB.
-SAMPLES = 32_768
+#: Nodes after which a pair is certain if its probability is this near to 0 or 1.
+FIRST_NODES, CERTAIN = 32, 5e-4
+
+#: Distance of the probability by the estimate from 0 and 1 up to which pairs of derived periods are
+#: not driven by the record.
+NEGLIGIBLE = 1e-4
 
 #: Demand / sum of the radii below which two oscillators move as one.
 ROUND_OFF = 1e-12
 
-#: Demand / largest demand of the pair's nodes below which its logarithm does not count in the
-#: spread of the nodes.
-NEGLIGIBLE = 1e-3
-
-#: Interquartile range over standard deviation of a normal variable.
-NORMAL_QUARTILES = 1.349
+#: Exact impact velocity at the medians / that of ``severity.py``: limits of what is believed.
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 
 #: Columns of a pair from which its demand at the site follows.
-COMMON = ("gap", "azimuth", "azimuth_used", "ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1",
-          "ln_per_std_2")  # fmt: skip
+PAIR = (
+    *("gap", "azimuth", "azimuth_used", "distance"),
+    *("ln_per_ratio_1", "ln_per_ratio_2", "ln_per_std_1", "ln_per_std_2"),
+)
 
-#: Columns of one building from which the exact demand follows.
-BUILDING = ("period", "damping", "participation", "yield_displacement", "hardening", "per")
+#: Columns of one building, besides those at nodes, from which the exact demand follows.
+BUILDING = ("participation", "yield_displacement", "hardening", "per")
 
 
-def record_probability(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
+class _Block(NamedTuple):
+    """Pairs of a block with all that their population follows from."""
+
+    station: StationMotion
+    table: Columns
+    motion: UncertainMotion
+    site: SiteDemand
+    screening: Screening
+
+    def rows(self, numbers: NDArray[np.intp]) -> "_Block":
+        """Return some of the pairs."""
+        return self._replace(
+            table=chosen(self.table, numbers),
+            motion=self.motion.rows(numbers),
+            site=SiteDemand(*(column[numbers] for column in self.site)),
+        )
+
+
+def record_population(station: StationMotion, table: Table, screening: Screening) -> Columns:
     """
-    Compute the probability of pounding of every pair at one station.
+    Compute the population of every pair at one station.
 
     Parameters
     ----------
@@ -86,126 +122,185 @@ def record_probability(station: StationMotion, table: Table, screening: Screenin
 
     Returns
     -------
-    probability : (n_pairs,) ndarray
-        From 0 to 1.
+    dict of (n_pairs,) ndarray
+        ``population.COLUMNS``. Where the exact demand decides and nothing is uncertain, what the
+        exact history gives.
     """
-    probability = pair_probability(record_motion(station, table, screening), station.per, table)
-    # exact demand of uncertain buildings: sampled, yielding pairs at fewer nodes
-    sampled = is_exact(table) & building_is_uncertain(table)
-    yields = can_yield(table)
-    for rows, nodes in ((sampled & ~yields, NODES), (sampled & yields, NODES[:YIELDING_NODES])):
-        if rows.any():
-            block = chosen(table, rows)
-            probability[rows] = sampled_probability(station, block, nodes, screening)
-    return probability
+    exact = is_exact(table)
+    result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
+    # estimates, which show too of which pairs of derived periods the contact is in doubt
+    estimated = np.flatnonzero(~exact)
+    if estimated.size:
+        part = chosen(table, estimated)
+        motion = record_motion(station, part, screening)
+        _fill(result, estimated, estimated_population(motion, station.per, part))
+    # exact demands in blocks, which bound the memory; a pair does not depend on its block
+    by_record = exact | _in_doubt(station, table, result["probability"])
+    size = SAMPLES // len(NODES)
+    for mask, nodes in _kinds(table):
+        rows = np.flatnonzero(by_record & mask)
+        for first in range(0, rows.size, size):
+            block = rows[first : first + size]
+            pairs = _block(station, chosen(table, block), screening)
+            found = _of_certain_buildings if nodes is None else _sampled
+            _fill(result, block, found(pairs, NODES if nodes is None else nodes))
+    return result
 
 
-def sampled_probability(
-    station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
+def _kinds(table: Table) -> list[tuple[NDArray[np.bool_], FloatArray | None]]:
+    """Return masks of pairs, each with its nodes of both buildings; None of certain buildings."""
+    uncertain, yields = building_is_uncertain(table), can_yield(table)
+    touching = values(table, "gap") == 0.0
+    # fewer nodes of yielding pairs, and of touching ones, which surely touch
+    return [
+        (~uncertain, None),
+        (uncertain & touching, NODES[:TOUCHING_NODES]),
+        (uncertain & ~touching & yields, NODES[:YIELDING_NODES]),
+        (uncertain & ~touching & ~yields, NODES),
+    ]
+
+
+def _fill(result: Columns, rows: NDArray[np.intp], part: Columns) -> None:
+    """Put the columns of some rows in place."""
+    for name, column in part.items():
+        result[name][rows] = column
+
+
+def _in_doubt(station: StationMotion, table: Table, estimated: FloatArray) -> NDArray[np.bool_]:
+    """Return where the record supports a pair of whose contact an estimate leaves a doubt."""
+    known = ~is_exact(table) & np.isfinite(values(table, "demand_exact"))
+    # rows of exact demands have no estimate yet
+    chance = np.where(known, estimated, 0.0)
+    doubtful = (chance >= NEGLIGIBLE) & (chance <= 1.0 - NEGLIGIBLE)
+    return known & doubtful & record_supports(station, table)
+
+
+def _block(station: StationMotion, table: Columns, screening: Screening) -> _Block:
+    """Return pairs with the exact demand as the one that decides."""
+    table = table | {"demand_rule": np.full(len(table["gap"]), "exact", dtype=object)}
+    motion = record_motion(station, table, screening)
+    return _Block(station, table, motion, site_demand(station, table, screening), screening)
+
+
+def _of_certain_buildings(block: _Block, nodes: FloatArray) -> Columns:
+    """Return the population of pairs of which at most motion and gap are uncertain."""
+    # the only demand, at the site
+    table, site = block.table, block.site
+    moving, factor = _at_the_medians(block)
+    result = population(Uncertain(moving, site.log_std, factor), table, nodes)
+    # nothing uncertain: the exact history itself
+    at_record = (site.log_std == 0.0) & (site.ln_ratio == 0.0) & (site.weight == 1.0)
+    certain = at_record & (gap_dispersion(table) == 0.0)
+    velocity = np.nan_to_num(values(table, "impact_velocity_exact"))
+    amplified = np.fmax(*both(table, "amplification_exact"))
+    history = {
+        "expected_impact_velocity": velocity,
+        "impact_velocity_84": velocity,
+        "expected_amplification": np.where(velocity > 0.0, np.fmax(amplified, 1.0), 1.0),
+    }
+    return result | {name: np.where(certain, history[name], result[name]) for name in history}
+
+
+def _sampled(block: _Block, nodes: FloatArray) -> Columns:
+    """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
+    # first nodes
+    demands = _demands(block, nodes[:FIRST_NODES])
+    chance = chance_of_contact(demands, block.site.log_std, block.table)
+    doubtful = (chance > CERTAIN) & (chance < 1.0 - CERTAIN)
+    result: Columns = {name: np.empty(chance.size) for name in COLUMNS}
+    for mask, taken in ((~doubtful, nodes[:FIRST_NODES]), (doubtful, nodes)):
+        rows = np.flatnonzero(mask)
+        if not rows.size:
+            continue
+        # the first nodes are known already
+        pairs, known = block.rows(rows), demands[rows]
+        every = np.concatenate([known, _demands(pairs, taken[FIRST_NODES:])], axis=1)
+        moving = _scaled(pairs, taken, every)
+        uncertain = Uncertain(moving, pairs.site.log_std, _factor_of_yielding(pairs))
+        _fill(result, rows, population(uncertain, pairs.table, taken))
+    return result
+
+
+def node_demands(
+    station: StationMotion, table: Columns, nodes: FloatArray, screening: Screening
 ) -> FloatArray:
     """
-    Compute the probability that the exact demand of uncertain buildings exceeds the gap.
+    Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m.
 
     Parameters
     ----------
     station : StationMotion
         The record.
     table : Table
-        Rows of the risk table whose exact demand decides.
-    nodes : (n_nodes, 4) ndarray
-        Standard normal nodes of ln period and ln damping of building 1, then of building 2.
+        Rows of the risk table.
+    nodes : (n_nodes, 6) ndarray
+        As ``nodes.NODES``.
     screening : Screening
         For the demand at the site.
-
-    Returns
-    -------
-    probability : (n_pairs,) ndarray
-        From 0 to 1; of a gap of 0 the share of nodes with a demand.
     """
-    count = len(values(table, "gap"))
-    probability = np.empty(count)
-    size = max(SAMPLES // len(nodes), 1)
-    # blocks bound the memory; a pair does not depend on its block
-    for first in range(0, count, size):
-        rows = np.arange(first, min(first + size, count))
-        probability[rows] = _of_block(station, chosen(table, rows), nodes, screening)
-    return probability
+    return _demands(_block(station, table, screening), nodes)
 
 
-def _of_block(
-    station: StationMotion, table: Table, nodes: FloatArray, screening: Screening
-) -> FloatArray:
-    """Return the probability of pairs, at all nodes where the first ones leave a doubt."""
-    site = site_demand(station, table, screening)
-    demands = _demands(station, table, site, nodes[:FIRST_NODES], screening)
-    probability = _mean_chance(demands, table, site.log_std)
-    doubtful = (probability > CERTAIN) & (probability < 1.0 - CERTAIN)
-    # mean over all nodes, the first ones included
-    if len(nodes) > FIRST_NODES and doubtful.any():
-        block = chosen(table, doubtful)
-        there = SiteDemand(*(column[doubtful] for column in site))
-        others = _demands(station, block, there, nodes[FIRST_NODES:], screening)
-        every = np.concatenate([demands[doubtful], others], axis=1)
-        probability[doubtful] = _mean_chance(every, block, there.log_std)
-    return probability
-
-
-def _demands(
-    station: StationMotion,
-    table: Table,
-    site: SiteDemand,
-    nodes: FloatArray,
-    screening: Screening,
-) -> FloatArray:
-    """Return median demands at the site of sampled buildings, (n_pairs, n_nodes), m."""
-    sample = _sampled_buildings(table, nodes)
-    demand = exact_demand(station, sample, values(sample, "azimuth_used"))
+def _demands(block: _Block, nodes: FloatArray) -> FloatArray:
+    """Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m."""
+    if not len(nodes):
+        return np.empty((len(block.table["gap"]), 0))
+    sample = _sampled_buildings(block.table, nodes)
+    demand = exact_demand(block.station, sample, values(sample, "azimuth_used"))
     demand = demand.reshape(-1, len(nodes))
     # equal motions leave the round-off of their difference
-    moves_apart = demand > ROUND_OFF * values(table, "absolute_gap")[:, None]
+    moves_apart = demand > ROUND_OFF * values(block.table, "absolute_gap")[:, None]
     demand = np.where(moves_apart, demand, 0.0)
-    ln_field = ln_field_demand(station, sample, screening).reshape(demand.shape)
-    return median_at_site(demand, site.weight[:, None], site.ln_ratio[:, None], ln_field)
+    # what the motion between the stations lets expect of the same buildings
+    ln_field = ln_field_demand(block.station, sample, block.screening).reshape(demand.shape)
+    weight, ln_ratio = block.site.weight[:, None], block.site.ln_ratio[:, None]
+    return median_at_site(demand, weight, ln_ratio, ln_field)
 
 
 def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     """Return the buildings of all pairs at all nodes, node by node within a pair."""
     # whatever does not differ between the nodes
-    names = [name for name in COMMON if name in table]
+    names = [name for name in PAIR if name in table]
     names += [f"{name}_{i}" for name in BUILDING for i in (1, 2)]
     sample: Columns = {name: np.repeat(values(table, name), len(nodes)) for name in names}
     for i in (1, 2):
         # lognormal period and damping
-        for name, node in zip(("period", "damping"), nodes.T[2 * i - 2 : 2 * i], strict=True):
-            deviation = values(table, f"{name}_log_std_{i}")
-            sample[f"{name}_{i}"] *= np.exp(deviation[:, None] * node).ravel()
-        # an oscillator has less than the critical damping
-        largest = np.maximum(np.repeat(values(table, f"damping_{i}"), len(nodes)), LARGEST_DAMPING)
-        sample[f"damping_{i}"] = np.minimum(sample[f"damping_{i}"], largest)
+        period = period_at_nodes(values(table, f"period_{i}"), table, i, nodes)
+        damping = damping_at_nodes(values(table, f"damping_{i}"), table, i, nodes)
+        sample[f"period_{i}"], sample[f"damping_{i}"] = period.ravel(), damping.ravel()
     return sample
 
 
-def _mean_chance(demands: FloatArray, table: Table, motion_log_std: FloatArray) -> FloatArray:
-    """Return the mean over the nodes of the chance that a demand exceeds an uncertain gap."""
-    gap = median_gap(table)
-    known = np.hypot(gap_dispersion(table), motion_log_std)
-    # nodes are smoothed as far as nothing else is uncertain
-    dispersion = np.maximum(known, _smoothing(demands))[:, None]
-    comparable = (demands > 0) & (gap > 0)[:, None] & (dispersion > 0)
-    # lognormal demand over gap; without dispersion the demand is above the gap or not
-    ratio = np.divide(demands, gap[:, None], out=np.ones_like(demands), where=comparable)
-    margin = np.divide(np.log(ratio), dispersion, out=np.zeros_like(ratio), where=comparable)
-    chance = np.where(comparable, ndtr(margin), demands > gap[:, None])
-    mean: FloatArray = chance.mean(axis=1)
-    return mean
+def _scaled(block: _Block, nodes: FloatArray, demand: FloatArray) -> RelativeMotion:
+    """Return the motion at nodes with exact demands: velocities follow by their frequency."""
+    estimate = estimated_motion(block.motion, block.station.per, block.table, nodes)
+    period_1, period_2 = both(block.table, "period")
+    between = np.broadcast_to((2.0 * np.pi / np.sqrt(period_1 * period_2))[:, None], demand.shape)
+    # circular frequency of the relative motion; between both where an estimate has none
+    moves = estimate.demand > 0.0
+    frequency = np.divide(estimate.velocity, estimate.demand, out=between.copy(), where=moves)
+    return estimate._replace(demand=demand, velocity=frequency * demand)
 
 
-def _smoothing(demands: FloatArray) -> FloatArray:
-    """Return the log-standard deviation of a node: of all nodes over the root of their number."""
-    largest = demands.max(axis=1, keepdims=True)
-    floor = np.maximum(NEGLIGIBLE * largest, np.finfo(np.float64).tiny)
-    logs = np.log(np.maximum(demands, floor))
-    # the smaller of two measures of spread: few nodes far off do not count
-    lower, upper = np.quantile(logs, (0.25, 0.75), axis=1)
-    spread = np.minimum(logs.std(axis=1), (upper - lower) / NORMAL_QUARTILES)
-    return np.asarray(spread / np.sqrt(demands.shape[1]))
+def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
+    """Return the motion at the medians, (n_pairs, 1), and the factor of impact velocities there."""
+    site, exact = block.site, values(block.table, "demand_exact")
+    demand = median_at_site(exact, site.weight, site.ln_ratio, site.ln_field)
+    moving = _scaled(block, np.zeros((1, NODES.shape[1])), demand[:, None])
+    # back to the record, whose history is known
+    at_record = np.divide(exact, demand, out=np.ones_like(exact), where=demand > 0.0)
+    gap = values(block.table, "gap")[:, None]
+    estimate = impact_velocity(moving, at_record[:, None], gap)[:, 0]
+    # both must hit at the medians
+    velocity = values(block.table, "impact_velocity_exact")
+    known = (velocity > 0.0) & (estimate > 0.0)
+    factor = np.divide(velocity, estimate, out=np.ones_like(velocity), where=known)
+    return moving, np.clip(factor, SMALLEST_FACTOR, LARGEST_FACTOR)
+
+
+def _factor_of_yielding(block: _Block) -> FloatArray:
+    """Return the factor at the medians where a building can yield, to which no fit applies."""
+    factor, yields = np.ones(block.motion.row.size), np.flatnonzero(can_yield(block.table))
+    if yields.size:
+        _, factor[yields] = _at_the_medians(block.rows(yields))
+    return factor

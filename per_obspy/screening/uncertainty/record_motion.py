@@ -12,17 +12,11 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
-from per_obspy.screening.by_record.stored_spectra import log_oscillator, stored_log
-from per_obspy.screening.uncertainty.probability import (
-    UncertainMotion,
-    UncertainRadius,
-    period_is_uncertain,
-)
+from per_obspy.screening.uncertainty.estimated import UncertainMotion, UncertainRadius
 from per_obspy.screening.uncertainty.site_demand import (
     estimate_log_std,
-    median_at_site,
     motion_at_site,
-    site_demand,
+    pair_at_site,
 )
 from per_obspy.screening.values import Table, values
 
@@ -46,43 +40,22 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
     Returns
     -------
     UncertainMotion
-        Its rows are those of the stored PER of the station. The exact demand is that of certain
-        buildings; :mod:`.exact_demand` samples it where they are uncertain.
+        Its rows are those of the stored PER of the station. Where the exact demand decides the
+        radii are those of PER, without the error of an estimate.
     """
-    first, second = (_radius(station, table, i, screening) for i in (1, 2))
-    # the exact demand at the site, and the error of an estimate there
-    site, exact = site_demand(station, table, screening), is_exact(table)
-    demand = np.where(exact, values(table, "demand_exact"), 0.0)
-    at_site = median_at_site(demand, site.weight, site.ln_ratio, site.ln_field)
+    first, second = (_radius(table, i, screening) for i in (1, 2))
+    # by the motion of both buildings, and by the error of an estimate
+    _, pair_log_std = pair_at_site(table)
     deviations = screening.linearized_dispersion, screening.model_dispersion
-    model_log_std = np.where(_linearized(table), *deviations)
+    at_record = np.where(_linearized(table), *deviations)
+    model_log_std = estimate_log_std(table, at_record, screening.interpolation)
     return UncertainMotion(
         first,
         second,
         correlation=_governing_correlation(table),
-        pair_log_std=np.where(exact, site.log_std, site.field_log_std),
-        model_log_std=estimate_log_std(table, model_log_std, screening.interpolation),
-        exact_demand=np.where(exact, at_site, np.nan),
+        log_std=np.hypot(pair_log_std, np.where(is_exact(table), 0.0, model_log_std)),
         row=nearest_azimuth(station, table),
     )
-
-
-def demand_at_site(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
-    """
-    Return the governing demand of pairs at their sites, m: what their probability rests on.
-
-    Parameters
-    ----------
-    station : StationMotion
-        The record.
-    table : Table
-        As of :func:`record_motion`.
-    screening : Screening
-        As of :func:`record_motion`.
-    """
-    site, demand = site_demand(station, table, screening), values(table, "demand")
-    exact = median_at_site(demand, site.weight, site.ln_ratio, site.ln_field)
-    return np.where(is_exact(table), exact, demand * np.exp(site.ln_ratio))
 
 
 def is_exact(table: Table) -> NDArray[np.bool_]:
@@ -90,16 +63,15 @@ def is_exact(table: Table) -> NDArray[np.bool_]:
     return np.asarray(table["demand_rule"] == "exact")
 
 
-def _radius(station: StationMotion, table: Table, i: int, screening: Screening) -> UncertainRadius:
+def _radius(table: Table, i: int, screening: Screening) -> UncertainRadius:
     """Return the radius of building i at contact height, with its oscillator and uncertainties."""
     # the median of the estimate over the exact demand is taken off the radius
-    bias = np.where(_linearized(table), screening.linearized_median, screening.model_median)
-    ln_ratio, motion_log_std = motion_at_site(table, i)
+    estimate = np.where(_linearized(table), screening.linearized_median, screening.model_median)
+    bias = np.where(is_exact(table), 1.0, estimate)
+    ln_ratio, _ = motion_at_site(table, i)
     return UncertainRadius(
         radius=values(table, f"participation_{i}") * _deciding(table, f"per_{i}") / bias,
         ln_ratio=ln_ratio,
-        motion_log_std=motion_log_std,
-        damping_log_std=_damping_dispersion(station, table, i),
         period=_deciding(table, f"period_{i}"),
         damping=_deciding(table, f"damping_{i}"),
     )
@@ -121,18 +93,3 @@ def _governing_correlation(table: Table) -> FloatArray:
     elastic = np.where(by_record, table["correlation_record"], table["correlation"])
     linearized = values(table, "correlation_linearized")
     return np.where(_linearized(table), linearized, elastic)
-
-
-def _damping_dispersion(station: StationMotion, table: Table, i: int) -> FloatArray:
-    """Return the deviation of ln radius i by an uncertain damping; 0 where that is resampled."""
-    single = ~is_exact(table) & ~period_is_uncertain(table)
-    row = nearest_azimuth(station, table)[single]
-    period, damping = log_oscillator(table, i)
-    period, damping = period[single], damping[single]
-    deviation = values(table, f"damping_log_std_{i}")[single]
-    # half the difference between one deviation below and above
-    low = stored_log(station.per, row, period, damping - deviation)
-    high = stored_log(station.per, row, period, damping + deviation)
-    dispersion = np.zeros(single.size)
-    dispersion[single] = np.abs(high - low) / 2.0
-    return dispersion

@@ -1,4 +1,4 @@
-"""Demand on the gap: the governing estimate, states and ratios."""
+"""Demand on the gap: the governing estimate and ratios."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ from per_obspy.screening.by_record.demand import (
     demand_ratio,
     gap_estimates,
     governing_demand,
-    pounding_state,
 )
 
 RANDOM = np.random.default_rng(3)
@@ -58,12 +57,6 @@ def test_demands_are_proportional_to_the_motion():
     twice = gap_estimates(per, sd, PERIOD, DAMPING, correlation)
     for name in ("per", "record", "sd", "srss", "absolute"):
         assert_allclose(getattr(twice, name), 2 * getattr(once, name), rtol=1e-12)  # round-off
-
-
-def test_states():
-    gap, demand = np.array([0.0, 0.1, 0.3, 0.3, 0.0]), np.array([0.2, 0.2, 0.2, 0.2, 0.0])
-    derived = np.array([False, False, False, True, False])
-    assert pounding_state(gap, demand, derived).tolist() == ["yes", "yes", "no", "possible", "no"]
 
 
 def test_ratio_is_empty_only_without_demand():

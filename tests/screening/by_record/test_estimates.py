@@ -1,14 +1,13 @@
 """Demand of a record: the governing estimate, round-off, and the velocity that ranks pairs."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_array_equal
 from screening_samples import make_pairs, table_of
 
 import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
-from per_obspy.screening.by_record.estimates import demand_columns, impact_velocity_that_counts
+from per_obspy.screening.by_record.estimates import demand_columns
 from per_obspy.screening.by_record.exact import EXACT_COLUMNS
 from per_obspy.screening.by_record.pair_radii import motion_along_every_azimuth
 from per_obspy.screening.by_record.yielding import linearized_columns
@@ -112,27 +111,6 @@ def test_equal_buildings_have_a_demand_of_zero(station):
     table = table_of(station, [equal])
     assert table["demand"].iloc[0] == 0.0
     assert np.isnan(table["estimate_over_exact"].iloc[0])
-
-
-@pytest.mark.parametrize(
-    ("rule", "exact", "single", "expected"),
-    [
-        ("exact", 0.2, 0.9, 0.2),
-        ("per_record", 0.2, 0.9, 0.9),
-        ("per_record", 1.3, 0.9, 1.3),
-        ("srss", np.nan, 0.9, 0.9),
-        ("srss", 0.2, np.nan, 0.2),
-    ],
-)
-def test_the_single_hit_counts_only_where_the_exact_demand_does_not_decide(
-    rule, exact, single, expected
-):
-    table = {
-        "demand_rule": np.array([rule], dtype=object),
-        "impact_velocity_exact": np.array([exact]),
-        "impact_velocity": np.array([single]),
-    }
-    assert impact_velocity_that_counts(table).tolist() == [expected]
 
 
 def test_round_off_is_relative_to_the_radii(station):

@@ -10,7 +10,12 @@ from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.single_hit import single_hit
-from per_obspy.screening.by_spectrum.demand import spectral_columns, spectral_demand
+from per_obspy.screening.by_spectrum.demand import (
+    spectral_columns,
+    spectral_demand,
+    spectral_radius,
+)
+from per_obspy.screening.uncertainty.population import COLUMNS
 from per_obspy.screening.values import both
 
 #: SD of both oscillators, m.
@@ -43,10 +48,16 @@ def test_derived_periods_ask_for_the_root_of_the_sum_of_squares(pairs):
     assert demand.demand[1] == demand.by_squares[1] > demand.by_correlation[1]
 
 
+def _population(probability):
+    """Return the population of both pairs with a probability."""
+    numbers = (probability, 0.3, 0.4, 1.2)
+    return {name: np.full(2, number) for name, number in zip(COLUMNS, numbers, strict=True)}
+
+
 def test_the_single_hit_is_at_the_demand(pairs):
     # would catch: radii of the oscillators, or the gap by correlation for derived periods
     demand = spectral_demand(pairs, SD)
-    table = spectral_columns(pairs, SD, demand, np.zeros(2), Screening())
+    table = spectral_columns(pairs, SD, demand, _population(0.0), Screening())
     hit = single_hit(
         *demand.radii,
         *both(pairs, "period"),
@@ -60,14 +71,18 @@ def test_the_single_hit_is_at_the_demand(pairs):
     assert_array_equal(table["sd_1"], SD[0])
 
 
-def test_a_gap_above_the_demand_is_possible_where_it_is_likely_or_periods_are_derived(pairs):
-    # would catch: a derived period that is a plain no, or a yes by probability alone
-    wide, likely = pairs.assign(gap=1.0), Screening().possible_from
-    demand = spectral_demand(wide, SD)
-    states = [
-        spectral_columns(wide, SD, demand, np.full(2, probability), Screening())["state"].tolist()
-        for probability in (0.0, likely)
-    ]
-    assert states == [["no", "possible"], ["possible", "possible"]]
-    table = spectral_columns(pairs.assign(gap=0.0), SD, demand, np.zeros(2), Screening())
-    assert set(table["state"]) == {"yes"}
+def test_state_and_class_are_those_of_the_population_whatever_was_derived(pairs):
+    # would catch: a derived period that is never a no, or a yes by the demand alone
+    demand, states = spectral_demand(pairs.assign(gap=0.0), SD), Screening().states
+    for probability, name in ((0.0, "no"), (states.unlikely, "unlikely"), (states.yes, "yes")):
+        table = spectral_columns(pairs, SD, demand, _population(probability), Screening())
+        assert set(table["state"]) == {name}
+        assert set(table["risk_class"]) == {"high"}
+
+
+def test_the_radius_of_the_population_has_no_bias(pairs):
+    demand = spectral_demand(pairs, SD)
+    radius = spectral_radius(pairs, demand, 2)
+    assert_allclose(radius.radius, demand.radii[1] / 0.97, rtol=1e-12)
+    assert_array_equal(radius.period, pairs["period_2"])
+    assert not radius.ln_ratio.any()

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from per_obspy.errors import CatalogError
 from per_obspy.screening.by_spectrum.design_spectrum import (
-    clipped_displacement,
     displacement_at,
     read_design_spectrum,
     within,
@@ -62,13 +61,6 @@ def test_nothing_is_extrapolated(write):
     spectrum = read_design_spectrum(write(_csv("sd", lambda T, _: 0.1 * T)))
     with pytest.raises(ValueError, match=r"inside the spectrum, got 4\.1 s and 0\.05"):
         displacement_at(spectrum, [1.0, 4.1], [0.05, 0.05])
-
-
-def test_resampled_oscillators_keep_the_value_at_the_edge(write):
-    spectrum = read_design_spectrum(write(_csv("sd", lambda T, xi: 0.1 * T / xi)))
-    period, damping = np.array([0.01, 9.0, 1.0]), np.array([0.02, 0.04, 0.3])
-    at_edge = displacement_at(spectrum, [0.1, 4.0, 1.0], [0.02, 0.04, 0.05])
-    assert_array_equal(clipped_displacement(spectrum, period, damping), at_edge)
 
 
 FAULTS = {

@@ -58,26 +58,32 @@ def _joined(*rows):
     same = {"gap": 0.05, "longitude": 20.0, "latitude": 10.0}
     # the same severity in both
     for name in ("near", "far"):
-        table = table.assign(**{f"impact_velocity_{name}": 0.5, f"amplification_{name}": np.nan})
+        severity = {f"expected_impact_velocity_{name}": 0.5}
+        table = table.assign(**severity, **{f"expected_amplification_{name}": np.nan})
     return table.assign(**same, **{f"{name}_largest": value for name, value in same.items()})
 
 
 def test_every_pair_has_its_probabilities_and_its_worst_scenario():
-    table = ensemble_rows(_joined(("a", 0.2, 0.4), ("b", 0.9, 0.1)), WEIGHTS, yearly=False)
-    assert_allclose(table["probability"], [0.25, 0.7])
-    assert table["worst_scenario"].tolist() == ["far", "near"]
+    joined = _joined(("a", 0.2, 0.4), ("b", 0.9, 0.1), ("c", 0.9, 0.1))
+    joined.loc[2, "expected_impact_velocity_far"] = 0.6
+    table = ensemble_rows(joined, WEIGHTS, yearly=False)
+    assert_allclose(table["probability"], [0.25, 0.7, 0.7])
+    # of equal velocities the likelier scenario; a harder impact outranks it
+    assert table["worst_scenario"].tolist() == ["far", "near", "far"]
     assert list(table) == [
         name for name in ensemble_columns(WEIGHTS, yearly=False) if name != "rank"
     ]
     assert "annual_probability" not in table
 
 
-def test_the_expected_severity_is_that_of_the_scenarios_in_which_a_pair_pounds():
-    joined = _joined(("a", 0.5, 0.0)).assign(impact_velocity_far=8.0, amplification_near=1.6)
+def test_the_expected_severity_is_the_weighted_mean_of_the_scenarios():
+    joined = _joined(("a", 0.5, 0.0)).assign(
+        expected_impact_velocity_far=8.0, expected_amplification_near=1.6
+    )
     table = ensemble_rows(joined, WEIGHTS, yearly=False)
-    # three quarters of the weight, half a chance; an unknown amplification is 1
-    assert_allclose(table["expected_impact_velocity"], 0.75 * 0.5 * 0.5)
-    assert_allclose(table["expected_amplification"], 0.75 * 0.5 * 0.6)
+    # three quarters of the weight; an unknown amplification is 1
+    assert_allclose(table["expected_impact_velocity"], 0.75 * 0.5 + 0.25 * 8.0)
+    assert_allclose(table["expected_amplification"], 1.0 + 0.75 * 0.6)
 
 
 def test_rates_give_a_probability_in_a_year_too():

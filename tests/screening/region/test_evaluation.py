@@ -12,13 +12,13 @@ def test_a_table_by_hand():
     table = pd.DataFrame(
         {
             "observed": [1.0, 1.0, 1.0, 0.0, 0.0, np.nan],
-            "state": ["yes", "yes", "possible", "yes", "no", "yes"],
+            "state": ["yes", "likely", "possible", "likely", "unlikely", "yes"],
             "probability": [0.8, 0.6, 0.4, 0.6, 0.2, 0.9],
         }
     )
     got = evaluation(table)
     assert (got.pairs, got.pounded) == (5, 3)
-    # of three that pounded two were yes and one possible; of two others one was yes
+    # of three that pounded two were yes or likely and one possible; of two others one was likely
     rates = [got.hit_rate, got.hit_rate_with_possible, got.false_alarm_rate]
     assert_allclose(rates, [2 / 3, 1.0, 1 / 2])
     assert_allclose(got.brier_score, (0.2**2 + 0.4**2 + 0.6**2 + 0.6**2 + 0.2**2) / 5)

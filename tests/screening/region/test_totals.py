@@ -24,9 +24,9 @@ TABLE = pd.DataFrame(
     {
         "rank": [4, 2, 1, 3],
         "pair_id": ["d", "b", "a", "c"],
-        "state": ["no", "yes", "yes", "possible"],
+        "state": ["no", "yes", "likely", "possible"],
         "risk_class": ["low", "severe", "high", "low"],
-        "demand_ratio": [2.0, 0.1, 0.0, np.nan],
+        "expected_impact_velocity": [0.0, 0.6, 0.7, 0.02],
         "probability": [0.0, 0.5, 1.0, 0.5],
         "longitude": [0.1, 179.9, -179.9, 0.3],
         "latitude": [10.0, 0.0, 0.0, 10.0],
@@ -36,16 +36,16 @@ TABLE = pd.DataFrame(
 
 def test_totals_by_hand():
     north, south = totals(TABLE, ["north", "south", "south", "north"]).to_dict("records")
-    states = ["pairs", "yes", "possible", "no"]
-    assert [north[name] for name in states] == [2, 0, 1, 1]
-    assert [south[name] for name in states] == [2, 2, 0, 0]
+    states = ["pairs", "yes", "likely", "possible", "unlikely", "no"]
+    assert [north[name] for name in states] == [2, 0, 0, 1, 0, 1]
+    assert [south[name] for name in states] == [2, 1, 1, 0, 0, 0]
     classes = ["class_severe", "class_high", "class_low"]
     assert [south[name] for name in classes] == [1, 1, 0]
 
     # the smallest rank of each area
     assert (north["area"], north["worst_pair"]) == ("north", "c")
-    assert (south["worst_pair"], south["worst_demand_ratio"]) == ("a", 0.0)
-    assert np.isnan(north["worst_demand_ratio"])
+    assert (south["worst_pair"], south["worst_state"]) == ("a", "likely")
+    assert south["worst_expected_impact_velocity"] == 0.7
     assert south["expected_pounding"] == 1.5
     assert south["expected_pounding_std_independent"] == 0.5
     assert abs(south["longitude"]) == pytest.approx(
@@ -65,7 +65,7 @@ def city():
             "state": random.choice(STATES, count),
             "risk_class": random.choice(["severe", "low"], count),
             # numbers that decide nothing here
-            "demand_ratio": random.uniform(0, 2, count),
+            "expected_impact_velocity": random.uniform(0, 2, count),
             "probability": random.uniform(0, 1, count),
             "longitude": random.uniform(-180, 180, count),
             "latitude": random.uniform(-90, 90, count),

@@ -1,4 +1,4 @@
-"""Uncertain motion of a record: sources that decide, the site, and dampings that are resampled."""
+"""Uncertain motion of a record: sources that decide, and the site."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from screening_samples import table_of
 from per_obspy.config import Screening
 from per_obspy.screening.uncertainty.pair_motion import pair_motion
 from per_obspy.screening.uncertainty.record_motion import record_motion
-from per_obspy.screening.values import at_contact, both, values
+from per_obspy.screening.values import at_contact, both
 
 #: One exact demand, one estimate outside the usable periods, one of derived periods, and one of
 #: buildings that yield along an unknown period.
@@ -38,19 +38,15 @@ def table(station):
     return table
 
 
-def test_the_exact_demand_counts_only_where_it_decides(record, table):
-    motion = record_motion(record, table, Screening())
-    assert np.isnan(motion.exact_demand).tolist() == [False, True, True, True]
-    assert motion.exact_demand[EXACT] == table["demand_exact"].iloc[EXACT]
-
-
 def test_the_median_of_the_estimate_is_taken_off_the_radius(record, table):
     # would catch: one bias for elastic and linearized estimates, a radius of the oscillator
     screening = Screening(model_median=2.0, linearized_median=5.0)
     motion = record_motion(record, table, screening)
     shares = both(table, "participation")
     for i, radius in enumerate((motion.first, motion.second), start=1):
-        elastic = shares[i - 1] * table[f"per_{i}"] / 2.0
+        # where the exact demand decides there is no error of an estimate
+        bias = np.where(table["demand_rule"] == "exact", 1.0, 2.0)
+        elastic = shares[i - 1] * table[f"per_{i}"] / bias
         equivalent = shares[i - 1] * table[f"equivalent_per_{i}"] / 5.0
         assert_allclose(radius.radius[:YIELDING], elastic[:YIELDING], rtol=1e-12)
         assert_allclose(radius.radius[YIELDING], equivalent[YIELDING], rtol=1e-12)
@@ -73,39 +69,19 @@ def test_oscillators_and_correlation_are_those_that_decide(record, table):
 def test_errors_of_the_model_are_those_of_the_estimate(record, table):
     screening = Screening(model_dispersion=0.31, linearized_dispersion=0.62)
     motion = record_motion(record, table, screening)
-    assert motion.model_log_std.tolist() == [0.31, 0.31, 0.31, 0.62]
-
-
-def test_dampings_widen_radii_only_where_they_are_not_resampled(station, record, table):
-    # at a stored period, azimuth and dampings 0.02, 0.05, 0.1 the change is that of the spectrum
-    motion = record_motion(record, table, Screening())
-    resampled = (table["period_log_std_1"] > 0) | (table["period_log_std_2"] > 0)
-    # of an exact demand the buildings are sampled
-    resampled |= table["demand_rule"] == "exact"
-    assert_array_equal(motion.first.damping_log_std > 0, ~resampled)
-    period = float(station["period"][30])
-    # one deviation of the damping is from 0.0447 to either of these
-    stored = table.assign(period_1=period, azimuth_used=40.0, damping_1=np.sqrt(0.02 * 0.1))
-    stored = stored.assign(damping_log_std_1=np.log(5.0) / 2.0, period_log_std_1=0.0)
-    stored = stored.assign(demand_rule="per_record")
-    found = record_motion(record, stored, Screening()).first.damping_log_std[EXACT]
-    spectrum = station["per_azimuthal"].sel(azimuth=40.0, period=period)
-    low, high = spectrum.sel(damping=[0.02, 0.1]).to_numpy()
-    assert_allclose(found, np.log(low / high) / 2.0, rtol=1e-5)
+    assert motion.log_std.tolist() == [0.0, 0.31, 0.31, 0.62]
 
 
 def test_the_motion_of_the_site_is_that_of_the_table(record, table):
     at_site = table.assign(**SITE)
-    motion = record_motion(record, at_site, Screening())
+    motion = record_motion(record, at_site, Screening(model_dispersion=0.3))
     assert set(motion.first.ln_ratio) == {0.4}
     assert set(motion.second.ln_ratio) == {-0.2}
-    assert set(motion.first.motion_log_std) == {0.5}
-    # the exact demand is scaled as the pair's
+    # the pair's own deviation, with the error of an estimate
     ratios, stds = both(at_site, "ln_per_ratio"), both(at_site, "ln_per_std")
-    ln_ratio, log_std = pair_motion(at_contact(table, "per"), ratios, stds, both(table, "period"))
-    assert_array_equal(motion.pair_log_std, log_std)
-    expected = values(table, "demand_exact") * np.exp(ln_ratio)
-    assert motion.exact_demand[EXACT] == expected[EXACT]
+    _, log_std = pair_motion(at_contact(table, "per"), ratios, stds, both(table, "period"))
+    assert motion.log_std[EXACT] == log_std[EXACT]
+    assert_allclose(motion.log_std[DERIVED], np.hypot(log_std[DERIVED], 0.3), rtol=1e-12)
 
 
 def test_without_a_field_of_stations_the_site_has_the_motion_of_the_record(record, table):
@@ -114,5 +90,5 @@ def test_without_a_field_of_stations_the_site_has_the_motion_of_the_record(recor
     absent = record_motion(record, table, Screening())
     for motion in (unknown, absent):
         assert not motion.first.ln_ratio.any()
-        assert not motion.second.motion_log_std.any()
-        assert not motion.pair_log_std.any()
+        assert not motion.second.ln_ratio.any()
+        assert motion.log_std[EXACT] == 0.0

