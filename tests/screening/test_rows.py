@@ -157,9 +157,13 @@ def test_state_and_probability_rest_on_the_same_motion():
     pairs = make_pairs([{**given, "gap": share * demand} for share in shares])
     rows, _ = _rows(pairs, loud, quiet)
     assert set(rows["demand_rule"]) == {"exact"}
-    # the median demand at the site divides yes from the rest, and likely from unlikely
-    yes, probability = rows["state"] == "yes", rows["probability"]
-    assert (yes == (probability > 0.5)).all()
-    assert (~yes & (rows["gap"] < rows["demand"])).any()
+    # the demand of the record is no certain contact at the site
+    states, probability = rows["state"], rows["probability"]
+    assert ((states != "yes") & (rows["gap"] < rows["demand"])).any()
     # no pair that is a yes is less likely than one that is none
-    assert probability[yes].min() > probability[~yes].max()
+    assert ((states == "yes") == (probability >= Screening().states.yes)).all()
+    assert probability[states == "yes"].min() > probability[states != "yes"].max()
+    # a wider gap is less likely to close, and hit less hard
+    by_gap = rows.sort_values("gap")
+    assert (np.diff(by_gap["probability"]) <= 0.0).all()
+    assert (np.diff(by_gap["expected_impact_velocity"]) <= 0.0).all()

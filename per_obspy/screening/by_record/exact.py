@@ -152,6 +152,11 @@ def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> F
     return _without_contact(station, table, azimuth).towards
 
 
+def exact_impact_velocity(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
+    """Return the largest impact velocity of the pounding histories of pairs, m/s."""
+    return _pounding_maxima(station, table, azimuth).impact_velocity
+
+
 def no_outcome(count: int) -> Columns:
     """Return ``EXACT_COLUMNS``, all empty, for a number of pairs."""
     return {name: np.full(count, np.nan) for name in EXACT_COLUMNS}

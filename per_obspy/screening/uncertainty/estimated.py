@@ -90,7 +90,12 @@ class UncertainMotion(NamedTuple):
         )
 
 
-def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Table) -> Columns:
+def estimated_population(
+    motion: UncertainMotion,
+    spectra: LogSpectra,
+    pairs: Table,
+    velocity_factor: FloatArray | None = None,
+) -> Columns:
     """
     Compute the population of pairs under an uncertain motion.
 
@@ -102,12 +107,15 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
         By which the radii of resampled oscillators change; at the edge beyond the grid.
     pairs : Table
         Completed pairs with their log-standard deviations.
+    velocity_factor : (n_pairs,) ndarray, optional
+        By which impact velocities are known to differ; 1 if not given.
 
     Returns
     -------
     dict of (n_pairs,) ndarray
         ``population.COLUMNS``.
     """
+    factor = np.ones(motion.row.size) if velocity_factor is None else velocity_factor
     count = motion.row.size
     result: Columns = {name: np.empty(count) for name in COLUMNS}
     size = SAMPLES // len(NODES)
@@ -116,7 +124,7 @@ def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Ta
         rows = np.arange(first, min(first + size, count))
         block, table = motion.rows(rows), chosen(pairs, rows)
         relative = estimated_motion(block, spectra, table, NODES)
-        uncertain = Uncertain(relative, block.log_std, np.ones(rows.size))
+        uncertain = Uncertain(relative, block.log_std, factor[rows])
         for name, column in population(uncertain, table, NODES).items():
             result[name][rows] = column
     return result
