@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import detrend
 from scipy.signal.windows import tukey
 
 from per_obspy.checks import FloatArray
@@ -25,10 +26,13 @@ from per_obspy.spectra.elastic import per_spectrum
 PERIODS: FloatArray = np.geomspace(0.2, 20.0, 13)
 
 #: Longest sampling interval at which that is done, s.
-INTERVAL = 0.02
+INTERVAL = 0.04
 
 #: Times at which a baseline may shift: they cut the energy of the shaking into equal parts.
 TIMES = 11
+
+#: Longest pad over which it is computed, s: two of the longest periods.
+LONGEST_PAD = 40.0
 
 #: Shortest time between two shifts, s.
 SHORTEST = 0.2
@@ -111,21 +115,28 @@ def longest_certain_period(
     depends on their times.
     """
     time: FloatArray = np.arange(float(plain.size)) * dt
-    line = final_line(plain, time, shaking.end)
     # Is the velocity that stays large for the record as it is used?
     interval = dt * _thinning(dt)
     (used,) = _filtered(corrected[np.newaxis], dt, highpass, settings.order)
     peak = np.abs(cumulative_trapezoid(used, dx=interval)).max()
-    if abs(line[0] + line[1] * shaking.end) <= SUSPECTED * peak:
+    straight = (plain, detrend(plain))
+    if min(_velocity_left(samples, time, shaking) for samples in straight) <= SUSPECTED * peak:
         return np.inf
     # PER of the record after every correction
     times = _times_of_shifts(plain, time, shaking)
-    shifts = list(_possible_shifts(times, line))
+    shifts = list(_possible_shifts(times, final_line(plain, time, shaking.end)))
     motions = [used, *_corrected_motions(plain, time, times, shifts, highpass, settings)]
     reference, *spectra = [np.log(per_spectrum(motion, interval, PERIODS)) for motion in motions]
     # Weighted root mean square at each period
     weights = _weights(plain, time, times, shifts)
     return _last_within(np.sqrt(weights @ (spectra - reference) ** 2), settings.baseline_spread)
+
+
+def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
+    """Return the velocity that a baseline leaves before and after the shaking, m/s."""
+    constant, slope = final_line(samples, time, shaking.end)
+    before = np.trapezoid(samples[time <= shaking.onset], dx=time[1])
+    return float(abs(before) + abs(constant + slope * shaking.end))
 
 
 def _thinning(dt: float) -> int:
@@ -159,8 +170,10 @@ def _filtered(signals: FloatArray, dt: float, highpass: float, order: int) -> Fl
     # Fewer frequencies: fewer points after the inverse transform
     frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1]
     amplitude = butterworth_amplitude(frequencies, highpass, np.inf, order)
-    spectra = rfft(padded)[:, : frequencies.size] * amplitude
-    return np.asarray(irfft(spectra, points) / thin)
+    filtered = irfft(rfft(padded)[:, : frequencies.size] * amplitude, points) / thin
+    # The ends of long pads move none of the oscillators
+    unused = max(pad - round(LONGEST_PAD / (thin * dt)), 0)
+    return np.asarray(filtered[:, unused : points - unused])
 
 
 def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> FloatArray:
