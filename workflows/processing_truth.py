@@ -82,7 +82,7 @@ def outcome(kind: str, seed: int) -> Outcome:
     )[0]
     ratio = per_spectrum(done.data, 1 / RATE, PERIODS) / per_spectrum(truth, 1 / RATE, PERIODS)
     chosen = done.stats.per_obspy
-    flagged = "baseline shifted" in chosen.get("warnings", "")
+    flagged = "baseline_shift" in chosen.get("record_flags", "").split()
     return Outcome(ratio, chosen.shortest_period, chosen.longest_period, flagged)
 
 

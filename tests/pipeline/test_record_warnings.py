@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import numpy as np
 import obspy
 import pandas as pd
 import pytest
@@ -12,7 +13,7 @@ from per_obspy.pipeline.run import run, screen
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
-DOUBLED, ALONE = "XX.S001", "XX.S002"
+DOUBLED, ALONE, SHIFTED = "XX.S001", "XX.S002", "XX.S003"
 
 
 def _repeat(trace):
@@ -23,12 +24,20 @@ def _repeat(trace):
     return (obspy.Stream([trace, later])).merge(fill_value=last)[0]
 
 
+def _shift(trace):
+    """Shift the baseline by a tenth of the peak for 3 s of the strong shaking."""
+    energy = np.cumsum((trace.data - trace.data[:100].mean()) ** 2)
+    first = int(np.searchsorted(energy, 0.3 * energy[-1]))
+    last = first + round(3.0 * trace.stats.sampling_rate)
+    trace.data[first:last] += round(0.1 * float(np.abs(trace.data).max()))
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A run of records of which one station has a second event, another one horizontal only."""
+    """A run with stations of a second event, of one horizontal and of a baseline that shifts."""
     folder = tmp_path_factory.mktemp("warnings")
     run(write_configuration(folder), executor=InProcess())
-    # The same records, two stations changed
+    # The same records, stations changed
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     for path in sorted((folder / "records").glob("*.mseed")):
         stream = obspy.read(path)
@@ -37,6 +46,8 @@ def finished(tmp_path_factory):
             stream = obspy.Stream([_repeat(trace) for trace in stream])
         if name == ALONE:
             stream = stream.select(component="E") + stream.select(component="Z")
+        if name == SHIFTED:
+            _shift(stream.select(component="E")[0])
         stream.write(str(path), format="MSEED")
     configuration = write_folder_configuration(folder, "again", SPECTRA)
     return configuration, run(configuration, executor=InProcess())
@@ -76,6 +87,28 @@ def test_every_pair_has_the_flags_of_its_station(finished):
     assert {"flag_second_event", "flag_baseline_shift", "flag_assumed_corners"} <= set(explained)
 
 
+def test_a_baseline_that_shifts_ends_the_exact_demand_at_the_period_it_leaves(finished):
+    _, result = finished
+    stations = _stations(result)
+    assert "baseline_shift" in stations.loc[SHIFTED, "flags"].split()
+    longest = stations["longest_usable_period"].astype(float)[SHIFTED]
+    # Pairs of the run before the shift and after it, by name
+    first = pd.read_parquet(result.folder.parent / "out" / "risk.parquet").set_index("pair_id")
+    risk = pd.read_parquet(result.folder / "risk.parquet").set_index("pair_id")
+    pairs = risk[risk["station"] == SHIFTED]
+    assert all("baseline_shift" in flags.split() for flags in pairs["flags"])
+    beyond = pairs[["period_1", "period_2"]].max(axis=1) > longest
+    was_exact = first.loc[pairs.index, "demand_rule"] == "exact"
+    # The exact rung leaves what the shift took, and keeps the rest
+    assert (beyond & was_exact).any()
+    assert not (pairs["demand_rule"][beyond] == "exact").any()
+    assert all("outside_usable_periods" in flags.split() for flags in pairs["flags"][beyond])
+    assert (pairs["demand_rule"][~beyond & was_exact] == "exact").all()
+    # The table for readers has the flag too
+    table = pd.read_csv(result.folder / "risk.csv", keep_default_na=False).set_index("pair_id")
+    assert all("baseline_shift" in flags.split() for flags in table.loc[pairs.index, "flags"])
+
+
 def test_the_console_names_the_stations(finished, capsys):
     _, result = finished
     assert DOUBLED in result.record["warnings"]["second_event"]
@@ -83,7 +116,8 @@ def test_the_console_names_the_stations(finished, capsys):
     # One line for all warnings
     print_result(result)
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "warnings:" in line]
-    assert line.startswith("warnings: 1 station with a second event (XX.S001)")
+    assert line.startswith(f"warnings: 1 station with a baseline shift ({SHIFTED})")
+    assert f"1 with a second event ({DOUBLED})" in line
     assert f"1 with one horizontal ({ALONE})" in line
     assert line.endswith("; see stations.csv")
 
