@@ -6,6 +6,8 @@ from obspy import Stream, Trace, UTCDateTime, read
 
 from per_obspy.config import Processing
 from per_obspy.processing.chain import process, process_station
+from per_obspy.processing.instrument_response import in_acceleration
+from per_obspy.processing.station.components import oriented
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.spectra.elastic import per_spectrum
 
@@ -118,6 +120,33 @@ def test_a_real_sensor_that_tilted_is_flagged_and_its_neighbours_are_not(real_da
     }
     flagged = [channel for channel, text in warnings.items() if "baseline shifted" in text]
     assert flagged == ["HNN"]
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(("shift", "seconds"), [(0.02, 300.0), (0.05, 15.0), (0.2, 3.0)])
+def test_usable_periods_of_a_real_record_with_a_known_shift(real_data, shift, seconds):
+    folder = real_data / "records" / "ridgecrest2019_mseed"
+    found = find_stations(folder)
+    stream, _ = read_station(found.stations["CI.CLC"], found.inventory, "CI.CLC")
+    raw = in_acceleration(oriented(stream.select(component="E")), 0.1)[0]
+    truth, dt = process(Stream([raw]))[0], raw.stats.delta
+    assert "certain_period" not in truth.stats.per_obspy
+    # The shift starts 6 s after the onset, in the strong shaking
+    shifted = raw.copy()
+    first = round((truth.stats.per_obspy.noise + 6.0) / dt)
+    shifted.data[first : first + round(seconds / dt)] += shift
+    processed = process(Stream([shifted]))[0]
+    chosen = processed.stats.per_obspy
+    assert "baseline_shift" in chosen.record_flags.split()
+    # 5 % are allowed for the spread; three records and shifts are no large sample: twice that
+    periods = np.geomspace(0.2, 0.8 / chosen.highpass, 30)
+    errors = np.abs(
+        np.log(np.divide(*(per_spectrum(t.data, dt, periods) for t in (processed, truth))))
+    )
+    assert errors[periods <= chosen.longest_period].max(initial=0.0) < 0.1
+    # Without the limit it would be wrong
+    assert errors.max() > 0.1
+    assert chosen.longest_period > 0.5
 
 
 def horizontals(stream):
