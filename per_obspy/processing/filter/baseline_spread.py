@@ -34,8 +34,8 @@ TIMES = 11
 #: Longest pad over which it is computed, s: two of the longest periods.
 LONGEST_PAD = 40.0
 
-#: Shortest time between two shifts, s.
-SHORTEST = 0.2
+#: Largest shift during the shaking, over the peak acceleration: a larger one is no baseline.
+LARGEST = 0.5
 
 #: Longest period of the motion whose energy decides when the shaking ends, s.
 SLOWEST = 10.0
@@ -82,7 +82,7 @@ def longest_certain_period(
 
     A baseline shifts at t1 and t2, which are all pairs out of 11 times that cut the energy of the
     shaking into equal parts. The line through the final velocity gives both shifts, so that every
-    corrected velocity ends at zero:
+    corrected velocity ends at zero; those above half the peak acceleration are left out:
 
     .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = (v_0 + a_f t_2) / (t_2 - t_1)
 
@@ -122,14 +122,25 @@ def longest_certain_period(
     straight = (plain, detrend(plain))
     if min(_velocity_left(samples, time, shaking) for samples in straight) <= SUSPECTED * peak:
         return np.inf
-    # PER of the record after every correction
+    # Shifts that fit the final velocity, and PER after each
     times = _times_of_shifts(plain, time, shaking)
-    shifts = list(_possible_shifts(times, final_line(plain, time, shaking.end)))
-    motions = [used, *_corrected_motions(plain, time, times, shifts, highpass, settings)]
-    reference, *spectra = [np.log(per_spectrum(motion, interval, PERIODS)) for motion in motions]
-    # Weighted root mean square at each period
-    weights = _weights(plain, time, times, shifts)
-    return _last_within(np.sqrt(weights @ (spectra - reference) ** 2), settings.baseline_spread)
+    line = final_line(plain, time, shaking.end)
+    shifts = list(_possible_shifts(times, line, LARGEST * float(np.abs(used).max())))
+    if not shifts:
+        return float(PERIODS[0])
+    motions = _corrected_motions(plain, time, times, shifts, highpass, settings)
+    spread = _spread(used, motions, interval, _weights(plain, time, times, shifts))
+    return _last_within(spread, settings.baseline_spread)
+
+
+def _spread(
+    used: FloatArray, motions: Sequence[FloatArray], interval: float, weights: FloatArray
+) -> FloatArray:
+    """Return the weighted root mean square of ln PER over that of the record as it is used."""
+    reference, *spectra = [
+        np.log(per_spectrum(motion, interval, PERIODS)) for motion in (used, *motions)
+    ]
+    return np.asarray(np.sqrt(weights @ (spectra - reference) ** 2))
 
 
 def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
@@ -185,13 +196,15 @@ def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> F
     return np.array([shaking.onset, *inner, shaking.end])
 
 
-def _possible_shifts(times: FloatArray, line: tuple[float, float]) -> Iterator[Shifts]:
+def _possible_shifts(
+    times: FloatArray, line: tuple[float, float], largest: float
+) -> Iterator[Shifts]:
     """Yield the shifts at each pair of times that turn the final line of the velocity to zero."""
     constant, slope = line
     for first, second in combinations(range(times.size), 2):
-        length = times[second] - times[first]
-        if length >= SHORTEST:
-            yield Shifts(first, second, (constant + slope * times[second]) / length, slope)
+        final, length = constant + slope * times[second], times[second] - times[first]
+        if abs(final) < largest * length:
+            yield Shifts(first, second, final / length, slope)
 
 
 def _corrected(record: FloatArray, steps: Sequence[FloatArray], shifts: Shifts) -> FloatArray:

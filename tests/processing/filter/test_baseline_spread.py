@@ -41,7 +41,7 @@ def test_every_correction_brings_the_velocity_to_rest(earthquake):
     recorded = earthquake() + box(0.02, 24, 200) + box(0.1, 25, 28)
     line = final_line(recorded, TIME, SHAKING.end)
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
-    shifts = list(baseline_spread._possible_shifts(times, line))
+    shifts = list(baseline_spread._possible_shifts(times, line, np.inf))
     assert len(shifts) == 55  # all pairs of 11 times
     steps = (times[:, np.newaxis] <= TIME).astype(float)
     for shift in shifts:
@@ -72,8 +72,8 @@ def test_the_spread_is_that_of_records_that_are_corrected_one_by_one(
     # Every record with its own baseline through the filter at full rate
     times = baseline_spread._times_of_shifts(recorded, TIME, SHAKING)
     line = final_line(recorded, TIME, SHAKING.end)
-    ratios, misfits = [], []
-    for first, second, between, after in baseline_spread._possible_shifts(times, line):
+    ratios, misfits, peak = [], [], 0.5 * np.abs(recorded).max()
+    for first, second, between, after in baseline_spread._possible_shifts(times, line, peak):
         baseline = np.where(times[second] <= TIME, after, box(between, times[first], times[second]))
         velocity = cumulative_trapezoid(recorded - baseline, dx=DT, initial=0)
         displacement = cumulative_trapezoid(velocity, dx=DT, initial=0)
@@ -100,6 +100,12 @@ def test_a_larger_shift_leaves_fewer_periods(earthquake):
     # and more of them if a larger spread is allowed
     patient = SETTINGS.model_copy(update={"baseline_spread": 0.2})
     assert certain(earthquake() + box(0.05, 23, 26), settings=patient) > limits[2]
+
+
+def test_a_shift_that_no_baseline_has_leaves_no_period():
+    # 20 m/s stay after a record whose peak is 0.6 m/s2
+    ground = 0.1 * np.sin(3 * TIME) * np.exp(-(((TIME - 30) / 4) ** 2))
+    assert certain(ground + box(0.5, 21, 61)) == baseline_spread.PERIODS[0]
 
 
 def test_a_higher_corner_removes_doubt(earthquake):
