@@ -1,9 +1,10 @@
 """
 Compare PER of real records with PER of the same records after a known shift of their baseline.
 
-Run: ``python workflows/known_shifts.py FOLDER [FOLDER ...]`` with folders of raw records; prints
-the tables of docs/processing.md. A record is a truth where the processing finds no fault of its
-baseline and its peak exceeds 0.8 m/s². Shifts start at 10, 30 and 50 % of the energy in turn.
+Run: ``python workflows/known_shifts.py PEAK FOLDER [FOLDER ...]`` with folders of raw records;
+prints the tables of docs/processing.md. A record is a truth where the processing finds no fault of
+its baseline and its peak is at least PEAK, m/s². Shifts start at 10, 30 and 50 % of the energy in
+turn.
 """
 
 import logging
@@ -30,9 +31,6 @@ from per_obspy.records.folder import find_stations, read_station
 
 #: Periods at which PER is compared, s.
 PERIODS = np.geomspace(0.2, 10.0, 30)
-
-#: Smallest peak of a truth, m/s².
-SMALLEST = 0.8
 
 #: Kinds of shifts: how long they last, s; sizes, m/s²; shares of the energy at which they start.
 DURATIONS = {"step": np.inf, "15 s": 15.0, "3 s": 3.0}
@@ -85,7 +83,7 @@ def horizontals(folder: Path) -> Iterator[Trace]:
                 yield in_acceleration(Stream([trace]), SETTINGS.gain_tolerance)[0]
 
 
-def cases(trace: Trace, starts: Iterator[float]) -> Iterator[Case]:
+def cases(trace: Trace, smallest: float, starts: Iterator[float]) -> Iterator[Case]:
     """Yield every shift of a record, none if the record is no truth."""
     samples, dt = np.asarray(trace.data, dtype=float), float(trace.stats.delta)
     try:
@@ -94,7 +92,7 @@ def cases(trace: Trace, starts: Iterator[float]) -> Iterator[Case]:
         return
     # A clean baseline is seen only between quiet ends
     is_clean = "residual_velocity" in done.stats.per_obspy and not truth.is_flagged
-    if not is_clean or np.abs(done.data).max() < SMALLEST:
+    if not is_clean or np.abs(done.data).max() < smallest:
         return
     # Every shift in turn
     print(trace.id, file=sys.stderr)
@@ -146,12 +144,12 @@ def figures(cases: list[Case], repair: str | None = None) -> str:
     return " | ".join(cells)
 
 
-def main(folders: list[Path]) -> None:
+def main(smallest: float, folders: list[Path]) -> None:
     """Print both tables."""
     starts, every = cycle(STARTS), list[Case]()
     for folder in folders:
         for trace in horizontals(folder):
-            every += cases(trace, starts)
+            every += cases(trace, smallest, starts)
     # By kind and size
     head = "median | 84 % | largest | to, s"
     print(f"| shift, m/s² | {head} | {head} | flagged |\n|{'---|' * 10}")
@@ -175,4 +173,4 @@ def with_limit(case: Case, name: str, repair: str | None = None) -> tuple[Array,
 
 if __name__ == "__main__":
     logging.disable()
-    main([Path(name) for name in sys.argv[1:]])
+    main(float(sys.argv[1]), [Path(name) for name in sys.argv[2:]])
