@@ -119,6 +119,14 @@ class Processing(Section):
     drift: float = Field(
         0.02, gt=0, lt=1, description="polynomial part of the displacement that counts as clean"
     )
+    baseline_spread: float = Field(
+        0.05,
+        gt=0,
+        description=(
+            "usable periods end where ln PER varies more between the times at which the baseline "
+            "may have shifted"
+        ),
+    )
     fallback_highpass: dict[float, Annotated[float, Field(gt=0)]] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
         description=(

@@ -38,7 +38,7 @@ QUANTITIES = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}
 #: Numbers and texts of the processing that a page lists, as far as the record has them.
 LISTED = (
     "onset", "onset_source", "noise", "signal_to_noise", "baseline", "residual_velocity",
-    "highpass", "highpass_source", "lowpass", "lowpass_source", "shortest_period",
+    "certain_period", "highpass", "highpass_source", "lowpass", "lowpass_source", "shortest_period",
     "longest_period", "azimuth_source", "warnings", "notes",
 )  # fmt: skip
 

@@ -253,7 +253,8 @@ FLAGS: dict[str, str] = {
         "the ShakeMap tells no deviation: the configured one is assumed"
     ),
     "baseline_shift": (
-        "the baseline of the station's record shifted during the shaking: long periods are doubtful"
+        "the baseline of the station's record shifted during the shaking: long periods are "
+        "doubtful, and not usable where PER depends on when it shifted"
     ),
     "second_event": ("the station's record holds another event: its demand may be that of both"),
     "assumed_corners": (

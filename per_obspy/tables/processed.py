@@ -37,6 +37,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "m/s",
         "left at the end of the shaking before any filter: a baseline that shifted",
     ),
+    "certain_period": (
+        "s",
+        "natural period beyond which PER depends on when the baseline shifted; empty: no doubt",
+    ),
     "highpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
     "highpass_source": ("", "why it is there; shared: the other horizontal needs it"),
     "own_highpass": ("Hz", "what this component alone would have had"),

@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import numpy as np
 import obspy
 import pandas as pd
 import pytest
@@ -15,6 +16,9 @@ from per_obspy.screening.columns import RECORD_FLAGS
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
 DOUBLED, ALONE, FILM = "XX.S001", "XX.S002", "XX.S003"
+
+#: The film's baseline shifts too.
+SHIFTED = FILM
 
 
 def _repeat(trace):
@@ -33,12 +37,20 @@ def _write_film(stream, path):
     write_description(path, write_processed(stream, path))
 
 
+def _shift(trace):
+    """Shift the baseline by a tenth of the peak for 3 s of the strong shaking."""
+    energy = np.cumsum((trace.data - trace.data[:100].mean()) ** 2)
+    first = int(np.searchsorted(energy, 0.3 * energy[-1]))
+    last = first + round(3.0 * trace.stats.sampling_rate)
+    trace.data[first:last] += round(0.1 * float(np.abs(trace.data).max()))
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """A run of stations with a second event, with one horizontal, and with undated film."""
     folder = tmp_path_factory.mktemp("warnings")
     run(write_configuration(folder), executor=InProcess())
-    # The same records, two stations changed
+    # The same records, stations changed
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     for path in sorted((folder / "records").glob("*.mseed")):
         stream = obspy.read(path)
@@ -48,6 +60,7 @@ def finished(tmp_path_factory):
         if name == ALONE:
             stream = stream.select(component="E") + stream.select(component="Z")
         if name == FILM:
+            _shift(stream.select(component="E")[0])
             _write_film(stream, path)
         else:
             stream.write(str(path), format="MSEED")
@@ -93,6 +106,28 @@ def test_every_pair_has_the_flags_of_its_station(finished):
     assert {f"flag_{name}" for name in RECORD_FLAGS} <= set(explained)
 
 
+def test_a_baseline_that_shifts_ends_the_exact_demand_at_the_period_it_leaves(finished):
+    _, result = finished
+    stations = _stations(result)
+    assert "baseline_shift" in stations.loc[SHIFTED, "flags"].split()
+    longest = stations["longest_usable_period"].astype(float)[SHIFTED]
+    # Pairs of the run before the shift and after it, by name
+    first = pd.read_parquet(result.folder.parent / "out" / "risk.parquet").set_index("pair_id")
+    risk = pd.read_parquet(result.folder / "risk.parquet").set_index("pair_id")
+    pairs = risk[risk["station"] == SHIFTED]
+    assert all("baseline_shift" in flags.split() for flags in pairs["flags"])
+    beyond = pairs[["period_1", "period_2"]].max(axis=1) > longest
+    was_exact = first.loc[pairs.index, "demand_rule"] == "exact"
+    # The exact rung leaves what the shift took, and keeps the rest
+    assert (beyond & was_exact).any()
+    assert not (pairs["demand_rule"][beyond] == "exact").any()
+    assert all("outside_usable_periods" in flags.split() for flags in pairs["flags"][beyond])
+    assert (pairs["demand_rule"][~beyond & was_exact] == "exact").all()
+    # The table for readers has the flag too
+    table = pd.read_csv(result.folder / "risk.csv", keep_default_na=False).set_index("pair_id")
+    assert all("baseline_shift" in flags.split() for flags in table.loc[pairs.index, "flags"])
+
+
 def test_the_console_names_the_stations(finished, capsys):
     _, result = finished
     assert DOUBLED in result.record["warnings"]["second_event"]
@@ -100,7 +135,8 @@ def test_the_console_names_the_stations(finished, capsys):
     # One line for all warnings
     print_result(result)
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "warnings:" in line]
-    assert line.startswith("warnings: 1 station with a second event (XX.S001)")
+    assert line.startswith(f"warnings: 1 station with a baseline shift ({SHIFTED})")
+    assert f"1 with a second event ({DOUBLED})" in line
     assert f"1 with one horizontal ({ALONE})" in line
     assert f"1 digitised from film ({FILM}), 1 without a date ({FILM})" in line
     assert line.endswith("; see stations.csv")

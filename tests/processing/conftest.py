@@ -24,7 +24,8 @@ def earthquake() -> Callable[..., NDArray[np.float64]]:
         white = np.random.default_rng(seed).normal(size=time.size)
         frequencies = np.fft.rfftfreq(time.size, 1 / RATE)
         band = frequencies**2 / (frequencies**2 + 0.3**2) / (1 + (frequencies / 20) ** 4)
-        shaped = np.fft.irfft(np.fft.rfft(white) * band, time.size)
-        return 3 * shaped * envelope
+        motion = 3 * np.fft.irfft(np.fft.rfft(white) * band, time.size) * envelope
+        # The ground comes to rest
+        return np.asarray(motion - motion.sum() / envelope.sum() * envelope)
 
     return make

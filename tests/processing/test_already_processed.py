@@ -8,6 +8,7 @@ from obspy.core import AttribDict
 
 from per_obspy.config import Processing
 from per_obspy.processing.already_processed import passed_through
+from per_obspy.processing.chain import process
 
 RATE = 100.0
 SETTINGS = Processing()
@@ -57,6 +58,20 @@ def test_a_drift_that_no_corner_cleans_leaves_short_periods(earthquake):
     known = passed_through(others(earthquake()), settings)[0].stats.per_obspy
     assert known.longest_period == pytest.approx(40.0)
     assert "drifts at any corner" in known.highpass_source
+
+
+@pytest.mark.parametrize(("shift", "seconds"), [(0.05, 15.0), (0.015, 3.0)])
+def test_the_limit_of_a_shifted_baseline_stays_when_a_file_is_read_back(earthquake, shift, seconds):
+    time = np.arange(12000) / RATE
+    baseline = np.where((time > 23) & (time < 23 + seconds), shift, 0.0)
+    noise = 1e-5 * np.random.default_rng(1).normal(size=12000)
+    header = {"sampling_rate": RATE, "channel": "HNE", "units": "m/s2"}
+    first = process(Stream([Trace(earthquake() + noise + baseline, header)]))[0]
+    again = process(Stream([first]))[0].stats.per_obspy
+    # The period, its flag and its text, once each
+    assert first.stats.per_obspy.longest_period == first.stats.per_obspy.certain_period
+    for name in ("longest_period", "certain_period", "record_flags", "warnings", "failed_checks"):
+        assert again[name] == first.stats.per_obspy[name]
 
 
 def test_motion_that_does_not_rest_is_a_warning(earthquake):

@@ -21,7 +21,10 @@ def pulse(offset=0.0):
     """Return an earthquake of 20 s between quiet ends, m/s2."""
     time = np.arange(COUNT) / RATE
     rng = np.random.default_rng(4)
-    return rng.normal(size=COUNT) * np.exp(-(((time - 30) / 6) ** 2)) + offset
+    envelope = np.exp(-(((time - 30) / 6) ** 2))
+    motion = rng.normal(size=COUNT) * envelope
+    # The ground comes to rest
+    return motion - motion.sum() / envelope.sum() * envelope + offset
 
 
 def trace(channel="HNE", samples=None, station="STA", **stats):

@@ -2,10 +2,16 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected
+from per_obspy.processing.filter.baseline_spread import (
+    Shaking,
+    longest_certain_period,
+    without_drift,
+)
 from per_obspy.processing.filter.butterworth import tapered
 from per_obspy.processing.filter.corners import (
     SHIFTED_BASELINE,
@@ -77,6 +83,7 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
         highpass = Corner(settings.highpass, "configuration")
     else:
         ready, highpass = _clean_baseline(checked, lowest, settings)
+    _certain_period_noted(plain[0], ready[0], highpass.frequency, settings)
     width = lowpass.frequency / highpass.frequency
     meaning = "low-pass over high-pass corner:"
     wide = judged(ready[0], below("bandwidth", settings.checks.bandwidth, width, meaning))
@@ -117,6 +124,7 @@ def offset_kept(stream: Stream, settings: Processing) -> Stream:
     straight = detrended(level, velocity_residual, onset=onset, end=end)
     out = tapered(straight, settings.taper)
     remembered(out[0], baseline="velocity residual")
+    _certain_period_noted(level[0], out[0], 0.0, settings)
     # Corners that limit the usable periods
     lowest = Corner(lowest_highpass(out[0]).frequency, "not applied: permanent offset kept")
     highest = highest_corner(out[0], settings.lowpass or settings.highest_lowpass)
@@ -133,10 +141,26 @@ def _residual_noted(stream: Stream) -> Stream:
     return out
 
 
+def _certain_period_noted(
+    plain: Trace, ready: Trace, highpass: float, settings: Processing
+) -> None:
+    """Note on the tapered record the period from which on PER depends on the baseline's shift."""
+    onset, end, has_quiet_ends = _shaking_times(plain)
+    if has_quiet_ends:
+        shaking = Shaking(onset, end)
+        longest = longest_certain_period(
+            plain.data, ready.data, plain.stats.delta, shaking, highpass, settings
+        )
+        if np.isfinite(longest):
+            remembered(ready, certain_period=longest)
+
+
 def _shaking_times(trace: Trace) -> tuple[float, float, bool]:
     """Return onset and end of the shaking, s, and whether the record is quiet before and after."""
     dt, onset = trace.stats.delta, float(trace.stats.per_obspy.noise)
-    end = onset + significant_samples(trace.data[round(onset / dt) :]) * dt
+    # A baseline that shifted has more energy at the end of the record than the shaking
+    level = without_drift(trace.data, dt)
+    end = onset + significant_samples(level[round(onset / dt) :]) * dt
     latest = LATEST_START * (trace.stats.npts - 1) * dt
     return onset, end, FEWEST * dt <= onset < end <= latest
 

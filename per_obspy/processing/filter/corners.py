@@ -156,12 +156,14 @@ def usable_periods_noted(stream: Stream, usable: float) -> Stream:
     """
     Return a copy with the usable periods of each trace, from its corners.
 
-    Longest: usable / highpass. Shortest: 1 / (usable lowpass) or 5 sampling intervals, the longer.
+    Longest: usable / highpass, or the period from which on PER depends on when the baseline
+    shifted, the shorter. Shortest: 1 / (usable lowpass) or 5 sampling intervals, the longer.
 
     Parameters
     ----------
     stream : obspy Stream
-        ``stats.per_obspy`` has ``highpass`` and ``lowpass``, Hz.
+        ``stats.per_obspy`` has ``highpass`` and ``lowpass``, Hz, and may have
+        ``certain_period``, s.
     usable : float
         Fraction of a corner's period that is usable, dimensionless.
 
@@ -178,7 +180,7 @@ def usable_periods_noted(stream: Stream, usable: float) -> Stream:
     out = stream.copy()
     for trace in out:
         corners = trace.stats.per_obspy
-        longest = usable / corners.highpass
+        longest = min(usable / corners.highpass, corners.get("certain_period", np.inf))
         shortest = max(1 / (usable * corners.lowpass), SAMPLES_PER_PERIOD * trace.stats.delta)
         # Spectra are computed at all periods and marked as usable between these two
         step = f"usable from {shortest:.3g} to {longest:.3g} s"

@@ -61,7 +61,7 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
             f"first and second must be times within the record, got {first:g} and {second:g} s"
         )
     # Shifts after t2 and between t1 and t2: a_f and a_m
-    constant, slope = _final_line(samples, time, second)
+    constant, slope = final_line(samples, time, second)
     during = (constant + slope * second) / (second - first)
     shift = np.where(time >= second, slope, np.where(time >= first, during, 0.0))
     return samples - shift
@@ -95,7 +95,7 @@ def residual_velocity(data: FloatArray, dt: float, end: float) -> float:
     >>> round(residual_velocity(shifted, 0.01, 5.0), 12)
     0.05
     """
-    constant, slope = _final_line(*_samples_and_times(data, dt), end)
+    constant, slope = final_line(*_samples_and_times(data, dt), end)
     return abs(constant + slope * end)
 
 
@@ -122,7 +122,7 @@ def crossing_time(data: FloatArray, dt: float, first: float, second: float) -> f
     ----------
     Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211: "v0 correction".
     """
-    constant, slope = _final_line(*_samples_and_times(data, dt), second)
+    constant, slope = final_line(*_samples_and_times(data, dt), second)
     crossing = -constant / slope if slope else np.inf
     return float(crossing) if first < crossing < second else second
 
@@ -242,8 +242,24 @@ def _samples_and_times(data: FloatArray, dt: float) -> tuple[FloatArray, FloatAr
     return samples, np.arange(float(samples.size)) * number("dt", dt, positive)
 
 
-def _final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[float, float]:
-    """Return constant, m/s, and slope, m/s2, of the line through the velocity from a start on."""
+def final_line(samples: FloatArray, time: FloatArray, start: float) -> tuple[float, float]:
+    """
+    Return the line through the velocity from a time on.
+
+    Parameters
+    ----------
+    samples : (n_samples,) ndarray
+        Acceleration, m/s2.
+    time : (n_samples,) ndarray
+        s.
+    start : float
+        s; at least two samples follow.
+
+    Returns
+    -------
+    constant, slope : float
+        m/s and m/s2; the line has the value constant + slope * time.
+    """
     velocity = cumulative_trapezoid(samples, time, initial=0)
     after = time >= start
     constant, slope = Polynomial.fit(time[after], velocity[after], 1).convert().coef

@@ -68,9 +68,18 @@ def final_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
 
 def _shift_findings(trace: Trace, peak: float, checks: Checks) -> Iterator[Finding]:
     """Yield a finding where the residual velocity before the filter is large for the peak, m/s."""
-    residual = float(trace.stats.get("per_obspy", {}).get("residual_velocity", 0.0))
-    ratio = residual / peak if peak else 0.0
+    known = trace.stats.get("per_obspy", {})
+    ratio = float(known.get("residual_velocity", 0.0)) / peak if peak else 0.0
     meaning = (
         "the baseline shifted during the shaking: velocity that stayed, over the peak velocity"
     )
-    yield from above("baseline_shift", checks.baseline_shift, ratio, meaning)
+    found = above("baseline_shift", checks.baseline_shift, ratio, meaning)
+    # A smaller one shortens the usable periods
+    certain = float(known.get("certain_period", np.inf))
+    if not found and certain <= float(known.get("longest_period", 0.0)):
+        reason = (
+            f"the baseline may have shifted during the shaking: PER beyond {certain:.3g} s depends "
+            "on when"
+        )
+        found = [Finding("baseline_shift", "warn", reason)]
+    yield from found

@@ -72,12 +72,18 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
     out = trace.copy() if warnings or notes else trace
     for name, reasons in (("warnings", warnings), ("notes", notes)):
         if reasons:
-            remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})
+            remembered(out, **{name: _joined("; ", trace, name, reasons)})
     # Names of the checks behind the warnings
     if warnings:
         names = [finding.check for finding in found if finding.level == "warn"]
-        remembered(out, failed_checks=" ".join([*_earlier(trace, "failed_checks"), *names]))
+        remembered(out, failed_checks=_joined(" ", trace, "failed_checks", names))
     return Stream([out])
+
+
+def _joined(separator: str, trace: Trace, name: str, texts: list[str]) -> str:
+    """Return earlier and new texts, each once: a file that is read back is checked again."""
+    earlier = [part for text in _earlier(trace, name) for part in text.split(separator)]
+    return separator.join(dict.fromkeys([*earlier, *texts]))
 
 
 def _reasons(findings: list[Finding], level: str) -> list[str]:

@@ -1,0 +1,241 @@
+"""
+Spread of PER over the baselines that fit the velocity after the shaking.
+
+A baseline that shifts during the shaking leaves a straight line in the final velocity. The line
+does not show when the baseline shifted, and PER at long periods depends on that.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import detrend
+from scipy.signal.windows import tukey
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Processing
+from per_obspy.processing.filter.butterworth import PAD, butterworth_amplitude
+from per_obspy.processing.filter.velocity import final_line
+from per_obspy.spectra.elastic import per_spectrum
+
+#: Periods at which PER is compared, s.
+PERIODS: FloatArray = np.geomspace(0.2, 20.0, 13)
+
+#: Longest sampling interval at which that is done, s.
+INTERVAL = 0.04
+
+#: Times at which a baseline may shift: they cut the energy of the shaking into equal parts.
+TIMES = 11
+
+#: Longest pad over which it is computed, s: two of the longest periods.
+LONGEST_PAD = 40.0
+
+#: Largest shift during the shaking, over the peak acceleration: a larger one is no baseline.
+LARGEST = 0.5
+
+#: Longest period of the motion whose energy decides when the shaking ends, s.
+SLOWEST = 10.0
+
+#: Velocity that stays, over the peak velocity, from which on a shift is suspected: below, known
+#: shifts changed PER by less than 5 % (docs/processing.md).
+SUSPECTED = 0.1
+
+#: Share of the largest misfit that is added to each, so that every weight is finite.
+FLOOR = 1e-12
+
+
+class Shaking(NamedTuple):
+    """Onset and end of the shaking, s from the first sample."""
+
+    onset: float
+    end: float
+
+
+class Shifts(NamedTuple):
+    """Numbers of the times of two shifts, and the baseline between and after them, m/s2."""
+
+    first: int
+    second: int
+    between: float
+    after: float
+
+
+def without_drift(samples: FloatArray, dt: float) -> FloatArray:
+    """Return the samples without their running mean over 10 s, which holds a shifted baseline."""
+    return samples - uniform_filter1d(samples, max(round(SLOWEST / dt), 1))
+
+
+def longest_certain_period(
+    plain: FloatArray,
+    corrected: FloatArray,
+    dt: float,
+    shaking: Shaking,
+    highpass: float,
+    settings: Processing,
+) -> float:
+    r"""
+    Return the period up to which PER hardly depends on when the baseline shifted.
+
+    A baseline shifts at t1 and t2, which are all pairs out of 11 times that cut the energy of the
+    shaking into equal parts. The line through the final velocity gives both shifts, so that every
+    corrected velocity ends at zero; those above half the peak acceleration are left out:
+
+    .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = (v_0 + a_f t_2) / (t_2 - t_1)
+
+    The spread at a period is the root mean square of ln(PER / PER of the record as it is used),
+    with weights 1 / misfit; the misfit is the root mean square displacement during the shaking.
+
+    Parameters
+    ----------
+    plain : (n_samples,) ndarray
+        Acceleration without the mean of its quiet beginning, m/s2.
+    corrected : (n_samples,) ndarray
+        The same record without its baseline as it is used, tapered, m/s2.
+    dt : float
+        Sampling interval, s.
+    shaking : Shaking
+        The record is quiet before and after it.
+    highpass : float
+        Corner of the filter, Hz; 0: none.
+    settings : Processing
+        Order of the filter, taper, and the spread that is allowed (``baseline_spread``).
+
+    Returns
+    -------
+    float
+        s; infinite if no shift is suspected, or if the spread is small at all `PERIODS`.
+
+    References
+    ----------
+    Boore 2001, Bull. Seism. Soc. Am. 91, 1199-1211: the two shifts, and how strongly displacement
+    depends on their times.
+    """
+    time: FloatArray = np.arange(float(plain.size)) * dt
+    # Is the velocity that stays large for the record as it is used?
+    interval = dt * _thinning(dt)
+    (used,) = _filtered(corrected[np.newaxis], dt, highpass, settings.order)
+    peak = np.abs(cumulative_trapezoid(used, dx=interval)).max()
+    straight = (plain, detrend(plain))
+    if min(_velocity_left(samples, time, shaking) for samples in straight) <= SUSPECTED * peak:
+        return np.inf
+    # Shifts that fit the final velocity, and PER after each
+    times = _times_of_shifts(plain, time, shaking)
+    line = final_line(plain, time, shaking.end)
+    shifts = list(_possible_shifts(times, line, LARGEST * float(np.abs(used).max())))
+    if not shifts:
+        return float(PERIODS[0])
+    motions = _corrected_motions(plain, time, times, shifts, highpass, settings)
+    spread = _spread(used, motions, interval, _weights(plain, time, times, shifts))
+    return _last_within(spread, settings.baseline_spread)
+
+
+def _spread(
+    used: FloatArray, motions: Sequence[FloatArray], interval: float, weights: FloatArray
+) -> FloatArray:
+    """Return the weighted root mean square of ln PER over that of the record as it is used."""
+    reference, *spectra = [
+        np.log(per_spectrum(motion, interval, PERIODS)) for motion in (used, *motions)
+    ]
+    return np.asarray(np.sqrt(weights @ (spectra - reference) ** 2))
+
+
+def _velocity_left(samples: FloatArray, time: FloatArray, shaking: Shaking) -> float:
+    """Return the velocity that a baseline leaves before and after the shaking, m/s."""
+    constant, slope = final_line(samples, time, shaking.end)
+    before = np.trapezoid(samples[time <= shaking.onset], dx=time[1])
+    return float(abs(before) + abs(constant + slope * shaking.end))
+
+
+def _thinning(dt: float) -> int:
+    """Return how many samples of a record make one of its thinned series."""
+    return max(int(INTERVAL / dt), 1)
+
+
+def _corrected_motions(
+    plain: FloatArray,
+    time: FloatArray,
+    times: FloatArray,
+    shifts: Sequence[Shifts],
+    highpass: float,
+    settings: Processing,
+) -> list[FloatArray]:
+    """Return the filtered record after each correction: sums of it and of steps at the times."""
+    taper = tukey(plain.size, 2 * settings.taper)
+    parts = np.vstack([plain, time >= times[:, np.newaxis]]) * taper
+    record, *steps = _filtered(parts, float(time[1]), highpass, settings.order)
+    return [_corrected(record, steps, shift) for shift in shifts]
+
+
+def _filtered(signals: FloatArray, dt: float, highpass: float, order: int) -> FloatArray:
+    """Return signals (n_signals, n_samples) with zero pads, filtered, at a longer interval."""
+    # Pads as long as those of the filter, a whole number of thinned samples
+    thin, samples = _thinning(dt), signals.shape[1]
+    pad = int(np.ceil(PAD * order / highpass / dt / thin)) if highpass else 0
+    points = next_fast_len(int(np.ceil(samples / thin)) + 2 * pad, real=True)
+    padded = np.zeros((signals.shape[0], points * thin))
+    padded[:, pad * thin : pad * thin + samples] = signals
+    # Fewer frequencies: fewer points after the inverse transform
+    frequencies = rfftfreq(points * thin, dt)[: points // 2 + 1]
+    amplitude = butterworth_amplitude(frequencies, highpass, np.inf, order)
+    filtered = irfft(rfft(padded)[:, : frequencies.size] * amplitude, points) / thin
+    # The ends of long pads move none of the oscillators
+    unused = max(pad - round(LONGEST_PAD / (thin * dt)), 0)
+    return np.asarray(filtered[:, unused : points - unused])
+
+
+def _times_of_shifts(plain: FloatArray, time: FloatArray, shaking: Shaking) -> FloatArray:
+    """Return times that cut the energy of the shaking into equal parts, s."""
+    # Slow motion holds the shift itself
+    during = (time >= shaking.onset) & (time <= shaking.end)
+    energy = np.cumsum(np.where(during, without_drift(plain, time[1]), 0.0) ** 2)
+    inner = np.interp(np.linspace(0, energy[-1], TIMES)[1:-1], energy, time)
+    return np.array([shaking.onset, *inner, shaking.end])
+
+
+def _possible_shifts(
+    times: FloatArray, line: tuple[float, float], largest: float
+) -> Iterator[Shifts]:
+    """Yield the shifts at each pair of times that turn the final line of the velocity to zero."""
+    constant, slope = line
+    for first, second in combinations(range(times.size), 2):
+        final, length = constant + slope * times[second], times[second] - times[first]
+        if abs(final) < largest * length:
+            yield Shifts(first, second, final / length, slope)
+
+
+def _corrected(record: FloatArray, steps: Sequence[FloatArray], shifts: Shifts) -> FloatArray:
+    """Return the record less both shifts, from its responses to steps at the times."""
+    first, second, between, after = shifts
+    return record - between * steps[first] - (after - between) * steps[second]
+
+
+def _weights(
+    plain: FloatArray, time: FloatArray, times: FloatArray, shifts: Sequence[Shifts]
+) -> FloatArray:
+    """Return the weight of each correction, from the displacement that it leaves in the shaking."""
+    velocity = cumulative_trapezoid(plain, time, initial=0)
+    displacement = cumulative_trapezoid(velocity, time, initial=0)
+    # Displacement of a step of 1 m/s2 at each time
+    during = (time >= times[0]) & (time <= times[-1])
+    parabolas = np.maximum(time[during] - times[:, np.newaxis], 0.0) ** 2 / 2
+    left = [_corrected(displacement[during], parabolas, shift) for shift in shifts]
+    misfits = np.sqrt(np.mean(np.square(left), axis=1))
+    weights = 1 / (misfits + FLOOR * misfits.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _last_within(spread: FloatArray, largest: float) -> float:
+    """Return the period from which on the spread exceeds its largest value, s."""
+    beyond = np.flatnonzero(spread > largest)
+    if not beyond.size:
+        return np.inf
+    last = beyond[0]
+    if last == 0:
+        return float(PERIODS[0])
+    # Between two periods: linear in the logarithm of the period
+    pair = slice(last - 1, last + 1)
+    return float(np.exp(np.interp(largest, spread[pair], np.log(PERIODS[pair]))))
