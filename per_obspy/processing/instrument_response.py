@@ -8,7 +8,7 @@ from obspy import Stream, Trace
 from obspy.core.inventory import Response
 from obspy.core.inventory.response import ResponseStage
 from obspy.signal.invsim import cosine_sac_taper
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
@@ -27,6 +27,9 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 #: recorders record no motion, and dividing by a response near zero makes noise.
 NYQUIST_BAND = (0.8, 0.9)
 
+
+#: Most seconds of zeros behind a record: what the filter moves is much shorter.
+LONGEST_PAD = 3600.0
 
 #: Spectral lines that are divided by the response at a time.
 BLOCK = 2**18
@@ -138,24 +141,31 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     nyquist = trace.stats.sampling_rate / 2
     band = (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
     # Zeros behind the record take up what the filter moves around
-    length = next_fast_len(2 * trace.stats.npts, real=True)
-    frequencies = rfftfreq(length, trace.stats.delta)
+    count = trace.stats.npts
+    zeros = min(count, round(LONGEST_PAD / trace.stats.delta))
+    length = next_fast_len(count + zeros, real=True)
+    step = 1 / (length * trace.stats.delta)
+    lines = length // 2 + 1
     try:
-        response_at = _interpolated(trace.stats.response, frequencies)
+        response_at = _interpolated(trace.stats.response, step, (lines - 1) * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    spectrum = rfft(trace.data - trace.data.mean(), length)
+    padded = np.zeros(length)
+    np.subtract(trace.data, trace.data.mean(), out=padded[:count])
+    spectrum = rfft(padded, overwrite_x=True)
+    del padded
     # Block by block: taper and response of a day take more memory than the record
-    for first in range(0, frequencies.size, BLOCK):
-        block = slice(first, first + BLOCK)
-        spectrum[block] *= cosine_sac_taper(frequencies[block], flimit=band)
-        spectrum[block] /= response_at(frequencies[block])
-    trace.data = irfft(spectrum, length, overwrite_x=True)[: trace.stats.npts].copy()
+    for first in range(0, lines, BLOCK):
+        block = slice(first, min(first + BLOCK, lines))
+        frequencies = step * np.arange(block.start, block.stop)
+        spectrum[block] *= cosine_sac_taper(frequencies, flimit=band)
+        spectrum[block] /= response_at(frequencies)
+    trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
 
 
 def _interpolated(
-    response: Response, frequencies: FloatArray
+    response: Response, low: float, high: float
 ) -> Callable[[FloatArray], NDArray[np.complex128]]:
     """
     Return the response to acceleration, counts/(m/s2), interpolated from a thousand frequencies.
@@ -164,7 +174,6 @@ def _interpolated(
     smooth: the difference is below 1e-8 up to 0.9 of the Nyquist frequency. The value at frequency
     0 is that of the first line.
     """
-    low, high = frequencies[1], frequencies[-1]
     # Frequencies that resolve both logarithmic and linear changes
     logarithmic, linear = np.geomspace(low, high, 200), np.linspace(high / 1000, high, 1000)
     lines = np.unique(np.concatenate((logarithmic, linear)))

@@ -7,7 +7,7 @@ from obspy import Stream, Trace
 
 from per_obspy.config import Check
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.notes import rejection, remembered
+from per_obspy.processing.notes import copied_trace, rejection, remembered
 
 
 class Finding(NamedTuple):
@@ -69,7 +69,7 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
         raise RecordRejected(trace.id, *rejecting, *_earlier(trace, "warnings"), *warnings)
     # Texts of earlier checks come first
     notes = _reasons(found, "note")
-    out = trace.copy() if warnings or notes else trace
+    out = copied_trace(trace) if warnings or notes else trace
     for name, reasons in (("warnings", warnings), ("notes", notes)):
         if reasons:
             remembered(out, **{name: "; ".join([*_earlier(trace, name), *reasons])})
@@ -92,7 +92,7 @@ def _earlier(trace: Trace, name: str) -> list[str]:
 
 
 def surviving(
-    step: Callable[[Stream], Stream], stream: Stream
+    step: Callable[[Stream], Stream], stream: Iterable[Trace]
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Apply a step trace by trace, so that a bad trace is rejected alone.
@@ -101,7 +101,8 @@ def surviving(
     ----------
     step : callable
         From Stream to new Stream; raises `RecordRejected`.
-    stream : obspy Stream
+    stream : iterable of obspy Trace
+        From `taken` where each may leave memory after its step.
 
     Returns
     -------
