@@ -5,7 +5,7 @@ Checks, m/s2, noise, baseline, corners, filter, usable periods.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial, reduce
+from functools import partial
 
 from obspy import Stream, Trace
 from obspy.core import AttribDict
@@ -73,7 +73,9 @@ def _in_turn(
     """Apply steps in turn to each trace by itself."""
 
     def apply(single: Stream) -> Stream:
-        return reduce(lambda record, step: step(record), steps, single)
+        for step in steps:
+            single = step(single)
+        return single
 
     return surviving(apply, stream)
 

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
+from per_obspy.processing.long_records import blocks, forget_plans
 from per_obspy.processing.notes import copied, noted
 
 #: Units of the ground motion in a response.
@@ -30,9 +31,6 @@ NYQUIST_BAND = (0.8, 0.9)
 
 #: Most seconds of zeros behind a record: what the filter moves is much shorter.
 LONGEST_PAD = 3600.0
-
-#: Spectral lines that are divided by the response at a time.
-BLOCK = 2**18
 
 
 def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
@@ -155,12 +153,12 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     spectrum = rfft(padded, overwrite_x=True)
     del padded
     # Block by block: taper and response of a day take more memory than the record
-    for first in range(0, lines, BLOCK):
-        block = slice(first, min(first + BLOCK, lines))
+    for block in blocks(0, lines):
         frequencies = step * np.arange(block.start, block.stop)
         spectrum[block] *= cosine_sac_taper(frequencies, flimit=band)
         spectrum[block] /= response_at(frequencies)
     trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
+    forget_plans(length)
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
 
 

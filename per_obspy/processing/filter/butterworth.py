@@ -11,6 +11,7 @@ from obspy import Stream
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from per_obspy.checks import FloatArray, finite, number, positive
+from per_obspy.processing.long_records import blocks, forget_plans
 from per_obspy.processing.notes import copied, noted
 
 #: Length of each pad in periods of the corner per order of the filter (Boore 2005).
@@ -147,10 +148,14 @@ def acausal_bandpass(
         In the unit of the data.
     """
     samples = finite("data", data)
-    amplitude = butterworth_amplitude(rfftfreq(samples.size, 1 / df), highpass, lowpass, order)
     spectrum = rfft(samples)
-    spectrum *= amplitude
-    return np.asarray(irfft(spectrum, samples.size, overwrite_x=True))
+    frequencies = rfftfreq(samples.size, 1 / df)
+    # Block by block: powers of all frequencies of a day take more memory than the record
+    for block in blocks(0, frequencies.size):
+        spectrum[block] *= butterworth_amplitude(frequencies[block], highpass, lowpass, order)
+    out = irfft(spectrum, samples.size, overwrite_x=True)
+    forget_plans(samples.size)
+    return np.asarray(out)
 
 
 def filtered(stream: Stream, highpass: float, lowpass: float, order: int) -> Stream:

@@ -1,16 +1,14 @@
 """Baselines of constant and polynomial form: means and trends."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from obspy import Stream
 
 from per_obspy.checks import FloatArray
+from per_obspy.processing.long_records import blocks
 from per_obspy.processing.notes import copied, noted
-
-#: Samples of a long record that are worked on at a time: ordinary records have fewer.
-BLOCK = 2**20
 
 
 def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
@@ -88,13 +86,13 @@ def trend(data: FloatArray, order: int) -> FloatArray:
     places = np.linspace(-1, 1, data.size)
     # Sums of products over the blocks
     products, moments = np.zeros((order + 1, order + 1)), np.zeros(order + 1)
-    for block in blocks(data.size):
+    for block in blocks(0, data.size):
         basis = legvander(places[block], order)
         products += basis.T @ basis
         moments += basis.T @ data[block]
     coefficients = np.linalg.solve(products, moments)
     # The places give way to the values of the polynomial there
-    for block in blocks(data.size):
+    for block in blocks(0, data.size):
         places[block] = legvander(places[block], order) @ coefficients
     return places
 
@@ -103,12 +101,6 @@ def without_trend(data: FloatArray, order: int) -> FloatArray:
     """Return samples without their `trend`, in a new array."""
     out = trend(data, order)
     return np.subtract(data, out, out=out)
-
-
-def blocks(size: int) -> Iterator[slice]:
-    """Yield the parts of a long record that are worked on in turn; others are one part."""
-    for first in range(0, size, BLOCK):
-        yield slice(first, min(first + BLOCK, size))
 
 
 def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:

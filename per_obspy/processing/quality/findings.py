@@ -112,9 +112,12 @@ def surviving(
         One row for each other trace.
     """
     accepted, rejected = Stream(), []
-    for trace in stream:
+    remaining = Stream(list(stream))
+    while remaining:
+        # The step is given the only reference to the trace
+        row = rejection(remaining[0])
         try:
-            accepted += step(Stream([trace]))
+            accepted += step(Stream([remaining.pop(0)]))
         except RecordRejected as fault:
-            rejected.append(rejection(trace, *fault.reasons))
+            rejected.append(row._replace(reasons=fault.reasons))
     return accepted, tuple(rejected)

@@ -10,7 +10,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
-from per_obspy.processing.filter.polynomial import trend
+from per_obspy.processing.filter.polynomial import without_trend
+from per_obspy.processing.long_records import blocks
 from per_obspy.processing.noise.signal_to_noise import SIGNIFICANT
 from per_obspy.processing.quality.findings import Finding, above, below
 
@@ -62,7 +63,7 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield Finding("levels", "reject", reason)
     else:
         yield from _recorder_findings(trace, checks)
-        yield from _shaking_findings(trace.data - trend(trace.data, 1), trace.stats.delta, checks)
+        yield from _shaking_findings(without_trend(trace.data, 1), trace.stats.delta, checks)
         yield from header_findings(trace, checks)
 
 
@@ -80,7 +81,7 @@ def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield from above("counter_use", checks.counter_use, use, meaning)
     still = longest_standstill(samples, dt)
     yield from above("dropout", checks.dropout, still, "dropout, s without change:")
-    spike = largest_spike(samples - trend(samples, 1), dt)
+    spike = largest_spike(without_trend(samples, 1), dt)
     yield from above("spike", checks.spike, spike, "spike or step, over its vicinity:")
 
 
@@ -182,7 +183,7 @@ def _running_rms(
     """Return the running root mean square of squared samples over a time, s."""
     means = uniform_filter1d(squares, max(round(seconds / dt), 1), mode=mode)
     # Rounding of the running sum may leave small negative values
-    return np.asarray(np.sqrt(np.maximum(means, 0)))
+    return np.asarray(np.sqrt(np.maximum(means, 0, out=means), out=means))
 
 
 def longest_standstill(samples: FloatArray, dt: float) -> float:
@@ -232,17 +233,21 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     """
     # Distance of each sample from the mean of its neighbours
     jumps = np.zeros(samples.size)
-    jumps[1:-1] = np.abs(samples[1:-1] - 0.5 * (samples[:-2] + samples[2:]))
+    inner = np.add(samples[:-2], samples[2:], out=jumps[1:-1])
+    inner *= 0.5
+    np.abs(np.subtract(samples[1:-1], inner, out=inner), out=inner)
     # Largest jump in windows before and after, clear of the spike itself
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
     side = maximum_filter1d(jumps, width, mode="constant", origin=0)
     shift = NEIGHBOURS + 1 + width // 2
-    around = np.maximum(np.roll(side, shift), np.roll(side, -shift))
     peak = np.abs(samples).max()
-    is_large = jumps > SMALLEST_SPIKE * peak
-    if not is_large.any():
-        return 0.0
-    return float((jumps[is_large] / np.maximum(around[is_large], SPIKE_FLOOR * peak)).max())
+    largest = 0.0
+    for block in blocks(0, jumps.size):
+        large = block.start + np.flatnonzero(jumps[block] > SMALLEST_SPIKE * peak)
+        before, after = side[large - shift], side[(large + shift) % side.size]
+        around = np.maximum(np.maximum(before, after), SPIKE_FLOOR * peak)
+        largest = max(largest, float((jumps[large] / around).max(initial=0.0)))
+    return largest
 
 
 def later_event(samples: FloatArray, dt: float) -> float:
@@ -267,10 +272,10 @@ def later_event(samples: FloatArray, dt: float) -> float:
     envelope = _running_rms(samples**2, ENVELOPE, dt, "constant")
     # First quiet sample after the main event, last one before it
     main, largest = int(envelope.argmax()), float(envelope.max())
-    quiet = np.flatnonzero(envelope < QUIET * largest)
-    after, before = quiet[quiet > main], quiet[quiet < main]
-    later = envelope[after[0] :].max() if after.size else 0.0
-    earlier = envelope[: before[-1] + 1].max() if before.size else 0.0
+    is_quiet = envelope < QUIET * largest
+    after, before = is_quiet[main + 1 :], is_quiet[:main][::-1]
+    later = envelope[main + 1 + after.argmax() :].max() if after.any() else 0.0
+    earlier = envelope[: main - before.argmax()].max() if before.any() else 0.0
     return float(max(later, earlier) / largest)
 
 
