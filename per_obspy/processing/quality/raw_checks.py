@@ -1,6 +1,7 @@
 """Checks of raw samples for faults of sensor and recorder, and for other events in the record."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
 from per_obspy.processing.filter.polynomial import without_trend
-from per_obspy.processing.long_records import blocks
+from per_obspy.processing.long_records import blocks, by_blocks
 from per_obspy.processing.noise.signal_to_noise import SIGNIFICANT
 from per_obspy.processing.quality.findings import Finding, above, below
 
@@ -178,12 +179,17 @@ def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
 
 
 def _running_rms(
-    squares: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
+    samples: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
 ) -> FloatArray:
-    """Return the running root mean square of squared samples over a time, s."""
-    means = uniform_filter1d(squares, max(round(seconds / dt), 1), mode=mode)
-    # Rounding of the running sum may leave small negative values
-    return np.asarray(np.sqrt(np.maximum(means, 0, out=means), out=means))
+    """Return the running root mean square of samples over a time, s."""
+    width = max(round(seconds / dt), 1)
+
+    def root_mean_square(part: FloatArray) -> FloatArray:
+        means = uniform_filter1d(part**2, width, mode=mode)
+        # Rounding of the running sum may leave small negative values
+        return np.asarray(np.sqrt(np.maximum(means, 0)))
+
+    return by_blocks(root_mean_square, samples, width)
 
 
 def longest_standstill(samples: FloatArray, dt: float) -> float:
@@ -204,8 +210,7 @@ def longest_standstill(samples: FloatArray, dt: float) -> float:
     -------
     float
     """
-    squares = (samples - samples.mean()) ** 2
-    envelope = _running_rms(squares, STANDSTILL_ENVELOPE, dt, "reflect")
+    envelope = _running_rms(samples - samples.mean(), STANDSTILL_ENVELOPE, dt, "reflect")
     # Runs of equal samples with moving ground at both ends
     starts, stops = runs(np.diff(samples) == 0)
     moving = np.minimum(envelope[starts], envelope[stops]) > MOVING * envelope.max()
@@ -231,6 +236,7 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     float
         Dimensionless; near 1 for ground motion.
     """
+    peak = np.abs(samples).max()
     # Distance of each sample from the mean of its neighbours
     jumps = np.zeros(samples.size)
     inner = np.add(samples[:-2], samples[2:], out=jumps[1:-1])
@@ -238,9 +244,8 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     np.abs(np.subtract(samples[1:-1], inner, out=inner), out=inner)
     # Largest jump in windows before and after, clear of the spike itself
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
-    side = maximum_filter1d(jumps, width, mode="constant", origin=0)
+    side = by_blocks(partial(maximum_filter1d, size=width, mode="constant"), jumps, width)
     shift = NEIGHBOURS + 1 + width // 2
-    peak = np.abs(samples).max()
     largest = 0.0
     for block in blocks(0, jumps.size):
         large = block.start + np.flatnonzero(jumps[block] > SMALLEST_SPIKE * peak)
@@ -269,7 +274,7 @@ def later_event(samples: FloatArray, dt: float) -> float:
     float
         Of the running root mean square, dimensionless.
     """
-    envelope = _running_rms(samples**2, ENVELOPE, dt, "constant")
+    envelope = _running_rms(samples, ENVELOPE, dt, "constant")
     # First quiet sample after the main event, last one before it
     main, largest = int(envelope.argmax()), float(envelope.max())
     is_quiet = envelope < QUIET * largest
