@@ -139,27 +139,30 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     nyquist = trace.stats.sampling_rate / 2
     band = (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
     # Zeros behind the record take up what the filter moves around
-    count = trace.stats.npts
-    zeros = min(count, round(LONGEST_PAD / trace.stats.delta))
-    length = next_fast_len(count + zeros, real=True)
-    step = 1 / (length * trace.stats.delta)
-    lines = length // 2 + 1
+    count, dt = trace.stats.npts, trace.stats.delta
+    length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
+    step = 1 / (length * dt)
     try:
-        response_at = _interpolated(trace.stats.response, step, (lines - 1) * step)
+        response_at = _interpolated(trace.stats.response, step, length // 2 * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    padded = np.zeros(length)
-    np.subtract(trace.data, trace.data.mean(), out=padded[:count])
-    spectrum = rfft(padded, overwrite_x=True)
-    del padded
-    # Block by block: taper and response of a day take more memory than the record
-    for block in blocks(0, lines):
+    # Taper and response of a day would take more memory than the record: block by block
+    spectrum = _padded_spectrum(trace.data, length)
+    for block in blocks(0, spectrum.size):
         frequencies = step * np.arange(block.start, block.stop)
         spectrum[block] *= cosine_sac_taper(frequencies, flimit=band)
         spectrum[block] /= response_at(frequencies)
+    # Back in time, without the zeros
     trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
     forget_plans(length)
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
+
+
+def _padded_spectrum(samples: FloatArray, length: int) -> NDArray[np.complex128]:
+    """Return the spectrum of samples without their mean, with zeros up to a length behind."""
+    padded = np.zeros(length)
+    np.subtract(samples, samples.mean(), out=padded[: samples.size])
+    return np.asarray(rfft(padded, overwrite_x=True))
 
 
 def _interpolated(

@@ -237,11 +237,7 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
         Dimensionless; near 1 for ground motion.
     """
     peak = np.abs(samples).max()
-    # Distance of each sample from the mean of its neighbours
-    jumps = np.zeros(samples.size)
-    inner = np.add(samples[:-2], samples[2:], out=jumps[1:-1])
-    inner *= 0.5
-    np.abs(np.subtract(samples[1:-1], inner, out=inner), out=inner)
+    jumps = _jumps(samples)
     # Largest jump in windows before and after, clear of the spike itself
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
     side = by_blocks(partial(maximum_filter1d, size=width, mode="constant"), jumps, width)
@@ -249,10 +245,19 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     largest = 0.0
     for block in blocks(0, jumps.size):
         large = block.start + np.flatnonzero(jumps[block] > SMALLEST_SPIKE * peak)
-        before, after = side[large - shift], side[(large + shift) % side.size]
+        before, after = side[(large - shift) % side.size], side[(large + shift) % side.size]
         around = np.maximum(np.maximum(before, after), SPIKE_FLOOR * peak)
         largest = max(largest, float((jumps[large] / around).max(initial=0.0)))
     return largest
+
+
+def _jumps(samples: FloatArray) -> FloatArray:
+    """Return the distance of each sample from the mean of its neighbours, 0 at both ends."""
+    jumps = np.zeros(samples.size)
+    inner = np.add(samples[:-2], samples[2:], out=jumps[1:-1])
+    inner *= 0.5
+    np.abs(np.subtract(samples[1:-1], inner, out=inner), out=inner)
+    return jumps
 
 
 def later_event(samples: FloatArray, dt: float) -> float:
