@@ -136,8 +136,7 @@ def _divide_sensitivity(trace: Trace, response: Response) -> None:
 
 def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
-    nyquist = trace.stats.sampling_rate / 2
-    band = (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
+    band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up what the filter moves around
     count, dt = trace.stats.npts, trace.stats.delta
     length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
@@ -156,6 +155,11 @@ def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
     forget_plans(length)
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
+
+
+def _pre_filter(low: tuple[float, float], nyquist: float) -> tuple[float, float, float, float]:
+    """Return the frequencies between which the pre-filter rises and falls, Hz."""
+    return (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
 
 
 def _padded_spectrum(samples: FloatArray, length: int) -> NDArray[np.complex128]:

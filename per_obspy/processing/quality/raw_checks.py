@@ -242,6 +242,7 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
     side = by_blocks(partial(maximum_filter1d, size=width, mode="constant"), jumps, width)
     shift = NEIGHBOURS + 1 + width // 2
+    # Jumps large enough to count, over the largest one around each
     largest = 0.0
     for block in blocks(0, jumps.size):
         large = block.start + np.flatnonzero(jumps[block] > SMALLEST_SPIKE * peak)
