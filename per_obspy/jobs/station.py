@@ -23,6 +23,7 @@ from per_obspy.files import bytes_hash, file_hash, remove_file
 from per_obspy.jobs.parallel import Work, results
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.chain import process_station
+from per_obspy.processing.notes import taken
 from per_obspy.records.event_file import EventFile, portable
 from per_obspy.records.folder import read_station
 from per_obspy.records.metadata import metadata_text
@@ -59,7 +60,7 @@ class Products(NamedTuple):
 
 def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") -> Products:
     """Write the spectra of a station as its shard if any record is usable."""
-    clean, unfit = process_station(stream, job.processing, event)
+    clean, unfit = process_station(taken(stream), job.processing, event)
     if not clean:
         return Products(unfit)
     # Spectra at periods in equal steps of their logarithm

@@ -1,6 +1,7 @@
 """Processed records of some sources as files: MiniSEED, the table of corners, a page per record."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from per_obspy.files import remove_dead_parts, remove_file
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
+from per_obspy.processing.notes import taken
 from per_obspy.processing.station.structures import kept_apart
 from per_obspy.processing.unprocessed import before_processing
 from per_obspy.progress import Progress
@@ -122,8 +124,9 @@ def _structure(job: StationJob) -> Path:
 
 def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
     """Write the processed records of a station as its shard, structures in another file."""
-    clean, unfit = process_station(stream, job.processing, event)
-    return _write_records(job, clean, unfit, _write_structure(job, stream, event))
+    ground, structure = kept_apart(taken(stream))
+    clean, unfit = process_station(chain(taken(ground), structure), job.processing, event)
+    return _write_records(job, clean, unfit, _write_structure(job, structure, event))
 
 
 def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
@@ -134,7 +137,8 @@ def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) ->
     if clean:
         traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
         draw_records(traces, pages)
-    products = _write_records(job, clean, unfit, _write_structure(job, stream, event))
+    _, structure = kept_apart(stream)
+    products = _write_records(job, clean, unfit, _write_structure(job, structure, event))
     return products._replace(files=(*products.files, pages)) if clean else products
 
 
@@ -149,11 +153,11 @@ def _write_records(
     return Products(rejected, (job.shard, *structure.files), facts)
 
 
-def _write_structure(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the records of the sensors in structures, every instrument, with their description."""
+def _write_structure(job: StationJob, structure: Stream, event: Event | None) -> Products:
+    """Write the records of the sensors in structures, every instrument; empty the stream."""
     path = _structure(job)
     remove_file(path)
-    instruments, rejected = process_instruments(kept_apart(stream)[1], job.processing, event)
+    instruments, rejected = process_instruments(taken(structure), job.processing, event)
     # All instruments in one file
     built = Stream([trace for traces in instruments for trace in traces])
     if not built:

@@ -12,7 +12,7 @@ from per_obspy.processing.filter.corners import (
     lowest_highpass,
     usable_periods_noted,
 )
-from per_obspy.processing.notes import noted, remembered
+from per_obspy.processing.notes import copied_trace, noted, remembered
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import judged
 from per_obspy.processing.quality.raw_checks import header_findings
@@ -49,7 +49,7 @@ def passed_through(stream: Stream, settings: Processing) -> Stream:
 
 def _with_corners(trace: Trace, settings: Processing) -> Trace:
     """Return a copy with the corners of the header, or else with limits in their place."""
-    out = trace.copy()
+    out = copied_trace(trace)
     noted(out, "processed already, passed through")
     header = trace.stats.get("corners", {})
     if header.get("highpass"):

@@ -2,6 +2,7 @@
 
 import logging
 from collections import defaultdict
+from collections.abc import Iterable
 
 from obspy import Stream, Trace
 from obspy.core.event import Event
@@ -10,7 +11,7 @@ from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.processing.instrument import process_instrument
 from per_obspy.processing.noise.windows import source_of
-from per_obspy.processing.notes import rejection
+from per_obspy.processing.notes import rejection, taken
 from per_obspy.processing.station.components import instruments, is_horizontal, oriented
 from per_obspy.processing.station.merging import merged
 from per_obspy.processing.station.structures import kept_apart
@@ -75,15 +76,16 @@ def process(
 
 
 def process_station(
-    stream: Stream, settings: Processing, event: Event | None = None
+    stream: Iterable[Trace], settings: Processing, event: Event | None = None
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Process a station and return the best instrument with a row for each other trace.
 
     Parameters
     ----------
-    stream : obspy Stream
-        All channels of one station.
+    stream : iterable of obspy Trace
+        All channels of one station, unchanged by it. From :func:`.notes.taken`, so that nobody else
+        holds them, raw records leave memory on the way.
     settings : Processing
         Every number of the chain.
     event : obspy Event, optional
@@ -98,7 +100,7 @@ def process_station(
         recorded the structure, not the ground; `process_instruments` processes them.
     """
     ground, structure = kept_apart(stream)
-    candidates, unusable = process_instruments(ground, settings, event)
+    candidates, unusable = process_instruments(taken(ground), settings, event)
     best = max(candidates, key=lambda traces: sum(map(is_horizontal, traces)), default=Stream())
     rejected = list(unusable)
     # Other instruments at the same place
@@ -119,7 +121,7 @@ def process_station(
 
 
 def process_instruments(
-    stream: Stream, settings: Processing, event: Event | None = None
+    stream: Iterable[Trace], settings: Processing, event: Event | None = None
 ) -> tuple[list[Stream], tuple[Rejection, ...]]:
     """
     Process every instrument of a station by itself, the preferred instrument first.
@@ -142,8 +144,8 @@ def process_instruments(
     source = source_of(event) if event is not None and event.origins else None
     processed, rejected = [], list(broken)
     # Each instrument by itself
-    for instrument in instruments(oriented(whole)):
-        traces, unusable = process_instrument(instrument, settings, source)
+    for instrument in instruments(oriented(taken(whole))):
+        traces, unusable = process_instrument(taken(instrument), settings, source)
         processed += [traces] if traces else []
         rejected += unusable
     return processed, tuple(rejected)

@@ -5,7 +5,7 @@ Checks, m/s2, noise, baseline, corners, filter, usable periods.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial, reduce
+from functools import partial
 
 from obspy import Stream, Trace
 from obspy.core import AttribDict
@@ -18,7 +18,7 @@ from per_obspy.processing.filter.butterworth import filtered, padded
 from per_obspy.processing.filter.corners import corners_shared, usable_periods_noted
 from per_obspy.processing.instrument_response import in_acceleration
 from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
-from per_obspy.processing.notes import is_processed
+from per_obspy.processing.notes import copied, is_processed, taken
 from per_obspy.processing.quality.final_checks import final_findings
 from per_obspy.processing.quality.findings import Finding, judged, surviving
 from per_obspy.processing.quality.raw_checks import outlier_findings, raw_findings
@@ -30,14 +30,17 @@ Step = Callable[[Stream], Stream]
 
 
 def process_instrument(
-    instrument: Stream, settings: Processing, source: Source | None
+    instrument: Iterable[Trace], settings: Processing, source: Source | None
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Process the components of one instrument and return a row for each that is left out.
 
+    Every step is done for one component at a time, and each leaves memory when its next form is
+    there, if nobody else holds it.
+
     Parameters
     ----------
-    instrument : obspy Stream
+    instrument : iterable of obspy Trace
         Whole, oriented traces, all raw or all processed by others.
     settings : Processing
         Every number of the chain.
@@ -49,30 +52,50 @@ def process_instrument(
     processed : obspy Stream
     rejected : tuple of Rejection
     """
-    if instrument and is_processed(instrument[0]):
+    components = Stream(list(instrument))
+    if components and is_processed(components[0]):
         # Series of velocity or displacement are no acceleration
-        physical, unfit = _in_turn(instrument, _conversion_steps(settings)[1:])
-        pair, rejected = paired(physical, settings.overlap)
-        return passed_through(pair, settings), (*unfit, *rejected)
-    # Each component in m/s2, then the horizontals over their common time
-    physical, unfit = _in_turn(instrument, _conversion_steps(settings))
-    pair, unpaired = paired(physical, settings.overlap)
+        pair, rejected = _physical_pair(components, settings, _conversion_steps(settings)[1:])
+        return passed_through(pair, settings), rejected
+    # Each component in m/s2, then all of them around the shaking
+    windowed, unusable = _windowed(components, settings, source)
     # Baseline and corners of each component; the horizontals share the narrower band
-    windowed = _windowed(pair, settings, source)
-    ready, undecided = _in_turn(windowed, _baseline_steps(windowed, settings, source))
-    horizontals = corners_shared(Stream([trace for trace in ready if is_horizontal(trace)]))
-    verticals = Stream([trace for trace in ready if not is_horizontal(trace)])
-    done, restless = _in_turn(horizontals + verticals, _filter_steps(settings))
-    return flags_noted(done), (*unfit, *unpaired, *undecided, *restless)
+    steps = _baseline_steps(windowed, settings, source)
+    ready, undecided = _in_turn(taken(windowed), steps)
+    banded = _horizontals_banded(taken(ready))
+    done, restless = _in_turn(taken(banded), _filter_steps(settings))
+    return flags_noted(done), (*unusable, *undecided, *restless)
 
 
-def _in_turn(stream: Stream, steps: Iterable[Step]) -> tuple[Stream, tuple[Rejection, ...]]:
+def _in_turn(
+    stream: Iterable[Trace], steps: Iterable[Step]
+) -> tuple[Stream, tuple[Rejection, ...]]:
     """Apply steps in turn to each trace by itself."""
 
     def apply(single: Stream) -> Stream:
-        return reduce(lambda record, step: step(record), steps, single)
+        for step in steps:
+            single = step(single)
+        return single
 
     return surviving(apply, stream)
+
+
+def _physical_pair(
+    components: Stream, settings: Processing, steps: Iterable[Step]
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """Return the components in m/s2, the horizontals over their common time; empty the input."""
+    physical, unfit = _in_turn(taken(components), steps)
+    pair, unpaired = paired(physical, settings.overlap)
+    return pair, (*unfit, *unpaired)
+
+
+def _horizontals_banded(stream: Iterable[Trace]) -> Stream:
+    """Return the components, horizontals first and with the narrower of their bands."""
+    horizontals, verticals = Stream(), Stream()
+    for trace in stream:
+        group = horizontals if is_horizontal(trace) else verticals
+        group.append(trace)
+    return corners_shared(horizontals) + verticals
 
 
 def _conversion_steps(settings: Processing) -> tuple[Step, ...]:
@@ -83,17 +106,20 @@ def _conversion_steps(settings: Processing) -> tuple[Step, ...]:
     )
 
 
-def _windowed(stream: Stream, settings: Processing, source: Source | None) -> Stream:
-    """Return the components with their noise windows, cut to the time around the shaking."""
+def _windowed(
+    components: Stream, settings: Processing, source: Source | None
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """Return physical components with noise windows, around the shaking; empty the input."""
+    pair, rejected = _physical_pair(components, settings, _conversion_steps(settings))
     noted_windows = noise_window_noted(
-        stream,
+        pair,
         settings.onset_margin,
         settings.shortest_noise,
         settings.pick_tolerance,
         source,
         settings.pre_event,
     )
-    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal)
+    return trimmed(noted_windows, settings.longest_noise, settings.longest_signal), rejected
 
 
 def _baseline_steps(
@@ -148,7 +174,7 @@ def _final_findings(trace: Trace, settings: Processing) -> Iterator[Finding]:
 
 def _marked(stream: Stream) -> Stream:
     """Return a copy marked as processed, with its corners, so that a second pass keeps it."""
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         corners = trace.stats.per_obspy
         trace.stats.processing_level = "processed"

@@ -8,11 +8,12 @@ from obspy import Stream, Trace
 from obspy.core.inventory import Response
 from obspy.core.inventory.response import ResponseStage
 from obspy.signal.invsim import cosine_sac_taper
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 
 from per_obspy.checks import FloatArray
 from per_obspy.errors import RecordRejected
+from per_obspy.processing.long_records import blocks, forget_plans
 from per_obspy.processing.notes import copied, noted
 
 #: Units of the ground motion in a response.
@@ -28,8 +29,8 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 NYQUIST_BAND = (0.8, 0.9)
 
 
-#: Spectral lines that are divided by the response at a time.
-BLOCK = 2**18
+#: Most seconds of zeros behind a record: what the filter moves is much shorter.
+LONGEST_PAD = 3600.0
 
 
 def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
@@ -135,27 +136,41 @@ def _divide_sensitivity(trace: Trace, response: Response) -> None:
 
 def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
-    nyquist = trace.stats.sampling_rate / 2
-    band = (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
+    band = _pre_filter(low, trace.stats.sampling_rate / 2)
     # Zeros behind the record take up what the filter moves around
-    length = next_fast_len(2 * trace.stats.npts, real=True)
-    frequencies = rfftfreq(length, trace.stats.delta)
+    count, dt = trace.stats.npts, trace.stats.delta
+    length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
+    step = 1 / (length * dt)
     try:
-        response_at = _interpolated(trace.stats.response, frequencies)
+        response_at = _interpolated(trace.stats.response, step, length // 2 * step)
     except (ValueError, NotImplementedError, ArithmeticError) as fault:
         raise RecordRejected(trace.id, f"response cannot be evaluated: {fault}") from fault
-    spectrum = rfft(trace.data - trace.data.mean(), length)
-    # Block by block: taper and response of a day take more memory than the record
-    for first in range(0, frequencies.size, BLOCK):
-        block = slice(first, first + BLOCK)
-        spectrum[block] *= cosine_sac_taper(frequencies[block], flimit=band)
-        spectrum[block] /= response_at(frequencies[block])
-    trace.data = irfft(spectrum, length, overwrite_x=True)[: trace.stats.npts].copy()
+    # Taper and response of a day would take more memory than the record: block by block
+    spectrum = _padded_spectrum(trace.data, length)
+    for block in blocks(0, spectrum.size):
+        frequencies = step * np.arange(block.start, block.stop)
+        spectrum[block] *= cosine_sac_taper(frequencies, flimit=band)
+        spectrum[block] /= response_at(frequencies)
+    # Back in time, without the zeros
+    trace.data = irfft(spectrum, length, overwrite_x=True)[:count].copy()
+    forget_plans(length)
     noted(trace, f"response removed, pre-filter {band} Hz", conversion="response")
 
 
+def _pre_filter(low: tuple[float, float], nyquist: float) -> tuple[float, float, float, float]:
+    """Return the frequencies between which the pre-filter rises and falls, Hz."""
+    return (*low, NYQUIST_BAND[0] * nyquist, NYQUIST_BAND[1] * nyquist)
+
+
+def _padded_spectrum(samples: FloatArray, length: int) -> NDArray[np.complex128]:
+    """Return the spectrum of samples without their mean, with zeros up to a length behind."""
+    padded = np.zeros(length)
+    np.subtract(samples, samples.mean(), out=padded[: samples.size])
+    return np.asarray(rfft(padded, overwrite_x=True))
+
+
 def _interpolated(
-    response: Response, frequencies: FloatArray
+    response: Response, low: float, high: float
 ) -> Callable[[FloatArray], NDArray[np.complex128]]:
     """
     Return the response to acceleration, counts/(m/s2), interpolated from a thousand frequencies.
@@ -164,7 +179,6 @@ def _interpolated(
     smooth: the difference is below 1e-8 up to 0.9 of the Nyquist frequency. The value at frequency
     0 is that of the first line.
     """
-    low, high = frequencies[1], frequencies[-1]
     # Frequencies that resolve both logarithmic and linear changes
     logarithmic, linear = np.geomspace(low, high, 200), np.linspace(high / 1000, high, 1000)
     lines = np.unique(np.concatenate((logarithmic, linear)))

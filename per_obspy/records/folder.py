@@ -29,6 +29,7 @@ from per_obspy.formats.text.station_table import (
     with_open_starts,
 )
 from per_obspy.machine import raise_machine_fault
+from per_obspy.processing.notes import taken
 from per_obspy.records.archives import IRREGULAR, LIMITS, archive_files, is_archive, read_file
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
 from per_obspy.records.metadata import with_metadata
@@ -240,7 +241,7 @@ def read_station(
             rejected.append(_rejected_file(path, rejection))
             continue
         # A trace that is refused does not stop the others of its file
-        for trace in traces:
+        for trace in taken(traces):
             if station not in (None, station_name(trace)):
                 continue
             try:

@@ -76,12 +76,12 @@ def write_processed(stream: Stream, path: Path) -> dict[str, Any]:
     dict
         ``{"traces": [...]}``: one description per trace, in the order of the file.
     """
-    with written_whole(path) as part:
-        short = Stream([_with_short_codes(trace) for trace in stream])
-        # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
-        content = BytesIO()
-        short.write(content, format="MSEED", encoding="FLOAT64")
-        part.write_bytes(content.getvalue())
+    with written_whole(path) as part, part.open("wb") as file:
+        for trace in stream:
+            # ObsPy's writer of MiniSEED ignores errors of the disk: only memory is safe
+            content = BytesIO()
+            _with_short_codes(trace).write(content, format="MSEED", encoding="FLOAT64")
+            file.write(content.getbuffer())
     return {"traces": [_description(trace) for trace in stream]}
 
 

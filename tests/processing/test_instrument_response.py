@@ -13,7 +13,8 @@ from obspy.core.inventory.response import (
 )
 
 from per_obspy.errors import RecordRejected
-from per_obspy.processing.instrument_response import in_acceleration
+from per_obspy.processing import instrument_response
+from per_obspy.processing.instrument_response import LONGEST_PAD, in_acceleration
 
 GAIN, RATE = 2e5, 100.0
 TOLERANCE = 0.1  # between gains and sensitivity
@@ -140,3 +141,18 @@ def test_knet_records_that_obspy_read_are_converted_by_their_factor():
     expected = abs(record[0].data).max() * record[0].stats.calib
     assert abs(out[0].data).max() == pytest.approx(expected, rel=1e-12)
     assert out[0].stats.units == "m/s2"
+
+
+def test_an_hour_of_zeros_behind_a_long_record_is_enough(monkeypatch):
+    # A velocity sensor moves most: its pre-filter begins at 0.005 Hz
+    count, rate = 100_000, 10.0
+    ground = np.random.default_rng(2).normal(size=count) * np.exp(
+        -(((np.arange(count) - 0.9 * count) / 500) ** 2)
+    )
+    stream = counts(GAIN * ground, response=response("M/S"), sampling_rate=rate)
+    assert count / rate > LONGEST_PAD
+    found = in_acceleration(stream, TOLERANCE)[0].data
+    monkeypatch.setattr(instrument_response, "LONGEST_PAD", count / rate)
+    expected = in_acceleration(stream, TOLERANCE)[0].data
+    # The tail of the pre-filter after an hour, which is 18 of its longest periods
+    assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())

@@ -1,14 +1,14 @@
-"""Notes on a trace, rows of rejected traces, and copies that share the response."""
+"""Notes on a trace, rows of rejected traces, and copies that share samples and response."""
 
 import numpy as np
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 from obspy.core.inventory import Response
 
-from per_obspy.processing.notes import copied, is_processed, noted, rejection
+from per_obspy.processing.notes import copied, is_processed, noted, rejection, taken
 
 
-def test_a_copy_is_equal_and_shares_nothing_but_the_response():
+def test_a_copy_is_equal_and_shares_nothing_but_samples_and_response():
     header = {
         "station": "STA",
         "delta": 0.02,
@@ -21,9 +21,20 @@ def test_a_copy_is_equal_and_shares_nothing_but_the_response():
     before, out = stream.copy(), copied(stream)
     assert out == stream
     assert out[0].stats.response is stream[0].stats.response
-    out[0].data[0], out[0].stats.corners.highpass = 7.0, 0.2
+    assert out[0].data is stream[0].data
+    # New samples and notes are those of the copy alone
+    out[0].data, out[0].stats.corners.highpass = out[0].data + 7.0, 0.2
     out[0].stats.processing.append("two")
     assert stream == before  # would catch a copy of the header that is not deep
+
+
+def test_traces_that_are_taken_leave_their_stream():
+    first, second = Trace(np.zeros(3)), Trace(np.ones(3))
+    stream = Stream([first, second])
+    remaining = [(trace, len(stream)) for trace in taken(stream)]
+    assert [count for _, count in remaining] == [1, 0]
+    assert remaining[0][0] is first
+    assert remaining[1][0] is second
 
 
 def test_masked_samples_stay_masked():

@@ -39,7 +39,7 @@ from per_obspy.processing.noise.signal_to_noise import (
     weakest_ratio,
     within,
 )
-from per_obspy.processing.notes import noted, remembered
+from per_obspy.processing.notes import copied, noted, remembered
 from per_obspy.processing.quality.findings import Finding, below, judged
 
 #: Fewest samples of noise to which a parabola is fitted.
@@ -68,8 +68,8 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     RecordRejected
         If the signal never clears the noise, or no corner cleans the displacement.
     """
-    plain = _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
-    level = trend_removed(plain)
+    quiet = float(stream[0].stats.per_obspy.noise)
+    level = trend_removed(_residual_noted(mean_removed(stream, quiet)))
     # Spectra of signal and noise between the corners that length and sampling allow
     outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)
@@ -133,7 +133,7 @@ def offset_kept(stream: Stream, settings: Processing) -> Stream:
 
 def _residual_noted(stream: Stream) -> Stream:
     """Return a copy with the residual velocity after the shaking, if the record has quiet ends."""
-    out = stream.copy()
+    out = copied(stream)
     _, end, has_quiet_ends = _shaking_times(out[0])
     if has_quiet_ends:
         velocity = residual_velocity(out[0].data, out[0].stats.delta, end)
@@ -262,7 +262,7 @@ def _limits(
 
 def _noted(stream: Stream, highpass: Corner, lowpass: Corner) -> Stream:
     """Return a copy with both corners and their reasons."""
-    out = stream.copy()
+    out = copied(stream)
     for name, corner in (("highpass", highpass), ("lowpass", lowpass)):
         noted(out[0], f"{name} corner {corner.frequency:.4g} Hz: {corner.reason}")
         remembered(out[0], **{name: corner.frequency}, **{f"{name}_source": corner.reason})

@@ -11,7 +11,8 @@ from obspy import Stream
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from per_obspy.checks import FloatArray, finite, number, positive
-from per_obspy.processing.notes import noted
+from per_obspy.processing.long_records import blocks, forget_plans
+from per_obspy.processing.notes import copied, noted
 
 #: Length of each pad in periods of the corner per order of the filter (Boore 2005).
 PAD = 0.75
@@ -31,9 +32,10 @@ def tapered(stream: Stream, fraction: float) -> Stream:
     -------
     obspy Stream
     """
-    out = stream.copy()
+    out = copied(stream)
     if fraction:
         for trace in out:
+            trace.data = trace.data.copy()  # tapered in place
             trace.taper(fraction, type="hann")
             noted(trace, f"{fraction:g} of each end tapered", taper=fraction)
     return out
@@ -65,7 +67,7 @@ def padded(stream: Stream, highpass: float, order: int) -> Stream:
     Boore 2005, Bull. Seism. Soc. Am. 95, 745-750.
     """
     number("highpass", highpass, positive)
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         dt, count = trace.stats.delta, trace.stats.npts
         # The end gets the samples up to the next length that is quick to transform
@@ -146,8 +148,14 @@ def acausal_bandpass(
         In the unit of the data.
     """
     samples = finite("data", data)
-    amplitude = butterworth_amplitude(rfftfreq(samples.size, 1 / df), highpass, lowpass, order)
-    return np.asarray(irfft(rfft(samples) * amplitude, samples.size))
+    spectrum = rfft(samples)
+    frequencies = rfftfreq(samples.size, 1 / df)
+    # Block by block: powers of all frequencies of a day take more memory than the record
+    for block in blocks(0, frequencies.size):
+        spectrum[block] *= butterworth_amplitude(frequencies[block], highpass, lowpass, order)
+    out = irfft(spectrum, samples.size, overwrite_x=True)
+    forget_plans(samples.size)
+    return np.asarray(out)
 
 
 def filtered(stream: Stream, highpass: float, lowpass: float, order: int) -> Stream:
@@ -165,7 +173,7 @@ def filtered(stream: Stream, highpass: float, lowpass: float, order: int) -> Str
     -------
     obspy Stream
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         rate = trace.stats.sampling_rate
         trace.data = acausal_bandpass(trace.data, rate, highpass, lowpass, order)

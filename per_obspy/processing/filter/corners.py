@@ -12,7 +12,7 @@ from obspy import Stream, Trace
 
 from per_obspy.processing.filter.displacement_drift import clean_highpass, displacement_drift
 from per_obspy.processing.noise.signal_to_noise import NoiseSpectra, noise_spectra
-from per_obspy.processing.notes import noted, remembered
+from per_obspy.processing.notes import copied, noted, remembered
 
 #: Highest low-pass corner, fraction of the Nyquist frequency.
 LOWPASS_OF_NYQUIST = 0.75
@@ -139,7 +139,7 @@ def corners_shared(stream: Stream) -> Stream:
     obspy Stream
         With shared corners; ``own_highpass`` and ``own_lowpass`` are those before.
     """
-    out = stream.copy()
+    out = copied(stream)
     for name, narrowest in (("highpass", max), ("lowpass", min)):
         shared = narrowest((trace.stats.per_obspy[name] for trace in out), default=0.0)
         for trace in out:
@@ -177,7 +177,7 @@ def usable_periods_noted(stream: Stream, usable: float) -> Stream:
     Boore 2004, J. Earthq. Eng. 8, 193-207; Akkar & Bommer 2006, Earthq. Eng. Struct. Dyn. 35,
     1275-1299.
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         corners = trace.stats.per_obspy
         longest = min(usable / corners.highpass, corners.get("certain_period", np.inf))

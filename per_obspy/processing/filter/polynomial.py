@@ -7,7 +7,8 @@ from numpy.polynomial.legendre import legvander
 from obspy import Stream
 
 from per_obspy.checks import FloatArray
-from per_obspy.processing.notes import noted
+from per_obspy.processing.long_records import blocks
+from per_obspy.processing.notes import copied, noted
 
 
 def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
@@ -28,7 +29,7 @@ def mean_removed(stream: Stream, pre_event: float = 0.0) -> Stream:
     ----------
     Boore & Bommer 2005, Soil Dyn. Earthq. Eng. 25, 93-115, section 3.
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         # Samples of the noise, if there are any
         quiet = trace.data[: max(round(pre_event / trace.stats.delta), 0)]
@@ -54,9 +55,9 @@ def trend_removed(stream: Stream, order: int = 1) -> Stream:
     -------
     obspy Stream
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
-        trace.data = trace.data - trend(trace.data, order)
+        trace.data = without_trend(trace.data, order)
         noted(trace, f"polynomial trend of order {order} removed", trend_order=order)
     return out
 
@@ -82,9 +83,24 @@ def trend(data: FloatArray, order: int) -> FloatArray:
     Legendre polynomials are nearly orthogonal there, so that the normal equations are as accurate
     as an orthogonal decomposition, which takes the memory of a dozen records.
     """
-    basis = legvander(np.linspace(-1, 1, data.size), order)
-    coefficients = np.linalg.solve(basis.T @ basis, basis.T @ data)
-    return np.asarray(basis @ coefficients)
+    places = np.linspace(-1, 1, data.size)
+    # Sums of products over the blocks
+    products, moments = np.zeros((order + 1, order + 1)), np.zeros(order + 1)
+    for block in blocks(0, data.size):
+        basis = legvander(places[block], order)
+        products += basis.T @ basis
+        moments += basis.T @ data[block]
+    coefficients = np.linalg.solve(products, moments)
+    # The places give way to the values of the polynomial there
+    for block in blocks(0, data.size):
+        places[block] = legvander(places[block], order) @ coefficients
+    return places
+
+
+def without_trend(data: FloatArray, order: int) -> FloatArray:
+    """Return samples without their `trend`, in a new array."""
+    out = trend(data, order)
+    return np.subtract(data, out, out=out)
 
 
 def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: float) -> Stream:
@@ -103,7 +119,7 @@ def detrended(stream: Stream, removed: Callable[..., FloatArray], **options: flo
     -------
     obspy Stream
     """
-    out = stream.copy()
+    out = copied(stream)
     numbers = ", ".join(f"{name} {value:g}" for name, value in options.items())
     for trace in out:
         trace.data = removed(trace.data, trace.stats.delta, **options)

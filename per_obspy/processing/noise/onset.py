@@ -8,7 +8,8 @@ from obspy.signal.trigger import pk_baer
 from scipy.signal import butter, sosfilt
 
 from per_obspy.checks import FloatArray
-from per_obspy.processing.filter.polynomial import trend
+from per_obspy.processing.filter.polynomial import without_trend
+from per_obspy.processing.long_records import blocks
 
 TINY = np.finfo(float).tiny
 
@@ -71,7 +72,7 @@ def _band_passed(samples: FloatArray, dt: float) -> FloatArray:
     """Return the samples between 1 and 20 Hz, filtered causally so that no wave arrives early."""
     corners = [min(1.0, 0.1 / dt), min(20.0, 0.4 / dt)]
     sections = butter(2, corners, "bandpass", fs=1 / dt, output="sos")
-    return np.asarray(sosfilt(sections, samples - trend(samples, 1)))
+    return np.asarray(sosfilt(sections, without_trend(samples, 1)))
 
 
 def aic_onset(samples: FloatArray) -> int:
@@ -94,19 +95,29 @@ def aic_onset(samples: FloatArray) -> int:
     ----------
     Maeda 1985, Zisin 38, 365-379.
     """
-    # Variances of both parts by running sums
-    count = np.arange(1, samples.size)
-    rest = samples.size - count
     sums, squares = np.cumsum(samples), np.cumsum(samples**2)
-    left = squares[:-1] / count - (sums[:-1] / count) ** 2
-    right = (squares[-1] - squares[:-1]) / rest - ((sums[-1] - sums[:-1]) / rest) ** 2
-    # Criterion, with variances that are not below the rounding of the running sums
-    floor = 1e-12 * max(squares[-1] / samples.size, TINY)
+    # Smallest criterion of every block, with the number of samples before it; the first of equals
+    edge = min(EDGE, (samples.size - 1) // 4)
+    smallest = list[tuple[float, int]]()
+    for block in blocks(edge, samples.size - 1 - edge):
+        criterion = _aic(sums, squares, block)
+        place = int(criterion.argmin())
+        smallest.append((float(criterion[place]), block.start + place + 1))
+    return min(smallest)[1]
+
+
+def _aic(sums: FloatArray, squares: FloatArray, block: slice) -> FloatArray:
+    """Return the criterion of `aic_onset` at a block of places, from running sums."""
+    # Variances of both parts
+    count = np.arange(block.start + 1, block.stop + 1)
+    rest = sums.size - count
+    left = squares[block] / count - (sums[block] / count) ** 2
+    right = (squares[-1] - squares[block]) / rest - ((sums[-1] - sums[block]) / rest) ** 2
+    # Variances are not below the rounding of the running sums
+    floor = 1e-12 * max(squares[-1] / sums.size, TINY)
     first = count * np.log(np.maximum(left, floor))
     second = (rest - 1) * np.log(np.maximum(right, floor))
-    criterion = first + second
-    edge = min(EDGE, count.size // 4)
-    return int(criterion[edge : count.size - edge].argmin()) + edge + 1
+    return np.asarray(first + second)
 
 
 def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
@@ -130,14 +141,19 @@ def energy_ratio_onset(samples: FloatArray, window: int) -> int | None:
     Akram & Eaton 2016, Geophysics 81, KS71-KS91: energy ratio.
     """
     # Energies of windows as differences of the running energy
-    energy = np.concatenate(([0.0], np.cumsum(samples**2)))
-    places = np.arange(window, samples.size - window)
-    if not places.size:
-        return None
-    before = energy[places] - energy[places - window]
-    after = energy[places + window] - energy[places]
-    ratio = after / (before + 1e-12 * energy[-1] + TINY)
-    return int(places[ratio.argmax()])
+    energy = np.zeros(samples.size + 1)
+    np.cumsum(samples**2, out=energy[1:])
+    floor = 1e-12 * energy[-1]
+    # Largest ratio of every block with its place, negative so that the first of equals is the least
+    largest = []
+    for block in blocks(window, samples.size - window):
+        middle = energy[block]
+        before = middle - energy[block.start - window : block.stop - window]
+        after = energy[block.start + window : block.stop + window] - middle
+        ratio = after / (before + floor + TINY)
+        place = int(ratio.argmax())
+        largest.append((-ratio[place], block.start + place))
+    return min(largest, default=(0.0, None))[1]
 
 
 def baer_onset(samples: FloatArray, dt: float) -> int | None:

@@ -10,7 +10,7 @@ from obspy.geodetics import locations2degrees
 from obspy.taup import TauPyModel
 
 from per_obspy.processing.noise.onset import picked_onset
-from per_obspy.processing.notes import noted
+from per_obspy.processing.notes import copied, noted
 from per_obspy.processing.station.components import is_horizontal
 
 #: Velocity model of the Earth for travel times.
@@ -115,7 +115,7 @@ def noise_window_noted(
         With ``noise`` (s from the first sample, 0 for none), ``onset_source`` and, where there is
         one, ``onset`` (UTC) in ``stats.per_obspy``.
     """
-    out = stream.copy()
+    out = copied(stream)
     if pre_event is not None:
         step = f"noise: first {pre_event:g} s"
         for trace in out:
@@ -181,13 +181,14 @@ def trimmed(stream: Stream, before: float, after: float) -> Stream:
     -------
     obspy Stream
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         start, end = trace.stats.starttime, trace.stats.endtime
         onset = UTCDateTime(trace.stats.per_obspy.get("onset", start))
         is_longer = start < onset - before or end > onset + after
         if "onset" in trace.stats.per_obspy and is_longer:
             trace.trim(onset - before, onset + after)
+            trace.data = trace.data.copy()  # a view would hold the whole day
             # The noise is shorter by the time that was cut before it
             cut = trace.stats.starttime - start
             noise = max(float(trace.stats.per_obspy.noise) - cut, 0.0)

@@ -7,7 +7,7 @@ from obspy import Stream, Trace
 from scipy.integrate import cumulative_trapezoid
 
 from per_obspy.config import Checks
-from per_obspy.processing.notes import noted
+from per_obspy.processing.notes import copied, noted
 from per_obspy.processing.quality.findings import Finding, above
 
 #: Quantity -> its integral and the unit of that.
@@ -28,7 +28,7 @@ def integrated(stream: Stream) -> Stream:
     obspy Stream
         Velocity, m/s, or displacement, m.
     """
-    out = stream.copy()
+    out = copied(stream)
     for trace in out:
         quantity, units = INTEGRALS[trace.stats.get("quantity", "acceleration")]
         trace.data = cumulative_trapezoid(trace.data, dx=trace.stats.delta, initial=0)

@@ -7,7 +7,7 @@ from obspy import Stream, Trace
 
 from per_obspy.config import Check
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.notes import rejection, remembered
+from per_obspy.processing.notes import copied_trace, rejection, remembered
 
 
 class Finding(NamedTuple):
@@ -69,7 +69,7 @@ def judged(trace: Trace, findings: Iterable[Finding]) -> Stream:
         raise RecordRejected(trace.id, *rejecting, *_earlier(trace, "warnings"), *warnings)
     # Texts of earlier checks come first
     notes = _reasons(found, "note")
-    out = trace.copy() if warnings or notes else trace
+    out = copied_trace(trace) if warnings or notes else trace
     for name, reasons in (("warnings", warnings), ("notes", notes)):
         if reasons:
             remembered(out, **{name: _joined("; ", trace, name, reasons)})
@@ -98,7 +98,7 @@ def _earlier(trace: Trace, name: str) -> list[str]:
 
 
 def surviving(
-    step: Callable[[Stream], Stream], stream: Stream
+    step: Callable[[Stream], Stream], stream: Iterable[Trace]
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Apply a step trace by trace, so that a bad trace is rejected alone.
@@ -107,7 +107,8 @@ def surviving(
     ----------
     step : callable
         From Stream to new Stream; raises `RecordRejected`.
-    stream : obspy Stream
+    stream : iterable of obspy Trace
+        From `taken` where each may leave memory after its step.
 
     Returns
     -------
@@ -117,9 +118,12 @@ def surviving(
         One row for each other trace.
     """
     accepted, rejected = Stream(), []
-    for trace in stream:
+    remaining = Stream(list(stream))
+    while remaining:
+        # The step is given the only reference to the trace
+        row = rejection(remaining[0])
         try:
-            accepted += step(Stream([trace]))
+            accepted += step(Stream([remaining.pop(0)]))
         except RecordRejected as fault:
-            rejected.append(rejection(trace, *fault.reasons))
+            rejected.append(row._replace(reasons=fault.reasons))
     return accepted, tuple(rejected)

@@ -1,6 +1,7 @@
 """Checks of raw samples for faults of sensor and recorder, and for other events in the record."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Checks
-from per_obspy.processing.filter.polynomial import trend
+from per_obspy.processing.filter.polynomial import without_trend
+from per_obspy.processing.long_records import blocks, by_blocks
 from per_obspy.processing.noise.signal_to_noise import SIGNIFICANT
 from per_obspy.processing.quality.findings import Finding, above, below
 
@@ -62,7 +64,7 @@ def raw_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield Finding("levels", "reject", reason)
     else:
         yield from _recorder_findings(trace, checks)
-        yield from _shaking_findings(trace.data - trend(trace.data, 1), trace.stats.delta, checks)
+        yield from _shaking_findings(without_trend(trace.data, 1), trace.stats.delta, checks)
         yield from header_findings(trace, checks)
 
 
@@ -80,7 +82,7 @@ def _recorder_findings(trace: Trace, checks: Checks) -> Iterator[Finding]:
         yield from above("counter_use", checks.counter_use, use, meaning)
     still = longest_standstill(samples, dt)
     yield from above("dropout", checks.dropout, still, "dropout, s without change:")
-    spike = largest_spike(samples - trend(samples, 1), dt)
+    spike = largest_spike(without_trend(samples, 1), dt)
     yield from above("spike", checks.spike, spike, "spike or step, over its vicinity:")
 
 
@@ -177,12 +179,17 @@ def _shaking(samples: FloatArray) -> NDArray[np.bool_]:
 
 
 def _running_rms(
-    squares: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
+    samples: FloatArray, seconds: float, dt: float, mode: Literal["reflect", "constant"]
 ) -> FloatArray:
-    """Return the running root mean square of squared samples over a time, s."""
-    means = uniform_filter1d(squares, max(round(seconds / dt), 1), mode=mode)
-    # Rounding of the running sum may leave small negative values
-    return np.asarray(np.sqrt(np.maximum(means, 0)))
+    """Return the running root mean square of samples over a time, s."""
+    width = max(round(seconds / dt), 1)
+
+    def root_mean_square(part: FloatArray) -> FloatArray:
+        means = uniform_filter1d(part**2, width, mode=mode)
+        # Rounding of the running sum may leave small negative values
+        return np.asarray(np.sqrt(np.maximum(means, 0)))
+
+    return by_blocks(root_mean_square, samples, width)
 
 
 def longest_standstill(samples: FloatArray, dt: float) -> float:
@@ -203,8 +210,7 @@ def longest_standstill(samples: FloatArray, dt: float) -> float:
     -------
     float
     """
-    squares = (samples - samples.mean()) ** 2
-    envelope = _running_rms(squares, STANDSTILL_ENVELOPE, dt, "reflect")
+    envelope = _running_rms(samples - samples.mean(), STANDSTILL_ENVELOPE, dt, "reflect")
     # Runs of equal samples with moving ground at both ends
     starts, stops = runs(np.diff(samples) == 0)
     moving = np.minimum(envelope[starts], envelope[stops]) > MOVING * envelope.max()
@@ -230,19 +236,29 @@ def largest_spike(samples: FloatArray, dt: float) -> float:
     float
         Dimensionless; near 1 for ground motion.
     """
-    # Distance of each sample from the mean of its neighbours
-    jumps = np.zeros(samples.size)
-    jumps[1:-1] = np.abs(samples[1:-1] - 0.5 * (samples[:-2] + samples[2:]))
+    peak = np.abs(samples).max()
+    jumps = _jumps(samples)
     # Largest jump in windows before and after, clear of the spike itself
     width = max(round(VICINITY / dt), NEIGHBOURS + 2)
-    side = maximum_filter1d(jumps, width, mode="constant", origin=0)
+    side = by_blocks(partial(maximum_filter1d, size=width, mode="constant"), jumps, width)
     shift = NEIGHBOURS + 1 + width // 2
-    around = np.maximum(np.roll(side, shift), np.roll(side, -shift))
-    peak = np.abs(samples).max()
-    is_large = jumps > SMALLEST_SPIKE * peak
-    if not is_large.any():
-        return 0.0
-    return float((jumps[is_large] / np.maximum(around[is_large], SPIKE_FLOOR * peak)).max())
+    # Jumps large enough to count, over the largest one around each
+    largest = 0.0
+    for block in blocks(0, jumps.size):
+        large = block.start + np.flatnonzero(jumps[block] > SMALLEST_SPIKE * peak)
+        before, after = side[(large - shift) % side.size], side[(large + shift) % side.size]
+        around = np.maximum(np.maximum(before, after), SPIKE_FLOOR * peak)
+        largest = max(largest, float((jumps[large] / around).max(initial=0.0)))
+    return largest
+
+
+def _jumps(samples: FloatArray) -> FloatArray:
+    """Return the distance of each sample from the mean of its neighbours, 0 at both ends."""
+    jumps = np.zeros(samples.size)
+    inner = np.add(samples[:-2], samples[2:], out=jumps[1:-1])
+    inner *= 0.5
+    np.abs(np.subtract(samples[1:-1], inner, out=inner), out=inner)
+    return jumps
 
 
 def later_event(samples: FloatArray, dt: float) -> float:
@@ -264,13 +280,13 @@ def later_event(samples: FloatArray, dt: float) -> float:
     float
         Of the running root mean square, dimensionless.
     """
-    envelope = _running_rms(samples**2, ENVELOPE, dt, "constant")
+    envelope = _running_rms(samples, ENVELOPE, dt, "constant")
     # First quiet sample after the main event, last one before it
     main, largest = int(envelope.argmax()), float(envelope.max())
-    quiet = np.flatnonzero(envelope < QUIET * largest)
-    after, before = quiet[quiet > main], quiet[quiet < main]
-    later = envelope[after[0] :].max() if after.size else 0.0
-    earlier = envelope[: before[-1] + 1].max() if before.size else 0.0
+    is_quiet = envelope < QUIET * largest
+    after, before = is_quiet[main + 1 :], is_quiet[:main][::-1]
+    later = envelope[main + 1 + after.argmax() :].max() if after.any() else 0.0
+    earlier = envelope[: main - before.argmax()].max() if before.any() else 0.0
     return float(max(later, earlier) / largest)
 
 

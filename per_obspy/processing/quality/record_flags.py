@@ -4,7 +4,7 @@ from obspy import Stream, Trace
 
 from per_obspy.constants import UNSET_DAYS
 from per_obspy.processing.filter.corners import ASSUMED_REASONS, SHIFTED_BASELINE
-from per_obspy.processing.notes import remembered
+from per_obspy.processing.notes import copied_trace, remembered
 
 #: Checks that have a flag of their own.
 NAMED_CHECKS = ("baseline_shift", "second_event")
@@ -37,7 +37,7 @@ def flags_noted(stream: Stream) -> Stream:
     out = Stream()
     for trace in stream:
         flags = record_flags(trace)
-        flagged = trace.copy() if flags else trace
+        flagged = copied_trace(trace) if flags else trace
         if flags:
             remembered(flagged, record_flags=" ".join(flags))
             _warn_of_kind(flagged, flags)

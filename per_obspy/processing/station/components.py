@@ -2,13 +2,14 @@
 
 import re
 from collections import defaultdict
+from collections.abc import Iterable
 
 import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.constants import VERTICAL_DIP
 from per_obspy.errors import Rejection
-from per_obspy.processing.notes import copied, is_processed, rejection, remembered
+from per_obspy.processing.notes import copied, copied_trace, is_processed, rejection, remembered
 from per_obspy.processing.station.film_interval import at_one_interval
 
 #: Band and instrument codes in order: accelerometers before velocity sensors, fast before slow.
@@ -30,7 +31,7 @@ NAMED_AZIMUTHS = {"N": 0.0, "NS": 0.0, "E": 90.0, "EW": 90.0}
 VERTICAL_CODES = ("Z", "U", "UD", "UP", "V", "DN")
 
 
-def oriented(stream: Stream) -> Stream:
+def oriented(stream: Iterable[Trace]) -> Stream:
     """
     Return a copy with the directions of sensors, from metadata or else from the channel code.
 
@@ -147,8 +148,8 @@ def _aligned(stream: Stream) -> Stream:
     count = min(counts, default=0)
     out = Stream()
     for trace, skip in zip(stream, skips, strict=True):
-        part = trace.copy()
-        part.data = part.data[skip : skip + count].copy()
+        part = copied_trace(trace)
+        part.data = part.data[skip : skip + count]
         # A fraction of a sample remains between the clocks
         shift = latest - (trace.stats.starttime + skip * trace.stats.delta)
         part.stats.starttime = latest

@@ -7,7 +7,7 @@ import numpy as np
 from obspy import Stream, Trace
 
 from per_obspy.errors import RecordRejected, Rejection
-from per_obspy.processing.notes import copied, is_processed
+from per_obspy.processing.notes import copied, copied_trace, is_processed, taken
 from per_obspy.processing.quality.findings import surviving
 from per_obspy.processing.station.splicing import spliced
 
@@ -15,7 +15,7 @@ from per_obspy.processing.station.splicing import spliced
 LARGEST = 1e30
 
 
-def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
+def merged(stream: Iterable[Trace]) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Join the pieces of each channel.
 
@@ -23,7 +23,7 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
 
     Parameters
     ----------
-    stream : obspy Stream
+    stream : iterable of obspy Trace
         Any number of pieces of any number of channels.
 
     Returns
@@ -33,11 +33,21 @@ def merged(stream: Stream) -> tuple[Stream, tuple[Rejection, ...]]:
     rejected : tuple of Rejection
         The channels that cannot be joined.
     """
+    pieces = _pieces(stream)
+    firsts = Stream([parts[0] for parts in pieces.values()])
+
+    def joined(first: Stream) -> Stream:
+        return _joined(first[0].id, pieces.pop(_channel(first[0])))
+
+    return surviving(joined, taken(firsts))
+
+
+def _pieces(stream: Iterable[Trace]) -> dict[tuple[str, bool, str], Stream]:
+    """Return the pieces of each channel."""
     pieces: dict[tuple[str, bool, str], Stream] = defaultdict(Stream)
     for trace in stream:
         pieces[_channel(trace)] += trace
-    firsts = Stream([parts[0] for parts in pieces.values()])
-    return surviving(lambda first: _joined(first[0].id, pieces[_channel(first[0])]), firsts)
+    return pieces
 
 
 def _channel(trace: Trace) -> tuple[str, bool, str]:
@@ -69,11 +79,8 @@ def _joined(name: str, pieces: Stream) -> Stream:
 
 def _in_float64(trace: Trace) -> Trace:
     """Return a copy in float64, masked if the samples were masked."""
-    out = copied(Stream([trace]))[0]
-    if np.ma.isMA(out.data):
-        out.data = np.ma.asarray(out.data, dtype=np.float64)
-    else:
-        out.data = out.data.astype(np.float64)
+    out = copied_trace(trace)
+    out.data = out.data.astype(np.float64)
     return out
 
 

@@ -1,6 +1,7 @@
 """Sensors in structures, which record the motion of a building or a bridge, not of the ground."""
 
 import re
+from collections.abc import Iterable
 
 from obspy import Stream, Trace
 
@@ -39,13 +40,13 @@ def in_structure(trace: Trace) -> bool:
     return bool(STRUCTURE.search(place)) and not FREE_FIELD.search(place)
 
 
-def kept_apart(stream: Stream) -> tuple[Stream, Stream]:
+def kept_apart(stream: Iterable[Trace]) -> tuple[Stream, Stream]:
     """
     Separate the traces of a station that recorded the ground from those in a structure.
 
     Parameters
     ----------
-    stream : obspy Stream
+    stream : iterable of obspy Trace
 
     Returns
     -------
