@@ -113,7 +113,9 @@ def _exit_code() -> int:
     except NothingUsable as error:
         return _failed(error, NOTHING_USABLE)
     except PerError as error:
-        return _failed(error, WRONG_INPUT)
+        # An input that the machine cannot read is not known to be wrong; one of a wrong name is
+        fault = machine_fault(error, missing=False)
+        return _failed(error, WRONG_INPUT if fault is None else TRY_LATER)
     except (MemoryError, OSError) as error:
         # Of all that is written, only the standard output has no name
         if isinstance(error, OSError) and error.filename is None and error.errno in _ROOMLESS:

@@ -16,7 +16,7 @@ PASSING = {
 }
 
 
-def machine_fault(error: BaseException) -> MachineFault | None:
+def machine_fault(error: BaseException, missing: bool = True) -> MachineFault | None:
     """
     Return the fault of the machine that an error is or was raised from; None if there is none.
 
@@ -27,6 +27,8 @@ def machine_fault(error: BaseException) -> MachineFault | None:
     ----------
     error : Exception
         Whatever a task raised.
+    missing : bool
+        Whether a missing file is one that has vanished, rather than one of a wrong name.
 
     Examples
     --------
@@ -41,7 +43,9 @@ def machine_fault(error: BaseException) -> MachineFault | None:
             return cause
         if isinstance(cause, MemoryError) and not _is_impossible(cause):
             return MachineFault(f"not enough memory: {str(cause) or type(cause).__name__}")
-        if isinstance(cause, OSError) and (cause.errno in PASSING or _vanished(cause, error)):
+        if not isinstance(cause, OSError):
+            continue
+        if cause.errno in PASSING or (missing and _vanished(cause, error)):
             named = f"{cause.filename}: " if cause.filename is not None else ""
             return MachineFault(f"{named}{cause.strerror}")
     return None

@@ -368,7 +368,6 @@ ROWS = {
         "a building has no gap to itself",
     ),
     "half observed": ({"observed": 0.5}, "observed = 0.5 is neither 0 nor 1"),
-    "torn row": ({"note": "a wall\nof two"}, "note has a line break"),
 }
 
 

@@ -149,8 +149,8 @@ def test_wrong_folders_stop_with_one_line(call, configuration, tmp_path):
     (tmp_path / "texts" / "readme.txt").write_text("hello")
     text = configuration.read_text()
     before = text[text.index("[records]") : text.index("[pairs]")]
-    # an empty folder is nothing usable, the others are wrong input
-    for folder, expected in (("absent", 2), ("empty", 3), ("texts", 2)):
+    # a folder without records is nothing usable, one that is not there wrong input
+    for folder, expected in (("absent", 2), ("empty", 3), ("texts", 3)):
         configuration.write_text(text.replace(before, f'[records]\nfolder = "{folder}"\n'))
         code, _, err = call("run", configuration)
         assert code == expected

@@ -70,7 +70,7 @@ class Scenario(Section):
     correlation: float = Field(
         0.3, ge=-1, le=1, description="between the north and east components"
     )
-    vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum on rock")
+    vertical: float = Field(2 / 3, ge=0, description="vertical / horizontal spectrum")
     noise: float = Field(2e-5, ge=0, description="m/s2, root mean square of the background")
     pre_event: float = Field(20.0, ge=0, description="s of background before the P wave")
     dt: float = Field(0.01, gt=0, le=0.05, description="sampling interval, s")

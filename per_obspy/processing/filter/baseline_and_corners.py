@@ -68,8 +68,8 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     RecordRejected
         If the signal never clears the noise, or no corner cleans the displacement.
     """
-    quiet = float(stream[0].stats.per_obspy.noise)
-    level = trend_removed(_residual_noted(mean_removed(stream, quiet)))
+    plain = _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
+    level = trend_removed(plain)
     # Spectra of signal and noise between the corners that length and sampling allow
     outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)

@@ -270,13 +270,13 @@ def _spectra(
     path = stochastic.path_spectrum(
         frequency, distance, scenario.shear_velocity, scenario.quality, scenario.quality_exponent
     )
-    # Rock, and for the horizontals of a station on it the lakebed
+    # Rock, and for a station on it the lakebed
     variation = np.exp(scenario.site_log_std * _variation(scenario, station, frequency))
     rock = source * path * stochastic.rock_response(frequency, scenario.kappa) * variation
-    horizontal = rock.astype(np.complex128)
+    motion = rock.astype(np.complex128)
     if station.lakebed is not None:
-        horizontal *= stochastic.kanai_tajimi(frequency, station.lakebed, scenario.lakebed_damping)
-    return np.stack([horizontal, horizontal, scenario.vertical * rock])
+        motion *= stochastic.kanai_tajimi(frequency, station.lakebed, scenario.lakebed_damping)
+    return np.stack([motion, motion, scenario.vertical * motion])
 
 
 def _variation(
