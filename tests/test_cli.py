@@ -100,6 +100,16 @@ def test_a_run_prints_the_worst_pairs_and_where_everything_is(call, configuratio
     assert "stations: 2 of 2" in err  # plain lines, because nobody watches
 
 
+@pytest.mark.parametrize("name", ["=1+1", "007"])
+def test_names_of_the_worst_pairs_are_those_of_the_pair_table(call, configuration, name):
+    # would catch: an apostrophe before a formula, a number for digits
+    row = f"{name}{ROW[ROW.index(',') :]}"
+    (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{row}\n")
+    code, out, _ = call("run", configuration)
+    assert code == 0
+    assert f" {name} " in out
+
+
 def test_what_was_seen_is_compared(call, configuration):
     (configuration.parent / "pairs.csv").write_text(
         f"{HEADER},observed\n{ROW},0\nb{ROW[1:-4]}0,1\nc{ROW[1:]},\n"

@@ -214,7 +214,7 @@ def print_result(result: "Result") -> None:
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
-        _print_worst(folder / "risk.csv", 10)
+        _print_worst(folder / "risk.parquet", 10)
     for name in sorted({*record["outputs"], "run.json"}):
         print(f"  {folder / name}")
 
@@ -290,11 +290,9 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 
 def _print_worst(path: Path, count: int) -> None:
     """Print the worst pairs as a table."""
-    import pandas as pd
+    from per_obspy.tables.parts import parquet_rows
 
-    worst = pd.read_csv(path, nrows=count, dtype={"pair_id": str, "station": str})
-    print_table(
-        f"The {len(worst)} worst pairs",
-        list(SHOWN.values()),
-        worst[list(SHOWN)].itertuples(index=False),
-    )
+    # Not from the CSV, in which names may have an apostrophe before them
+    worst = parquet_rows([path], list(SHOWN)).head(count).to_pandas()
+    title = f"The {len(worst)} worst pairs"
+    print_table(title, list(SHOWN.values()), worst.itertuples(index=False))
