@@ -18,8 +18,7 @@ from per_obspy.screening.ground_motion.site_motion import (
     prepared_field,
 )
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.record_motion import record_motion
-from per_obspy.screening.uncertainty.site_demand import site_demand
+from per_obspy.screening.uncertainty.site_demand import median_at_site, site_demand
 from per_obspy.screening.values import values
 
 #: Periods whose pairs are screened, s: shortest, longest, number.
@@ -153,16 +152,15 @@ def _predicted(
     parts = []
     for name, some in rows.groupby("station"):
         station = station_motion(stations[str(name)])
-        motion = record_motion(station, _with_equivalents(some), screening)
-        site = site_demand(station, some, screening)
-        record = np.log(values(some, "demand_exact")) + site.ln_ratio
+        site, exact = site_demand(station, some, screening), values(some, "demand_exact")
+        median = median_at_site(exact, site.weight, site.ln_ratio, site.ln_field)
         table = pd.DataFrame(
             {
                 "record": name,
                 "distance": values(some, "distance"),
-                "ln_median": np.log(motion.exact_demand),
-                "log_std": motion.pair_log_std,
-                "ln_record": record,
+                "ln_median": np.log(median),
+                "log_std": site.log_std,
+                "ln_record": np.log(exact) + site.ln_ratio,
                 "record_log_std": site.field_log_std,
                 "ln_field": site.ln_field,
             },
@@ -170,11 +168,3 @@ def _predicted(
         )
         parts.append(table)
     return pd.concat(parts).loc[rows.index]
-
-
-def _with_equivalents(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows with equivalent linear buildings, which linear ones have not."""
-    columns = {
-        f"equivalent_{name}_{i}": np.nan for name in ("period", "damping", "per") for i in (1, 2)
-    }
-    return rows.assign(**columns)

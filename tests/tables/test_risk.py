@@ -124,11 +124,11 @@ FOLDERS = ["run [2]", "out*", "a?b", "{x,y}", "it's", "new\nline", "a!b", "http:
 def test_names_of_folders_are_literal(rows, expected, tmp_path, monkeypatch, name, is_relative):
     # would catch the rows of the folder that the name matches as a pattern: run 2, out1, acb
     for other in ("run 2", "out1", "acb", "x", "A"):
-        write_part(in_order(rows.head(3), np.zeros(3)), 5, tmp_path / other / "000000.parquet")
-        write_part(in_order(rows.head(3), np.zeros(3)), 6, tmp_path / other / "risk.parquet")
+        write_part(in_order(rows.head(3)), 5, tmp_path / other / "000000.parquet")
+        write_part(in_order(rows.head(3)), 6, tmp_path / other / "risk.parquet")
     monkeypatch.chdir(tmp_path)
     folder = Path(name) if is_relative else tmp_path / name
-    write_part(in_order(rows, np.zeros(COUNT)), 0, folder / "000000.parquet")
+    write_part(in_order(rows), 0, folder / "000000.parquet")
     write_risk([folder / "000000.parquet"], folder, FACTS, csv_rows=COUNT)
     write_worst(folder / "risk.parquet", COUNT, folder / "again.csv")
     with ranked_table(folder / "risk.parquet", ["pair_id"]) as table:
@@ -161,7 +161,7 @@ def test_no_text_of_the_table_is_a_formula_and_pairs_join_again(tmp_path):
     table = table.assign(gap=0.1, probability=0.5, demand_ratio=0.1, height_1=-0.0, height_2=9.0)
     table = table.assign(**{name: -1.0 - np.arange(count) / 1e5 for name in NAMES[2:]})
     table = table.assign(height_1=9.0, Gap=1, gap_=2)
-    write_part(in_order(table, np.zeros(count)), 0, tmp_path / "part.parquet")
+    write_part(in_order(table), 0, tmp_path / "part.parquet")
     write_risk([tmp_path / "part.parquet"], tmp_path, FACTS, csv_rows=COUNT)
     with (tmp_path / "risk.csv").open(encoding="utf-8", newline="") as file:
         written = list(csv.reader(file))

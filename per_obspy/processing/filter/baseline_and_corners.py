@@ -68,8 +68,7 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
     RecordRejected
         If the signal never clears the noise, or no corner cleans the displacement.
     """
-    plain = _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
-    level = trend_removed(plain)
+    level = trend_removed(_without_mean(stream))
     # Spectra of signal and noise between the corners that length and sampling allow
     outer = _outer_corners(level[0], settings)
     spectra = measured_noise(level[0], settings.smoothing)
@@ -83,11 +82,16 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
         highpass = Corner(settings.highpass, "configuration")
     else:
         ready, highpass = _clean_baseline(checked, lowest, settings)
-    _certain_period_noted(plain[0], ready[0], highpass.frequency, settings)
+    _certain_period_noted(_without_mean(stream)[0], ready[0], highpass.frequency, settings)
     width = lowpass.frequency / highpass.frequency
     meaning = "low-pass over high-pass corner:"
     wide = judged(ready[0], below("bandwidth", settings.checks.bandwidth, width, meaning))
     return _noted(wide, highpass, lowpass)
+
+
+def _without_mean(stream: Stream) -> Stream:
+    """Return one record without the mean of its noise, with its residual velocity noted."""
+    return _residual_noted(mean_removed(stream, float(stream[0].stats.per_obspy.noise)))
 
 
 def offset_kept(stream: Stream, settings: Processing) -> Stream:
