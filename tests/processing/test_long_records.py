@@ -59,9 +59,9 @@ def test_memory_per_sample_of_a_component_is_bounded(has_event):
     process_station(taken(stream), settings)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    # Three components of 8 bytes, and at most five arrays of the one that is worked on. A day of
-    # 17.28 million samples at 70 bytes each is 1.2 GB, which leaves 0.3 GB of 1.5 to the libraries
-    assert peak / COUNT < 70
+    # Three components of 8 bytes, and at most six arrays of the one that is worked on. A day of
+    # 17.28 million samples at 75 bytes each is 1.3 GB beside the libraries
+    assert peak / COUNT < 75
 
 
 def test_parts_do_not_change_the_record(monkeypatch):
