@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from per_obspy.kernels.pairs.resampling import resampled_probabilities
 from per_obspy.pounding.correlation.by_azimuth import directional_correlation
 from per_obspy.pounding.history.relative import (
     critical_gap_surface,
@@ -113,7 +112,6 @@ def main() -> None:
         3,
     )
     print(f"pounding_probability      {5 / chance:8.1f} thousand pairs/s")
-    print(f"resampled, 128 nodes      {resampled_rate() / 1e3:8.1f} thousand pairs/s")
 
 
 def of_a_record(motion: np.ndarray) -> None:
@@ -144,20 +142,6 @@ def of_a_record(motion: np.ndarray) -> None:
         pair = *structures[:4], structures[4:].T
         each = best(lambda r=record, p=pair: directional_correlation(r, r[::-1], DT, *p), 5) / 2000
         print(f"correlation               {1e-3 / each:8.1f} thousand pairs/s, {name}")
-
-
-def resampled_rate() -> float:
-    """Return pairs per second of the probability over 128 nodes of period and damping."""
-    rng = np.random.default_rng(3)
-    grid = (
-        np.log(np.geomspace(0.05, 10.0, 100)),
-        np.log([0.01, 0.02, 0.05, 0.1, 0.2]),
-        rng.normal(size=(36, 5, 100)),
-    )
-    building = np.log([0.5, 0.05]), np.full(2, 0.3), np.log([0.1])
-    pairs = np.concatenate([[3.0], *building, *building, [0.1, 0.35]]) * np.ones((4000, 1))
-    nodes, chance = rng.normal(size=(128, 4)), np.empty(4000)
-    return len(pairs) / best(lambda: resampled_probabilities(grid, pairs, nodes, chance), 3)
 
 
 if __name__ == "__main__":

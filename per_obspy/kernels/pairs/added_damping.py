@@ -3,7 +3,6 @@
 import math
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.pairs.resampling import white_noise_correlation
 
 #: Step of the scan over the added damping; halved so many times before the first that is enough.
 SCAN_STEP = 0.02
@@ -96,3 +95,23 @@ def _log_radius(log_dampings, radii, damping):
     width = log_dampings[k + 1] - log_dampings[k]
     part = max((log_damping - log_dampings[k]) / width, 0.0)
     return radii[k] + part * (radii[k + 1] - radii[k])
+
+
+@kernel
+def white_noise_correlation(log_ratio, damping_1, damping_2):
+    """Return eq. (16) for oscillators whose periods differ by a factor exp(log_ratio); 1 at 0/0."""
+    return _correlation(math.exp(0.5 * log_ratio), math.sqrt(damping_1), math.sqrt(damping_2))
+
+
+@kernel
+def _correlation(root_ratio, root_1, root_2):
+    """Return eq. (16) from the roots of the ratio of the periods and of both dampings; 1 at 0/0."""
+    # The equation divided by the squared ratio of the periods: symmetric in both structures
+    inverse, damping_1, damping_2 = 1.0 / root_ratio, root_1 * root_1, root_2 * root_2
+    ratio, inverse_ratio = root_ratio * root_ratio, inverse * inverse
+    detuning, product = ratio - inverse_ratio, damping_1 * damping_2
+    above = 8.0 * root_1 * root_2 * (damping_2 * root_ratio + damping_1 * inverse)
+    below = (
+        detuning**2 + 4.0 * product * (ratio + inverse_ratio) + 4.0 * (damping_1**2 + damping_2**2)
+    )
+    return above / below if below > 0.0 else 1.0

@@ -11,9 +11,9 @@ with 0 where there is no contact. Where nothing is uncertain all nodes are one.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from per_obspy.checks import FloatArray
+from per_obspy.pounding.probability import demand_probability
 from per_obspy.screening.uncertainty.nodes import DEMAND, GAP, gap_dispersion, median_gap
 from per_obspy.screening.uncertainty.severity import (
     RelativeMotion,
@@ -110,12 +110,7 @@ def chance_of_contact(demands: FloatArray, log_std: FloatArray, table: Table) ->
     known = np.hypot(gap_dispersion(table), log_std)
     # nodes are smoothed as far as nothing else is uncertain
     dispersion = np.maximum(known, _smoothing(demands))[:, None]
-    comparable = (demands > 0) & (gap > 0)[:, None] & (dispersion > 0)
-    # lognormal demand over gap; without dispersion the demand is above the gap or not
-    ratio = np.divide(demands, gap[:, None], out=np.ones_like(demands), where=comparable)
-    margin = np.divide(np.log(ratio), dispersion, out=np.zeros_like(ratio), where=comparable)
-    chance = np.where(comparable, ndtr(margin), demands > gap[:, None])
-    mean: FloatArray = chance.mean(axis=1)
+    mean: FloatArray = demand_probability(demands, gap[:, None], dispersion).mean(axis=1)
     return mean
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from per_obspy.kernels.pairs.added_damping import least_dampings
+from per_obspy.kernels.pairs.added_damping import least_dampings, white_noise_correlation
 
 #: Radii that fall like the square root of the damping, as under white noise.
 DAMPINGS = np.log([0.02, 0.05, 0.1, 0.2])
@@ -33,3 +33,15 @@ def test_limits():
 def test_correlated_buildings_of_equal_period_keep_the_difference_of_their_radii():
     # equal dampings and periods: correlation 1 whatever is added
     assert least(0.8, log_ratio=0.0) == pytest.approx(0.05 / 0.8**2 - 0.05, abs=2e-8)
+
+
+def test_correlation_of_white_noise():
+    # mutation: damping attached to the other building. Undamped and in step: 0 / 0 counts as one
+    assert white_noise_correlation(0.0, 0.05, 0.05) == pytest.approx(1.0, abs=1e-15)
+    assert white_noise_correlation(0.0, 0.0, 0.0) == 1.0
+    assert white_noise_correlation(0.3, 0.02, 0.1) == pytest.approx(
+        white_noise_correlation(-0.3, 0.1, 0.02), rel=1e-14
+    )
+    assert white_noise_correlation(0.3, 0.02, 0.1) != pytest.approx(
+        white_noise_correlation(0.3, 0.1, 0.02), rel=1e-3
+    )
