@@ -116,7 +116,7 @@ class TestInvariants:
     def test_structures_never_overlap(self, case):
         # catches: contacts missed between samples, drift of clusters
         history = run(case)
-        # approaches slower than 1e-11 of the ground velocity count as rest, and drift on for seconds
+        # approaches slower than 1e-11 of the ground velocity count as rest, and drift for seconds
         assert (history.displacement[0] - history.displacement[1] <= case[6] + 1e-10).all()
 
     @settings(max_examples=25, deadline=None)
