@@ -1,5 +1,5 @@
 """
-Compare populations of pairs with draws of exact histories on real records (ten minutes).
+Compare populations of pairs with draws of exact histories on real records (25 minutes).
 
     python workflows/population_accuracy.py
 

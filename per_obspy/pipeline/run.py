@@ -8,13 +8,10 @@ only then the other results are complete, and a run of the same inputs does noth
 
 import json
 import os
-import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 from per_obspy.config import Run, load
@@ -43,7 +40,7 @@ from per_obspy.pipeline.stations import (
     simulated_stations,
     stations_of_earlier_run,
 )
-from per_obspy.progress import Progress, silent
+from per_obspy.progress import Progress, silent, timed
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records, hash_if_readable, input_files
 from per_obspy.resume import (
@@ -53,7 +50,7 @@ from per_obspy.resume import (
     read_status,
     write_status,
 )
-from per_obspy.screening.warmup import compile_screening
+from per_obspy.screening.warmup import compiling
 from per_obspy.tables.station_summary import StationSummary, write_stations
 
 #: Written first as unfinished, and last as it ends.
@@ -61,9 +58,6 @@ RECORD = "run.json"
 
 #: State of a run that is under way, was killed, or met a fault of the machine; and its stages.
 UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
-
-#: Stage that the first run waits for.
-COMPILING = "loading kernels (the first run compiles them for a minute)"
 
 
 def run(
@@ -119,7 +113,7 @@ def run(
         check_inputs(settings)
         earlier_rows = _begun(folder, settings, STATIONS)
         seconds, started = dict[str, float](), now()
-        with _timed(seconds, "records"):
+        with timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or _head(settings, configuration, fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
@@ -153,7 +147,7 @@ def screen(
         head = _head(settings, configuration, None, {})
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
-        with _compiling(progress):
+        with compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
         record |= {"started": started, "earthquakes": earthquakes}
         return _finished_record(settings, folder, record, head, earlier_rows)
@@ -238,7 +232,7 @@ def _all_stages(
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
     seconds = dict[str, float]()
-    with _timed(seconds, "stations"), _compiling(progress):
+    with timed(seconds, "stations"), compiling(progress):
         progress("stations", 0, len(found.jobs))
         stations = finished_stations(found.jobs, settings.workers, executor, progress)
     _begun(folder, settings, SCREENING)
@@ -307,10 +301,10 @@ def _later_stages(
     """Do the stages after the stations and return their part of ``run.json``."""
     seconds, usable = dict[str, float](), _usable(stations)
     # The risk table, then everything that is read from it
-    with _timed(seconds, "screening"):
+    with timed(seconds, "screening"):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
-    with _timed(seconds, "report"):
+    with timed(seconds, "report"):
         made = reported(settings, folder, usable, progress)
         outputs = [*found.outputs, *table.files, *made.outputs]
     outcome = _outcome(found, stations)
@@ -401,27 +395,3 @@ def _finished(file: Path) -> dict[str, Any]:
     if changed:
         raise CatalogError(str(changed[0]), "not as the run left it: run again")
     return record
-
-
-@contextmanager
-def _compiling(progress: Progress) -> Iterator[None]:
-    """Compile the kernels of screening in a thread, while other processes do the stations."""
-    thread = Thread(target=compile_screening)
-    thread.start()
-    try:
-        yield
-        progress(COMPILING, 0, 1)
-    except Exception:
-        # A thread that is alive when the interpreter ends can abort it; an interrupt does not wait
-        thread.join()
-        raise
-    thread.join()
-    progress(COMPILING, 1, 1)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the duration of a stage, s."""
-    start = time.perf_counter()
-    yield
-    seconds[stage] = round(time.perf_counter() - start, 3)

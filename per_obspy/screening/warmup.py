@@ -1,11 +1,19 @@
 """Compilation of the kernels of screening ahead of use, while stations are still processed."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Thread
+
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
+from per_obspy.progress import Progress
 from per_obspy.screening.risk import risk_table
+
+#: Stage that the first run waits for.
+COMPILING = "loading kernels (the first run compiles them for a minute)"
 
 #: Three pairs that together call every kernel: touching ones with given periods, with derived
 #: periods, and with a building that could yield.
@@ -22,6 +30,22 @@ PAIRS = pd.DataFrame(
         "yield_displacement_1": [np.nan, np.nan, 0.02],
     }
 )
+
+
+@contextmanager
+def compiling(progress: Progress) -> Iterator[None]:
+    """Compile the kernels of screening in a thread, while other processes do the stations."""
+    thread = Thread(target=compile_screening)
+    thread.start()
+    try:
+        yield
+        progress(COMPILING, 0, 1)
+    except Exception:
+        # A thread that is alive when the interpreter ends can abort it; an interrupt does not wait
+        thread.join()
+        raise
+    thread.join()
+    progress(COMPILING, 1, 1)
 
 
 def compile_screening() -> None:

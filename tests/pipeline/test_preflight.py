@@ -15,6 +15,7 @@ from per_obspy.pipeline import run as whole_run
 from per_obspy.pipeline.ensemble import screen_scenarios
 from per_obspy.pipeline.preflight import check_inputs
 from per_obspy.pipeline.run import report, run, screen
+from per_obspy.screening import warmup
 
 from .small_run import write_configuration
 
@@ -109,7 +110,7 @@ def test_an_ensemble_checks_all_its_runs_before_the_first(tmp_path):
 def test_no_thread_is_alive_after_a_run_that_fails(tmp_path, monkeypatch):
     # would catch an interpreter that aborts at its end because a thread still compiles
     write_configuration(tmp_path)
-    monkeypatch.setattr(whole_run, "compile_screening", lambda: time.sleep(0.5))
+    monkeypatch.setattr(warmup, "compile_screening", lambda: time.sleep(0.5))
 
     def fails(*_):
         raise CatalogError("stations", "no luck")

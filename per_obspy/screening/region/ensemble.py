@@ -104,6 +104,28 @@ SAME = {"gap": "m", "longitude": "degrees", "latitude": "degrees"}
 #: unknown: that without contact.
 SEVERITY = {"expected_impact_velocity": 0.0, "expected_amplification": 1.0}
 
+#: Columns that do not depend on the scenarios; ``probability`` is the third.
+JOINED = (
+    Column("rank", "int64", "", "1 is the worst: by expected impact velocity, then amplification"),
+    Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
+    Column(
+        "annual_probability",
+        "float64",
+        "1",
+        "of pounding within a year, scenarios coming as a Poisson process",
+    ),
+    Column("expected_impact_velocity", "float64", "m/s", "weighted mean of those in the scenarios"),
+    Column(
+        "expected_amplification",
+        "float64",
+        "1",
+        "weighted mean of those in the scenarios; 1 without contact",
+    ),
+    Column(
+        "worst_scenario", "str", "", "name of the one with the largest expected impact velocity"
+    ),
+)
+
 
 def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
     """
@@ -118,45 +140,13 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     """
     unit = "/year" if yearly else ""
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
+    chance = f"of pounding, given that one of these happens: {scenarios}"
+    columns = [*JOINED[:2], Column("probability", "float64", "1", chance), *JOINED[2:]]
     # The scenarios' own columns follow the joined ones
-    columns = [
-        Column(
-            "rank", "int64", "", "1 is the worst: by expected impact velocity, then amplification"
-        ),
-        Column("pair_id", "str", "", COLUMNS["pair_id"].meaning),
-        Column(
-            "probability",
-            "float64",
-            "1",
-            f"of pounding, given that one of these happens: {scenarios}",
-        ),
-        Column(
-            "annual_probability",
-            "float64",
-            "1",
-            "of pounding within a year, scenarios coming as a Poisson process",
-        ),
-        Column(
-            "expected_impact_velocity",
-            "float64",
-            "m/s",
-            "weighted mean of those in the scenarios",
-        ),
-        Column(
-            "expected_amplification",
-            "float64",
-            "1",
-            "weighted mean of those in the scenarios; 1 without contact",
-        ),
-        Column(
-            "worst_scenario", "str", "", "name of the one with the largest expected impact velocity"
-        ),
-        *(
-            Column(f"probability_{name}", "float64", "1", f"of pounding in scenario {name}")
-            for name in weights
-        ),
-        *((COLUMNS | COMPLETED)[name] for name in SAME),
-    ]
+    for name in weights:
+        meaning = f"of pounding in scenario {name}"
+        columns.append(Column(f"probability_{name}", "float64", "1", meaning))
+    columns += [(COLUMNS | COMPLETED)[name] for name in SAME]
     # weights that are no rates leave the yearly probability out
     return {
         column.name: column for column in columns if yearly or column.name != "annual_probability"
