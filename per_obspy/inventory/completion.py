@@ -173,6 +173,9 @@ def _add_contact(
     given = numbers_in(pairs, "restitution")
     _add_column(columns, derived, "restitution", given, building.restitution)
     columns["gap_std"] = _given_or(numbers_in(pairs, "gap_std"), 0.0)
+    # A default of whoever made the table is no survey's deviation
+    if "gap_std_source" in pairs:
+        derived["gap_std"] = (pairs["gap_std_source"] == "assumed").to_numpy(dtype=bool)
 
 
 def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:
