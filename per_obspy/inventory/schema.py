@@ -111,6 +111,8 @@ _BUILDING = (
            hint="metres of a projection?"),
     Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
            hint="longitude and latitude swapped, or metres of a projection?"),
+    Column("position", "str", "", "whether the building stands at the end of its row of buildings",
+           choices=POSITIONS),
     Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
            hint="metres above ground expected"),
     Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
