@@ -62,7 +62,6 @@ def moat_history(
     Examples
     --------
     >>> import numpy as np
-    from per_obspy.checks import ArrayLike
     >>> pulse = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 301))
     >>> history = moat_history(pulse, 0.01, Structure(3.0, 0.1, 1e6), 0.2, 0.25, 0.5)
     >>> bool(abs(history.displacement[1]).max() <= 0.25)
