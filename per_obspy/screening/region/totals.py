@@ -34,7 +34,7 @@ TOTALS: dict[str, Column] = {
             "expected_pounding",
             "float64",
             "1",
-            "expected number of pounding pairs: sum of the probabilities of those whose gap is known",
+            "expected number of pounding pairs: sum of the probabilities, without unknown gaps",
         ),
         Column(
             "expected_pounding_std_independent",
