@@ -11,6 +11,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from per_obspy.checks import FloatArray
+from per_obspy.pounding.dispersion import lognormal_dispersion
 from per_obspy.screening.values import Table, both, values
 
 #: Standard normal nodes of ln period and ln damping of building 1, of building 2, of ln demand for
@@ -78,8 +79,10 @@ def gap_dispersion(pairs: Table) -> FloatArray:
     a normal one about ``gap`` with ``gap_std``, truncated at 0. The lognormal gap has two of its
     quantiles (``TOUCHING``, ``APART``): those at one standard deviation on either side where the
     gap is wide, and where outlines touch those at which the state becomes ``unlikely`` and
-    ``yes``, between which the lognormal gap gives more chance of contact. It never gives
-    a ``no`` to a chance above 0.042, and nearer outlines always have more chance.
+    ``yes``, between which the lognormal gap gives more chance of contact. To a certain demand it
+    never gives a ``no`` if the chance is above 0.042, and nearer outlines have more chance.
+
+    A gap that the configuration assumes (``assumed_gap``) is lognormal itself, with mean ``gap``.
     """
     return _lognormal_gap(pairs)[1]
 
@@ -92,15 +95,24 @@ def median_gap(pairs: Table) -> FloatArray:
 def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:
     """Return median, m, and log-standard deviation of lognormal gaps."""
     gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
-    median, dispersion = gap.astype(np.float64), np.zeros(gap.shape)
-    uncertain = deviation > 0
-    gap, deviation = gap[uncertain], deviation[uncertain]
+    assumed = values(pairs, "assumed_gap") > 0 if "assumed_gap" in pairs else gap < 0
+    measured, lognormal = (deviation > 0) & ~assumed, (gap > 0) & assumed
+    # Certain gaps stay
+    median, dispersion = gap.copy(), np.zeros(gap.shape)
+    dispersion[lognormal] = lognormal_dispersion(gap[lognormal], deviation[lognormal])
+    median[lognormal] *= np.exp(-(dispersion[lognormal] ** 2) / 2.0)
+    fitted = _with_quantiles(gap[measured], deviation[measured])
+    median[measured], dispersion[measured] = fitted
+    return median, dispersion
+
+
+def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return median, m, and log-standard deviation of lognormal gaps from measured ones."""
     # shares of the gaps below both quantiles
     apart = np.minimum(gap / (WIDE * deviation), 1.0)
     low, high = (near + apart * (far - near) for near, far in zip(TOUCHING, APART, strict=True))
     # quantiles of the normal distribution above 0
     above = ndtr(gap / deviation)
     lower, upper = (gap - deviation * ndtri(above * (1.0 - share)) for share in (low, high))
-    dispersion[uncertain] = np.log(upper / lower) / (ndtri(high) - ndtri(low))
-    median[uncertain] = upper * np.exp(-ndtri(high) * dispersion[uncertain])
-    return median, dispersion
+    dispersion = np.log(upper / lower) / (ndtri(high) - ndtri(low))
+    return upper * np.exp(-ndtri(high) * dispersion), dispersion
