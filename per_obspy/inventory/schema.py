@@ -80,7 +80,7 @@ _PAIR = (
            "unknown",
            required=True, may_be_empty=True, low=0.0, high=10.0,
            hint="given in millimetres or centimetres by mistake?"),
-    Column("gap_std", "float64", "m", "standard deviation of the gap",
+    Column("gap_std", "float64", "m", "standard deviation of the measured gap",
            low=0.0, high=1.0, hint="in millimetres?"),
     Column("gap_std_source", "str", "", "whether gap_std is given or assumed",
            choices=DEVIATION_SOURCES),

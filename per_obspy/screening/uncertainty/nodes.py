@@ -23,8 +23,8 @@ NODES: FloatArray = ndtri(qmc.Sobol(6, scramble=False).fast_forward(128).random(
 #: Columns of ``NODES``: both buildings, demand, gap.
 BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
 
-#: Shares of gaps below the quantiles that a lognormal gap has of the truncated normal one, for
-#: outlines that touch and from ``WIDE`` standard deviations on; in between they are interpolated.
+#: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
+#: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
 TOUCHING, APART, WIDE = (0.01, 0.9), (0.16, 0.84), 3.0
 
 #: Largest damping of a node, fraction of critical: an oscillator has less than the critical one.
@@ -75,12 +75,11 @@ def gap_dispersion(pairs: Table) -> FloatArray:
     """
     Return the log-standard deviation of a lognormal gap; 0 where the gap is certain.
 
-    A gap is a distance measured with a normal error and not below 0, so that its distribution is
-    a normal one about ``gap`` with ``gap_std``, truncated at 0. The lognormal gap has two of its
-    quantiles (``TOUCHING``, ``APART``): those at one standard deviation on either side where the
-    gap is wide, and where outlines touch those at which the state becomes ``unlikely`` and
-    ``yes``, between which the lognormal gap gives more chance of contact. To a certain demand it
-    never gives a ``no`` if the chance is above 0.042, and nearer outlines have more chance.
+    A gap is a distance measured with a normal error, and not below 0: either the walls are one, or
+    the gap has a normal distribution about ``gap`` with ``gap_std``, truncated at 0. Both are
+    equally likely where outlines touch, as the error alone would give a stiff pair, whose demand is
+    a hundredth of it, a ``no``. For outlines apart, Bayes' rule gives the chance that the walls are
+    one. The lognormal gap has two quantiles of this distribution (``TOUCHING``, ``APART``).
 
     A gap that the configuration assumes (``assumed_gap``) is lognormal itself, with mean ``gap``.
     """
@@ -108,11 +107,14 @@ def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:
 
 def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return median, m, and log-standard deviation of lognormal gaps from measured ones."""
-    # shares of the gaps below both quantiles
+    # Quantiles of the normal distribution above 0
     apart = np.minimum(gap / (WIDE * deviation), 1.0)
     low, high = (near + apart * (far - near) for near, far in zip(TOUCHING, APART, strict=True))
-    # quantiles of the normal distribution above 0
     above = ndtr(gap / deviation)
     lower, upper = (gap - deviation * ndtri(above * (1.0 - share)) for share in (low, high))
-    dispersion = np.log(upper / lower) / (ndtri(high) - ndtri(low))
-    return upper * np.exp(-ndtri(high) * dispersion), dispersion
+    # The same lengths as quantiles of all gaps, of which some are 0
+    odds = np.exp(-((gap / deviation) ** 2) / 2.0) / (2.0 * above)
+    one_wall = odds / (1.0 + odds)
+    low, high = (ndtri(one_wall + (1.0 - one_wall) * share) for share in (low, high))
+    dispersion = np.log(upper / lower) / (high - low)
+    return upper * np.exp(-high * dispersion), dispersion
