@@ -221,7 +221,7 @@ def test_a_column_that_stands_twice(tmp_path):
     path = _write_geoparquet(tmp_path / "town.parquet")
     table = pa.parquet.read_table(path)
     pa.parquet.write_table(table.append_column("height", table["height"]), path)
-    with pytest.raises(CatalogError, match="[Mm]ultiple matches.*height|height stands more than once"):
+    with pytest.raises(CatalogError, match=r"Multiple matches for .*height"):
         read_layer(path)
 
 
