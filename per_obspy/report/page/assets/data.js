@@ -1,0 +1,70 @@
+"use strict";
+// The data block: deflated JSON and columns of numbers, see packing.py.
+
+const UNKNOWN_PLACE = -2147483648;
+
+async function unpacked(text) {
+  const letters = atob(text.trim());
+  const bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i += 1) bytes[i] = letters.charCodeAt(i);
+  const inflated = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const buffer = await new Response(inflated).arrayBuffer();
+  const length = new DataView(buffer).getUint32(0, true);
+  const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  for (const table of content.tables) at = readColumns(table, buffer, at);
+  return content;
+}
+
+function readColumns(table, buffer, start) {
+  let at = start;
+  table.column = {};
+  for (const column of table.columns) {
+    const size = { number: 4, place: 4, choice: 2, text: 0 }[column.kind] * table.count;
+    const bytes = new Uint8Array(buffer, at, size);
+    table.column[column.name] = READERS[column.kind](column, bytes, table.count);
+    at += size;
+  }
+  return at;
+}
+
+function joinedPlanes(bytes, count) {
+  const joined = new Uint8Array(4 * count);
+  for (let plane = 0; plane < 4; plane += 1) {
+    for (let i = 0; i < count; i += 1) joined[4 * i + plane] = bytes[plane * count + i];
+  }
+  return joined.buffer;
+}
+
+const READERS = {
+  number: (column, bytes, count) => new Float32Array(joinedPlanes(bytes, count)),
+  place: (column, bytes, count) => {
+    const whole = new Int32Array(joinedPlanes(bytes, count));
+    return Float64Array.from(whole, (value) => (value === UNKNOWN_PLACE ? NaN : value / 1e6));
+  },
+  choice: (column, bytes) => ({
+    texts: column.texts,
+    codes: new Uint16Array(bytes.slice().buffer),
+  }),
+  text: (column) => column.texts,
+};
+
+// Elements: texts are always set as texts, never as markup.
+
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+function drawing(name, attributes = {}, text = null) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== null) made.textContent = text;
+  return made;
+}
+
+function byId(name) {
+  return document.getElementById(name);
+}

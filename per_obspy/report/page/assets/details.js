@@ -1,0 +1,226 @@
+"use strict";
+// Everything about one pair: numbers in words, circles, history, prevention, flags.
+
+class Details {
+  constructor(page) {
+    this.page = page;
+    this.place = byId("detail");
+  }
+
+  value(name, i) {
+    const values = this.page.pairs.column[name];
+    if (!values) return NaN;
+    return values.codes ? values.texts[values.codes[i]] : values[i];
+  }
+
+  show(i, focus) {
+    const { t } = this.page;
+    const close = element("button", { type: "button", class: "close" }, t("close"));
+    close.addEventListener("click", () => this.page.choose(null));
+    const state = this.page.content.states[this.page.stateCodes[i]];
+    const heading = element("h2", {}, `${t("pair")} ${this.value("pair_id", i)} `);
+    const words = element("p", {}, element("strong", {}, swatch(state), ` ${state.label}. `), this.words(i));
+    const pictures = element("div", { class: "pictures" }, ...this.circles(i), ...this.history(i));
+    this.place.replaceChildren(
+      close, heading, words, pictures, this.buildings(i),
+      ...this.prevention(i), ...this.flags(i), ...this.derived(i), ...this.sides(i),
+    );
+    this.place.hidden = false;
+    if (focus) this.place.focus();
+  }
+
+  hide() {
+    this.place.hidden = true;
+    this.place.replaceChildren();
+  }
+
+  centimetres(name, i) { return this.page.number(100 * this.value(name, i), 1); }
+
+  words(i) {
+    const { t, number } = this.page;
+    const known = (name) => Number.isFinite(this.value(name, i));
+    const said = [];
+    if (known("probability")) said.push(t("says_probability", { value: number(100 * this.value("probability", i), 0) }));
+    if (known("expected_impact_velocity") && this.value("expected_impact_velocity", i) > 0) {
+      said.push(t("says_velocity", {
+        value: this.page.number(100 * this.value("expected_impact_velocity", i), 0),
+        high: this.page.number(100 * this.value("impact_velocity_84", i), 0),
+      }));
+    }
+    const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
+    said.push(gap, t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
+    if (this.value("impacts", i) > 0) {
+      said.push(t("says_impacts", { value: number(this.value("impacts", i), 0), velocity: number(100 * this.value("impact_velocity_exact", i), 0) }));
+    }
+    if (known("expected_amplification")) said.push(t("says_amplification", { value: number(this.value("expected_amplification", i), 2) }));
+    const station = this.value("station", i);
+    if (station) said.push(t("says_station", { station, value: number(this.value("distance", i) / 1000, 1) }));
+    return said.join(" ");
+  }
+
+  buildings(i) {
+    const { t, number } = this.page;
+    const facts = [
+      ["building_id", null], ["height", 1, 1], ["storeys", 1, 0], ["period", 1, 2], ["damping", 100, 1],
+      ["participation", 1, 2], ["per", 100, 1], ["sd", 100, 1], ["amplification_exact", 1, 2],
+    ];
+    const table = element("table", {}, element("caption", {}, t("both_buildings")));
+    for (const [name, factor, digits] of facts) {
+      if (!this.page.pairs.column[`${name}_1`]) continue;
+      const cells = [1, 2].map((side) => {
+        const value = this.value(`${name}_${side}`, i);
+        return element("td", { class: factor ? "number" : "name" }, factor ? number(factor * value, digits) : value || "–");
+      });
+      table.append(element("tr", {}, element("th", { scope: "row" }, t(`fact_${name}`)), ...cells));
+    }
+    return element("div", { class: "scroll" }, table);
+  }
+
+  // Both circles of energy at contact height, at the gap that there is and at the gap that is needed
+  circles(i) {
+    const { t } = this.page;
+    const radii = [1, 2].map((side) => this.value(`per_${side}`, i) * this.value(`participation_${side}`, i));
+    if (!radii.every(Number.isFinite)) return [];
+    const gaps = [["circles_gap", this.value("gap", i)], ["circles_needed", this.value("demand", i)]];
+    return gaps.filter(([, gap]) => Number.isFinite(gap)).map(([key, gap]) => {
+      const caption = t(key, { value: this.page.number(100 * gap, 1) });
+      return element("figure", {}, element("figcaption", {}, caption), this.circlePicture(radii, gap, caption));
+    });
+  }
+
+  circlePicture(radii, gap, caption) {
+    const furthest = Math.max(this.largestGap(radii), gap);
+    const width = radii[0] + furthest + radii[1];
+    const height = 2.1 * Math.max(...radii);
+    const scale = Math.min(340 / width, 200 / height);
+    const picture = drawing("svg", { class: "picture", viewBox: "0 0 360 220", role: "img", "aria-label": caption });
+    const middle = 180 - (scale * (gap + radii[1] - radii[0])) / 2;
+    const centres = [middle, middle + scale * gap];
+    const colours = this.page.content.building_colours;
+    const dashes = ["none", "7 4"];
+    [0, 1].forEach((side) => {
+      picture.append(drawing("circle", {
+        cx: centres[side], cy: 105, r: scale * radii[side], fill: colours[side], "fill-opacity": 0.2,
+        stroke: colours[side], "stroke-width": 2, "stroke-dasharray": dashes[side],
+      }));
+      picture.append(drawing("line", { x1: centres[side], x2: centres[side], y1: 10, y2: 200, stroke: colours[side] }));
+      const anchor = side ? "start" : "end";
+      picture.append(drawing("text", { x: centres[side] + (side ? 4 : -4), y: 214, "text-anchor": anchor, "font-size": 12 }, String(side + 1)));
+    });
+    return picture;
+  }
+
+  largestGap(radii) { return Math.hypot(radii[0], radii[1]); }
+
+  history(i) {
+    const { t } = this.page;
+    const found = this.page.content.histories[String(Math.round(this.value("rank", i)))];
+    if (!found) return this.value("station", i) ? [element("p", { class: "small" }, t("no_history", { value: this.page.content.history_count }))] : [];
+    const caption = t("history", { value: found.impacts.length });
+    const picture = drawing("svg", { class: "picture", viewBox: "0 0 560 240", role: "img", "aria-label": caption });
+    const start = found.time[0];
+    const length = found.time[found.time.length - 1] - start || 1;
+    const gap = 1000 * this.value("gap", i);
+    const two = found.two.map((value) => value + gap);
+    const all = [...found.one, ...two];
+    const [low, high] = [Math.min(...all), Math.max(...all)];
+    const x = (time) => 44 + (506 * (time - start)) / length;
+    const y = (value) => 12 + (196 * (high - value)) / (high - low || 1);
+    const colours = this.page.content.building_colours;
+    for (const tick of ticks(low / 10, high / 10)) {
+      picture.append(drawing("line", { x1: 44, x2: 550, y1: y(10 * tick), y2: y(10 * tick), stroke: "#ccc" }));
+      picture.append(drawing("text", { x: 40, y: y(10 * tick) + 4, "text-anchor": "end", "font-size": 11 }, this.page.number(tick, tickDigits(low / 10, high / 10))));
+    }
+    for (const tick of ticks(start, start + length)) {
+      picture.append(drawing("text", { x: x(tick), y: 224, "text-anchor": "middle", "font-size": 11 }, `${this.page.number(tick, tickDigits(start, start + length))} s`));
+    }
+    [found.one, two].forEach((line, side) => {
+      const points = line.map((value, at) => {
+        const step = Math.floor(at / 2);
+        const time = found.time[step] + ((at % 2) / 2) * (found.time[step + 1] - found.time[step]);
+        return `${x(time).toFixed(1)},${y(value).toFixed(1)}`;
+      });
+      picture.append(drawing("polyline", { points: points.join(" "), fill: "none", stroke: colours[side], "stroke-width": 1.3, "stroke-dasharray": side ? "5 2" : "none" }));
+    });
+    const fastest = Math.max(...found.impacts.map(([, speed]) => speed), 1e-9);
+    for (const [time, speed] of found.impacts) {
+      picture.append(drawing("line", { x1: x(time), x2: x(time), y1: 208, y2: 208 - Math.max(4, (34 * speed) / fastest), stroke: "#000", "stroke-width": 1 }));
+    }
+    return [element("figure", {}, element("figcaption", {}, caption), picture, element("p", { class: "small" }, t("history_note")))];
+  }
+
+  prevention(i) {
+    const { t, number } = this.page;
+    const said = [];
+    const [missing, damping, bumper] = ["missing_gap", "supplemental_damping", "bumper_restitution"].map((name) => this.value(name, i));
+    if (missing > 0) said.push(t("prevents_gap", { value: number(100 * missing, 1), whole: this.centimetres("demand", i) }));
+    if (Number.isFinite(damping) && damping > 0) said.push(t("prevents_damping", { value: number(100 * damping, 0) }));
+    else if (missing > 0 && !Number.isFinite(damping)) said.push(t("prevents_no_damping"));
+    if (Number.isFinite(bumper)) said.push(t("prevents_bumper", { value: number(bumper, 2) }));
+    if (!said.length) said.push(t("prevents_nothing"));
+    return [element("h3", {}, t("prevention")), element("ul", {}, ...said.map((text) => element("li", {}, text)))];
+  }
+
+  flags(i) {
+    const names = String(this.value("flags", i) || "").split(" ").filter(Boolean);
+    if (!names.length) return [];
+    const list = element("dl", {});
+    for (const name of names) {
+      list.append(element("dt", {}, name.replaceAll("_", " ")), element("dd", {}, this.page.content.flags[name] || "–"));
+    }
+    return [element("h3", {}, this.page.t("flags")), list];
+  }
+
+  derived(i) {
+    const { t, number } = this.page;
+    const names = String(this.value("derived", i) || "").split(" ").filter(Boolean);
+    if (!names.length) return [];
+    const made = [element("h3", {}, t("derived")), element("p", {}, names.map((name) => name.replaceAll("_", " ")).join(", "))];
+    const spread = [1, 2].map((side) => this.value(`period_log_std_${side}`, i));
+    const sure = spread.every((value) => value > 0);
+    if (sure) made.push(element("p", {}, t("derived_spread", { first: number(100 * spread[0], 0), second: number(100 * spread[1], 0) })));
+    else made.push(element("p", {}, t("derived_fixed")));
+    return made;
+  }
+
+  // Other pairs of both buildings
+  sides(i) {
+    const { t } = this.page;
+    const made = [];
+    for (const side of [1, 2]) {
+      const name = this.value(`building_id_${side}`, i);
+      if (!name || typeof name !== "string") continue;
+      const facts = this.page.buildingFacts(name);
+      const others = (this.page.pairsOf.get(name) || []).filter((pair) => pair !== i).slice(0, 12);
+      if (!others.length && !facts) continue;
+      made.push(element("h3", {}, `${t("building")} ${name}`));
+      if (facts) made.push(element("p", {}, facts));
+      if (!others.length) continue;
+      const list = element("p", {}, `${t("other_pairs")} `);
+      for (const pair of others) {
+        const button = element("button", { type: "button" }, this.value("pair_id", pair));
+        button.addEventListener("click", () => this.page.choose(pair, true));
+        list.append(button, " ");
+      }
+      made.push(list);
+    }
+    return made;
+  }
+}
+
+function tickStep(low, high) {
+  const rough = (high - low) / 4 || 1;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= rough);
+}
+
+function tickDigits(low, high) {
+  return Math.max(0, -Math.floor(Math.log10(tickStep(low, high)) + 1e-9));
+}
+
+function ticks(low, high) {
+  const step = tickStep(low, high);
+  const found = [];
+  for (let tick = Math.ceil(low / step) * step; tick <= high; tick += step) found.push(tick);
+  return found;
+}

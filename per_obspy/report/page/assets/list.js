@@ -1,0 +1,234 @@
+"use strict";
+// Filters and the table of pairs, which sorts and exports what is filtered.
+
+const PAGE_ROWS = 100;
+
+// Columns of the table, with the factor to the unit of their heading and their decimals
+const LISTED = [
+  ["rank", 1, 0], ["pair_id"], ["state"], ["probability", 100, 0],
+  ["expected_impact_velocity", 100, 0], ["gap", 100, 1], ["demand", 100, 1],
+  ["missing_gap", 100, 1], ["expected_amplification", 1, 2], ["station"],
+];
+
+class PairList {
+  constructor(page) {
+    this.page = page;
+    this.columns = LISTED.filter(([name]) => page.pairs.column[name]);
+    this.sorted = { name: "rank", ascending: true };
+    this.rows = PAGE_ROWS;
+    this.fields = {};
+    this.makeFilters();
+    this.makeHead();
+    byId("more").addEventListener("click", () => { this.rows += 5 * PAGE_ROWS; this.fill(); });
+    byId("clear").addEventListener("click", () => { byId("filters").reset(); this.apply(); });
+    byId("export").addEventListener("click", () => this.download());
+    this.filter();
+  }
+
+  makeFilters() {
+    const { t, content, pairs } = this.page;
+    const form = byId("filters");
+    const states = element("fieldset", {}, element("legend", {}, t("state")));
+    this.states = content.states.map((state) => {
+      const box = element("input", { type: "checkbox", checked: "", value: state.name });
+      states.append(element("label", {}, box, swatch(state), state.label));
+      return box;
+    });
+    form.append(states);
+    this.number("probability", t("least_probability"), 100);
+    this.number("velocity", t("least_velocity"), 1000);
+    this.choice("area", t("area"), pairs.column.area ? [...pairs.column.area.texts].sort() : []);
+    const flags = pairs.column.flags ? pairs.column.flags.texts.flatMap((text) => text.split(" ")) : [];
+    this.choice("flag", t("flag"), [...new Set(flags)].filter(Boolean).sort());
+    const search = element("input", { type: "search", id: "search", maxlength: "120", placeholder: t("search_hint") });
+    form.append(element("label", { class: "tall" }, t("search"), search));
+    this.fields.search = search;
+    form.addEventListener("input", () => this.apply());
+    form.addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  number(name, label, largest) {
+    const field = element("input", { type: "number", id: name, min: "0", max: String(largest), step: "any", inputmode: "decimal" });
+    byId("filters").append(element("label", { class: "tall" }, label, field));
+    this.fields[name] = field;
+  }
+
+  choice(name, label, texts) {
+    const field = element("select", { id: name });
+    field.append(element("option", { value: "" }, this.page.t("any")));
+    for (const text of texts.slice(0, 2000)) field.append(element("option", { value: text }, text || "–"));
+    if (texts.length) byId("filters").append(element("label", { class: "tall" }, label, field));
+    this.fields[name] = field;
+  }
+
+  makeHead() {
+    const row = document.querySelector("#pairs thead tr");
+    for (const [name, factor] of this.columns) {
+      const button = element("button", { type: "button" }, this.page.t(`column_${name}`));
+      button.addEventListener("click", () => this.sort(name));
+      const head = element("th", { scope: "col", "data-column": name }, button);
+      if (factor) head.className = "number";
+      row.append(head);
+    }
+  }
+
+  sort(name) {
+    const again = this.sorted.name === name;
+    // Names and ranks rise at first, other numbers fall: the worst is on top
+    const rises = ["rank", "pair_id", "station", "gap", "state"].includes(name);
+    this.sorted = { name, ascending: again ? !this.sorted.ascending : rises };
+    this.rows = PAGE_ROWS;
+    this.order();
+    this.fill();
+  }
+
+  apply() {
+    this.rows = PAGE_ROWS;
+    this.filter();
+    this.page.map.later();
+  }
+
+  filter() {
+    const { pairs, stateCodes, content } = this.page;
+    const { column, count } = pairs;
+    const shown = this.page.shownStates;
+    shown.clear();
+    for (const box of this.states) if (box.checked) shown.add(box.value);
+    const allowed = content.states.map((state) => shown.has(state.name));
+    const probability = Number(this.fields.probability.value) / 100;
+    const velocity = Number(this.fields.velocity.value) / 100;
+    const area = this.codesOf("area", (text, chosen) => text === chosen);
+    const flags = this.codesOf("flags", (text, chosen) => text.split(" ").includes(chosen), "flag");
+    const matches = this.searched();
+    this.found = [];
+    for (let i = 0; i < count; i += 1) {
+      // A number that is missing passes only where nothing is asked of it
+      const passes = allowed[stateCodes[i]]
+        && (!probability || column.probability[i] >= probability)
+        && (!velocity || column.expected_impact_velocity[i] >= velocity)
+        && (!area || area.has(column.area.codes[i]))
+        && (!flags || flags.has(column.flags.codes[i]))
+        && (!matches || matches(i));
+      this.page.isShown[i] = passes ? 1 : 0;
+      if (passes) this.found.push(i);
+    }
+    this.order();
+    this.fill();
+  }
+
+  codesOf(name, isChosen, field = name) {
+    const chosen = this.fields[field].value;
+    if (!chosen) return null;
+    const codes = new Set();
+    this.page.pairs.column[name].texts.forEach((text, code) => { if (isChosen(text, chosen)) codes.add(code); });
+    return codes;
+  }
+
+  // A place (latitude, longitude) moves the map there; anything else is sought in names
+  searched() {
+    const sought = this.fields.search.value.trim().toLowerCase();
+    if (!sought) return null;
+    const { column } = this.page.pairs;
+    const place = sought.match(/^(-?\d+(?:\.\d+)?)\s*[,; ]\s*(-?\d+(?:\.\d+)?)$/);
+    if (place && Math.abs(place[1]) <= 90 && Math.abs(place[2]) <= 360) {
+      const [latitude, longitude] = [Number(place[1]), Number(place[2])];
+      if (this.page.map) this.page.map.show(longitude, latitude, 1000);
+      const shrink = Math.cos((latitude * Math.PI) / 180);
+      return (i) => Math.hypot((column.longitude[i] - longitude) * shrink, column.latitude[i] - latitude) < 1000 / 111200;
+    }
+    const texts = ["pair_id", "building_id_1", "building_id_2"].map((name) => column[name]).filter(Boolean);
+    return (i) => texts.some((names) => names[i].toLowerCase().includes(sought))
+      || (column.station && column.station.texts[column.station.codes[i]].toLowerCase() === sought);
+  }
+
+  order() {
+    const { name, ascending } = this.sorted;
+    const values = this.page.pairs.column[name];
+    const sign = ascending ? 1 : -1;
+    let value = (i) => values[i];
+    if (values.codes) {
+      const rank = name === "state" ? this.page.stateCodes : null;
+      value = rank ? (i) => rank[i] : (i) => values.texts[values.codes[i]];
+    }
+    const compare = (a, b) => {
+      const [first, second] = [value(a), value(b)];
+      if (Number.isNaN(first) || Number.isNaN(second)) return Number.isNaN(first) - Number.isNaN(second) || a - b;
+      if (first === second) return a - b;
+      return first < second ? -sign : sign;
+    };
+    this.found.sort(compare);
+    for (const head of document.querySelectorAll("#pairs th")) {
+      if (head.dataset.column === name) head.setAttribute("aria-sort", ascending ? "ascending" : "descending");
+      else head.removeAttribute("aria-sort");
+    }
+  }
+
+  fill() {
+    const body = document.querySelector("#pairs tbody");
+    const rows = this.found.slice(0, this.rows).map((i) => this.row(i));
+    body.replaceChildren(...rows);
+    const { t, pairs, content } = this.page;
+    byId("count").textContent = t("count", { found: this.page.whole(this.found.length), shown: this.page.whole(pairs.count), all: this.page.whole(content.pair_count) });
+    byId("more").hidden = this.found.length <= this.rows;
+  }
+
+  row(i) {
+    const { page } = this;
+    const made = element("tr", { "data-pair": String(i) });
+    if (i === page.chosen) made.className = "chosen";
+    for (const [name, factor, digits] of this.columns) {
+      const values = page.pairs.column[name];
+      if (factor) {
+        made.append(element("td", { class: "number" }, page.number(factor * values[i], digits)));
+      } else if (name === "pair_id") {
+        const button = element("button", { type: "button" }, values[i]);
+        button.addEventListener("click", () => page.choose(i, true));
+        made.append(element("td", { class: "name" }, button));
+      } else if (name === "state") {
+        const state = page.content.states[page.stateCodes[i]];
+        made.append(element("td", { class: "state" }, element("span", {}, swatch(state), state.label)));
+      } else made.append(element("td", { class: "name" }, values.texts[values.codes[i]]));
+    }
+    return made;
+  }
+
+  mark() {
+    for (const row of document.querySelectorAll("#pairs tbody tr")) {
+      row.className = Number(row.dataset.pair) === this.page.chosen ? "chosen" : "";
+    }
+  }
+
+  csv() {
+    const { column } = this.page.pairs;
+    const names = Object.keys(column);
+    const lines = [names.join(",")];
+    for (const i of this.found) lines.push(names.map((name) => cellText(column[name], i)).join(","));
+    return `${lines.join("\r\n")}\r\n`;
+  }
+
+  download() {
+    const address = URL.createObjectURL(new Blob(["\ufeff", this.csv()], { type: "text/csv;charset=utf-8" }));
+    const link = element("a", { href: address, download: "pairs_filtered.csv" });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(address), 10000);
+  }
+}
+
+// A cell of the export: numbers as they are, texts quoted and never a formula of a spreadsheet
+function cellText(values, i) {
+  const value = values.codes ? values.texts[values.codes[i]] : values[i];
+  if (typeof value === "number") {
+    if (!Number.isFinite(value)) return Number.isNaN(value) ? "" : String(value).replace("Infinity", "inf");
+    return String(values instanceof Float32Array ? Number(value.toPrecision(4)) : value);
+  }
+  const safe = /^[\s]*[=+\-@\t\r]/.test(value) ? `'${value}` : value;
+  return /[",\r\n]/.test(safe) || safe !== value ? `"${safe.replaceAll('"', '""')}"` : safe;
+}
+
+// The mark of a state: its colour, and a bar that is the thicker the likelier
+function swatch(state) {
+  const picture = drawing("svg", { width: 18, height: 12, "aria-hidden": "true" });
+  const height = 2 + 2 * state.weight;
+  picture.append(drawing("rect", { x: 0.5, y: 6 - height / 2, width: 17, height, fill: state.colour, stroke: "#333" }));
+  return picture;
+}

@@ -1,0 +1,160 @@
+"use strict";
+// The page as a whole: reads its data, fills the first screen, makes map and list.
+
+class Page {
+  constructor(content) {
+    this.content = content;
+    [this.pairs, this.cells, this.buildings] = content.tables;
+    this.chosen = null;
+    this.shownStates = new Set(content.states.map((state) => state.name));
+    this.isShown = new Uint8Array(this.pairs.count).fill(1);
+    this.t = (key, values = {}) => {
+      const text = content.texts[key] === undefined ? key : content.texts[key];
+      return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
+    };
+    this.number = (value, digits) => {
+      if (!Number.isFinite(value)) return "–";
+      return value.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+    };
+    this.setStates();
+    this.setBuildings();
+  }
+
+  whole(value) { return this.number(value, 0); }
+
+  setStates() {
+    const { texts, codes } = this.pairs.column.state || { texts: [], codes: [] };
+    const number = texts.map((name) => {
+      const found = this.content.states.findIndex((state) => state.name === name);
+      return found < 0 ? this.content.states.length - 1 : found;
+    });
+    this.stateCodes = Uint8Array.from(codes, (code) => number[code]);
+  }
+
+  setBuildings() {
+    this.pairsOf = new Map();
+    for (const name of ["building_id_1", "building_id_2"]) {
+      (this.pairs.column[name] || []).forEach((building, i) => {
+        if (!building) return;
+        if (!this.pairsOf.has(building)) this.pairsOf.set(building, []);
+        this.pairsOf.get(building).push(i);
+      });
+    }
+    for (const pairs of this.pairsOf.values()) pairs.sort((a, b) => a - b);
+    this.outlines = (this.content.outlines || []).map(([name, ring]) => ({ ring, pairs: this.pairsOf.get(name) || [] }));
+    this.buildingRow = new Map();
+    const names = this.buildings.column.building_id || [];
+    names.forEach((name, i) => { if (!this.buildingRow.has(name)) this.buildingRow.set(name, i); });
+  }
+
+  // What is known of a building from its row of neighbours, as a sentence
+  buildingFacts(name) {
+    const i = this.buildingRow.get(name);
+    if (i === undefined) return "";
+    const { column } = this.buildings;
+    const text = (values) => (values ? values.texts[values.codes ? values.codes[i] : i] : "");
+    const said = [this.t("building_says", {
+      rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
+      hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.number(100 * column.probability_common[i], 0),
+    })];
+    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { value: this.whole(column.impacts[i]), velocity: this.number(100 * column.impact_velocity[i], 0) }));
+    const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
+    if (prevention) said.push(this.t("building_prevention", { value: prevention }));
+    return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
+  }
+
+  colourOf(pair) { return this.content.states[this.stateCodes[pair]].colour; }
+
+  shortText(pair) {
+    const { column } = this.pairs;
+    const state = this.content.states[this.stateCodes[pair]];
+    return `${column.pair_id[pair]}: ${state.label}, ${this.number(100 * column.expected_impact_velocity[pair], 0)} cm/s`;
+  }
+
+  choose(pair, focus = false) {
+    const before = this.chosen;
+    this.chosen = pair;
+    if (pair === null) {
+      this.details.hide();
+      const row = document.querySelector(`#pairs tr[data-pair="${before}"] button`);
+      if (row) row.focus();
+    } else {
+      this.details.show(pair, focus);
+      const { column } = this.pairs;
+      if (focus) this.map.show(column.longitude[pair], column.latitude[pair], 400);
+    }
+    this.list.mark();
+    this.map.later();
+  }
+
+  fillFirstScreen() {
+    const { content } = this;
+    for (const place of document.querySelectorAll("[data-text]")) place.textContent = this.t(place.dataset.text);
+    for (const place of document.querySelectorAll("[data-label]")) place.setAttribute("aria-label", this.t(place.dataset.label));
+    document.title = `${content.title} – per_obspy`;
+    byId("title").textContent = content.title;
+    byId("event").textContent = content.event;
+    byId("simulated").hidden = !content.simulated;
+    byId("simulated").textContent = this.t("simulated");
+    for (const [value, label] of content.numbers) {
+      byId("numbers").append(element("div", {}, element("dt", {}, label), element("dd", {}, value)));
+    }
+    for (const text of content.first) byId("todo").append(element("li", {}, text));
+    for (const text of content.sure) byId("sure").append(element("li", {}, text));
+    byId("map").setAttribute("aria-label", this.t("map_help"));
+    byId("cells").textContent = this.cells.count ? this.t("cells_note", { shown: this.whole(this.pairs.count), all: this.whole(content.pair_count) }) : "";
+    this.fillLegend();
+  }
+
+  fillLegend() {
+    const { states, state_counts: counts } = this.content;
+    const legend = byId("legend");
+    for (const state of states) {
+      if (counts[state.name]) legend.append(element("span", {}, swatch(state), `${state.label}: ${this.whole(counts[state.name])}`));
+    }
+    const station = drawing("svg", { width: 14, height: 12, "aria-hidden": "true" });
+    station.append(drawing("path", { d: "M7 1L13 11H1Z", fill: "none", stroke: "#222", "stroke-width": 1.3 }));
+    if (this.content.stations.places.length) legend.append(element("span", {}, station, this.t("station")));
+    if (this.content.epicentre) legend.append(element("span", {}, "☆ ", this.t("epicentre")));
+  }
+
+  fillRest() {
+    const { stations, areas, rejected, provenance } = this.content;
+    this.fillTable("stations", stations);
+    this.fillTable("areas", areas);
+    this.fillTable("rejected", rejected);
+    document.querySelector("#rejected p").textContent = rejected.note;
+    for (const [name, value] of provenance) {
+      document.querySelector("#provenance dl").append(element("dt", {}, name), element("dd", {}, value));
+    }
+  }
+
+  fillTable(name, { heads, rows }) {
+    const section = byId(name);
+    if (!rows.length) {
+      if (name !== "rejected") section.hidden = true;
+      return;
+    }
+    const head = element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)));
+    const body = rows.map((row) => element("tr", {}, ...row.map((cell) => (typeof cell === "number"
+      ? element("td", { class: "number" }, cell.toLocaleString(this.content.language, { maximumSignificantDigits: 4 }))
+      : element("td", { class: cell.length > 30 ? "text" : "name" }, cell)))));
+    section.querySelector("div").append(element("table", {}, element("thead", {}, head), element("tbody", {}, ...body)));
+  }
+}
+
+async function start() {
+  const page = new Page(await unpacked(byId("data").textContent));
+  page.fillFirstScreen();
+  page.list = new PairList(page);
+  page.details = new Details(page);
+  page.map = new PairMap(byId("map"), page);
+  performance.mark("drawn");
+  // What is further down can wait
+  setTimeout(() => { page.fillRest(); performance.mark("filled"); document.documentElement.dataset.ready = "yes"; });
+}
+
+start().catch((error) => {
+  byId("title").textContent = `This browser cannot show the report: ${error.message}`;
+  throw error;
+});

@@ -1,0 +1,232 @@
+"""Content of the page: everything that its script shows, as values of JSON and packed tables."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from per_obspy.errors import shortened
+from per_obspy.report.page.first_screen import Event, first_screen
+from per_obspy.report.page.packing import PackedTable, pack_table
+from per_obspy.report.page.tally import PairTally
+from per_obspy.report.page.texts import LANGUAGES, Language
+from per_obspy.report.style import BUILDING_COLOURS, STATE_COLOURS, UNKNOWN_COLOUR
+from per_obspy.screening.columns import FLAGS
+from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_STATE
+
+#: Columns of a pair on the page, and their kinds.
+PAIR_KINDS = {
+    "rank": "number", "pair_id": "text", "state": "choice", "risk_class": "choice",
+    "probability": "number", "expected_impact_velocity": "number", "impact_velocity_84": "number",
+    "expected_amplification": "number", "gap": "number", "demand": "number",
+    "demand_rule": "choice", "missing_gap": "number", "impacts": "number",
+    "impact_velocity_exact": "number", "amplification_exact_1": "number",
+    "amplification_exact_2": "number", "flags": "choice", "derived": "choice", "area": "choice",
+    "station": "choice", "distance": "number", "azimuth_used": "number",
+    "building_id_1": "text", "building_id_2": "text", "longitude": "place", "latitude": "place",
+    "longitude_1": "place", "latitude_1": "place", "longitude_2": "place", "latitude_2": "place",
+    "height_1": "number", "height_2": "number", "storeys_1": "number", "storeys_2": "number",
+    "period_1": "number", "period_2": "number", "damping_1": "number", "damping_2": "number",
+    "participation_1": "number", "participation_2": "number", "per_1": "number",
+    "per_2": "number", "sd_1": "number", "sd_2": "number", "period_log_std_1": "number",
+    "period_log_std_2": "number", "supplemental_damping": "number",
+    "bumper_restitution": "number",
+}  # fmt: skip
+
+#: Columns of a building on the page, and their kinds.
+BUILDING_KINDS = {
+    "rank": "number", "building_id": "text", "probability_common": "number",
+    "neighbours": "number", "neighbours_that_can_hit": "number", "impacts": "number",
+    "impact_velocity": "number", "position": "choice", "prevention": "choice",
+}  # fmt: skip
+
+#: Columns of the tables further down.
+STATION_COLUMNS = (
+    "station", "state", "pairs", "pga", "pgv", "per", "sd", "shortest_usable_period",
+    "longest_usable_period", "warnings",
+)  # fmt: skip
+AREA_COLUMNS = (
+    "area", "pairs", "yes", "likely", "possible", "expected_pounding", "worst_pair",
+    "worst_expected_impact_velocity",
+)  # fmt: skip
+REJECTED_COLUMNS = ("kind", "name", "source", "row", "reasons")
+
+#: Rows of the tables further down.
+MOST_ROWS = 500
+
+#: Longest text of a cell in them, characters.
+LONGEST_CELL = 300
+
+
+class PageData(NamedTuple):
+    """
+    Everything that a page is made of.
+
+    Attributes
+    ----------
+    title : str
+        Name of the run.
+    language : Language
+        Of its texts.
+    simulated : bool
+        Whether the motion is simulated.
+    event : Event
+        The earthquake.
+    tally : PairTally
+        Of all pairs.
+    worst : DataFrame
+        The worst pairs in their order, at most ``PAGE_PAIRS``.
+    stations, areas, rejected : DataFrame
+        Tables of the run; ``rejected`` is its beginning.
+    rejections : int
+        Rows of the whole table of rejections.
+    buildings : DataFrame or None
+        The worst buildings.
+    outlines : list of (str, list of float)
+        Buildings and their outlines: longitude and latitude by turns, degrees.
+    lines : mapping of str to list
+        ``coast`` and ``borders``, lines of longitude and latitude by turns.
+    histories : mapping of int to dict
+        Rank -> history of a pair for a drawing.
+    provenance : sequence of (str, str)
+        Where the results come from.
+    """
+
+    title: str
+    language: Language
+    simulated: bool
+    event: Event
+    tally: PairTally
+    worst: pd.DataFrame
+    stations: pd.DataFrame
+    areas: pd.DataFrame
+    rejected: pd.DataFrame
+    rejections: int
+    buildings: pd.DataFrame | None
+    outlines: Sequence[tuple[str, list[float]]]
+    lines: Mapping[str, list[list[float]]]
+    histories: Mapping[int, dict[str, Any]]
+    provenance: Sequence[tuple[str, str]]
+
+
+def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
+    """Return the content of the page, and its tables, whose descriptions the content holds."""
+    screen = first_screen(
+        data.event,
+        data.tally,
+        data.worst,
+        data.areas,
+        data.buildings,
+        (data.language, data.simulated),
+    )
+    texts = LANGUAGES[data.language]
+    tables = _tables(data)
+    content = {
+        "language": data.language,
+        "texts": {key: text for key, text in texts.items() if not key.startswith("flag_")},
+        "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
+        "title": shortened(data.title, LONGEST_CELL),
+        "simulated": data.simulated,
+        **screen._asdict(),
+        "states": _states(texts),
+        "state_counts": dict(data.tally.states),
+        "pair_count": data.tally.pairs,
+        "building_colours": BUILDING_COLOURS,
+        "cell_size": data.tally.cells.size,
+        "epicentre": list(data.event.place[:2]) if data.event.place else None,
+        **data.lines,
+        "outlines": [[shortened(name, LONGEST_CELL), ring] for name, ring in data.outlines],
+        "histories": {str(rank): history for rank, history in data.histories.items()},
+        "history_count": len(data.histories),
+        **_further_tables(data, texts),
+        "tables": [table.description for table in tables],
+    }
+    return content, tables
+
+
+def _tables(data: PageData) -> list[PackedTable]:
+    """Return pairs, cells and buildings."""
+    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(EVERY_STATE, "number")
+    buildings = pd.DataFrame() if data.buildings is None else data.buildings
+    return [
+        pack_table(data.worst, PAIR_KINDS),
+        pack_table(data.tally.cells.table(), cells),
+        pack_table(buildings, BUILDING_KINDS),
+    ]
+
+
+def _states(texts: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the states, the worst first, with label, colour and weight of their marks."""
+    colours = {**STATE_COLOURS, UNKNOWN_STATE: UNKNOWN_COLOUR}
+    weights = {name: weight for weight, name in enumerate(reversed(tuple(STATE_COLOURS)))}
+    return [
+        {
+            "name": name,
+            "label": texts[f"state_{name}"],
+            "colour": colours[name],
+            "weight": weights.get(name, 1),
+        }
+        for name in EVERY_STATE
+    ]
+
+
+def _further_tables(data: PageData, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return stations, areas, rejections and provenance."""
+    stations = data.stations.copy()
+    places = _station_places(stations)
+    if "state" in stations:
+        named = {name: texts[f"station_{name}"] for name in ("used", "rejected")}
+        stations["state"] = stations["state"].map(named).fillna("")
+    if {"warnings", "rejected"} <= set(stations):
+        both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
+        stations["warnings"] = both.str.strip()
+    areas = data.areas
+    if "expected_pounding" in areas:
+        areas = areas.sort_values("expected_pounding", ascending=False)
+    note = texts["rejected_none"]
+    if data.rejections:
+        shown = min(data.rejections, MOST_ROWS)
+        note = texts["rejected_some"].format(shown=shown, all=data.rejections)
+    return {
+        "stations": {**_rows(stations, STATION_COLUMNS, texts), "places": places},
+        "areas": _rows(areas, AREA_COLUMNS, texts),
+        "rejected": {**_rows(data.rejected, REJECTED_COLUMNS, texts), "note": note},
+        "provenance": [[name, shortened(value, LONGEST_CELL)] for name, value in data.provenance],
+    }
+
+
+def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
+    """Return name, longitude, latitude of every station with a place, and whether it is used."""
+    if not {"longitude", "latitude"} <= set(stations):
+        return []
+    placed = stations[stations["longitude"].notna() & stations["latitude"].notna()]
+    return [
+        [
+            shortened(str(row["station"]), 24),
+            float(row["longitude"]),
+            float(row["latitude"]),
+            row["state"] == "used",
+        ]
+        for _, row in placed.iterrows()
+    ]
+
+
+def _rows(table: pd.DataFrame, columns: Sequence[str], texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return heads and rows of the columns that a table has."""
+    present = [name for name in columns if name in table]
+    rows = [
+        [_cell(value) for value in row]
+        for row in table[present].head(MOST_ROWS).itertuples(index=False)
+    ]
+    return {"heads": [texts[f"head_{name}"] for name in present], "rows": rows}
+
+
+def _cell(value: Any) -> str | float:
+    """Return a value of a table as JSON holds it; missing ones are empty."""
+    if value is None or value is pd.NA:
+        return ""
+    if isinstance(value, str):
+        return shortened(value, LONGEST_CELL)
+    number = float(value)
+    return number if math.isfinite(number) else ""

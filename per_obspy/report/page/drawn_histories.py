@@ -1,0 +1,102 @@
+"""Pounding histories of single pairs, thinned for a drawing."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from per_obspy.checks import FloatArray
+from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
+from per_obspy.pounding.structure import Structure
+from per_obspy.report.figures import motion_along
+
+#: Intervals of time in a drawing, each with the smallest and the largest displacement in it.
+INTERVALS = 300
+
+#: Impacts that are drawn, the fastest ones.
+MOST_IMPACTS = 300
+
+#: Longest record of which a history is drawn, samples: longer ones take too long.
+MOST_SAMPLES = 200_000
+
+
+def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:
+    """
+    Return the exact history of a pair at contact level for a drawing, None where there is none.
+
+    Parameters
+    ----------
+    station : Dataset
+        With the acceleration of the record that the pair used.
+    pair : Series
+        Row of the risk table.
+
+    Returns
+    -------
+    dict or None
+        ``time`` (s, of the drawn intervals), ``one`` and ``two`` (displacements as smallest and
+        largest per interval, mm), ``impacts`` (time in s and approach velocity in m/s).
+    """
+    azimuth, gap = float(pair["azimuth_used"]), float(pair["gap"])
+    if not math.isfinite(gap) or station.sizes["time"] > MOST_SAMPLES:
+        return None
+    motion = motion_along(station, azimuth)
+    try:
+        structures = [_structure(pair, 1), _structure(pair, 2)]
+        history = pounding_history(
+            motion,
+            float(station["sampling_interval"]),
+            structures,
+            gap,
+            float(pair["restitution"]),
+            free_vibration=False,
+        )
+    except ValueError:
+        # A structure outside the range of the exact history has none
+        return None
+    return _thinned(history)
+
+
+def _structure(pair: pd.Series, number: int) -> Structure:
+    """Return a building of the pair as an oscillator at contact level."""
+    share = float(pair[f"participation_{number}"])
+    limit = float(pair.get(f"yield_displacement_{number}", math.inf))
+    return Structure(
+        period=float(pair[f"period_{number}"]),
+        damping=float(pair[f"damping_{number}"]),
+        mass=float(pair[f"contact_mass_{number}"]),
+        yield_displacement=share * limit if math.isfinite(limit) else math.inf,
+        hardening=float(pair.get(f"hardening_{number}", 0.0)) if math.isfinite(limit) else 0.0,
+        participation=share,
+    )
+
+
+def _thinned(history: PoundingHistory) -> dict[str, Any]:
+    """Return the part of a history with strong motion as few numbers."""
+    strength = np.cumsum((history.displacement**2).sum(axis=0))
+    if strength[-1] == 0:
+        first, last = 0, history.time.size - 1
+    else:
+        first, last = np.searchsorted(strength, np.array([0.002, 0.995]) * strength[-1])
+    edges = np.unique(np.linspace(first, last, INTERVALS + 1).astype(int))
+    impacts = history.impacts[history.impacts["counted"].to_numpy(dtype=bool)]
+    speed = impacts["velocity_before_1"] - impacts["velocity_before_2"]
+    fastest = speed.sort_values(ascending=False).index[:MOST_IMPACTS]
+    return {
+        "time": [round(float(time), 3) for time in history.time[edges]],
+        "one": _envelope(history.displacement[0], edges),
+        "two": _envelope(history.displacement[1], edges),
+        "impacts": [
+            [round(float(impacts["time"][i]), 3), round(float(speed[i]), 3)] for i in fastest
+        ],
+    }
+
+
+def _envelope(displacement: FloatArray, edges: Any) -> list[float]:
+    """Return the smallest and the largest displacement between edges, mm."""
+    values = 1000.0 * displacement[: edges[-1] + 1]
+    smallest = np.minimum.reduceat(values, edges[:-1])
+    largest = np.maximum.reduceat(values, edges[:-1])
+    return [round(float(value), 1) for pair in zip(smallest, largest, strict=True) for value in pair]

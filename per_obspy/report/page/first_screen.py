@@ -1,0 +1,205 @@
+"""Sentences and numbers of the first screen: event, five numbers, first actions, doubts."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pandas as pd
+
+from per_obspy.errors import shortened
+from per_obspy.report.page.tally import PairTally
+from per_obspy.report.page.texts import LANGUAGES, Language, written
+
+#: Names in a sentence.
+NAMED = 5
+
+#: Longest name in a sentence, characters.
+LONGEST_NAME = 40
+
+#: Flags that are counted on the first screen, with the keys of their sentences.
+DOUBTS = {
+    "derived_inputs": "sure_derived",
+    "outside_usable_periods": "sure_periods",
+    "far_station": "sure_far",
+    "record_from_other_site_class": "sure_station_class",
+    "record_warning": "sure_record",
+    "shakemap_demand": "sure_map",
+}
+
+
+class Event(NamedTuple):
+    """
+    Facts of the earthquake, as far as the records know them.
+
+    Attributes
+    ----------
+    start : str
+        First sample of the first record, UTC; empty if unknown.
+    place : tuple of float or None
+        Longitude and latitude of the hypocentre, degrees, and its depth, m.
+    used, missing : int
+        Stations that serve pairs and those that do not.
+    """
+
+    start: str
+    place: tuple[float, float, float] | None
+    used: int
+    missing: int
+
+
+class FirstScreen(NamedTuple):
+    """
+    Everything of the first screen, in one language.
+
+    Attributes
+    ----------
+    event : str
+        One line.
+    numbers : list of (str, str)
+        Value and meaning.
+    first, sure : list of str
+        Sentences: what to do first, and how sure the result is.
+    """
+
+    event: str
+    numbers: list[tuple[str, str]]
+    first: list[str]
+    sure: list[str]
+
+
+def first_screen(
+    event: Event,
+    tally: PairTally,
+    worst: pd.DataFrame,
+    areas: pd.DataFrame,
+    buildings: pd.DataFrame | None,
+    facts: tuple[Language, bool],
+) -> FirstScreen:
+    """
+    Write the first screen.
+
+    Parameters
+    ----------
+    event : Event
+        The earthquake.
+    tally : PairTally
+        Of all pairs.
+    worst : DataFrame
+        The worst pairs in their order.
+    areas : DataFrame
+        Totals by area.
+    buildings : DataFrame or None
+        Buildings, the worst first, if the run has them.
+    facts : (Language, bool)
+        Language, and whether the motion is simulated.
+    """
+    language, simulated = facts
+    return FirstScreen(
+        _event_line(event, language),
+        _numbers(tally, worst, buildings, language),
+        _first(tally, worst, areas, buildings, facts),
+        _sure(tally, areas, language) if tally.pairs else [],
+    )
+
+
+def _event_line(event: Event, language: Language) -> str:
+    """Return time, place and stations in one line."""
+    texts, parts = LANGUAGES[language], list[str]()
+    if event.start:
+        parts.append(texts["event_time"].format(time=event.start))
+    if event.place is not None:
+        longitude, latitude, depth = event.place
+        place = {"latitude": written(latitude, 2, language)}
+        parts.append(
+            texts["event_place"].format(longitude=written(longitude, 2, language), **place)
+        )
+        if math.isfinite(depth):
+            kilometres = written(depth / 1000.0, 0, language)
+            parts.append(texts["event_depth"].format(value=kilometres))
+    parts.append(texts["event_stations"].format(used=event.used, missing=event.missing))
+    return ", ".join(parts) + "."
+
+
+def _numbers(
+    tally: PairTally, worst: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
+) -> list[tuple[str, str]]:
+    """Return the five numbers: pairs, pounding, expected or buildings, worst class, velocity."""
+    texts = LANGUAGES[language]
+
+    def count(value: float) -> str:
+        return written(value, 0, language)
+
+    sure = tally.states["yes"] + tally.states["likely"]
+    numbers = [(count(tally.pairs), texts["number_pairs"]), (count(sure), texts["number_pounding"])]
+    if buildings is not None and "neighbours_that_can_hit" in buildings:
+        hit = int((buildings["neighbours_that_can_hit"] > 0).sum())
+        numbers.append((count(hit), texts["number_buildings"]))
+    else:
+        numbers.append((count(tally.expected), texts["number_expected"]))
+    # The class of the worst pair is the worst that occurs
+    if "risk_class" in worst and len(worst):
+        name = str(worst["risk_class"].iloc[0])
+        numbers.append((count(tally.classes[name]), texts["number_severe"].format(name=name)))
+    fastest = worst["expected_impact_velocity"].max() if len(worst) else math.nan
+    if math.isfinite(fastest):
+        value = f"{written(100.0 * fastest, 0, language)} cm/s"
+        numbers.append((value, texts["number_velocity"]))
+    return numbers
+
+
+def _first(
+    tally: PairTally,
+    worst: pd.DataFrame,
+    areas: pd.DataFrame,
+    buildings: pd.DataFrame | None,
+    facts: tuple[Language, bool],
+) -> list[str]:
+    """Return sentences on what to do first."""
+    language, simulated = facts
+    texts, said = LANGUAGES[language], list[str]()
+    if simulated:
+        said.append(texts["todo_exercise"])
+    hit = worst[worst["state"].isin(("yes", "likely"))] if "state" in worst else worst
+    if len(hit) == 0:
+        said.append(texts["todo_none"])
+    elif buildings is not None and len(buildings):
+        said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
+    else:
+        said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
+    if len(areas) > 1 and "expected_pounding" in areas and len(hit):
+        most = areas.sort_values("expected_pounding", ascending=False)["area"]
+        said.append(texts["todo_areas"].format(names=_names(most[:3])))
+    for state in ("unknown", "possible"):
+        if tally.states[state]:
+            value = written(tally.states[state], 0, language)
+            said.append(texts[f"todo_{state}"].format(count=value))
+    return said
+
+
+def _sure(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str]:
+    """Return sentences on what is uncertain."""
+    texts, said = LANGUAGES[language], list[str]()
+    limits = ("expected_pounding_std_independent", "expected_pounding_std_common")
+    if len(areas) and set(limits) <= set(areas):
+        # Areas are independent of each other, or else of one cause
+        low = float((areas[limits[0]].fillna(0.0) ** 2).sum() ** 0.5)
+        high = float(areas[limits[1]].fillna(0.0).sum())
+        spread = {"low": written(low, 0, language), "high": written(high, 0, language)}
+        mean = written(tally.expected, 0, language)
+        said.append(texts["sure_expected"].format(mean=mean, **spread))
+    whole = written(tally.pairs, 0, language)
+    for flag, key in DOUBTS.items():
+        if tally.flags[flag]:
+            value = written(tally.flags[flag], 0, language)
+            said.append(texts[key].format(count=value, all=whole))
+    distance = tally.median_distance()
+    if math.isfinite(distance):
+        value = written(distance / 1000.0, 1, language)
+        said.append(texts["sure_distance"].format(value=value))
+    said.append(texts["sure_nature"])
+    return said
+
+
+def _names(names: Sequence[object] | pd.Series) -> str:
+    """Return the first names in one text, long ones cut."""
+    return ", ".join(shortened(str(name), LONGEST_NAME) for name in list(names)[:NAMED])

@@ -1,0 +1,138 @@
+"""Columns of a table as few bytes that a browser reads at once."""
+
+import json
+import zlib
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.errors import shortened
+
+#: Bits of the fraction of a number that are stored: four digits, which is more than any is known.
+FRACTION_BITS = 13
+
+#: Coordinates are whole millionths of a degree, 0.1 m; the smallest whole number means unknown.
+PLACES_PER_DEGREE = 1e6
+UNKNOWN_PLACE = np.iinfo(np.int32).min
+
+#: Longest name on the page, characters: an inventory may have identifiers of any length.
+LONGEST_TEXT = 120
+
+#: Largest number of different texts that are stored once each, with a number per row.
+MOST_CHOICES = 65_536
+
+
+class PackedTable(NamedTuple):
+    """
+    Columns of a table as bytes.
+
+    Attributes
+    ----------
+    description : dict
+        Number of rows, and name, kind and texts of each column.
+    data : bytes
+        The columns one after the other.
+    """
+
+    description: dict[str, Any]
+    data: bytes
+
+
+def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
+    """
+    Pack columns of a table; those that it lacks are left out.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Its rows keep their order.
+    kinds : mapping of str to str
+        Column -> ``number``, ``place`` (degrees), ``choice`` (few different texts) or ``text``.
+    """
+    columns, pieces = list[dict[str, Any]](), list[bytes]()
+    for name, kind in kinds.items():
+        if name not in table:
+            continue
+        described, data = _PACKERS[kind](table[name])
+        columns.append({"name": name, "kind": kind, **described})
+        pieces.append(data)
+    return PackedTable({"count": len(table), "columns": columns}, b"".join(pieces))
+
+
+def _numbers(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return numbers in single precision, their fractions rounded."""
+    numbers = column.to_numpy(dtype=np.float32, na_value=np.nan)
+    return {}, _planes(rounded(numbers))
+
+
+def rounded(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
+    """
+    Round the fractions of numbers to ``FRACTION_BITS``, so that they take few bytes deflated.
+
+    Examples
+    --------
+    >>> rounded(np.array([0.1, np.inf], dtype=np.float32)).tolist()
+    [0.0999908447265625, inf]
+    """
+    with np.errstate(invalid="ignore"):
+        fraction, exponent = np.frexp(numbers)
+        scale = np.float32(2.0 ** (FRACTION_BITS + 1))
+        return np.ldexp(np.rint(fraction * scale) / scale, exponent).astype(np.float32)
+
+
+def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return degrees as whole numbers."""
+    degrees = column.to_numpy(dtype=np.float64, na_value=np.nan)
+    known = np.isfinite(degrees)
+    whole = np.rint(np.where(known, degrees, 0.0) * PLACES_PER_DEGREE).astype(np.int32)
+    return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
+
+
+def _choices(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return the different texts, and the number of each row's text."""
+    codes, texts = pd.factorize(column.fillna("").astype(str))
+    if len(texts) > MOST_CHOICES:
+        raise ValueError(f"{column.name}: {len(texts)} different texts are no choice")
+    return {"texts": _short(texts)}, codes.astype("<u2").tobytes()
+
+
+def _texts(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return every text; they are part of the description."""
+    return {"texts": _short(column.fillna("").astype(str))}, b""
+
+
+def _short(texts: Any) -> list[str]:
+    """Return texts without control characters, cut where they are long."""
+    return [shortened(str(text), LONGEST_TEXT) for text in texts]
+
+
+def _planes(values: NDArray[Any]) -> bytes:
+    """Return four-byte numbers as four planes of bytes, which deflate better."""
+    little = values.astype(values.dtype.newbyteorder("<"), copy=False)
+    return little.view(np.uint8).reshape(-1, 4).T.tobytes()
+
+
+_PACKERS = {"number": _numbers, "place": _places, "choice": _choices, "text": _texts}
+
+
+def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
+    """
+    Return content and tables as one deflated text of letters, digits, ``+``, ``/`` and ``=``.
+
+    Nothing in it can be taken for markup. Its bytes are the length of a JSON text (four bytes,
+    little endian), the JSON text, and the data of the tables.
+
+    Parameters
+    ----------
+    content : mapping
+        Whatever JSON can hold; without numbers that are not finite.
+    tables : sequence of PackedTable
+        Their descriptions are part of the content already, in this order.
+    """
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
+    data = b"".join([len(text).to_bytes(4, "little"), text, *(table.data for table in tables)])
+    return b64encode(zlib.compress(data, 9)).decode("ascii")

@@ -1,0 +1,247 @@
+"""Texts of the page in Spanish, by the keys of the English ones."""
+
+SPANISH: dict[str, str] = {
+    "simulated": "Movimiento SIMULADO: un ejercicio, no un sismo ocurrido.",
+    "skip": "a la tabla de pares",
+    "summary": "resumen",
+    "do_first": "Qué hacer primero",
+    "how_sure": "Qué tan seguro es",
+    "number_pairs": "pares evaluados",
+    "number_pounding": "chocan, con seguridad o probablemente",
+    "number_expected": "choques esperados",
+    "number_severe": "en la peor clase, {name}",
+    "number_velocity": "impacto esperado más rápido",
+    "number_buildings": "edificios que un vecino puede golpear",
+    "event_time": "Los registros empiezan {time} UTC",
+    "event_place": "epicentro {latitude}°, {longitude}°",
+    "event_depth": "profundidad {value} km",
+    "event_stations": "{used} estaciones usadas, {missing} no utilizables",
+    "todo_exercise": "No envíe a nadie: el movimiento es simulado.",
+    "todo_worst": "Inspeccione primero los pares con los impactos más rápidos: {names}.",
+    "todo_buildings": "Inspeccione primero estos edificios: {names}.",
+    "todo_areas": "Empiece en las zonas con más choques esperados: {names}.",
+    "todo_unknown": "Mida {count} separaciones desconocidas: sin ellas no hay veredicto.",
+    "todo_possible": "Después revise los {count} pares con choque posible pero no probable.",
+    "todo_none": "Ningún par chocó probablemente; revise los posibles.",
+    "sure_expected": (
+        "Se esperan {mean} pares con choque; la desviación estándar está entre {low} (pares "
+        "independientes) y {high} (una sola causa)."
+    ),
+    "sure_derived": "{count} de {all} pares tienen datos derivados, no medidos.",
+    "sure_far": "{count} pares usan una estación lejana.",
+    "sure_periods": "{count} pares tienen un período fuera de los utilizables de su registro.",
+    "sure_station_class": "{count} pares usan el registro de otra clase de sitio.",
+    "sure_record": "{count} pares usan un registro con advertencia: vea las estaciones.",
+    "sure_map": "{count} pares no tienen estación cercana: un ShakeMap da su demanda.",
+    "sure_distance": "Los registros están a {value} km de los pares (mediana).",
+    "sure_nature": "Dos osciladores representan cada par; no se calcula el daño de los edificios.",
+    "map": "Mapa de los pares",
+    "map_help": (
+        "Mapa de los pares. Las flechas lo mueven, más y menos lo amplían y reducen, Inicio "
+        "muestra todo. La tabla de abajo contiene los mismos pares."
+    ),
+    "nearer": "ampliar",
+    "further": "reducir",
+    "whole": "mostrar todo",
+    "station": "estación",
+    "epicentre": "epicentro",
+    "cells_note": (
+        "Los {shown} peores de {all} pares se dibujan uno por uno; los demás se cuentan en "
+        "celdas, con el color del estado más probable en ellas."
+    ),
+    "pairs": "Pares, los peores primero",
+    "state": "choque",
+    "any": "todas",
+    "least_probability": "probabilidad desde, %",
+    "least_velocity": "impacto desde, cm/s",
+    "area": "zona",
+    "flag": "marca",
+    "search": "buscar",
+    "search_hint": "identificador, o latitud, longitud",
+    "count": "{found} de {shown} pares de esta página ({all} evaluados)",
+    "export": "exportar como CSV",
+    "clear": "quitar filtros",
+    "more": "más filas",
+    "column_rank": "rango",
+    "column_pair_id": "par",
+    "column_state": "choque",
+    "column_probability": "probabilidad, %",
+    "column_expected_impact_velocity": "impacto, cm/s",
+    "column_gap": "separación, cm",
+    "column_demand": "necesaria, cm",
+    "column_missing_gap": "falta, cm",
+    "column_expected_amplification": "amplificación",
+    "column_station": "estación",
+    "state_yes": "seguro",
+    "state_likely": "probable",
+    "state_possible": "posible",
+    "state_unlikely": "improbable",
+    "state_no": "no",
+    "state_unknown": "separación desconocida",
+    "pair": "Par",
+    "building": "Edificio",
+    "close": "cerrar",
+    "says_probability": "La probabilidad de choque en este evento es {value} %.",
+    "says_velocity": (
+        "Se espera que los edificios se encuentren a {value} cm/s; en 84 de 100 casos a lo sumo a "
+        "{high} cm/s."
+    ),
+    "says_touching": "Los edificios se tocan: la separación es 0 cm.",
+    "says_gap": "La separación es {value} cm.",
+    "says_no_gap": "La separación es desconocida.",
+    "says_demand": "La separación necesaria es {value} cm ({rule}).",
+    "says_impacts": "La historia exacta tiene {value} impactos, el más rápido a {velocity} cm/s.",
+    "says_amplification": "El choque multiplica el movimiento de uno de ellos por {value}.",
+    "says_station": "Registro de la estación {station}, a {value} km.",
+    "rule_exact": "exacta para el registro",
+    "rule_per_white_noise": "estimada con PER",
+    "rule_per_record": "estimada con PER y la correlación del registro",
+    "rule_linearized": "estimada para edificios que fluyen",
+    "rule_srss": "SRSS, porque un período es derivado",
+    "rule_shakemap": "de un ShakeMap",
+    "both_buildings": "Ambos edificios",
+    "fact_building_id": "edificio",
+    "fact_height": "altura, m",
+    "fact_storeys": "pisos",
+    "fact_period": "período, s",
+    "fact_damping": "amortiguamiento, %",
+    "fact_participation": "participación a la altura de contacto",
+    "fact_per": "PER, cm",
+    "fact_sd": "SD, cm",
+    "fact_amplification_exact": "movimiento con / sin choque",
+    "circles_gap": "Círculos de energía con la separación que hay, {value} cm",
+    "circles_needed": "Círculos de energía con la separación necesaria, {value} cm",
+    "history": "Desplazamientos en el tiempo, cm, y {value} impactos",
+    "history_note": (
+        "Edificio 1 continuo, edificio 2 a trazos y a una separación de distancia; barras abajo: "
+        "impactos, más altas cuanto más rápidos. Sigue el registro; tras unos diez impactos dos "
+        "programas correctos pueden diferir."
+    ),
+    "no_history": (
+        "Se dibujan historias de los {value} peores pares con separación conocida y registro."
+    ),
+    "prevention": "Qué lo habría evitado",
+    "prevents_gap": "{value} cm más de separación, {whole} cm en total.",
+    "prevents_damping": "{value} % del amortiguamiento crítico añadido a ambos edificios.",
+    "prevents_no_damping": "Solo amortiguamiento no basta: 40 % del crítico es muy poco.",
+    "prevents_bumper": (
+        "Topes no lo evitan pero lo suavizan: restitución a lo sumo {value} (estimación)."
+    ),
+    "prevents_nothing": "En este evento no hace falta nada.",
+    "flags": "Marcas",
+    "derived": "Datos derivados",
+    "derived_spread": (
+        "Los períodos derivados son inciertos: sus desviaciones estándar logarítmicas son "
+        "{first} % y {second} %, y la probabilidad las incluye."
+    ),
+    "derived_fixed": "Su incertidumbre no es parte de la probabilidad.",
+    "other_pairs": "Sus otros pares:",
+    "building_says": (
+        "Rango {rank} de los edificios; {hit} de sus {neighbours} vecinos pueden golpearlo, con "
+        "una probabilidad de al menos {probability} % de que uno lo haga."
+    ),
+    "building_impacts": "En su fila recibe {value} golpes, de hasta {velocity} cm/s.",
+    "building_prevention": "Prevención (en inglés): {value}.",
+    "position_inside": "dentro de su fila",
+    "position_end": "extremo de su fila",
+    "position_corner": "esquina de dos filas",
+    "position_single": "un solo par",
+    "stations": "Estaciones",
+    "areas": "Zonas",
+    "rejected": "Rechazado, con razones",
+    "rejected_none": "No se rechazó nada.",
+    "rejected_some": "{shown} de {all} rechazos; todos están en rejected.csv.",
+    "provenance": "De dónde viene esto",
+    "head_station": "estación",
+    "head_state": "estado",
+    "head_pairs": "pares",
+    "head_shortest_usable_period": "utilizable desde, s",
+    "head_longest_usable_period": "hasta, s",
+    "head_warnings": "advertencias y razones",
+    "head_area": "zona",
+    "head_yes": "seguro",
+    "head_likely": "probable",
+    "head_possible": "posible",
+    "head_expected_pounding": "esperados",
+    "head_worst_pair": "peor par",
+    "head_worst_expected_impact_velocity": "su impacto, m/s",
+    "head_kind": "tipo",
+    "head_name": "nombre",
+    "head_source": "fuente",
+    "head_row": "fila",
+    "head_reasons": "razones",
+    "made": "hecho",
+    "made_with": "hecho con",
+    "files": "archivos junto a esta página",
+    "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (entradas con sus huellas)",
+    "configuration": "configuración",
+    "station_used": "usada",
+    "station_rejected": "rechazada",
+    "flag_unknown_gap": (
+        "la tabla no da separación: la demanda es la separación necesaria; probabilidad, estado e "
+        "impactos están vacíos o son los de la separación que supone la configuración"
+    ),
+    "flag_touching": "separación 0: el golpe único está fuera de su rango confiable",
+    "flag_single_hit_unreliable": (
+        "separación menor que 0.6 de la demanda: probablemente varios impactos, el golpe único "
+        "puede quedar corto"
+    ),
+    "flag_outside_usable_periods": (
+        "el período de un edificio está fuera de los períodos utilizables del registro"
+    ),
+    "flag_per_far_above_sd": (
+        "PER/SD sobre el límite configurado: una separación según PER es demasiado grande"
+    ),
+    "flag_far_station": "la estación está más lejos que la distancia configurada para esta marca",
+    "flag_one_horizontal": (
+        "la estación tiene una horizontal: se usa su azimut, cualquiera que sea el del par"
+    ),
+    "flag_derived_inputs": "la fila tiene datos derivados, nombrados en la columna derived",
+    "flag_derived_period": (
+        "un período es derivado: la demanda es al menos SRSS; estado y rango vienen de remuestreo"
+    ),
+    "flag_linearized_not_converged": (
+        "no se halló ductilidad hasta 40: la demanda linealizada es la de 40, a menudo excesiva"
+    ),
+    "flag_no_damping_suffices": (
+        "choca, y ningún amortiguamiento añadido hasta 0.4 del crítico mantiene separados los "
+        "edificios"
+    ),
+    "flag_no_bumper_suffices": (
+        "choca, y ninguna restitución mantiene el golpe único dentro de target_amplification"
+    ),
+    "flag_no_demand": (
+        "la demanda es 0 (los osciladores se mueven como uno o no se mueven): no hay razón de "
+        "demanda"
+    ),
+    "flag_floor_to_column": "las losas no coinciden: fuera del método",
+    "flag_record_from_other_site_class": (
+        "ninguna estación de la clase de sitio del par está al alcance: sirve la más cercana de "
+        "otra"
+    ),
+    "flag_motion_from_other_site_class": (
+        "ninguna estación de la clase del sitio dio su movimiento: sirvieron las de otras clases"
+    ),
+    "flag_shakemap_demand": (
+        "ninguna estación al alcance: demanda del SD de un ShakeMap, sin PER, registro ni historia "
+        "exacta"
+    ),
+    "flag_shakemap_assumed_deviation": (
+        "el ShakeMap no da desviación: se supone la configurada"
+    ),
+    "flag_baseline_shift": (
+        "la línea base del registro se desplazó durante el sismo: los períodos largos son dudosos"
+    ),
+    "flag_second_event": "el registro contiene otro evento: su demanda puede ser la de ambos",
+    "flag_assumed_corners": (
+        "una frecuencia de corte del registro es supuesta: ni el ruido ni el encabezado la dan"
+    ),
+    "flag_digitised": (
+        "el registro fue digitalizado de película: períodos cortos y largos menos ciertos"
+    ),
+    "flag_undated": "se desconoce la hora del registro: puede ser de otro sismo",
+    "flag_record_warning": (
+        "el registro falló otra revisión que solo advierte: vea stations.csv"
+    ),
+    "flag_simulated": "el movimiento del suelo es simulado",
+}

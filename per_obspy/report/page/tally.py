@@ -1,0 +1,63 @@
+"""Everything that the page says of all pairs, counted while the risk table is read in pieces."""
+
+from collections import Counter
+
+import numpy as np
+import pandas as pd
+
+from per_obspy.report.page.cells import CellCounts
+from per_obspy.screening.ranking import EVERY_STATE
+
+#: Pairs that the page holds one by one, the worst; the others are counted in cells.
+PAGE_PAIRS = 20_000
+
+#: Columns of the risk table that are counted; a table may lack some.
+COUNTED = (
+    "rank", "state", "risk_class", "probability", "flags", "distance", "longitude", "latitude",
+)  # fmt: skip
+
+
+class PairTally:
+    """
+    Counts of pairs by state, class and flag, and of those beyond the worst by cell.
+
+    A class, because the pieces of a table arrive one by one.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a pair."""
+        self.pairs = 0
+        self.expected = 0.0
+        self.states: Counter[str] = Counter()
+        self.classes: Counter[str] = Counter()
+        self.flags: Counter[str] = Counter()
+        self.cells = CellCounts(EVERY_STATE)
+        self._distances: list[np.ndarray] = []
+
+    def add(self, piece: pd.DataFrame) -> None:
+        """Count a piece of the risk table, of which the worst pairs come first."""
+        before, self.pairs = self.pairs, self.pairs + len(piece)
+        self.states.update(_counts(piece, "state"))
+        self.classes.update(_counts(piece, "risk_class"))
+        for names, count in _counts(piece, "flags").items():
+            self.flags.update(dict.fromkeys(names.split(), count))
+        if "probability" in piece:
+            self.expected += float(np.nansum(piece["probability"]))
+        if "distance" in piece:
+            self._distances.append(piece["distance"].to_numpy(dtype=np.float32))
+        others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
+        if len(others) and "state" in piece:
+            self.cells.add(others)
+
+    def median_distance(self) -> float:
+        """Return the median distance between pair and station, m; NaN if no pair has one."""
+        known = [values[np.isfinite(values)] for values in self._distances]
+        joined = np.concatenate(known) if known else np.empty(0)
+        return float(np.median(joined)) if joined.size else float("nan")
+
+
+def _counts(piece: pd.DataFrame, column: str) -> dict[str, int]:
+    """Return how often each text occurs in a column, nothing if the table lacks it."""
+    if column not in piece:
+        return {}
+    return {str(text): int(count) for text, count in piece[column].value_counts().items()}

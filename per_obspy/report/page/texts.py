@@ -1,0 +1,212 @@
+"""Texts of the page in English, and the choice of a language; numbers are written by it too."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from per_obspy.report.page.spanish import SPANISH
+from per_obspy.screening.columns import FLAGS
+
+Language = Literal["en", "es"]
+
+ENGLISH: dict[str, str] = {
+    # First screen
+    "simulated": "SIMULATED ground motion: an exercise, not an earthquake that happened.",
+    "skip": "to the table of pairs",
+    "summary": "summary",
+    "do_first": "What to do first",
+    "how_sure": "How sure this is",
+    "number_pairs": "pairs screened",
+    "number_pounding": "hit each other, surely or likely",
+    "number_expected": "expected to hit each other",
+    "number_severe": "in the worst class, {name}",
+    "number_velocity": "fastest expected impact",
+    "number_buildings": "buildings that a neighbour can hit",
+    "event_time": "Records start {time} UTC",
+    "event_place": "epicentre {latitude}°, {longitude}°",
+    "event_depth": "depth {value} km",
+    "event_stations": "{used} stations used, {missing} not usable",
+    "todo_exercise": "Send nobody: the motion is simulated.",
+    "todo_worst": "Inspect the pairs of the fastest impacts first: {names}.",
+    "todo_buildings": "Inspect these buildings first: {names}.",
+    "todo_areas": "Begin in the areas with most expected pounding: {names}.",
+    "todo_unknown": "Measure {count} gaps that are unknown: there is no verdict without them.",
+    "todo_possible": "Then look at the {count} pairs for which pounding is possible but not likely.",
+    "todo_none": "No pair is likely to have hit its neighbour; check the possible ones.",
+    "sure_expected": (
+        "{mean} pairs are expected to pound; the standard deviation lies between {low} "
+        "(independent pairs) and {high} (one cause for all)."
+    ),
+    "sure_derived": "{count} of {all} pairs have inputs that are derived, not measured.",
+    "sure_far": "{count} pairs use a station that is far away.",
+    "sure_periods": "{count} pairs have a period outside the usable periods of their record.",
+    "sure_station_class": "{count} pairs use the record of another site class.",
+    "sure_record": "{count} pairs use a record with a warning: see the stations.",
+    "sure_map": "{count} pairs have no station in reach: a ShakeMap gives their demand.",
+    "sure_distance": "The records lie {value} km from the pairs, as the median.",
+    "sure_nature": (
+        "Two oscillators stand for each pair; damage of the buildings is not computed."
+    ),
+    # Map
+    "map": "Map of the pairs",
+    "map_help": (
+        "Map of the pairs. Arrow keys move it, plus and minus enlarge and reduce it, Home shows "
+        "all. The table below holds the same pairs."
+    ),
+    "nearer": "enlarge",
+    "further": "reduce",
+    "whole": "show all",
+    "station": "station",
+    "epicentre": "epicentre",
+    "cells_note": (
+        "The worst {shown} of {all} pairs are drawn one by one; the others are counted in cells, "
+        "in the colour of the likeliest state in them."
+    ),
+    # Filters and table
+    "pairs": "Pairs, the worst first",
+    "state": "pounding",
+    "any": "any",
+    "least_probability": "probability from, %",
+    "least_velocity": "impact from, cm/s",
+    "area": "area",
+    "flag": "flag",
+    "search": "search",
+    "search_hint": "identifier, or latitude, longitude",
+    "count": "{found} of {shown} pairs of this page ({all} screened)",
+    "export": "export as CSV",
+    "clear": "clear filters",
+    "more": "more rows",
+    "column_rank": "rank",
+    "column_pair_id": "pair",
+    "column_state": "pounding",
+    "column_probability": "probability, %",
+    "column_expected_impact_velocity": "impact, cm/s",
+    "column_gap": "gap, cm",
+    "column_demand": "needed, cm",
+    "column_missing_gap": "missing, cm",
+    "column_expected_amplification": "amplification",
+    "column_station": "station",
+    "state_yes": "sure",
+    "state_likely": "likely",
+    "state_possible": "possible",
+    "state_unlikely": "unlikely",
+    "state_no": "no",
+    "state_unknown": "gap unknown",
+    # One pair
+    "pair": "Pair",
+    "building": "Building",
+    "close": "close",
+    "says_probability": "The probability of pounding in this event is {value} %.",
+    "says_velocity": (
+        "The buildings are expected to meet at {value} cm/s; in 84 of 100 outcomes it is at most "
+        "{high} cm/s."
+    ),
+    "says_touching": "The buildings touch: the gap is 0 cm.",
+    "says_gap": "The gap is {value} cm.",
+    "says_no_gap": "The gap is unknown.",
+    "says_demand": "The gap needed is {value} cm ({rule}).",
+    "says_impacts": "The exact history has {value} impacts, the fastest at {velocity} cm/s.",
+    "says_amplification": "Pounding multiplies the motion of one of them by {value}.",
+    "says_station": "Record of station {station}, {value} km away.",
+    "rule_exact": "exact for the record",
+    "rule_per_white_noise": "estimate from PER",
+    "rule_per_record": "estimate from PER and the record's correlation",
+    "rule_linearized": "estimate for yielding buildings",
+    "rule_srss": "SRSS, because a period is derived",
+    "rule_shakemap": "from a ShakeMap",
+    "both_buildings": "Both buildings",
+    "fact_building_id": "building",
+    "fact_height": "height, m",
+    "fact_storeys": "storeys",
+    "fact_period": "period, s",
+    "fact_damping": "damping, %",
+    "fact_participation": "participation at contact height",
+    "fact_per": "PER, cm",
+    "fact_sd": "SD, cm",
+    "fact_amplification_exact": "motion with / without pounding",
+    "circles_gap": "Circles of energy at the gap that there is, {value} cm",
+    "circles_needed": "Circles of energy at the gap needed, {value} cm",
+    "history": "Displacements over time, cm, and {value} impacts",
+    "history_note": (
+        "Building 1 solid, building 2 dashed and a gap away; bars below: impacts, the higher the "
+        "faster. Follows the record; after some ten impacts two correct programs may differ."
+    ),
+    "no_history": "Histories are drawn for the {value} worst pairs with a known gap and a record.",
+    "prevention": "What would have prevented it",
+    "prevents_gap": "{value} cm more gap, {whole} cm in all.",
+    "prevents_damping": "{value} % of critical damping added to both buildings.",
+    "prevents_no_damping": "Damping alone does not: 40 % of critical added is too little.",
+    "prevents_bumper": (
+        "Bumpers do not prevent it but soften it: restitution at most {value} (estimate)."
+    ),
+    "prevents_nothing": "Nothing is needed in this event.",
+    "flags": "Flags",
+    "derived": "Derived inputs",
+    "derived_spread": (
+        "Derived periods are uncertain: their logarithmic standard deviations are {first} % and "
+        "{second} %, and the probability counts this."
+    ),
+    "derived_fixed": "Their uncertainty is not part of the probability.",
+    "other_pairs": "Its other pairs:",
+    "building_says": (
+        "Rank {rank} of the buildings; {hit} of its {neighbours} neighbours can hit it, with a "
+        "probability of at least {probability} % that one does."
+    ),
+    "building_impacts": "In its row it is hit {value} times, at up to {velocity} cm/s.",
+    "building_prevention": "Prevention: {value}.",
+    "position_inside": "inside its row",
+    "position_end": "end of its row",
+    "position_corner": "corner of two rows",
+    "position_single": "one pair only",
+    # Rest
+    "stations": "Stations",
+    "areas": "Areas",
+    "rejected": "Rejected, with reasons",
+    "rejected_none": "Nothing was rejected.",
+    "rejected_some": "{shown} of {all} rejections; all are in rejected.csv.",
+    "provenance": "Where this comes from",
+    "head_station": "station",
+    "head_state": "state",
+    "head_pairs": "pairs",
+    "head_pga": "PGA, m/s²",
+    "head_pgv": "PGV, m/s",
+    "head_per": "PER (1 s), cm",
+    "head_sd": "SD (1 s), cm",
+    "head_shortest_usable_period": "usable from, s",
+    "head_longest_usable_period": "to, s",
+    "head_warnings": "warnings and reasons",
+    "head_area": "area",
+    "head_yes": "sure",
+    "head_likely": "likely",
+    "head_possible": "possible",
+    "head_expected_pounding": "expected",
+    "head_worst_pair": "worst pair",
+    "head_worst_expected_impact_velocity": "its impact, m/s",
+    "head_kind": "kind",
+    "head_name": "name",
+    "head_source": "source",
+    "head_row": "row",
+    "head_reasons": "reasons",
+    "made": "made",
+    "made_with": "made with",
+    "files": "files beside this page",
+    "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (inputs with their hashes)",
+    "configuration": "configuration",
+    "station_used": "used",
+    "station_rejected": "rejected",
+    **{f"flag_{name}": meaning for name, meaning in FLAGS.items()},
+}
+
+LANGUAGES: Mapping[str, Mapping[str, str]] = {"en": ENGLISH, "es": {**ENGLISH, **SPANISH}}
+
+
+def written(value: float, digits: int, language: Language) -> str:
+    """
+    Return a number with its digits as a language writes it.
+
+    Examples
+    --------
+    >>> written(12345.678, 1, "en"), written(12345.678, 1, "es")
+    ('12,345.7', '12.345,7')
+    """
+    text = f"{value:,.{digits}f}"
+    return text if language == "en" else text.translate(str.maketrans(",.", ".,"))
