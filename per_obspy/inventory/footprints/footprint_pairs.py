@@ -14,9 +14,9 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import Rejections, checked_pairs, plain_numbers
 from per_obspy.inventory.contact_height import floor_offset
-from per_obspy.inventory.footprints.importers import imported
 from per_obspy.inventory.footprints.layers import Geometries, Layer, read_layer
 from per_obspy.inventory.footprints.neighbours import IntArray, Neighbours, neighbours
+from per_obspy.inventory.importers.recognition import imported
 from per_obspy.inventory.schema import COLUMNS, POSITIONS
 from per_obspy.inventory.table_columns import numbers_in
 
@@ -38,7 +38,7 @@ def pairs_from_footprints(
     ----------
     path : str or Path
         GeoPackage, GeoJSON, Shapefile, FlatGeobuf or GeoParquet of polygons with heights or
-        storeys. Known column names are in ``per_obspy.inventory.footprints.importers``.
+        storeys. Known sources are in ``per_obspy.inventory.importers``.
     distance : float, optional
         Largest gap of a pair, m.
     layer : str, optional

@@ -18,6 +18,9 @@ from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.footprints.gdal_paths import literal_path
+from per_obspy.inventory.importers.building_files import SUFFIXES, read_buildings
+from per_obspy.inventory.importers.importer import RawLayer as _Raw
+from per_obspy.inventory.importers.nested_columns import without_nesting
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow.
 GDAL_KINDS = {
@@ -59,14 +62,6 @@ class Layer(NamedTuple):
     rejected: tuple[Rejection, ...]
 
 
-class _Raw(NamedTuple):
-    """A layer as its file has it: geometries, attributes and coordinate reference system."""
-
-    geometries: Geometries
-    attributes: pd.DataFrame
-    crs: Any
-
-
 def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     """
     Read the footprints of a file.
@@ -94,13 +89,24 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     # degrees
     stray = _on_earth(raw.geometries) & bool(crs.is_projected)
     good = _are_footprints(degrees) & ~stray
+    good[list(raw.faults)] = False
     # Features without a usable polygon
     rejected = []
     for i in np.flatnonzero(~good).tolist():
-        fault = _fault(degrees[i], raw.geometries[i], stray[i])
+        fault = raw.faults.get(i) or _fault(degrees[i], raw.geometries[i], stray[i])
         rejected.append(_rejection(file, i + 1, fault))
     attributes = raw.attributes.set_index(pd.RangeIndex(1, len(good) + 1))
     return Layer(degrees[good], attributes[good], tuple(rejected))
+
+
+def raw_layer(path: str | Path, layer: str | None = None) -> _Raw:
+    """Return a layer as its file has it, with points and unusable features."""
+    return _read(Path(path), layer)
+
+
+def in_degrees(file: Path, raw: _Raw) -> Geometries:
+    """Return the geometries of a layer in longitude and latitude."""
+    return _in_degrees(file, shapely.force_2d(raw.geometries), _reference_system(file, raw.crs))
 
 
 def _require_outlines(file: Path, geometries: Geometries) -> None:
@@ -124,6 +130,8 @@ def _read(file: Path, layer: str | None) -> _Raw:
     suffix = file.suffix.lower()
     if not file.exists():
         raise CatalogError(str(file), "no such file")
+    if (buildings := read_buildings(file)) is not None:
+        return buildings
     if suffix == ".csv":
         raise CatalogError(
             str(file),
@@ -131,7 +139,7 @@ def _read(file: Path, layer: str | None) -> _Raw:
         )
     # GDAL knows further files, but not whether they hold footprints
     if suffix not in (*GDAL_KINDS, *PARQUET_SUFFIXES):
-        expected = ", ".join((*GDAL_KINDS, *PARQUET_SUFFIXES))
+        expected = ", ".join((*GDAL_KINDS, *PARQUET_SUFFIXES, *SUFFIXES))
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
     return _read_gdal(file, layer) if suffix in GDAL_KINDS else _read_geoparquet(file)
 
@@ -200,7 +208,7 @@ def _layer_name(file: Path, path: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> _Raw:
     """Read a GeoParquet file."""
     try:
-        table = pa.parquet.read_table(file.absolute())
+        table = without_nesting(pa.parquet.read_table(file.absolute()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     # GeoParquet is described by JSON in the metadata

@@ -424,5 +424,5 @@ def test_real_cities(real_data, city, expected, utm):
 
 @pytest.mark.real_data
 def test_points_of_berkeley_are_no_footprints(real_data):
-    with pytest.raises(CatalogError, match="a table has no walls"):
+    with pytest.raises(CatalogError, match="points, not footprints"):
         pairs_from_footprints(real_data / "inventories" / "BerkeleyBuildings_full.csv")

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints.importers import IMPORTERS, imported
+from per_obspy.inventory.importers.recognition import IMPORTERS, imported
 from per_obspy.inventory.schema import COLUMNS, SYSTEMS
 
 SURVEY = {

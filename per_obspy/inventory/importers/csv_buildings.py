@@ -1,0 +1,147 @@
+"""
+CSV files of buildings: outlines as WKT or GeoJSON in a column, or points.
+
+Google Open Buildings have WKT in ``geometry``, inventories of SimCenter GeoJSON in ``Footprint``;
+GEM exposures, the National Structure Inventory and others have two columns of coordinates.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.csv
+import shapely
+from numpy.typing import NDArray
+
+from per_obspy.errors import CatalogError
+from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.importers.asset_json import footprint_of
+from per_obspy.inventory.importers.importer import RawLayer
+from per_obspy.inventory.importers.recognition import recognised
+from per_obspy.inventory.importers.sources.own_names import OWN
+
+#: Columns of outlines as WKT and as GeoJSON, and pairs of columns of coordinates, degrees.
+WKT = ("geometry", "WKT", "wkt", "the_geom", "geom")
+GEOJSON = ("Footprint",)
+POINTS = (("lon", "lat"), ("longitude", "latitude"), ("Longitude", "Latitude"), ("x", "y"))
+
+#: Largest block of lines, and therefore largest line, bytes.
+_BLOCK = 16 << 20
+
+#: Most rows that are read, and largest text of an outline, characters.
+MOST_ROWS = 5_000_000
+LONGEST_OUTLINE = 1 << 20
+
+
+def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
+    """
+    Read a CSV file of buildings, or return None if it has neither outlines nor a known source.
+
+    Parameters
+    ----------
+    file : Path
+        UTF-8, comma separated, one header line, WGS 84. A row with another number of cells is
+        a fault of its own, after the good ones.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    CatalogError
+        If the file cannot be read or has more than ``MOST_ROWS`` rows.
+    """
+    names = _header(file)
+    geometry = next((name for name in (*WKT, *GEOJSON) if name in names), None)
+    points = next((pair for pair in POINTS if set(pair) <= set(names)), None)
+    if geometry is None and (points is None or recognised(names) is OWN):
+        return None
+    broken = list[str]()
+    table = _table(file, source, names, broken)
+    # Outlines, or points where there is no column of them
+    faults = dict[int, str]()
+    if geometry is None:
+        assert points is not None  # by the condition above
+        shapes = _points(table, points)
+    else:
+        shapes, faults = _outlines(table[geometry], is_wkt=geometry in WKT)
+        table = table.drop(columns=geometry)
+    # Rows that are no rows come last, without cells
+    faults |= dict(enumerate(broken, start=len(table)))
+    shapes = np.concatenate([shapes, np.full(len(broken), None, dtype=object)])
+    return RawLayer(shapes, table.reindex(range(len(shapes))), "OGC:CRS84", faults)
+
+
+def _header(file: Path) -> list[str]:
+    """Return the names in the header, none if it cannot be read."""
+    with file.open("rb") as opened:
+        line = opened.readline(1 << 16)
+    text = line.decode("utf-8-sig", "replace").strip()
+    return [name.strip().strip('"') for name in text.split(",")]
+
+
+def _table(file: Path, source: str, names: Sequence[str], broken: list[str]) -> pd.DataFrame:
+    """Return the cells of a file as text, and add what is wrong with broken rows."""
+
+    def is_skipped(row: pa.csv.InvalidRow) -> str:
+        cells = f"{row.actual_columns} cells instead of {row.expected_columns}"
+        broken.append(f"a row has {cells}: {row.text[:60]}")
+        return "skip"
+
+    try:
+        with pa.csv.open_csv(
+            file.absolute(),
+            pa.csv.ReadOptions(block_size=_BLOCK, use_threads=False),
+            pa.csv.ParseOptions(newlines_in_values=True, invalid_row_handler=is_skipped),
+            pa.csv.ConvertOptions(
+                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=True
+            ),
+        ) as reader:
+            return pd.concat(list(_blocks(reader, source)), ignore_index=True)
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        raise CatalogError(source, f"not a CSV file: {str(error)[:200]}") from error
+    except ValueError as error:
+        raise CatalogError(source, "the table has no rows") from error
+
+
+def _blocks(reader: pa.csv.CSVStreamingReader, source: str) -> Iterator[pd.DataFrame]:
+    """Yield the blocks of a file as tables of text."""
+    rows = 0
+    for batch in reader:
+        rows += batch.num_rows
+        if rows > MOST_ROWS:
+            raise CatalogError(source, f"it has more than {MOST_ROWS} rows: split the file")
+        yield batch.to_pandas()
+
+
+def _outlines(cells: pd.Series, is_wkt: bool) -> tuple[NDArray[np.object_], dict[int, str]]:
+    """Return outlines, and the fault of each cell that holds none."""
+    faults = dict[int, str]()
+    texts = cells.to_numpy(dtype=object, na_value=None)
+    lengths = cells.str.len().fillna(0).to_numpy()
+    for row in np.flatnonzero(lengths > LONGEST_OUTLINE).tolist():
+        faults[row] = f"the outline has more than {LONGEST_OUTLINE} characters"
+        texts[row] = None
+    if is_wkt:
+        shapes = shapely.from_wkt(texts, on_invalid="ignore")
+        is_lost = shapely.is_missing(shapes) & np.array([text is not None for text in texts])
+        for row in np.flatnonzero(is_lost).tolist():
+            faults[row] = f"geometry = {str(texts[row])[:40]!r} is not WKT"
+        return shapes, faults
+    shapes = np.full(len(texts), None, dtype=object)
+    for row, text in enumerate(texts):
+        try:
+            shapes[row] = None if text is None else footprint_of(text)
+        except ValueError as error:
+            faults[row] = str(error)
+    return shapes, faults
+
+
+def _points(table: pd.DataFrame, names: tuple[str, str]) -> NDArray[np.object_]:
+    """Return points from two columns of coordinates, None where one is no number."""
+    east, north = (plain_numbers(table[name]).to_numpy(np.float64) for name in names)
+    known = np.isfinite(east) & np.isfinite(north)
+    shapes = np.full(len(table), None, dtype=object)
+    shapes[known] = shapely.points(east[known], north[known])
+    return shapes

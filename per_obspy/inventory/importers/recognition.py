@@ -1,0 +1,127 @@
+"""Recognition of a layer's source by its columns, and its attributes under the schema's names."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from per_obspy.errors import CatalogError, did_you_mean
+from per_obspy.inventory.importers.class_heights import with_class_heights
+from per_obspy.inventory.importers.importer import Importer
+from per_obspy.inventory.importers.sources.gem import GEM
+from per_obspy.inventory.importers.sources.google import GOOGLE
+from per_obspy.inventory.importers.sources.microsoft import MICROSOFT
+from per_obspy.inventory.importers.sources.national_structures import NATIONAL_STRUCTURES
+from per_obspy.inventory.importers.sources.openstreetmap import OPENSTREETMAP
+from per_obspy.inventory.importers.sources.overture import OVERTURE
+from per_obspy.inventory.importers.sources.own_names import OWN
+from per_obspy.inventory.importers.sources.plateau import CITYGML
+from per_obspy.inventory.importers.sources.seismic_building_exposure import (
+    SEISMIC_BUILDING_EXPOSURE,
+)
+from per_obspy.inventory.importers.sources.simcenter import SIMCENTER
+
+#: In the order in which a layer is recognised; the last one fits every layer.
+IMPORTERS = (
+    SEISMIC_BUILDING_EXPOSURE,
+    CITYGML,
+    GOOGLE,
+    NATIONAL_STRUCTURES,
+    SIMCENTER,
+    GEM,
+    OVERTURE,
+    OPENSTREETMAP,
+    MICROSOFT,
+    OWN,
+)
+
+#: Quantities of which a layer must give one.
+_SIZES = ("height", "storeys", "period")
+
+
+def recognised(names: Iterable[str]) -> Importer:
+    """
+    Return the importer of a layer by the names of its columns.
+
+    Examples
+    --------
+    >>> recognised(["height", "confidence"]).name
+    'Microsoft building footprints'
+    """
+    known = set(names)
+    return next(row for row in IMPORTERS if any(known.issuperset(each) for each in row.needed))
+
+
+def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
+    """
+    Return the attributes of buildings under the schema's names, then the columns to carry along.
+
+    Heights that a layer leaves empty are estimated from buildings of the same class in the layer:
+    see :mod:`per_obspy.inventory.importers.class_heights`.
+
+    Parameters
+    ----------
+    attributes : DataFrame
+        One row per footprint with the layer's columns; the index is the number of the feature.
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    CatalogError
+        If the layer has neither height nor storeys nor period.
+    """
+    importer = recognised(map(str, attributes.columns))
+    adapted = importer.adapted(attributes)
+    names = set(adapted.columns)
+    # Columns that the layer has
+    columns = {name: adapted[column] for name, column in importer.columns.items() if column in names}
+    sizes = [columns[name] for name in _SIZES if name in columns]
+    is_given = adapted.empty or any(column.notna().any() for column in sizes)
+    if not (sizes and is_given):
+        raise CatalogError(source, _no_height(attributes, importer, bool(sizes)))
+    table = pd.DataFrame(columns, index=adapted.index)
+    # Structural systems by name or by code
+    if "system" in names and not importer.systems:
+        table["system"] = adapted["system"].fillna("")
+    elif set(importer.system_columns) <= names and importer.systems:
+        table["system"] = _coded_systems(adapted, importer)
+    table["building_id"] = _identifiers(table)
+    # Missing heights by the layer's own classes
+    if importer.class_column is not None:
+        unknown = pd.Series("", adapted.index)
+        table = with_class_heights(table, adapted.get(importer.class_column, unknown))
+    carried = [name for name in importer.carried if name in names]
+    return table.join(adapted[carried])
+
+
+def _no_height(attributes: pd.DataFrame, importer: Importer, has_column: bool) -> str:
+    """Return the message for a layer without heights, with a similar column if there is one."""
+    columns = list(map(str, attributes.columns))
+    suggestion = did_you_mean("height", columns) or did_you_mean("storeys", columns)
+    found = ", ".join(columns) or "none"
+    mend = "" if importer.name == "per_obspy" else f"; {importer.name} gives none here, add one"
+    if has_column:
+        return f"height, storeys and period are empty in every feature{mend}"
+    problem = "no column height, storeys or period in the layer"
+    return f"{problem}{mend} (columns found: {found:.200}){suggestion}"
+
+
+def _coded_systems(attributes: pd.DataFrame, importer: Importer) -> pd.Series:
+    """Return structural systems from the codes of material and lateral system, "" if unknown."""
+    codes = [attributes[name].fillna("").astype(str).str.strip() for name in importer.system_columns]
+    joined = codes[0].str.cat(codes[1:], sep=" ")
+    return joined.map(importer.systems).fillna("")
+
+
+def _identifiers(table: pd.DataFrame) -> pd.Series:
+    """Return identifiers as text, and the number of the feature where a building has none."""
+    numbers = pd.Series([f"feature {number}" for number in table.index], index=table.index)
+    if "building_id" not in table:
+        return numbers
+    given = table["building_id"]
+    # Whole numbers that were stored as floats lose their decimal point
+    if pd.api.types.is_float_dtype(given) and (given.dropna() % 1 == 0).all():
+        given = given.astype("Int64")
+    text = given.astype(str).str.strip()
+    return text.mask(np.asarray(given.isna()) | (text == ""), numbers)
