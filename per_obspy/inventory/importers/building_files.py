@@ -57,7 +57,10 @@ def _read(plain: Path, file: Path) -> RawLayer | None:
     if suffix in LINES or (suffix == ".csv" and _first_character(plain) == b"{"):
         return read_geojson_lines(plain, str(file))
     if suffix == ".csv":
-        return read_csv_buildings(plain, str(file))
+        buildings = read_csv_buildings(plain, str(file))
+        if buildings is None and plain != file:
+            raise CatalogError(str(file), "not a CSV file of outlines, nor of a known source")
+        return buildings
     if suffix in (".json", ".geojson") and is_asset_json(plain):
         return read_asset_json(plain, str(file))
     if suffix in (".gml", ".xml"):

@@ -222,6 +222,8 @@ def _ring(element: Any) -> Any:
     numbers = np.array(" ".join(lists).split()[: _MOST_NUMBERS + 1], dtype=np.float64)
     if numbers.size > _MOST_NUMBERS:
         raise ValueError(f"a ring has more than {_MOST_NUMBERS} numbers")
+    if not np.isfinite(numbers).all():
+        raise ValueError("a coordinate is not finite")
     dimension = _dimension(element)
     if numbers.size % dimension:
         raise ValueError(f"{numbers.size} numbers are not a multiple of {dimension}")

@@ -57,6 +57,8 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
     points = next((pair for pair in POINTS if set(pair) <= set(names)), None)
     if geometry is None and (points is None or recognised(names) is OWN):
         return None
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise CatalogError(source, f"column {repeated[:200]} stands more than once")
     broken = list[str]()
     table = _table(file, source, names, broken)
     # Outlines, or points where there is no column of them
@@ -98,11 +100,12 @@ def _table(file: Path, source: str, names: Sequence[str], broken: list[str]) -> 
                 column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=True
             ),
         ) as reader:
-            return pd.concat(list(_blocks(reader, source)), ignore_index=True)
+            blocks = list(_blocks(reader, source))
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise CatalogError(source, f"not a CSV file: {str(error)[:200]}") from error
-    except ValueError as error:
-        raise CatalogError(source, "the table has no rows") from error
+    if not any(map(len, blocks)):
+        raise CatalogError(source, "the table has no rows")
+    return pd.concat(blocks, ignore_index=True)
 
 
 def _blocks(reader: pa.csv.CSVStreamingReader, source: str) -> Iterator[pd.DataFrame]:
@@ -124,7 +127,9 @@ def _outlines(cells: pd.Series, is_wkt: bool) -> tuple[NDArray[np.object_], dict
         faults[row] = f"the outline has more than {LONGEST_OUTLINE} characters"
         texts[row] = None
     if is_wkt:
-        shapes = shapely.from_wkt(texts, on_invalid="ignore")
+        # A number beyond all numbers becomes infinite, which no place on the Earth is
+        with np.errstate(all="ignore"):
+            shapes = shapely.from_wkt(texts, on_invalid="ignore")
         is_lost = shapely.is_missing(shapes) & np.array([text is not None for text in texts])
         for row in np.flatnonzero(is_lost).tolist():
             faults[row] = f"geometry = {str(texts[row])[:40]!r} is not WKT"
