@@ -23,7 +23,7 @@ class Building(Section):
     )
     storey_height: float = Field(3.0, ge=2, le=12, description="m")
     storey_height_log_std: float = Field(
-        0.14, ge=0, le=1, description="log-standard deviation of a height derived from storeys"
+        0.13, ge=0, le=1, description="log-standard deviation of a height derived from storeys"
     )
     mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
     area: float = Field(

@@ -59,20 +59,26 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
         return None
     if repeated := next((name for name in names if names.count(name) > 1), None):
         raise CatalogError(source, f"column {repeated[:200]} stands more than once")
-    broken = list[str]()
-    table = _table(file, source, names, broken)
-    # Outlines, or points where there is no column of them
-    faults = dict[int, str]()
-    if geometry is None:
-        assert points is not None  # by the condition above
-        shapes = _points(table, points)
-    else:
-        shapes, faults = _outlines(table[geometry], is_wkt=geometry in WKT)
-        table = table.drop(columns=geometry)
+    broken, faults = list[str](), dict[int, str]()
+    tables, shapes = list[pd.DataFrame](), list[NDArray[np.object_]]()
+    for block in _blocks(file, source, names, broken):
+        # Outlines, whose text is forgotten, or points where there is no column of them
+        if geometry is None:
+            assert points is not None  # by the condition above
+            shapes.append(_points(block, points))
+        else:
+            first = sum(map(len, tables))
+            outlines, wrong = _outlines(block.pop(geometry), is_wkt=geometry in WKT)
+            faults |= {first + row: fault for row, fault in wrong.items()}
+            shapes.append(outlines)
+        tables.append(block)
+    if not any(map(len, tables)):
+        raise CatalogError(source, "the table has no rows")
     # Rows that are no rows come last, without cells
+    table = pd.concat(tables, ignore_index=True)
     faults |= dict(enumerate(broken, start=len(table)))
-    shapes = np.concatenate([shapes, np.full(len(broken), None, dtype=object)])
-    return RawLayer(shapes, table.reindex(range(len(shapes))), "OGC:CRS84", faults)
+    found = np.concatenate([*shapes, np.full(len(broken), None, dtype=object)])
+    return RawLayer(found, table.reindex(range(len(found))), "OGC:CRS84", faults)
 
 
 def _header(file: Path) -> list[str]:
@@ -83,39 +89,31 @@ def _header(file: Path) -> list[str]:
     return [name.strip().strip('"') for name in text.split(",")]
 
 
-def _table(file: Path, source: str, names: Sequence[str], broken: list[str]) -> pd.DataFrame:
-    """Return the cells of a file as text, and add what is wrong with broken rows."""
+def _blocks(
+    file: Path, source: str, names: Sequence[str], broken: list[str]
+) -> Iterator[pd.DataFrame]:
+    """Yield the blocks of a file as tables of text, and add what is wrong with broken rows."""
 
     def is_skipped(row: pa.csv.InvalidRow) -> str:
         cells = f"{row.actual_columns} cells instead of {row.expected_columns}"
         broken.append(f"a row has {cells}: {row.text[:60]}")
         return "skip"
 
+    reading = pa.csv.ReadOptions(block_size=_BLOCK, use_threads=False)
+    parsing = pa.csv.ParseOptions(newlines_in_values=True, invalid_row_handler=is_skipped)
+    texts = dict.fromkeys(names, pa.string())
+    converting = pa.csv.ConvertOptions(column_types=texts, strings_can_be_null=True)
+    rows = 0
     try:
-        with pa.csv.open_csv(
-            file.absolute(),
-            pa.csv.ReadOptions(block_size=_BLOCK, use_threads=False),
-            pa.csv.ParseOptions(newlines_in_values=True, invalid_row_handler=is_skipped),
-            pa.csv.ConvertOptions(
-                column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=True
-            ),
-        ) as reader:
-            blocks = list(_blocks(reader, source))
+        # Relative names such as http:/x are addresses to the reader
+        with pa.csv.open_csv(file.absolute(), reading, parsing, converting) as reader:
+            for batch in reader:
+                rows += batch.num_rows
+                if rows + len(broken) > MOST_ROWS:
+                    raise CatalogError(source, f"it has more than {MOST_ROWS} rows: split the file")
+                yield batch.to_pandas()
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise CatalogError(source, f"not a CSV file: {str(error)[:200]}") from error
-    if not any(map(len, blocks)):
-        raise CatalogError(source, "the table has no rows")
-    return pd.concat(blocks, ignore_index=True)
-
-
-def _blocks(reader: pa.csv.CSVStreamingReader, source: str) -> Iterator[pd.DataFrame]:
-    """Yield the blocks of a file as tables of text."""
-    rows = 0
-    for batch in reader:
-        rows += batch.num_rows
-        if rows > MOST_ROWS:
-            raise CatalogError(source, f"it has more than {MOST_ROWS} rows: split the file")
-        yield batch.to_pandas()
 
 
 def _outlines(cells: pd.Series, is_wkt: bool) -> tuple[NDArray[np.object_], dict[int, str]]:

@@ -1,4 +1,8 @@
-"""Foreign column names: what is recognised, what stays unknown."""
+"""
+Foreign column names: what is recognised, what stays unknown.
+
+Covers per_obspy.inventory.importers.importer.
+"""
 
 import numpy as np
 import pandas as pd
