@@ -16,6 +16,17 @@ import obspy
 import pandas as pd
 import pyogrio
 import shapely
+from building_samples import (
+    Town,
+    google,
+    microsoft,
+    osm_xml,
+    overture,
+    plateau_lod0,
+    plateau_lod1,
+    r2d_assets,
+    small_town,
+)
 from format_samples import SAMPLES
 from obspy import Stream
 from obspy.core.event import Catalog, Event, Magnitude, Origin
@@ -160,6 +171,13 @@ def _inventories() -> dict[str, Entry]:
         "pairs_parquet": Entry("pairs.parquet", _pairs_parquet, _pairs),
         "footprints_geojson": Entry("town.geojson", partial(_layer, "a.geojson"), _footprints),
         "footprints_gpkg": Entry("town.gpkg", partial(_layer, "a.gpkg"), _footprints),
+        "citygml_lod0": Entry("town.gml", partial(_town, plateau_lod0), _footprints),
+        "citygml_lod1": Entry("town.gml", partial(_town, plateau_lod1), _footprints),
+        "assets": Entry("town.json", partial(_town, r2d_assets), _footprints),
+        "google_csv": Entry("town.csv", partial(_town, google), _footprints),
+        "geojson_lines": Entry("town.geojsonl", partial(_town, microsoft), _footprints),
+        "osm": Entry("town.osm", partial(_town, osm_xml), _footprints),
+        "overture": Entry("town.parquet", partial(_town, overture), _footprints),
     }
 
 
@@ -328,6 +346,12 @@ def _layer(name: str) -> bytes:
             crs="EPSG:4326",
         )
         return path.read_bytes()
+
+
+def _town(write: Callable[[Path, Town], Path]) -> bytes:
+    """Return four houses in the format of another source."""
+    with TemporaryDirectory() as folder:
+        return write(Path(folder), small_town()).read_bytes()
 
 
 def _records(path: Path) -> Iterable[object]:

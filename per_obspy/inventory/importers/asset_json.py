@@ -46,12 +46,7 @@ def read_asset_json(file: Path, source: str) -> RawLayer:
     CatalogError
         If the file is too large, no JSON, or holds no asset.
     """
-    if file.stat().st_size > LARGEST:
-        raise CatalogError(source, f"it is larger than {LARGEST >> 20} MiB: split the file")
-    try:
-        content = json.loads(file.read_bytes())
-    except (ValueError, RecursionError) as error:
-        raise CatalogError(source, f"not a JSON file: {str(error)[:200]}") from error
+    content = _content(file, source)
     geometries, cells, faults = list[Any](), list[dict[str, object]](), dict[int, str]()
     for row, asset in enumerate(_assets(content)):
         properties = _properties(asset)
@@ -61,23 +56,38 @@ def read_asset_json(file: Path, source: str) -> RawLayer:
         except ValueError as error:
             geometry, faults[row] = None, str(error)
         geometries.append(geometry)
-        unit = properties.get("units") or _member(content, "units")
-        properties = {LENGTH_UNIT: _member(unit, "length"), **properties}
-        cells.append({str(name)[:200]: plain_cell(value) for name, value in properties.items()})
+        cells.append(_cells(properties, _member(content, "units")))
     if not geometries:
         raise CatalogError(source, f"no asset: neither features nor {_GENERAL}")
+    # Outlines are in the geometries now
     table = pd.DataFrame(cells).drop(columns=["Footprint", "units"], errors="ignore")
     return RawLayer(np.array(geometries, dtype=object), table, "OGC:CRS84", faults)
+
+
+def _content(file: Path, source: str) -> object:
+    """Return the content of a JSON file; raise CatalogError if it is too large or none."""
+    if file.stat().st_size > LARGEST:
+        raise CatalogError(source, f"it is larger than {LARGEST >> 20} MiB: split the file")
+    try:
+        content: object = json.loads(file.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise CatalogError(source, f"not a JSON file: {str(error)[:200]}") from error
+    return content
+
+
+def _cells(properties: dict[str, Any], common_units: object) -> dict[str, object]:
+    """Return the cells of an asset, with its unit of length or that of the file."""
+    unit = _member(properties.get("units") or common_units, "length")
+    cells = {LENGTH_UNIT: unit, **properties}
+    return {str(name)[:200]: plain_cell(value) for name, value in cells.items()}
 
 
 def _assets(content: object) -> Iterator[dict[str, Any]]:
     """Yield the assets of a file; entries that are no objects are empty ones."""
     if isinstance(content, dict):
-        found = content["features"] if "features" in content else [content]
-    else:
-        found = content
-    if isinstance(found, list):
-        for asset in found:
+        content = content.get("features", [content])
+    if isinstance(content, list):
+        for asset in content:
             yield asset if isinstance(asset, dict) else {}
 
 

@@ -32,9 +32,9 @@ def read_buildings(file: Path) -> RawLayer | None:
     Parameters
     ----------
     file : Path
-        CityGML (``.gml``, ``.xml``), OpenStreetMap (``.osm``, ``.pbf``), GeoJSON lines, assets of
-        SimCenter (``.json``, ``.geojson``), CSV with outlines or points; the last two also packed by
-        gzip. It must exist.
+        CityGML (``.gml``, ``.xml``), OpenStreetMap (``.osm``, ``.pbf``), assets of SimCenter
+        (``.json``, ``.geojson``), GeoJSON lines, CSV with outlines or points; the last two also
+        packed by gzip. It must exist.
 
     Raises
     ------
@@ -85,6 +85,7 @@ def _unpacked(file: Path) -> Iterator[Path]:
     """Give the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
     with TemporaryDirectory(prefix="per_obspy_") as folder:
         plain = Path(folder, file.stem)
+        # Block by block, up to the limit
         try:
             with gzip.open(file) as packed, plain.open("wb") as copy:
                 while block := packed.read(_BLOCK):

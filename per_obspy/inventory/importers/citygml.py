@@ -41,8 +41,6 @@ _MOST_NUMBERS = 300_000
 #: errors only, and a passage of 1 m by 1 km has 2.5e-4.
 _FLAT = 1e-6
 
-_ATTRIBUTES = ("measuredHeight", "storeysAboveGround", "usage", "structure_type", "address")
-
 
 class _Building(NamedTuple):
     """Outline in the coordinates of the file, kind of the outline, attributes."""
@@ -75,7 +73,8 @@ def read_citygml(file: Path, source: str) -> RawLayer:
     except (etree.XMLSyntaxError, UnicodeDecodeError) as error:
         raise CatalogError(source, f"not a CityGML file: {str(error)[:200]}") from error
     if not buildings:
-        raise CatalogError(source, "not a CityGML file of buildings: no bldg:Building of 1.0 or 2.0")
+        raise CatalogError(source, "not a CityGML file: no bldg:Building of 1.0 or 2.0")
+    # Coordinates east first
     crs, is_north_first = _reference_system(systems, source)
     shapes = np.array([building.outline for building in buildings], dtype=object)
     if is_north_first:
@@ -90,6 +89,7 @@ def _elements(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
     tags = [f"{space}Building" for space in _BUILDINGS]
     wanted = (*tags, _VERSION_3, "{*}Envelope")
     with file.open("rb") as opened:
+        # No entity, no address, no unlimited text
         parser = etree.iterparse(
             opened,
             events=("start", "end"),
@@ -126,9 +126,12 @@ def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
     name = names[0]
     if other := next((each for each in names if each != name), None):
         raise CatalogError(source, f"two reference systems, {name:.60} and {other:.60}")
+    # Official names, and others that the library of projections knows
     found = _EPSG.search(name)
     try:
-        crs = pyproj.CRS.from_epsg(int(found["code"])) if found else pyproj.CRS.from_user_input(name)
+        crs = (
+            pyproj.CRS.from_epsg(int(found["code"])) if found else pyproj.CRS.from_user_input(name)
+        )
     except pyproj.exceptions.CRSError as error:
         problem = f"unknown coordinate reference system {name!r:.80}"
         raise CatalogError(source, problem) from error
@@ -141,22 +144,30 @@ def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
 
 def _building(element: Any) -> _Building:
     """Return a building of the document."""
-    space = etree.QName(element).namespace
-    cells: dict[str, object] = {"id": next(iter(element.xpath("@*[local-name()='id']")), None)}
-    height, unit = _text(element, space, "measuredHeight")
-    factor = _UNITS.get(unit.lower().rpartition("#")[2].rpartition(":")[2])
-    fault = "" if factor else f"measuredHeight has the unit {unit!r:.40}, expected m"
-    cells["measuredHeight"] = _number(height, factor or 1.0)
-    cells["storeysAboveGround"] = _number(_text(element, space, "storeysAboveGround")[0], 1.0)
-    cells["usage"] = _text(element, space, "usage")[0]
-    cells["structure_type"] = _anywhere(element, "buildingStructureType")
-    cells["address"] = _anywhere(element, "LocalityName")
+    cells, fault = _attributes(element)
     # Outline of the building or of its parts
     try:
         outline, cells["outline"] = _outline(element)
     except (ValueError, shapely.errors.GEOSException) as error:
         return _Building(None, cells | {"outline": None}, fault or f"outline: {str(error)[:80]}")
     return _Building(outline, cells, fault)
+
+
+def _attributes(element: Any) -> tuple[dict[str, object], str]:
+    """Return the attributes of a building, and what is wrong with its unit of height."""
+    space = etree.QName(element).namespace
+    height, unit = _text(element, space, "measuredHeight")
+    # Units may be names in a dictionary, such as urn:ogc:def:uom:UCUM::m or #m
+    factor = _UNITS.get(unit.lower().rpartition("#")[2].rpartition(":")[2])
+    cells: dict[str, object] = {
+        "id": next(iter(element.xpath("@*[local-name()='id']")), None),
+        "measuredHeight": _number(height, factor or 1.0),
+        "storeysAboveGround": _number(_text(element, space, "storeysAboveGround")[0], 1.0),
+        "usage": _text(element, space, "usage")[0],
+        "structure_type": _anywhere(element, "buildingStructureType"),
+        "address": _anywhere(element, "LocalityName"),
+    }
+    return cells, "" if factor else f"measuredHeight has the unit {unit!r:.40}, expected m"
 
 
 def _text(element: Any, space: str, name: str) -> tuple[str | None, str]:
@@ -193,17 +204,13 @@ def _outline(element: Any) -> tuple[Any, str | None]:
         If its coordinates are no numbers.
     """
     for name in OUTLINES:
-        rings = [_polygon(each) for top in element.iter(f"{{*}}{name}") for each in _polygons(top)]
+        tops = element.iter(f"{{*}}{name}")
+        rings = [_polygon(each) for top in tops for each in top.iter("{*}Polygon")]
         # Walls of a block are lines from above
         flat = [ring for ring in rings if ring is not None and ring.area > _FLAT * ring.length**2]
         if flat:
             return (flat[0] if len(flat) == 1 else shapely.union_all(flat)), name
     return None, None
-
-
-def _polygons(element: Any) -> Iterator[Any]:
-    """Yield the polygons of a surface."""
-    return element.iter("{*}Polygon")
 
 
 def _polygon(element: Any) -> Any:
@@ -222,6 +229,7 @@ def _ring(element: Any) -> Any:
     numbers = np.array(" ".join(lists).split()[: _MOST_NUMBERS + 1], dtype=np.float64)
     if numbers.size > _MOST_NUMBERS:
         raise ValueError(f"a ring has more than {_MOST_NUMBERS} numbers")
+    # Corners of two or three numbers
     if not np.isfinite(numbers).all():
         raise ValueError("a coordinate is not finite")
     dimension = _dimension(element)

@@ -49,6 +49,7 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
     missing = table[sizes].isna().all(axis=1)
     if not missing.any():
         return table
+    # Classes as text
     labels = classes.fillna("").astype(str)
     result = table.copy()
     # Heights first, storeys where a class has too few heights

@@ -5,6 +5,7 @@ Google Open Buildings have WKT in ``geometry``, inventories of SimCenter GeoJSON
 GEM exposures, the National Structure Inventory and others have two columns of coordinates.
 """
 
+import codecs
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -26,6 +27,8 @@ from per_obspy.inventory.importers.sources.own_names import OWN
 WKT = ("geometry", "WKT", "wkt", "the_geom", "geom")
 GEOJSON = ("Footprint",)
 POINTS = (("lon", "lat"), ("longitude", "latitude"), ("Longitude", "Latitude"), ("x", "y"))
+
+_DEGREES = "OGC:CRS84"
 
 #: Largest block of lines, and therefore largest line, bytes.
 _BLOCK = 16 << 20
@@ -57,28 +60,40 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
     points = next((pair for pair in POINTS if set(pair) <= set(names)), None)
     if geometry is None and (points is None or recognised(names) is OWN):
         return None
+    # Text, and columns that can be told apart
+    _require_utf_8(file, source)
     if repeated := next((name for name in names if names.count(name) > 1), None):
         raise CatalogError(source, f"column {repeated[:200]} stands more than once")
-    broken, faults = list[str](), dict[int, str]()
-    tables, shapes = list[pd.DataFrame](), list[NDArray[np.object_]]()
+    # Block by block, so that the text of outlines is forgotten
+    broken, found = list[str](), list[RawLayer]()
     for block in _blocks(file, source, names, broken):
-        # Outlines, whose text is forgotten, or points where there is no column of them
-        if geometry is None:
-            assert points is not None  # by the condition above
-            shapes.append(_points(block, points))
-        else:
-            first = sum(map(len, tables))
-            outlines, wrong = _outlines(block.pop(geometry), is_wkt=geometry in WKT)
-            faults |= {first + row: fault for row, fault in wrong.items()}
-            shapes.append(outlines)
-        tables.append(block)
-    if not any(map(len, tables)):
+        found.append(_layer(block, geometry, points))
+    if not any(len(each.geometries) for each in found):
         raise CatalogError(source, "the table has no rows")
-    # Rows that are no rows come last, without cells
-    table = pd.concat(tables, ignore_index=True)
-    faults |= dict(enumerate(broken, start=len(table)))
-    found = np.concatenate([*shapes, np.full(len(broken), None, dtype=object)])
-    return RawLayer(found, table.reindex(range(len(found))), "OGC:CRS84", faults)
+    return _joined(found, broken)
+
+
+def _layer(block: pd.DataFrame, geometry: str | None, points: tuple[str, str] | None) -> RawLayer:
+    """Return a block of rows with their outlines, or points where there is no column of them."""
+    if geometry is not None:
+        shapes, faults = _outlines(block.pop(geometry), is_wkt=geometry in WKT)
+        return RawLayer(shapes, block, _DEGREES, faults)
+    assert points is not None  # the reader has asked for one of both
+    return RawLayer(_points(block, points), block, _DEGREES)
+
+
+def _joined(blocks: Sequence[RawLayer], broken: Sequence[str]) -> RawLayer:
+    """Return all blocks as one; rows that are no rows come last, without cells."""
+    faults, first = dict[int, str](), 0
+    for block in blocks:
+        faults |= {first + row: fault for row, fault in block.faults.items()}
+        first += len(block.geometries)
+    faults |= dict(enumerate(broken, start=first))
+    # Geometries and cells of the same length
+    lost = np.full(len(broken), None, dtype=object)
+    shapes = np.concatenate([*(block.geometries for block in blocks), lost])
+    table = pd.concat([block.attributes for block in blocks], ignore_index=True)
+    return RawLayer(shapes, table.reindex(range(len(shapes))), _DEGREES, faults)
 
 
 def _header(file: Path) -> list[str]:
@@ -87,6 +102,18 @@ def _header(file: Path) -> list[str]:
         line = opened.readline(1 << 16)
     text = line.decode("utf-8-sig", "replace").strip()
     return [name.strip().strip('"') for name in text.split(",")]
+
+
+def _require_utf_8(file: Path, source: str) -> None:
+    """Raise CatalogError if the bytes of a file are no text in UTF-8."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with file.open("rb") as opened:
+        try:
+            while block := opened.read(_BLOCK):
+                decoder.decode(block)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError as error:
+            raise CatalogError(source, "not UTF-8: save the table as UTF-8") from error
 
 
 def _blocks(
@@ -103,6 +130,7 @@ def _blocks(
     parsing = pa.csv.ParseOptions(newlines_in_values=True, invalid_row_handler=is_skipped)
     texts = dict.fromkeys(names, pa.string())
     converting = pa.csv.ConvertOptions(column_types=texts, strings_can_be_null=True)
+    # Rows of all blocks so far
     rows = 0
     try:
         # Relative names such as http:/x are addresses to the reader
@@ -112,27 +140,35 @@ def _blocks(
                 if rows + len(broken) > MOST_ROWS:
                     raise CatalogError(source, f"it has more than {MOST_ROWS} rows: split the file")
                 yield batch.to_pandas()
-    except (pa.ArrowException, UnicodeDecodeError) as error:
+    except pa.ArrowException as error:
         raise CatalogError(source, f"not a CSV file: {str(error)[:200]}") from error
 
 
 def _outlines(cells: pd.Series, is_wkt: bool) -> tuple[NDArray[np.object_], dict[int, str]]:
     """Return outlines, and the fault of each cell that holds none."""
     faults = dict[int, str]()
-    texts = cells.to_numpy(dtype=object, na_value=None)
-    lengths = cells.str.len().fillna(0).to_numpy()
-    for row in np.flatnonzero(lengths > LONGEST_OUTLINE).tolist():
+    texts = cells.astype(object).where(cells.notna(), None).to_numpy(copy=True)
+    # Texts that would take too much memory as outlines
+    for row in np.flatnonzero(cells.str.len().fillna(0) > LONGEST_OUTLINE).tolist():
         faults[row] = f"the outline has more than {LONGEST_OUTLINE} characters"
         texts[row] = None
-    if is_wkt:
-        # A number beyond all numbers becomes infinite, which no place on the Earth is
-        with np.errstate(all="ignore"):
-            shapes = shapely.from_wkt(texts, on_invalid="ignore")
-        is_lost = shapely.is_missing(shapes) & np.array([text is not None for text in texts])
-        for row in np.flatnonzero(is_lost).tolist():
-            faults[row] = f"geometry = {str(texts[row])[:40]!r} is not WKT"
-        return shapes, faults
-    shapes = np.full(len(texts), None, dtype=object)
+    shapes, wrong = _from_wkt(texts) if is_wkt else _from_geojson(texts)
+    return shapes, faults | wrong
+
+
+def _from_wkt(texts: NDArray[np.object_]) -> tuple[NDArray[np.object_], dict[int, str]]:
+    """Return outlines from WKT, and the fault of each text that is none."""
+    # A number beyond all numbers becomes infinite, which no place on the Earth is
+    with np.errstate(all="ignore"):
+        shapes = shapely.from_wkt(texts, on_invalid="ignore")
+    is_text = np.array([text is not None for text in texts])
+    lost = np.flatnonzero(shapely.is_missing(shapes) & is_text).tolist()
+    return shapes, {row: f"geometry = {str(texts[row])[:40]!r} is not WKT" for row in lost}
+
+
+def _from_geojson(texts: NDArray[np.object_]) -> tuple[NDArray[np.object_], dict[int, str]]:
+    """Return outlines from GeoJSON, and the fault of each text that is none."""
+    shapes, faults = np.full(len(texts), None, dtype=object), dict[int, str]()
     for row, text in enumerate(texts):
         try:
             shapes[row] = None if text is None else footprint_of(text)

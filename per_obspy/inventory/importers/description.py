@@ -6,8 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from per_obspy.inventory.footprints.layers import in_degrees, raw_layer
+from per_obspy.inventory.footprints.layers import Geometries, in_degrees, raw_layer
 from per_obspy.inventory.importers.recognition import recognised
+
+_POLYGONAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
 
 
 class BuildingsDescription(NamedTuple):
@@ -18,7 +20,7 @@ class BuildingsDescription(NamedTuple):
     ----------
     source : str
         Name of the importer that recognised the columns.
-    count : int
+    features : int
         Number of features.
     outlines : int
         Features with a polygon; points have none, and pairs need outlines.
@@ -29,7 +31,7 @@ class BuildingsDescription(NamedTuple):
     """
 
     source: str
-    count: int
+    features: int
     outlines: int
     columns: dict[str, str]
     bounds: tuple[float, float, float, float] | None
@@ -56,15 +58,20 @@ def describe_buildings(path: str | Path, layer: str | None = None) -> BuildingsD
     importer = recognised(map(str, raw.attributes.columns))
     names = set(importer.adapted(raw.attributes).columns)
     columns = {name: column for name, column in importer.columns.items() if column in names}
-    # Features that lie on the Earth
-    degrees = in_degrees(Path(path), raw)
+    # Outlines and places
+    is_outline = np.isin(shapely.get_type_id(raw.geometries), _POLYGONAL)
+    bounds = _bounds(in_degrees(Path(path), raw))
+    outlines = int(is_outline.sum())
+    return BuildingsDescription(importer.name, len(raw.geometries), outlines, columns, bounds)
+
+
+def _bounds(degrees: Geometries) -> tuple[float, float, float, float] | None:
+    """Return west, south, east and north of the geometries that lie on the Earth, degrees."""
+    # Without what a wrong reference system throws off
     box = shapely.bounds(degrees)
     box = box[(np.abs(box) <= [180.0, 90.0, 180.0, 90.0]).all(axis=1)]
-    bounds = None
-    if len(box):
-        west, south = box[:, :2].min(axis=0).tolist()
-        east, north = box[:, 2:].max(axis=0).tolist()
-        bounds = (west, south, east, north)
-    kinds = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
-    outlines = int(np.isin(shapely.get_type_id(raw.geometries), kinds).sum())
-    return BuildingsDescription(importer.name, len(raw.geometries), outlines, columns, bounds)
+    if not len(box):
+        return None
+    west, south = box[:, :2].min(axis=0).tolist()
+    east, north = box[:, 2:].max(axis=0).tolist()
+    return west, south, east, north

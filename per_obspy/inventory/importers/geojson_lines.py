@@ -44,12 +44,14 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
     for row, line in enumerate(_lines(file)):
         if row >= MOST_LINES:
             raise CatalogError(source, f"it has more than {MOST_LINES} features: split the file")
+        # What is no feature loses its own building
         try:
             geometry, properties = feature_of(line)
         except ValueError as error:
             geometry, properties, faults[row] = None, {}, str(error)
         geometries.append(geometry)
         _append(columns, properties, row)
+    # Another kind of file
     if len(faults) == len(geometries):
         first = faults.get(0, "it is empty")
         raise CatalogError(source, f"not a file of GeoJSON features: line 1: {first}")
@@ -88,6 +90,7 @@ def feature_of(line: bytes) -> tuple[Any, dict[str, Any]]:
         found = json.loads(line)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"not JSON: {str(error)[:80]}") from error
+    # One feature, not a collection of them
     if not isinstance(found, dict) or found.get("type") != "Feature":
         raise ValueError("not a GeoJSON feature")
     properties = found.get("properties")

@@ -25,15 +25,23 @@ def without_nesting(table: pa.Table) -> pa.Table:
         fields = {field.name for field in kind} if pa.types.is_struct(kind) else set()
         if fields >= _BOX:
             table = table.drop_columns([name])
-        elif name == "names" and "primary" in fields:
-            table = _replaced(table, name, [_field(row, "primary") for row in _rows(table, name)])
-        elif name == "sources" and pa.types.is_list(kind):
-            firsts = [row[0] if row else None for row in _rows(table, name)]
-            table = _replaced(table, name, [_field(row, "dataset") for row in firsts])
-        elif pa.types.is_map(kind):
-            texts = [None if row is None else json.dumps(dict(row)) for row in _rows(table, name)]
+        elif texts := _texts(table, name, fields):
             table = _replaced(table, name, texts)
     return table
+
+
+def _texts(table: pa.Table, name: str, fields: set[str]) -> list[str | None]:
+    """Return the cells of a nested column of a known source as text; none of other columns."""
+    kind = table.schema.field(name).type
+    if name == "names" and "primary" in fields:
+        return [_field(row, "primary") for row in _rows(table, name)]
+    if name == "sources" and pa.types.is_list(kind):
+        firsts = [row[0] if row else None for row in _rows(table, name)]
+        return [_field(row, "dataset") for row in firsts]
+    # Tags
+    if pa.types.is_map(kind):
+        return [None if row is None else json.dumps(dict(row)) for row in _rows(table, name)]
+    return []
 
 
 def _rows(table: pa.Table, name: str) -> list[Any]:

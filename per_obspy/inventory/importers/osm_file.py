@@ -58,9 +58,12 @@ def _areas(file: Path) -> tuple[dict[str, Any], Any, Any]:
 
 def _read(file: Path, **options: str) -> tuple[dict[str, Any], Any, Any]:
     """Read the layer of areas with open options of GDAL."""
-    with warnings.catch_warnings(action="ignore", category=RuntimeWarning), literal_path(file) as at:
+    with (
+        warnings.catch_warnings(action="ignore", category=RuntimeWarning),
+        literal_path(file) as path,
+    ):
         meta, _, geometries, fields = pyogrio.raw.read(
-            at,
+            path,
             layer="multipolygons",
             columns=_COLUMNS,
             where="building IS NOT NULL",

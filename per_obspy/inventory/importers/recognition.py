@@ -49,7 +49,10 @@ def recognised(names: Iterable[str]) -> Importer:
     'Microsoft building footprints'
     """
     known = set(names)
-    return next(row for row in IMPORTERS if any(known.issuperset(each) for each in row.needed))
+    for importer in IMPORTERS:
+        if any(known.issuperset(each) for each in importer.needed):
+            return importer
+    return OWN
 
 
 def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
@@ -75,24 +78,30 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
     adapted = importer.adapted(attributes)
     names = set(adapted.columns)
     # Columns that the layer has
-    columns = {name: adapted[column] for name, column in importer.columns.items() if column in names}
+    columns = {
+        name: adapted[column] for name, column in importer.columns.items() if column in names
+    }
     sizes = [columns[name] for name in _SIZES if name in columns]
-    is_given = adapted.empty or any(column.notna().any() for column in sizes)
-    if not (sizes and is_given):
+    if not sizes or (len(adapted) and pd.concat(sizes).isna().all()):
         raise CatalogError(source, _no_height(attributes, importer, bool(sizes)))
     table = pd.DataFrame(columns, index=adapted.index)
-    # Structural systems by name or by code
-    if "system" in names and not importer.systems:
-        table["system"] = adapted["system"].fillna("")
-    elif set(importer.system_columns) <= names and importer.systems:
-        table["system"] = _coded_systems(adapted, importer)
+    if (systems := _systems(adapted, importer)) is not None:
+        table["system"] = systems
     table["building_id"] = _identifiers(table)
     # Missing heights by the layer's own classes
     if importer.class_column is not None:
         unknown = pd.Series("", adapted.index)
         table = with_class_heights(table, adapted.get(importer.class_column, unknown))
-    carried = [name for name in importer.carried if name in names]
-    return table.join(adapted[carried])
+    return table.join(adapted[[name for name in importer.carried if name in names]])
+
+
+def _systems(attributes: pd.DataFrame, importer: Importer) -> pd.Series | None:
+    """Return structural systems by name or by code, None if the layer has neither."""
+    if "system" in attributes and not importer.systems:
+        return attributes["system"].fillna("")
+    if importer.systems and set(importer.system_columns) <= set(attributes.columns):
+        return _coded_systems(attributes, importer)
+    return None
 
 
 def _no_height(attributes: pd.DataFrame, importer: Importer, has_column: bool) -> str:
@@ -100,6 +109,7 @@ def _no_height(attributes: pd.DataFrame, importer: Importer, has_column: bool) -
     columns = list(map(str, attributes.columns))
     suggestion = did_you_mean("height", columns) or did_you_mean("storeys", columns)
     found = ", ".join(columns) or "none"
+    # The column is empty, or is not there
     mend = "" if importer.name == "per_obspy" else f"; {importer.name} gives none here, add one"
     if has_column:
         return f"height, storeys and period are empty in every feature{mend}"
@@ -109,9 +119,12 @@ def _no_height(attributes: pd.DataFrame, importer: Importer, has_column: bool) -
 
 def _coded_systems(attributes: pd.DataFrame, importer: Importer) -> pd.Series:
     """Return structural systems from the codes of material and lateral system, "" if unknown."""
-    codes = [attributes[name].fillna("").astype(str).str.strip() for name in importer.system_columns]
-    joined = codes[0].str.cat(codes[1:], sep=" ")
-    return joined.map(importer.systems).fillna("")
+    given = (attributes[name] for name in importer.system_columns)
+    first, *others = (column.fillna("").astype(str).str.strip() for column in given)
+    codes = first
+    for other in others:
+        codes = codes + " " + other
+    return codes.map(importer.systems).fillna("")
 
 
 def _identifiers(table: pd.DataFrame) -> pd.Series:

@@ -16,6 +16,7 @@ No line is copied from published data; the structures are those of:
 import gzip
 import json
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -94,7 +95,9 @@ def osm_xml(folder: Path, town: Town) -> Path:
         ways.append(f'<way id="{1000 + i}" version="1">{"".join(lines)}</way>')
     path = folder / "town.osm"
     text = "\n".join([*nodes, *ways])
-    path.write_text(f"<?xml version='1.0' encoding='UTF-8'?>\n<osm version=\"0.6\">\n{text}\n</osm>")
+    path.write_text(
+        f"<?xml version='1.0' encoding='UTF-8'?>\n<osm version=\"0.6\">\n{text}\n</osm>"
+    )
     return path
 
 
@@ -200,7 +203,7 @@ def gml_polygon(polygon: Any, elevation: float) -> str:
 def gml_walls(polygon: Any, low: float, high: float) -> str:
     corners = shapely.get_coordinates(polygon.exterior).tolist()
     text = ""
-    for (x0, y0), (x1, y1) in zip(corners[:-1], corners[1:], strict=True):
+    for (x0, y0), (x1, y1) in pairwise(corners):
         places = [(y0, x0, low), (y1, x1, low), (y1, x1, high), (y0, x0, high), (y0, x0, low)]
         numbers = " ".join(f"{value!r}" for place in places for value in place)
         ring = f"<gml:LinearRing><gml:posList>{numbers}</gml:posList></gml:LinearRing>"
@@ -237,8 +240,9 @@ def _gml_lod0(outline: Any, height: float) -> str:
 
 
 def _gml_lod1(outline: Any, height: float) -> str:
+    high = 3.0 + height
     surfaces = "".join(
-        gml_polygon(part, 3.0) + gml_polygon(part, 3.0 + height) + gml_walls(part, 3.0, 3.0 + height)
+        gml_polygon(part, 3.0) + gml_polygon(part, high) + gml_walls(part, 3.0, high)
         for part in _parts(outline)
     )
     shell = f"<gml:CompositeSurface>{surfaces}</gml:CompositeSurface>"

@@ -35,7 +35,12 @@ def test_heights_are_in_the_unit_of_the_file(tmp_path):
 def test_building_types_of_hazus(tmp_path):
     path = r2d_assets(tmp_path, small_town())
     text = path.read_text()
-    for code, system in (("C1", "concrete_mrf"), ("S1M", "steel_mrf"), ("URML", "other"), ("?", "")):
+    for code, system in (
+        ("C1", "concrete_mrf"),
+        ("S1M", "steel_mrf"),
+        ("URML", "other"),
+        ("?", ""),
+    ):
         path.write_text(text.replace('"StructureType": "C1"', f'"StructureType": "{code}"'))
         assert imported(read_asset_json(path, "a").attributes, "a")["system"].tolist()[0] == system
 

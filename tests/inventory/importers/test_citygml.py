@@ -42,9 +42,10 @@ def test_latitude_comes_first_and_both_levels_give_one_outline(tmp_path):
         # would catch axes taken as longitude, latitude
         assert shapely.bounds(raw.geometries) == pytest.approx(shapely.bounds(town.outlines))
         assert raw.crs.to_epsg() == 6668  # the horizontal part of EPSG:6697
-        assert shapely.symmetric_difference(raw.geometries, town.outlines).tolist() == [
-            shapely.Polygon()
-        ] * 4
+        assert (
+            shapely.symmetric_difference(raw.geometries, town.outlines).tolist()
+            == [shapely.Polygon()] * 4
+        )
 
 
 def test_attributes_and_values_that_mean_unknown(tmp_path):
@@ -141,7 +142,7 @@ AWAY = '<!DOCTYPE x SYSTEM "http://127.0.0.1:9/evil.dtd">'
 @pytest.mark.parametrize("kind", [BOMB, FILE, AWAY], ids=["bomb", "file", "address"])
 def test_type_definitions_are_refused(tmp_path, kind):
     text = gml_document(gml_building("&a;", 9, 3, _lod0()).replace("丁目", "&a;"))
-    with pytest.raises(CatalogError, match="type definition|not a CityGML file"):
+    with pytest.raises(CatalogError, match=r"type definition|not a CityGML file"):
         _read(tmp_path, text.replace("\n", f"\n{kind}\n", 1))
     plain = gml_document(gml_building("a", 9, 3, _lod0()))
     with pytest.raises(CatalogError, match="type definition"):
@@ -167,9 +168,7 @@ def test_depth_and_text_beyond_the_limits_of_the_parser(tmp_path):
         (gml_document(gml_building("a", 9, 3, _lod0()), ""), "no coordinate reference system"),
         (gml_document(gml_building("a", 9, 3, _lod0()), "EPSG:999999"), "unknown coordinate"),
         (
-            gml_document(
-                gml_building("a", 9, 3, '<gml:Envelope srsName="EPSG:25832"/>' + _lod0())
-            ),
+            gml_document(gml_building("a", 9, 3, '<gml:Envelope srsName="EPSG:25832"/>' + _lod0())),
             "two reference systems",
         ),
         (

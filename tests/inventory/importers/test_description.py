@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from building_samples import OUTLINES, POINTS, small_town
+from screening_samples import make_station
 
 import per_obspy
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.inventory.importers.description import describe_buildings
-from screening_samples import make_station
 
 #: Metres by which coordinates are rounded: OSM has seven decimals of a degree.
 ROUNDED = {"osm_xml": 0.02}
@@ -25,7 +25,7 @@ def test_from_a_file_to_risk_rows(tmp_path, name, station):
     town = small_town()
     path = write(tmp_path, town)
     described = describe_buildings(path)
-    assert (described.source, described.count, described.outlines) == (source, 4, 4)
+    assert (described.source, described.features, described.outlines) == (source, 4, 4)
     assert {"height", "storeys"} & set(described.columns)
     # seven decimals
     assert described.bounds == pytest.approx((20.0, 10.0, 20.00044, 10.000108), abs=1e-6)
@@ -49,7 +49,7 @@ def test_points_are_described_and_refused_as_pairs(tmp_path, name):
     source, write = POINTS[name]
     path = write(tmp_path, small_town())
     described = describe_buildings(path)
-    assert (described.source, described.count, described.outlines) == (source, 4, 0)
+    assert (described.source, described.features, described.outlines) == (source, 4, 0)
     assert "storeys" in described.columns
     assert described.bounds is not None
     assert described.bounds[0] == pytest.approx(20.0, abs=1e-3)

@@ -22,7 +22,10 @@ POINT = '{"type": "Feature", "geometry": {"type": "Point", "coordinates": [20, 1
         ('{"a": ' * 50_000 + "1" + "}" * 50_000, "not JSON"),
         ("9" * 5000, "not JSON"),
         ('{"type": "FeatureCollection", "features": []}', "not a GeoJSON feature"),
-        ('{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 3}}', "not a geometry"),
+        (
+            '{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 3}}',
+            "not a geometry",
+        ),
         ('{"type": "Feature", "geometry": {"type": "Polygon"}}', "not a geometry"),
         ('{"type": "Feature", "geometry": [1, 2]}', "not a geometry"),
         ('{"type": "Feature", "properties": {"height": 9}}', "no geometry"),

@@ -6,6 +6,7 @@ Covers per_obspy.inventory.importers.sources.openstreetmap.
 
 from pathlib import Path
 
+import pandas as pd
 import pyogrio
 import pytest
 import shapely
@@ -71,7 +72,5 @@ def test_tags_in_hstore_and_hostile_text():
 )  # fmt: skip
 def test_heights_with_units(text, expected):
     # what is not understood stays text, which the checks of pairs reject with the text
-    import pandas as pd
-
     table = adapted(pd.DataFrame({"height": [text], "building:levels": ["3"]}))
     assert table["height"].tolist()[0] == pytest.approx(expected)

@@ -22,7 +22,7 @@ EXACT = 1e-9
 
 @pytest.fixture(scope="module")
 def quarter(real_data, tmp_path_factory):
-    """Return the surveyed buildings of known height, their pairs by the survey, and by own names."""
+    """Return surveyed buildings of known height, their pairs by the survey and by own names."""
     folder = real_data / "inventories" / "footprints"
     path = folder / "san_jose_pilot_region_all_fields.gpkg"
     meta, _, geometries, fields = pyogrio.raw.read(path)

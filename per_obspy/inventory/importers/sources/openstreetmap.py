@@ -27,7 +27,9 @@ TAG_COLUMNS = ("other_tags", "tags")
 _NUMBER = r"(?P<number>[0-9]{1,6}(?:\.[0-9]{1,6})?)"
 _METRES = re.compile(rf"{_NUMBER} ?m(?:et(?:er|re)s?)?")
 _FEET = re.compile(rf"{_NUMBER} ?(?:ft|feet|foot)")
-_FEET_AND_INCHES = re.compile(r"(?P<feet>[0-9]{1,5})'(?:(?P<inches>[0-9]{1,2}(?:\.[0-9]{1,3})?)\")?")
+_FEET_AND_INCHES = re.compile(
+    r"(?P<feet>[0-9]{1,5})'(?:(?P<inches>[0-9]{1,2}(?:\.[0-9]{1,3})?)\")?"
+)
 _HSTORE = re.compile(r'"(?P<key>(?:[^"\\]|\\.)*)"=>"(?P<value>(?:[^"\\]|\\.)*)"')
 
 
@@ -42,6 +44,7 @@ def metres(text: object) -> object:
     >>> metres("12;15")
     '12;15'
     """
+    # Metres, feet, feet and inches
     words = str(text).strip().lower()
     if found := _METRES.fullmatch(words):
         return float(found["number"])
@@ -77,6 +80,7 @@ def tags_of(cell: object) -> dict[str, object]:
 def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
     """Return the attributes with the known tags as columns, and heights in m."""
     table = attributes.copy()
+    # Tags that stand together in one column
     for column in TAG_COLUMNS:
         if column in table:
             cells = [tags_of(cell) for cell in table[column]]

@@ -46,7 +46,9 @@ def test_exact_storeys_have_no_deviation():
     assert parsed("CR/LFM/HAPP:4").log_std > 0.0
 
 
-@pytest.mark.parametrize("text", [None, 3.5, "/" * 10**6, "+" * 10**6, "H:" * 10**5, "H:9999", "HBET:0-3"])
+@pytest.mark.parametrize(
+    "text", [None, 3.5, "/" * 10**6, "+" * 10**6, "H:" * 10**5, "H:9999", "HBET:0-3"]
+)
 def test_hostile_strings_are_unknown(text):
     found = parsed(text)
     assert math.isnan(found.storeys)

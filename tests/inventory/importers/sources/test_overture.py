@@ -7,6 +7,8 @@ per_obspy.inventory.importers.sources.microsoft.
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet
 from building_samples import OUTLINES, overture, small_town
 
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
@@ -16,9 +18,6 @@ from per_obspy.inventory.importers.recognition import imported
 def test_a_building_under_the_ground_has_no_pairs(tmp_path):
     path = overture(tmp_path, small_town())
     assert len(pairs_from_footprints(path)) == 2
-    import pyarrow as pa
-    import pyarrow.parquet
-
     table = pa.parquet.read_table(path)
     number = table.column_names.index("is_underground")
     below = pa.array([True, False, False, False])
