@@ -202,6 +202,7 @@ def _add_gap(
     gap, deviation = numbers_in(pairs, "gap"), numbers_in(pairs, "gap_std")
     if building.gap is None:
         columns["gap"], columns["gap_std"] = gap, _given_or(deviation, 0.0)
+        _mark_gap_deviation(derived, pairs)
         return
     # Mean and standard deviation of the lognormal distribution
     variance = building.gap_log_std**2
@@ -209,6 +210,13 @@ def _add_gap(
     _add_column(columns, derived, "gap", gap, mean)
     spread = np.where(derived["gap"], mean * np.sqrt(np.expm1(variance)), _given_or(deviation, 0.0))
     columns["gap_std"] = spread
+    _mark_gap_deviation(derived, pairs)
+
+
+def _mark_gap_deviation(derived: Derived, pairs: pd.DataFrame) -> None:
+    """Mark deviations of gaps that whoever made the table has assumed: no survey's deviation."""
+    if "gap_std_source" in pairs:
+        derived["gap_std"] = (pairs["gap_std_source"] == "assumed").to_numpy(dtype=bool)
 
 
 def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:

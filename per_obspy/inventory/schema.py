@@ -25,6 +25,9 @@ EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 #: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 
+#: Where the deviation of a gap comes from: it is known, or a default stands in for it.
+DEVIATION_SOURCES = ("given", "assumed")
+
 #: Whether both buildings are within one property.
 ONE_PROPERTY = ("yes", "no")
 
@@ -79,6 +82,8 @@ _PAIR = (
            hint="given in millimetres or centimetres by mistake?"),
     Column("gap_std", "float64", "m", "standard deviation of the gap",
            low=0.0, high=1.0, hint="in millimetres?"),
+    Column("gap_std_source", "str", "", "whether gap_std is given or assumed",
+           choices=DEVIATION_SOURCES),
     Column("azimuth", "float64", "degrees",
            "direction from building 1 to building 2, clockwise from north", low=0.0, high=360.0),
     Column("contact_height", "float64", "m", "height at which the buildings meet first",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from per_obspy.inventory.checking import plain_numbers
+from per_obspy.inventory.footprints.lengths import read_numbers
 
 #: Known values that a class needs. The median of twenty of log-deviation s is off by 1.25 s / 4.5.
 ENOUGH = 20
@@ -67,7 +67,8 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
 
 def _spread(values: pd.Series, labels: pd.Series) -> _Spread:
     """Return the spread of known positive values by class."""
-    numbers = plain_numbers(values)
+    # Cells may have units, as tags of OpenStreetMap do
+    numbers, _ = read_numbers(values, is_length=values.name == "height")
     logarithms = np.log(numbers.where(numbers > 0.0))
     grouped = logarithms.groupby(labels)
     is_enough = grouped.transform("count") >= ENOUGH

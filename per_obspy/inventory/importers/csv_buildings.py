@@ -6,7 +6,7 @@ GEM exposures, the National Structure Inventory and others have two columns of c
 """
 
 import codecs
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +38,14 @@ MOST_ROWS = 5_000_000
 LONGEST_OUTLINE = 1 << 20
 
 
+def has_outlines(file: Path) -> bool:
+    """Return whether the header of a CSV file has a column of outlines."""
+    return bool({*WKT, *GEOJSON} & set(_header(file)))
+
+
 def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
     """
-    Read a CSV file of buildings, or return None if it has neither outlines nor a known source.
+    Read a CSV file of outlines, or return None if it has none or is of no known source.
 
     Parameters
     ----------
@@ -57,29 +62,53 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
     """
     names = _header(file)
     geometry = next((name for name in (*WKT, *GEOJSON) if name in names), None)
-    points = next((pair for pair in POINTS if set(pair) <= set(names)), None)
-    if geometry is None and (points is None or recognised(names) is OWN):
+    if geometry is None or recognised(names) is OWN:
         return None
+    return _read(file, source, names, lambda block: _with_outlines(block, geometry))
+
+
+def read_csv_points(file: Path, source: str) -> RawLayer | None:
+    """
+    Read a CSV file of points, or return None if it has no two columns of coordinates.
+
+    Parameters and errors are those of :func:`read_csv_buildings`.
+    """
+    names = _header(file)
+    points = next((pair for pair in POINTS if set(pair) <= set(names)), None)
+    if points is None:
+        return None
+    return _read(file, source, names, lambda block: _with_points(block, points))
+
+
+def _read(
+    file: Path, source: str, names: list[str], layer: Callable[[pd.DataFrame], RawLayer]
+) -> RawLayer:
+    """Read a file block by block, so that the text of outlines is forgotten."""
     # Text, and columns that can be told apart
     _require_utf_8(file, source)
     if repeated := next((name for name in names if names.count(name) > 1), None):
         raise CatalogError(source, f"column {repeated[:200]} stands more than once")
-    # Block by block, so that the text of outlines is forgotten
     broken, found = list[str](), list[RawLayer]()
     for block in _blocks(file, source, names, broken):
-        found.append(_layer(block, geometry, points))
+        found.append(layer(block))
     if not any(len(each.geometries) for each in found):
         raise CatalogError(source, "the table has no rows")
     return _joined(found, broken)
 
 
-def _layer(block: pd.DataFrame, geometry: str | None, points: tuple[str, str] | None) -> RawLayer:
-    """Return a block of rows with their outlines, or points where there is no column of them."""
-    if geometry is not None:
-        shapes, faults = _outlines(block.pop(geometry), is_wkt=geometry in WKT)
-        return RawLayer(shapes, block, _DEGREES, faults)
-    assert points is not None  # the reader has asked for one of both
-    return RawLayer(_points(block, points), block, _DEGREES)
+def _with_outlines(block: pd.DataFrame, geometry: str) -> RawLayer:
+    """Return a block of rows with the outlines of a column."""
+    shapes, faults = _outlines(block.pop(geometry), is_wkt=geometry in WKT)
+    return RawLayer(shapes, block, _DEGREES, faults)
+
+
+def _with_points(block: pd.DataFrame, names: tuple[str, str]) -> RawLayer:
+    """Return a block of rows with points from two columns of coordinates."""
+    east, north = (plain_numbers(block[name]).to_numpy(np.float64) for name in names)
+    known = np.isfinite(east) & np.isfinite(north)
+    shapes = np.full(len(block), None, dtype=object)
+    shapes[known] = shapely.points(east[known], north[known])
+    return RawLayer(shapes, block, _DEGREES)
 
 
 def _joined(blocks: Sequence[RawLayer], broken: Sequence[str]) -> RawLayer:
@@ -175,12 +204,3 @@ def _from_geojson(texts: NDArray[np.object_]) -> tuple[NDArray[np.object_], dict
         except ValueError as error:
             faults[row] = str(error)
     return shapes, faults
-
-
-def _points(table: pd.DataFrame, names: tuple[str, str]) -> NDArray[np.object_]:
-    """Return points from two columns of coordinates, None where one is no number."""
-    east, north = (plain_numbers(table[name]).to_numpy(np.float64) for name in names)
-    known = np.isfinite(east) & np.isfinite(north)
-    shapes = np.full(len(table), None, dtype=object)
-    shapes[known] = shapely.points(east[known], north[known])
-    return shapes

@@ -6,7 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from per_obspy.inventory.footprints.layers import Geometries, in_degrees, raw_layer
+from per_obspy.inventory.footprints.layer_files import RawLayer, raw_features, read_raw_layer
+from per_obspy.inventory.footprints.layers import BLOCK, in_degrees, polygons, to_degrees
+from per_obspy.inventory.importers.csv_buildings import has_outlines, read_csv_points
 from per_obspy.inventory.importers.recognition import recognised
 
 _POLYGONAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
@@ -54,24 +56,38 @@ def describe_buildings(path: str | Path, layer: str | None = None) -> BuildingsD
     CatalogError
         If the file cannot be read.
     """
-    raw = raw_layer(path, layer)
-    importer = recognised(map(str, raw.attributes.columns))
-    names = set(importer.adapted(raw.attributes).columns)
+    file = Path(path)
+    raw = read_csv_points(file, str(file)) if _is_table_of_points(file) else None
+    features = raw_features(raw) if raw else read_raw_layer(file, layer)
+    # Columns by the source's table
+    attributes = features.attributes.to_pandas()
+    importer = recognised(map(str, attributes.columns))
+    names = set(importer.adapted(attributes).columns)
     columns = {name: column for name, column in importer.columns.items() if column in names}
-    # Outlines and places
-    is_outline = np.isin(shapely.get_type_id(raw.geometries), _POLYGONAL)
-    bounds = _bounds(in_degrees(Path(path), raw))
-    outlines = int(is_outline.sum())
-    return BuildingsDescription(importer.name, len(raw.geometries), outlines, columns, bounds)
+    outlines, bounds = _places(file, features)
+    return BuildingsDescription(importer.name, len(features.wkb), outlines, columns, bounds)
 
 
-def _bounds(degrees: Geometries) -> tuple[float, float, float, float] | None:
-    """Return west, south, east and north of the geometries that lie on the Earth, degrees."""
-    # Without what a wrong reference system throws off
-    box = shapely.bounds(degrees)
-    box = box[(np.abs(box) <= [180.0, 90.0, 180.0, 90.0]).all(axis=1)]
-    if not len(box):
-        return None
-    west, south = box[:, :2].min(axis=0).tolist()
-    east, north = box[:, 2:].max(axis=0).tolist()
-    return west, south, east, north
+def _is_table_of_points(file: Path) -> bool:
+    """Return whether a file is a CSV table without outlines."""
+    return file.suffix.lower() == ".csv" and not has_outlines(file)
+
+
+def _places(file: Path, features: RawLayer) -> tuple[int, tuple[float, float, float, float] | None]:
+    """Return the number of outlines, and the bounds of all features on the Earth, degrees."""
+    transformer, _ = to_degrees(file, features.crs)
+    # Block by block, to bound memory
+    outlines, boxes = 0, [np.empty((0, 4))]
+    for start in range(0, len(features.wkb), BLOCK):
+        found = polygons(features.wkb.slice(start, BLOCK))
+        outlines += int(np.isin(shapely.get_type_id(found), _POLYGONAL).sum())
+        degrees = in_degrees(found, transformer)
+        # Without what a wrong reference system throws off
+        box = shapely.bounds(degrees)
+        boxes.append(box[(np.abs(box) <= [180.0, 90.0, 180.0, 90.0]).all(axis=1)])
+    every = np.concatenate(boxes)
+    if not len(every):
+        return outlines, None
+    west, south = every[:, :2].min(axis=0).tolist()
+    east, north = every[:, 2:].max(axis=0).tolist()
+    return outlines, (west, south, east, north)

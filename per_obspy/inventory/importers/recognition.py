@@ -1,6 +1,6 @@
 """Recognition of a layer's source by its columns, and its attributes under the schema's names."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -55,7 +55,9 @@ def recognised(names: Iterable[str]) -> Importer:
     return OWN
 
 
-def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
+def imported(
+    attributes: pd.DataFrame, source: str, given: Mapping[str, pd.Series] | None = None
+) -> pd.DataFrame:
     """
     Return the attributes of buildings under the schema's names, then the columns to carry along.
 
@@ -68,6 +70,9 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
         One row per footprint with the layer's columns; the index is the number of the feature.
     source : str
         The file, for messages.
+    given : mapping of str to Series, optional
+        Name in the schema -> column that the user names for it, which takes the place of the
+        recognised one.
 
     Raises
     ------
@@ -78,14 +83,12 @@ def imported(attributes: pd.DataFrame, source: str) -> pd.DataFrame:
     adapted = importer.adapted(attributes)
     names = set(adapted.columns)
     # Columns that the layer has
-    columns = {
-        name: adapted[column] for name, column in importer.columns.items() if column in names
-    }
-    sizes = [columns[name] for name in _SIZES if name in columns]
-    if not sizes or (len(adapted) and pd.concat(sizes).isna().all()):
-        raise CatalogError(source, _no_height(attributes, importer, bool(sizes)))
-    table = pd.DataFrame(columns, index=adapted.index)
-    if (systems := _systems(adapted, importer)) is not None:
+    found = {name: adapted[column] for name, column in importer.columns.items() if column in names}
+    table = pd.DataFrame(found | dict(given or {}), index=adapted.index)
+    sizes = table[[name for name in _SIZES if name in table]]
+    if sizes.columns.empty or (len(sizes) and sizes.isna().all(axis=None)):
+        raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
+    if "system" not in table and (systems := _systems(adapted, importer)) is not None:
         table["system"] = systems
     table["building_id"] = _identifiers(table)
     # Missing heights by the layer's own classes

@@ -11,9 +11,9 @@ from building_samples import google, nsi, small_town
 
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
-from per_obspy.inventory.footprints.layers import raw_layer
+from per_obspy.inventory.footprints.layer_files import read_raw_layer
 from per_obspy.inventory.importers import csv_buildings
-from per_obspy.inventory.importers.csv_buildings import read_csv_buildings
+from per_obspy.inventory.importers.csv_buildings import read_csv_buildings, read_csv_points
 from per_obspy.inventory.importers.recognition import imported
 
 
@@ -92,7 +92,7 @@ def test_too_many_rows_are_refused(tmp_path, monkeypatch):
 
 @pytest.mark.real_data
 def test_points_of_berkeley(real_data):
-    raw = raw_layer(real_data / "inventories" / "BerkeleyBuildings_full.csv")
+    raw = read_csv_points(real_data / "inventories" / "BerkeleyBuildings_full.csv", "a")
     table = imported(raw.attributes, "Berkeley")
     assert table["storeys"].tolist()[:2] == ["2", "1"]
     assert table["system"].tolist()[0] == "other"  # W1, wood
@@ -101,7 +101,8 @@ def test_points_of_berkeley(real_data):
 
 
 def test_people_at_night_of_the_national_inventory(tmp_path):
-    table = imported(raw_layer(nsi(tmp_path, small_town())).attributes, "nsi")
+    raw = read_raw_layer(nsi(tmp_path, small_town()), None)
+    table = imported(raw.attributes.to_pandas(), "nsi")
     assert table["occupants"].tolist() == [3, 3, 3, 3]
     assert table["storeys"].tolist() == [4, 3, 2, 3]
     # the height of the first floor above ground is not that of the building

@@ -5,12 +5,12 @@ import json
 import pyarrow as pa
 from building_samples import overture, small_town
 
-from per_obspy.inventory.footprints.layers import raw_layer
+from per_obspy.inventory.footprints.layer_files import read_raw_layer
 from per_obspy.inventory.importers.nested_columns import without_nesting
 
 
 def test_names_sources_and_boxes_of_overture(tmp_path):
-    attributes = raw_layer(overture(tmp_path, small_town())).attributes
+    attributes = read_raw_layer(overture(tmp_path, small_town()), None).attributes.to_pandas()
     assert attributes["names"].fillna("").tolist() == ["House", "", "", ""]
     assert attributes["sources"].tolist() == ["OpenStreetMap"] * 4
     assert "bbox" not in attributes

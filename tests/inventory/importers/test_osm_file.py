@@ -6,16 +6,16 @@ Covers per_obspy.inventory.importers.sources.openstreetmap.
 
 from pathlib import Path
 
-import pandas as pd
 import pyogrio
 import pytest
 import shapely
 from building_samples import osm_xml, small_town
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints.layers import raw_layer
+from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
+from per_obspy.inventory.importers.osm_file import read_osm_file
 from per_obspy.inventory.importers.recognition import imported, recognised
-from per_obspy.inventory.importers.sources.openstreetmap import adapted, tags_of
+from per_obspy.inventory.importers.sources.openstreetmap import tags_of
 
 REAL = Path(pyogrio.__file__).parent / "tests" / "fixtures" / "sample.osm.pbf"
 
@@ -23,7 +23,7 @@ REAL = Path(pyogrio.__file__).parent / "tests" / "fixtures" / "sample.osm.pbf"
 def test_a_real_extract():
     # its nodes are not in the order of their numbers; Greenacres and Friendship House are the only
     # areas with the tag building
-    raw = raw_layer(REAL)
+    raw = read_osm_file(REAL, "sample")
     assert sorted(raw.attributes["name"]) == ["Friendship House", "Greenacres"]
     assert recognised(raw.attributes.columns).name == "OpenStreetMap"
     assert {geometry.geom_type for geometry in raw.geometries} == {"MultiPolygon"}
@@ -33,7 +33,7 @@ def test_a_real_extract():
 
 def test_a_made_extract(tmp_path):
     town = small_town()
-    raw = raw_layer(osm_xml(tmp_path, town))
+    raw = read_osm_file(osm_xml(tmp_path, town), "town")
     table = imported(raw.attributes, "town")
     assert table["building_id"].tolist() == ["w1000", "w1001", "w1002", "w1003"]
     assert table["storeys"].tolist() == ["4", "3", "2", "3"]
@@ -46,7 +46,7 @@ def test_a_made_extract(tmp_path):
 def test_damaged_files_end_in_one_line(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(CatalogError) as error:
-        imported(raw_layer(tmp_path / name).attributes, name)
+        pairs_from_footprints(tmp_path / name)
     assert "\n" not in str(error.value)
 
 
@@ -54,7 +54,7 @@ def test_a_cut_extract(tmp_path):
     path = tmp_path / "a.osm.pbf"
     path.write_bytes(REAL.read_bytes()[:4000])
     with pytest.raises(CatalogError):
-        imported(raw_layer(path).attributes, "a")
+        pairs_from_footprints(path)
 
 
 def test_tags_in_hstore_and_hostile_text():
@@ -63,14 +63,16 @@ def test_tags_in_hstore_and_hostile_text():
     assert tags_of('"' * 100_000) == {}
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("9", "9"), ("9.5 m", 9.5), ("20 ft", 6.096), ("7'4\"", 2.2352), ("7'", 2.1336),
-        ("~9", "~9"), ("9;12", "9;12"), ("9,5", "9,5"), ("nan", "nan"), ("1e9", "1e9"),
-    ],
-)  # fmt: skip
-def test_heights_with_units(text, expected):
-    # what is not understood stays text, which the checks of pairs reject with the text
-    table = adapted(pd.DataFrame({"height": [text], "building:levels": ["3"]}))
-    assert table["height"].tolist()[0] == pytest.approx(expected)
+@pytest.mark.parametrize(("text", "expected"), [("10", 10.0), ("9.5 m", 9.5), ("40 ft", 12.192)])
+def test_heights_with_units(tmp_path, text, expected):
+    path = osm_xml(tmp_path, small_town())
+    path.write_text(path.read_text().replace('v="12.0"', f'v="{text}"'))
+    assert pairs_from_footprints(path)["height_1"].tolist()[0] == pytest.approx(expected)
+
+
+def test_a_height_that_is_none_is_a_rejected_pair(tmp_path):
+    path = osm_xml(tmp_path, small_town())
+    path.write_text(path.read_text().replace('v="12.0"', 'v="9;12"'))
+    pairs = pairs_from_footprints(path)
+    assert len(pairs) == 1
+    assert "'9;12'" in pairs.attrs["rejected"][0].reasons[0]

@@ -1,7 +1,9 @@
 """Nodes of what is uncertain: moments, and medians where nothing is."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import lognorm, truncnorm
 
 from per_obspy.screening.uncertainty.nodes import (
     NODES,
@@ -48,8 +50,57 @@ def test_a_deviation_of_any_building_is_a_doubt():
     assert building_is_uncertain(PAIRS).tolist() == [True, False]
 
 
-def test_a_lognormal_gap_keeps_its_moments():
-    # mean 0.2, standard deviation 0.1: ln(1 + 0.25) is the variance of the logarithm
-    pairs = {"gap": np.array([0.2, 0.2, 0.0]), "gap_std": np.array([0.1, 0.0, 0.0])}
-    assert_allclose(gap_dispersion(pairs), [np.sqrt(np.log(1.25)), 0.0, 0.0], rtol=1e-12)
-    assert_allclose(median_gap(pairs), [0.2 / np.sqrt(1.25), 0.2, 0.0], rtol=1e-12)
+def _truncated(gap, deviation):
+    """Return the distribution of a length measured with a normal error, if it is not below 0."""
+    return truncnorm(-gap / deviation, np.inf, gap, deviation)
+
+
+def _lognormal(gap, deviation):
+    """Return the lognormal distribution of a gap."""
+    pairs = {"gap": np.array([gap]), "gap_std": np.array([deviation])}
+    return lognorm(gap_dispersion(pairs)[0], scale=median_gap(pairs)[0])
+
+
+def test_certain_gaps_stay():
+    pairs = {"gap": np.array([0.2, 0.0]), "gap_std": np.zeros(2)}
+    assert_array_equal(gap_dispersion(pairs), [0.0, 0.0])
+    assert_array_equal(median_gap(pairs), [0.2, 0.0])
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01, 0.05, 0.1, 0.2, 0.4])
+def test_an_uncertain_gap_gives_hardly_less_contact_than_a_normal_error(gap):
+    # an independent distribution gives the expected chances; those below the threshold of `no` are
+    # understated by no more than what the docstring says
+    demands = np.geomspace(1e-4, 2.0, 500)
+    expected, found = _truncated(gap, 0.1).cdf(demands), _lognormal(gap, 0.1).cdf(demands)
+    assert expected[found < 0.01].max(initial=0.0) < 0.0425
+    assert (found - expected).min() > -0.045
+
+
+def test_touching_outlines_are_no_less_likely_to_hit_than_by_a_normal_error():
+    # from the threshold of `unlikely` to that of `yes`
+    chances = np.linspace(0.01, 0.9, 50)
+    found = _lognormal(0.0, 0.1).cdf(_truncated(0.0, 0.1).ppf(chances))
+    # the ends agree, up to round-off
+    assert (found >= chances - 1e-9).all()
+    assert_allclose(found[[0, -1]], chances[[0, -1]], rtol=1e-9)
+
+
+def test_nearer_outlines_are_likelier_to_hit():
+    # would catch walls drawn a centimetre apart that hit more often than walls drawn as one
+    demands = np.geomspace(0.001, 0.5, 100)
+    chances = [_lognormal(gap, 0.1).cdf(demands) for gap in np.linspace(0.0, 0.6, 61)]
+    # two lognormal distributions may cross where both are nearly certain
+    assert np.diff(chances, axis=0).max() < 0.003
+
+
+def test_touching_outlines_are_neither_certain_to_touch_nor_certain_not_to():
+    # a demand of a fifth of the deviation: 0.159 by the half of a normal distribution
+    touching = _lognormal(0.0, 0.1)
+    assert 0.159 < touching.cdf(0.02) < 0.5
+
+
+def test_a_small_deviation_of_a_gap_is_that_of_its_logarithm():
+    # a fiftieth of the gap: a normal and a lognormal distribution differ by the square of that
+    assert_allclose(_lognormal(0.5, 0.01).median(), 0.5, rtol=4e-4)
+    assert_allclose(_lognormal(0.5, 0.01).std(), 0.01, rtol=0.01)

@@ -2,7 +2,7 @@
 OpenStreetMap: tags as columns, or together in one column.
 
 GDAL gives further tags in ``other_tags`` (hstore text or JSON), Overpass and QuackOSM in ``tags``
-(JSON or a map). Heights are metres unless they have a unit; feet and inches are written ``7'4"``.
+(JSON or a map). Heights are metres unless they have a unit, which is read as that of any length.
 ``building:levels`` counts storeys above ground without those in the roof. Materials are known, not
 structural systems.
 
@@ -16,43 +16,13 @@ import pandas as pd
 
 from per_obspy.inventory.importers.importer import Importer
 
-FOOT, INCH = 0.3048, 0.0254
-
 #: Tags that are looked for inside a column of several.
 TAGS = ("height", "building:levels", "building")
 
 #: Columns of several tags.
 TAG_COLUMNS = ("other_tags", "tags")
 
-_NUMBER = r"(?P<number>[0-9]{1,6}(?:\.[0-9]{1,6})?)"
-_METRES = re.compile(rf"{_NUMBER} ?m(?:et(?:er|re)s?)?")
-_FEET = re.compile(rf"{_NUMBER} ?(?:ft|feet|foot)")
-_FEET_AND_INCHES = re.compile(
-    r"(?P<feet>[0-9]{1,5})'(?:(?P<inches>[0-9]{1,2}(?:\.[0-9]{1,3})?)\")?"
-)
 _HSTORE = re.compile(r'"(?P<key>(?:[^"\\]|\\.)*)"=>"(?P<value>(?:[^"\\]|\\.)*)"')
-
-
-def metres(text: object) -> object:
-    """
-    Return a height in m where the text has a unit; any other value is returned as it is.
-
-    Examples
-    --------
-    >>> metres("12.5 m"), round(metres("20 ft"), 3), round(metres("7'4" + chr(34)), 3)
-    (12.5, 6.096, 2.235)
-    >>> metres("12;15")
-    '12;15'
-    """
-    # Metres, feet, feet and inches
-    words = str(text).strip().lower()
-    if found := _METRES.fullmatch(words):
-        return float(found["number"])
-    if found := _FEET.fullmatch(words):
-        return float(found["number"]) * FOOT
-    if found := _FEET_AND_INCHES.fullmatch(words):
-        return float(found["feet"]) * FOOT + float(found["inches"] or 0.0) * INCH
-    return text
 
 
 def tags_of(cell: object) -> dict[str, object]:
@@ -78,7 +48,7 @@ def tags_of(cell: object) -> dict[str, object]:
 
 
 def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
-    """Return the attributes with the known tags as columns, and heights in m."""
+    """Return the attributes with the known tags as columns, and one identifier."""
     table = attributes.copy()
     # Tags that stand together in one column
     for column in TAG_COLUMNS:
@@ -87,8 +57,6 @@ def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
             for tag in TAGS:
                 found = pd.Series([tags.get(tag) for tags in cells], table.index, dtype=object)
                 table[tag] = table[tag].astype(object).fillna(found) if tag in table else found
-    if "height" in table:
-        table["height"] = table["height"].map(metres)
     # Ways have one identifier in GDAL's layers, relations another
     if "osm_way_id" in table:
         way = "w" + table["osm_way_id"].astype(str)
