@@ -84,7 +84,7 @@ def _with_numbers(table: pa.Table) -> pa.Table:
 
 
 #: Suffixes of layers of footprints, which are not pairs yet.
-FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb")
+FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb", ".gml", ".osm", ".pbf", ".geojsonl")
 
 _KINDS: dict[str, type[CsvFile] | type[ParquetFile]] = {".csv": CsvFile, ".parquet": ParquetFile}
 

@@ -81,10 +81,9 @@ def imported(
     """
     importer = recognised(map(str, attributes.columns))
     adapted = importer.adapted(attributes)
+    table = _named(adapted, importer, given or {})
     names = set(adapted.columns)
-    # Columns that the layer has
-    found = {name: adapted[column] for name, column in importer.columns.items() if column in names}
-    table = pd.DataFrame(found | dict(given or {}), index=adapted.index)
+    # A layer needs one size at least
     sizes = table[[name for name in _SIZES if name in table]]
     if sizes.columns.empty or (len(sizes) and sizes.isna().all(axis=None)):
         raise CatalogError(source, _no_height(attributes, importer, not sizes.columns.empty))
@@ -96,6 +95,15 @@ def imported(
         unknown = pd.Series("", adapted.index)
         table = with_class_heights(table, adapted.get(importer.class_column, unknown))
     return table.join(adapted[[name for name in importer.carried if name in names]])
+
+
+def _named(
+    adapted: pd.DataFrame, importer: Importer, given: Mapping[str, pd.Series]
+) -> pd.DataFrame:
+    """Return the columns that a layer has, or the user names, under the names of the schema."""
+    names = set(adapted.columns)
+    found = {name: adapted[column] for name, column in importer.columns.items() if column in names}
+    return pd.DataFrame(found | dict(given), index=adapted.index)
 
 
 def _systems(attributes: pd.DataFrame, importer: Importer) -> pd.Series | None:

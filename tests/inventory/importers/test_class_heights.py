@@ -3,7 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
+from screening_samples import make_pairs, make_station
 
+import per_obspy
 from per_obspy.inventory.importers.class_heights import ENOUGH, with_class_heights
 from per_obspy.inventory.importers.recognition import imported
 
@@ -63,3 +65,15 @@ def test_layers_of_surveys_are_left_as_they_are():
     table = imported(pd.DataFrame(survey | {"llrs": "LFM", "structural_system": "CR"}), "town")
     assert np.isnan(table["storeys"].tolist()[0])
     assert "height_log_std" not in table
+
+
+def test_the_deviation_of_a_height_reaches_the_probability():
+    # one pair whose gap is well above its demand: uncertain heights make pounding likelier
+    probability = []
+    for deviation in (0.0, 0.6):
+        pairs = make_pairs([{"gap": 0.4, "period_1": np.nan, "period_2": np.nan}])
+        pairs = pairs.assign(height_log_std_1=deviation, height_log_std_2=deviation)
+        risk = per_obspy.risk_table([make_station()], pairs)
+        probability.append(float(risk["probability"].iloc[0]))
+        assert ("height_1" in risk["derived"].iloc[0].split()) == (deviation > 0.0)
+    assert probability[1] > 1.2 * probability[0] > 0.0
