@@ -129,6 +129,7 @@ def _write_footprint_pairs(found: "FootprintPairs", output: Path) -> dict[str, P
 
 def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_json: bool) -> None:
     """Print the counts, for machines or with the most common reasons for rejection."""
+    # Counts
     rejected = table.attrs["rejected"]
     touching = int((table["gap"] == 0.0).sum())
     if as_json:
@@ -137,6 +138,7 @@ def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_js
         return
     counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
     print(f"{counted}: {places['output']}")
+    # What lies beside the pairs, what was assumed, why rows were rejected
     print(f"  outlines and columns of all buildings: {places['buildings']}")
     if "assumed" in table["gap_std_source"].to_numpy():
         print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")

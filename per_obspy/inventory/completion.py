@@ -49,8 +49,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     Returns
     -------
     pairs : DataFrame
-        All columns of the input and, for each building, ``storeys, height, system, period,
-        period_log_std, damping, damping_log_std, mass, participation, contact_mass,
+        All columns of the input and, for each building, ``storeys, height, height_log_std, system,
+        period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         yield_displacement, hardening``; for the pair ``longitude, latitude, azimuth,
         contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
         names of the derived columns, separated by blanks, empty if none. Units as in the schema.
@@ -187,6 +187,9 @@ def _add_contact(
     # Contact at the top of the lower building whose height is known
     lower = np.fmin(columns["height_1"], columns["height_2"])
     _add_column(columns, derived, "contact_height", numbers_in(pairs, "contact_height"), lower)
+    # Also where the table has taken it from an estimated height
+    deviation = np.fmax(columns["height_log_std_1"], columns["height_log_std_2"])
+    derived["contact_height"] |= (deviation > 0.0) & (columns["contact_height"] == lower)
     for i in (1, 2):
         _add_participation(columns, derived, pairs, i)
     _add_floor_offset(columns, derived, pairs)
@@ -200,9 +203,11 @@ def _add_gap(
 ) -> None:
     """Add gap and its deviation, m: those of the assumed lognormal gap where it is unknown."""
     gap, deviation = numbers_in(pairs, "gap"), numbers_in(pairs, "gap_std")
+    # A deviation may be a default of the command that made the table
+    if "gap_std_source" in pairs:
+        derived["gap_std"] = (pairs["gap_std_source"] == "assumed").to_numpy(dtype=bool)
     if building.gap is None:
         columns["gap"], columns["gap_std"] = gap, _given_or(deviation, 0.0)
-        _mark_gap_deviation(derived, pairs)
         return
     # Mean and standard deviation of the lognormal distribution
     variance = building.gap_log_std**2
@@ -210,13 +215,6 @@ def _add_gap(
     _add_column(columns, derived, "gap", gap, mean)
     spread = np.where(derived["gap"], mean * np.sqrt(np.expm1(variance)), _given_or(deviation, 0.0))
     columns["gap_std"] = spread
-    _mark_gap_deviation(derived, pairs)
-
-
-def _mark_gap_deviation(derived: Derived, pairs: pd.DataFrame) -> None:
-    """Mark deviations of gaps that whoever made the table has assumed: no survey's deviation."""
-    if "gap_std_source" in pairs:
-        derived["gap_std"] = (pairs["gap_std_source"] == "assumed").to_numpy(dtype=bool)
 
 
 def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:

@@ -1,8 +1,8 @@
 """
 Time and memory of ``per-obspy pairs`` for a simulated city.
 
-Run: ``python tests/benchmarks/footprints.py [houses]``; prints features, pairs, seconds of processor
-and clock, and the largest memory of the command, from its start to its files.
+Run: ``python tests/benchmarks/footprints.py [houses]``; prints features, pairs, seconds of
+processor and clock, and the largest memory of the command, from its start to its files.
 """
 
 import resource

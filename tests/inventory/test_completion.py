@@ -228,6 +228,13 @@ def test_an_estimated_height_counts_as_derived_and_widens_the_period():
     row = _completed(**SIZES, height_log_std_1=0.5)
     assert "height_1" in row["derived"].split()
     assert "height_2" not in row["derived"].split()
+    # and so does a contact height that the table has from it
+    assert "contact_height" in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5, contact_height=9.0)
+    assert "contact_height" in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5, contact_height=8.0)
+    assert "contact_height" not in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5)
     assert row["period_log_std_1"] == pytest.approx(np.hypot(0.4, 0.75 * 0.5))
     # a period that is given does not depend on the height
     assert _completed(**SIZES, height_log_std_1=0.5, period_1=0.3)["period_log_std_1"] == 0.0

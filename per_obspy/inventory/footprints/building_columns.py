@@ -29,7 +29,7 @@ GIVEN = (
 LENGTHS, COUNTS = ("height", "storey_height"), ("storeys",)
 
 #: Quantities that the outlines give.
-FROM_OUTLINES = ("longitude", "latitude", "area", "position", "geometry")
+FROM_OUTLINES = ("longitude", "latitude", "area", "geometry")
 
 #: Results of one building in the risk table; a test compares them with the table's columns.
 RESULTS = (
@@ -155,8 +155,12 @@ def _is_same(original: pd.Series, known: pd.Series) -> bool:
     # Text that was read as a number is kept beside it
     if is_number(original) or is_number(known):
         return False
-    texts = (cells.astype(str).mask(cells.isna(), "") for cells in (original, known))
-    return bool(np.array_equal(*(text.to_numpy(dtype=object) for text in texts)))
+    return bool((_texts(original) == _texts(known)).all())
+
+
+def _texts(cells: pd.Series) -> pd.Series:
+    """Return cells as text, empty where there is none."""
+    return cells.astype(str).mask(cells.isna(), "")
 
 
 def _free_name(name: str, taken: Iterable[str]) -> str:

@@ -147,7 +147,7 @@ def _missing(names: Sequence[str], found: Mapping[str, str]) -> str:
         columns = ", ".join(names)
         return f"no outlines of buildings: {wanted} ({units}; columns found: {columns:.200})"
     # Points, and what does not help either
-    area = f", and an area ({found['area']}) does not place them" if "area" in found else ""
+    area = f", and an area ({found['area']}) does not place these" if "area" in found else ""
     return f"points have no walls, and a gap is a distance between walls{area}: {wanted} ({units})"
 
 

@@ -11,9 +11,9 @@ from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.checking import Rejections
 from per_obspy.inventory.footprints.building_columns import building_columns
 from per_obspy.inventory.footprints.buildings import Buildings, projected, without_repetitions
+from per_obspy.inventory.footprints.footprint_rows import NearBuildings, pair_table
 from per_obspy.inventory.footprints.layers import read_layer
 from per_obspy.inventory.footprints.neighbours import neighbours
-from per_obspy.inventory.footprints.pair_rows import NearBuildings, pair_table
 from per_obspy.inventory.schema import COLUMNS
 
 #: Standard deviation of a gap between drawn outlines where none is given, m: 0.2 mm, about the

@@ -105,7 +105,7 @@ def test_cells_that_are_no_polygon(write):
 
 MISSING = {
     "id,lon,lat,height": r"points have no walls.*add a column wkt .*, or width, length, azimuth",
-    "lon,lat,PlanArea": r"an area \(PlanArea\) does not place them: add a column wkt",
+    "lon,lat,PlanArea": r"an area \(PlanArea\) does not place these: add a column wkt",
     "lon,lat,width,length": r"add a column wkt \(outlines in degrees\), or azimuth \(",
     "name,height": r"no outlines of buildings: .*longitude, latitude, width.*found: name, height",
     "pair_id,gap": r"a table of pairs already, not of buildings: per-obspy pairs check",

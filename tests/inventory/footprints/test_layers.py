@@ -1,4 +1,8 @@
-"""Layers of footprints: files of another kind, damaged files, layers to choose from."""
+"""
+Layers of footprints: files of another kind, damaged files, layers to choose from.
+
+The files themselves are read by per_obspy.inventory.footprints.layer_files.
+"""
 
 import json
 

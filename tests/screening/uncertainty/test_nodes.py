@@ -69,21 +69,30 @@ def test_certain_gaps_stay():
 
 @pytest.mark.parametrize("gap", [0.0, 0.01, 0.05, 0.1, 0.2, 0.4])
 def test_an_uncertain_gap_gives_hardly_less_contact_than_a_normal_error(gap):
-    # an independent distribution gives the expected chances; those below the threshold of `no` are
-    # understated by no more than what the docstring says
+    # an independent distribution gives the expected chances; a lognormal one has two quantiles of
+    # it only, so that a chance of 0.04 may become a `no`
     demands = np.geomspace(1e-4, 2.0, 500)
     expected, found = _truncated(gap, 0.1).cdf(demands), _lognormal(gap, 0.1).cdf(demands)
-    assert expected[found < 0.01].max(initial=0.0) < 0.0425
-    assert (found - expected).min() > -0.045
+    assert expected[found < 0.01].max(initial=0.0) < 0.04
+    assert (found - expected).min() > -0.06
 
 
-def test_touching_outlines_are_no_less_likely_to_hit_than_by_a_normal_error():
-    # from the threshold of `unlikely` to that of `yes`
-    chances = np.linspace(0.01, 0.9, 50)
-    found = _lognormal(0.0, 0.1).cdf(_truncated(0.0, 0.1).ppf(chances))
-    # the ends agree, up to round-off
-    assert (found >= chances - 1e-9).all()
-    assert_allclose(found[[0, -1]], chances[[0, -1]], rtol=1e-9)
+@pytest.mark.parametrize("deviation", [0.001, 0.1, 0.5])
+def test_touching_outlines_are_never_a_no(deviation):
+    # stiff houses in a row have demands of some hundredths of the deviation: by a normal error
+    # alone 183 of 434 touching pairs of San José would be `no`
+    touching = _lognormal(0.0, deviation)
+    assert touching.cdf(0.0005 * deviation) > 0.1
+    # half of the walls are one, the gaps of the others have the half of a normal distribution
+    for share in (0.02, 0.1, 1.0, 2.0):
+        mixture = 0.5 + 0.5 * _truncated(0.0, deviation).cdf(share * deviation)
+        # two quantiles make no mixture: most contact is overstated
+        assert -0.04 < touching.cdf(share * deviation) - mixture < 0.25
+
+
+def test_touching_outlines_are_no_certain_contact():
+    assert _lognormal(0.0, 0.1).cdf(0.001) < 0.5
+    assert _lognormal(0.0, 0.1).cdf(0.05) < 0.9
 
 
 def test_nearer_outlines_are_likelier_to_hit():
@@ -91,13 +100,7 @@ def test_nearer_outlines_are_likelier_to_hit():
     demands = np.geomspace(0.001, 0.5, 100)
     chances = [_lognormal(gap, 0.1).cdf(demands) for gap in np.linspace(0.0, 0.6, 61)]
     # two lognormal distributions may cross where both are nearly certain
-    assert np.diff(chances, axis=0).max() < 0.003
-
-
-def test_touching_outlines_are_neither_certain_to_touch_nor_certain_not_to():
-    # a demand of a fifth of the deviation: 0.159 by the half of a normal distribution
-    touching = _lognormal(0.0, 0.1)
-    assert 0.159 < touching.cdf(0.02) < 0.5
+    assert np.diff(chances, axis=0).max() < 0.005
 
 
 def test_a_small_deviation_of_a_gap_is_that_of_its_logarithm():

@@ -62,7 +62,7 @@ def pair_table(found: NearBuildings, source: str) -> pd.DataFrame:
     source : str
         The file, for messages.
     """
-    parts, rejected = [], list[Rejection]()
+    columns, rejected = dict[str, list[pd.Series]](), list[Rejection]()
     # Repeated names are known of all pairs only
     names = _pair_names(found)
     repeated = names.duplicated().to_numpy()
@@ -70,17 +70,28 @@ def pair_table(found: NearBuildings, source: str) -> pd.DataFrame:
     for start in range(0, len(names), CHUNK):
         rows = slice(start, start + CHUNK)
         part = _rows(found, names[rows], rows)
-        part, lost = _without_faults(part.assign(_repeated=repeated[rows]), found, rows, source)
+        checked, lost = _checked(part.assign(_repeated=repeated[rows]), found, rows, source)
         rejected += lost
-        is_repeated = part.pop("_repeated").to_numpy(dtype=bool)
-        lines = np.arange(2, len(part) + 2)
-        checked = checked_pairs(part, source, lines, is_repeated)
-        rejected += [row._replace(row=None) for row in checked.attrs["rejected"]]
-        checked.attrs = {}
-        parts.append(_with_contact(checked))
-    pairs = pd.concat(parts, ignore_index=True)
+        for name, column in checked.items():
+            columns.setdefault(str(name), []).append(column.copy())
+    # Joined column by column, so that no second copy of the whole table is in memory
+    joined = {name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}
+    pairs = pd.DataFrame(joined, copy=False)
     pairs.attrs["rejected"] = Rejections(rejected)
     return pairs
+
+
+def _checked(
+    part: pd.DataFrame, found: NearBuildings, rows: slice, source: str
+) -> tuple[pd.DataFrame, list[Rejection]]:
+    """Return the good pairs of a block, and the rejections of the others."""
+    clear, rejected = _without_faults(part, found, rows, source)
+    repeated = clear.pop("_repeated").to_numpy(dtype=bool)
+    checked = checked_pairs(clear, source, np.arange(2, len(clear) + 2), repeated)
+    # Pairs have no line in the file
+    rejected += [row._replace(row=None) for row in checked.attrs["rejected"]]
+    checked.attrs = {}
+    return _with_contact(checked), rejected
 
 
 def _pair_names(found: NearBuildings) -> pd.Series:
