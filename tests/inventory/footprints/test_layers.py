@@ -203,6 +203,28 @@ def test_an_unknown_system_of_geojson_is_not_taken_for_degrees(write, declared, 
     assert len(read_layer(path).outlines) == len(HOUSES)
 
 
+def test_the_system_of_geojson_stands_anywhere_at_its_top(write):
+    path = write(HOUSES, "town.geojson")
+    content = json.loads(path.read_text())
+    content.pop("crs", None)
+    unknown = {"type": "name", "properties": {"name": "EPSG:999999"}}
+    # after the features, as JSON has no order
+    path.write_text(json.dumps(content | {"crs": unknown}))
+    with pytest.raises(CatalogError, match="unknown"):
+        read_layer(path)
+    # inside of another member it is none of the layer
+    path.write_text(json.dumps({"metadata": {"crs": unknown}} | content))
+    assert len(read_layer(path).outlines) == len(HOUSES)
+
+
+def test_a_column_that_stands_twice(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet")
+    table = pa.parquet.read_table(path)
+    pa.parquet.write_table(table.append_column("height", table["height"]), path)
+    with pytest.raises(CatalogError, match=r"Multiple matches for .*height"):
+        read_layer(path)
+
+
 @pytest.mark.parametrize("prj", ["junk", "", "GEOGCS[", 'LOCAL_CS["site"]'])
 def test_a_projection_file_that_is_none(write, prj):
     path = write(HOUSES, "town.shp")
