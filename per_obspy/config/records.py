@@ -184,6 +184,15 @@ class Archives(Section):
     most_members: int = Field(
         1_000_000, gt=0, description="files of an archive; one of more is left out"
     )
+    most_levels: int = Field(
+        3,
+        ge=1,
+        le=5,
+        description=(
+            "levels of archives inside archives, whose files share the limits of the outermost; "
+            "1: none inside another is opened"
+        ),
+    )
 
 
 class Records(Section):

@@ -16,7 +16,7 @@ from per_obspy.errors import RecordRejected, Rejection, shortened
 from per_obspy.files import opened_hash
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
-from per_obspy.records.archives import open_file
+from per_obspy.records.archives.archive_files import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
 from per_obspy.records.earthquakes.choice import OneEarthquake, Reader, one_earthquake
 from per_obspy.records.earthquakes.groups import event_groups

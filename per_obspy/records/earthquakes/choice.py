@@ -11,7 +11,7 @@ from obspy.core.event import Event
 
 from per_obspy import config
 from per_obspy.errors import Rejection
-from per_obspy.records.archives import LIMITS
+from per_obspy.records.archives.archive_files import LIMITS
 from per_obspy.records.earthquakes.groups import (
     HOURS,
     MARGIN,
