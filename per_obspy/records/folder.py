@@ -4,12 +4,8 @@ A folder of records: every file that ObsPy and its plugins understand.
 StationXML may be in the same folder or elsewhere.
 """
 
-import os
-import stat
 from collections.abc import Iterable, Mapping
-from functools import reduce
 from itertools import chain
-from operator import add
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -18,24 +14,34 @@ import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
 from per_obspy.config import Archives
-from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, reason_of
-from per_obspy.files import bytes_hash, is_part
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
+from per_obspy.files import bytes_hash
+from per_obspy.formats.text.itaca_metadata import read_itaca_metadata
 from per_obspy.formats.text.station_table import (
     StationRow,
-    is_station_table,
+    bare_name,
     located_stations,
-    marked_open_starts,
     read_station_table,
-    with_open_starts,
 )
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.notes import taken
-from per_obspy.records.archives.archive_files import IRREGULAR, LIMITS, archive_files, read_file
+from per_obspy.records.archives.archive_files import LIMITS, archive_files, read_file
 from per_obspy.records.archives.walked import is_archive
+from per_obspy.records.contents.file_list import files_below, is_document
+from per_obspy.records.contents.metadata_files import (
+    METADATA,
+    kind_of,
+    merged_inventory,
+    named_metadata,
+    read_station_text,
+)
+from per_obspy.records.contents.one_series import without_doubles, without_integrals
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
+from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
+from per_obspy.records.obspy_readers import UNKNOWN_FORMAT, read_content
 from per_obspy.records.processed_files import described
+
 
 class SourceContents(NamedTuple):
     """
@@ -90,13 +96,13 @@ def find_stations(
     """
     files, rejected = _files(Path(folder), limits)
     found = [_read_file(path, limits) for path in files]
-    records = tuple(chain.from_iterable(file.records for file in found))
+    records = _records(found)
     # Metadata that is named comes before that of the folder
-    inventories, rows = _named_metadata(None if stationxml is None else Path(stationxml))
+    inventories, rows = named_metadata(None if stationxml is None else Path(stationxml))
     inventories += [file.inventory for file in found if file.inventory is not None]
     rows += chain.from_iterable(file.rows for file in found)
     # Unusable records come before unusable metadata
-    for kind in ("record", *_METADATA):
+    for kind in ("record", *METADATA):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
     if not records:
         # A folder without records may fill up; a file that was named should have been one
@@ -124,6 +130,7 @@ class _File(NamedTuple):
     records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
     rows: tuple[StationRow, ...] = ()
+    events: Mapping[str, HeaderEvent] = MappingProxyType({})
     rejection: Rejection | None = None
 
 
@@ -134,7 +141,7 @@ def _read_file(path: Path, limits: Archives) -> _File:
     try:
         content = read_file(path, limits)
         # Hash, headers and metadata come from the same bytes
-        file = file._replace(hash=bytes_hash(content), kind=_kind(path, content))
+        file = file._replace(hash=bytes_hash(content), kind=kind_of(path, content))
         if file.kind == "record":
             stream = _traces(path, content, headonly=True)
             return file._replace(records=tuple(record_span(trace, path) for trace in stream))
@@ -142,12 +149,39 @@ def _read_file(path: Path, limits: Archives) -> _File:
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
         if file.kind == "station text":
-            return file._replace(inventory=_read_station_text(path, content))
+            return file._replace(inventory=read_station_text(path, content))
         if file.kind == "station table":
             return file._replace(rows=read_station_table(str(path), content))
+        if file.kind == "ITACA metadata":
+            return _with_itaca_metadata(file, content)
     except RecordRejected as rejection:
+        # Documents that agencies pack with records are no records
+        if is_document(path) and UNKNOWN_FORMAT in rejection.reasons[0]:
+            return file._replace(kind="document")
         return file._replace(rejection=_rejected_file(path, rejection))
     return file
+
+
+def _with_itaca_metadata(file: _File, content: bytes) -> _File:
+    """Return a file with the station and the earthquake of a metadata file of ITACA."""
+    found = read_itaca_metadata(str(file.path), content)
+    event = header_event(found.event)
+    events = dict.fromkeys(found.row.names, event) if event else {}
+    return file._replace(rows=(found.row,), events=events)
+
+
+def _records(found: list[_File]) -> tuple[RecordSpan, ...]:
+    """Return the records of all files, with the earthquake that metadata of their station name."""
+    events = dict(chain.from_iterable(file.events.items() for file in found))
+    records = chain.from_iterable(file.records for file in found)
+    return tuple(_with_event(record, events) for record in records)
+
+
+def _with_event(record: RecordSpan, events: Mapping[str, HeaderEvent]) -> RecordSpan:
+    """Return a record with the event of its station's metadata if that has more facts."""
+    event = events.get(bare_name(record.station.split(".", 1)[1]))
+    known = record.event.known if record.event else 0
+    return record._replace(event=event) if event and event.known > known else record
 
 
 def _traces(path: Path, content: bytes, **options: Any) -> Stream:
@@ -192,8 +226,9 @@ def read_station(
         Traces in the words of ``formats/text/vocabulary.py``; the path of each one's file is in
         ``stats.source``.
     rejected : tuple of Rejection
-        Files that cannot be read, traces whose metadata is insufficient, and velocity and
-        displacement of a channel whose acceleration is read; the rest goes on.
+        Files that cannot be read, traces whose metadata is insufficient, velocity and
+        displacement of a channel whose acceleration is read, and doubles of a record in another
+        format; the rest goes on.
     """
     stream, rejected = Stream(), []
     for path in paths:
@@ -214,7 +249,8 @@ def read_station(
             except RecordRejected as rejection:
                 rejected.append(Rejection("record", trace.id, str(path), None, rejection.reasons))
     stream, integrals = without_integrals(stream)
-    return stream, (*rejected, *integrals)
+    stream, doubles = without_doubles(stream)
+    return stream, (*rejected, *integrals, *doubles)
 
 
 def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]:

@@ -8,6 +8,14 @@ from per_obspy.errors import CatalogError, Rejection, reason_of
 from per_obspy.files import is_part
 from per_obspy.records.archives.archive_files import IRREGULAR
 
+#: Beginnings and ends of names of documents, and of files that systems leave.
+_TITLES = ("readme", "read_me", "licence", "license", "disclaimer", "copying", "citation")
+_SUFFIXES = (
+    *(".pdf", ".htm", ".html", ".md", ".rtf", ".doc", ".docx", ".ps", ".eps", ".svg"),
+    *(".png", ".gif", ".jpg", ".jpeg", ".kml", ".kmz", ".md5", ".sha256"),
+)
+_HIDDEN = (".ds_store", "thumbs.db", "desktop.ini")
+
 
 def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
     """
@@ -54,3 +62,18 @@ def _problem(path: Path) -> str:
         is_link = path.is_symlink()
         return "is a link to a folder, which is not followed: name that folder" if is_link else ""
     return "" if stat.S_ISREG(kind) else IRREGULAR
+
+
+def is_document(path: Path) -> bool:
+    """
+    Check from its name whether a file is for people: what agencies pack beside records.
+
+    >>> is_document(Path("a.zip/README.TXT")), is_document(Path("plot.pdf"))
+    (True, True)
+    >>> is_document(Path("readme/CE1.V2"))
+    False
+    """
+    name = path.name.lower()
+    # A Mac packs a file of its own beside each file
+    is_hidden = name.startswith("._") or name in _HIDDEN
+    return is_hidden or name.startswith(_TITLES) or name.endswith(_SUFFIXES)

@@ -1,5 +1,6 @@
 """Files that describe stations: StationXML, FDSN station text, tables; and other kinds of files."""
 
+import re
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -8,6 +9,7 @@ import obspy
 from obspy import Inventory
 
 from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.formats.text.itaca_metadata import is_itaca_metadata
 from per_obspy.formats.text.station_table import (
     StationRow,
     is_station_table,
@@ -28,14 +30,22 @@ _MARKS = {
     b'"shard": ': "description",
 }
 
+#: Beginning of dataless SEED: number of the record and type V, a volume header.
+_DATALESS = re.compile(rb"\d{6}V[ *]")
+
 #: Kinds of files that describe stations.
-_METADATA = ("inventory", "station text", "station table")
+METADATA = ("inventory", "station text", "station table", "ITACA metadata")
+
 
 def kind_of(path: Path, content: bytes) -> str:
     """Return the kind of a file: a kind of metadata, event, description, or else record."""
     start = content[:1000]
     if path.suffix.lower() == ".csv" and is_station_table(start):
         return "station table"
+    if is_itaca_metadata(start):
+        return "ITACA metadata"
+    if _DATALESS.match(start):
+        return "inventory"
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
 
 
@@ -106,5 +116,3 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
 def _is_needed(rejection: Rejection) -> bool:
     """Return whether something that cannot be read may hold StationXML."""
     return rejection.source.endswith(".xml") or "cannot be listed" in rejection.reasons[0]
-
-

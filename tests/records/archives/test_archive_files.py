@@ -16,7 +16,7 @@ CONTENT = {
     "deep/one.mseed": mseed("ONE"),
     "two.mseed": mseed("TWO"),
     "three.AT2": AT2,
-    "readme.txt": b"words",
+    "notes.txt": b"words",
 }
 
 
@@ -47,7 +47,7 @@ def test_an_archive_is_a_folder(tmp_path: Path, name: str):
     contents = find_stations(tmp_path)
     assert contents.stations["CI.ONE"] == (archive / "deep" / "one.mseed",)
     assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
-    assert [rejection.name for rejection in contents.rejected] == ["readme.txt"]
+    assert [rejection.name for rejection in contents.rejected] == ["notes.txt"]
     assert open_file(archive / "three.AT2").read() == AT2
     assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # no file is unpacked on disk
 
