@@ -22,6 +22,7 @@ from obspy import Trace, UTCDateTime
 
 from per_obspy.constants import UNSET_DAYS
 from per_obspy.errors import CatalogError
+from per_obspy.formats.knet import knet_event
 from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
 
 #: Longest time from the first start of a group to the last, s.
@@ -126,7 +127,8 @@ def record_span(trace: Trace, path: Path) -> RecordSpan:
     pads = stats.get("per_obspy", {})
     start = stats.starttime + (pads.get("pad_before") or 0.0)
     end = stats.endtime - (pads.get("pad_after") or 0.0)
-    event = header_event(stats.get("event"))
+    # ObsPy's own reader keeps the header of K-NET apart
+    event = header_event(knet_event(trace) if "knet" in stats else stats.get("event"))
     return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end, event)
 
 

@@ -17,7 +17,7 @@ from per_obspy.records.fdsn.providers import base_url
 #: form of an identifier -> provider that writes it so
 _FORMS = {
     # Code of a network and its own number: us7000abcd, ci38457511, official20110311054624120_30
-    r"[a-z]{2}[a-z0-9]{4,20}|(usp|iscgem|official)[a-z0-9_]{4,30}": "USGS",
+    r"[a-z]{2}\d[a-z0-9]{5,12}|us[a-z]000[a-z0-9]{4}|(iscgem|official)\d[a-z0-9_]{3,30}": "USGS",
     # Year, letter p and part of the year: 2016p858000
     r"\d{4}p\d{6}": "GEONET",
     # Date and number of the day: 20161113_0000040
