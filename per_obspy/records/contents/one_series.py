@@ -7,6 +7,9 @@ from obspy import Stream, Trace
 
 from per_obspy.errors import Rejection
 
+#: Difference of durations that decides between two forms of a record, s.
+_STEP = 10.0
+
 #: Format and unit of a record -> its series.
 Forms = dict[tuple[str, str], list[Trace]]
 
@@ -38,9 +41,9 @@ def without_doubles(stream: Stream) -> tuple[Stream, list[Rejection]]:
     Return a stream with one form of every record that agencies give in several.
 
     A record may lie beside itself as counts and as acceleration (V0 and V1), or in two formats (SMC
-    and RAW). Of the forms of one channel and state (raw or processed) that overlap in time, that in
-    physical units stays, of several the longest, of these the first by format and file. A form
-    that does not overlap, in time or by its channel code, is another record.
+    and RAW). Of the forms of one channel and state (raw or processed) that overlap in time, the
+    longest stays (in steps of 10 s), of several one in physical units, of these the first by format
+    and file. A form that does not overlap, in time or by its channel code, is another record.
     """
     left_out: dict[int, Rejection] = {}
     for forms in _forms_by_channel(stream):
@@ -67,12 +70,13 @@ def _forms_by_channel(stream: Stream) -> Iterable[Forms]:
     return channels.values()
 
 
-def _rank(form: tuple[str, str], traces: Iterable[Trace]) -> tuple[bool, float, str, str]:
-    """Return the sorting key of a form: physical units, duration, format and file."""
+def _rank(form: tuple[str, str], traces: Iterable[Trace]) -> tuple[int, bool, str, str]:
+    """Return the sorting key of a form: duration, physical units, format and file."""
     format_name, units = form
     known = list(traces)
     seconds = sum(float(trace.stats.npts * trace.stats.delta) for trace in known)
-    return units == "counts", -seconds, format_name, min(str(t.stats.source) for t in known)
+    first = min(str(trace.stats.source) for trace in known)
+    return -round(seconds / _STEP), units == "counts", format_name, first
 
 
 def _overlap(first: Trace, second: Trace) -> bool:

@@ -36,6 +36,7 @@ def test_an_identifier_names_its_service(identifier: str):
         "",
         "7073641",
         "records",
+        "mexico1985",
         "US7000KUFC",
         "run.toml",
         "../../x",
