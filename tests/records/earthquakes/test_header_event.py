@@ -139,3 +139,31 @@ def test_an_origin_at_another_time_is_no_earthquake_of_the_records(tmp_path: Pat
     found = group_event(group)
     assert found.event is None
     assert len(found.others) == 1
+
+
+#: Folder of real records -> one record of the earthquake, and what catalogues say of it: the USGS
+#: (us1000778i, us1000hyfh, nc72282711), JMA (24 January 2018, off Aomori) and AFAD (Pazarcik)
+KNOWN = {
+    ("kaikoura2016_geonet", "HSES"): HeaderEvent(
+        "2016-11-13T11:02:56.340Z", -42.7373, 173.054, 15110.0, 7.8
+    ),
+    ("cosmos", "BMR"): HeaderEvent("2018-11-30T17:29:29.330Z", 61.3464, -149.9552, 46700.0, 7.1),
+    ("cosmos", "C031"): HeaderEvent("2014-08-24T10:20:44.070Z", 38.2152, -122.3123, 11120.0, 6.0),
+    ("aomori2018_knet", "AOM001"): HeaderEvent("2018-01-24T10:51:19Z", 41.01, 142.45, 34000.0, 6.3),
+    ("afad2023", "3125"): HeaderEvent("2023-02-06T01:17:34Z", 37.226, 37.014, 10000.0, 7.8),
+    ("itaca2009", "2987"): HeaderEvent("2009-04-06T01:32:40Z", 42.342, 13.380, 8300.0, 6.3),
+}
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(("folder", "station"), KNOWN)
+def test_headers_of_real_records_describe_the_earthquake_of_catalogues(
+    real_data: Path, folder: str, station: str
+):
+    found = find_stations(real_data / "records" / folder)
+    events = {record.event for record in found.records if record.station.endswith(station)}
+    (event,) = events
+    assert same_earthquake(event, KNOWN[folder, station])
+    # time, place, depth and magnitude are all there
+    assert event.known == 5
+    assert abs(event.depth - KNOWN[folder, station].depth) < 10_000.0
