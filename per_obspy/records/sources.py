@@ -24,7 +24,7 @@ from per_obspy.records.earthquakes.choice import (
     Reader,
     group_event,
     one_earthquake,
-    read_station_of,
+    reader_of_event,
 )
 from per_obspy.records.earthquakes.groups import EventGroup, event_groups
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
@@ -180,11 +180,7 @@ def _with_usable_names(found: SourceContents) -> SourceContents:
 def _path_reader(groups: Sequence[EventGroup]) -> Reader:
     """Return the reader of stations; records of one earthquake have that of most headers."""
     found = group_event(groups[0]) if len(groups) == 1 else None
-    if found is None or found.event is None:
-        return partial(read_station)
-    for name, other in found.others.items():
-        log.warning("%s: its header describes another earthquake, %s", name, other)
-    return partial(read_station_of, event=found.event)
+    return reader_of_event(partial(read_station), found)
 
 
 def _warn_of_several_earthquakes(groups: Sequence[EventGroup]) -> None:

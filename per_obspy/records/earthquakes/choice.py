@@ -1,5 +1,6 @@
 """The one earthquake of a folder that is screened: its stations and files, and what is left out."""
 
+import logging
 from collections.abc import Container, Iterable
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,7 @@ from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy import config
-from per_obspy.errors import Rejection
+from per_obspy.errors import Rejection, shortened
 from per_obspy.records.archives.archive_files import LIMITS
 from per_obspy.records.earthquakes.groups import (
     GAP,
@@ -26,6 +27,8 @@ from per_obspy.records.earthquakes.groups import (
 )
 from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
 from per_obspy.records.folder import SourceContents, read_station
+
+log = logging.getLogger(__name__)
 
 #: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
 Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
@@ -79,9 +82,8 @@ def one_earthquake(
     group = chosen_group(groups, time, source, motion, records.event_gap)
     facts = [_facts(other, is_screened=other is group) for other in groups]
     # Without an event of the configuration that of the headers counts
-    by_headers = group_event(group, records.event_gap)
-    if by_headers is not None and event is None and by_headers.event is not None:
-        reader = partial(read_station_of, *reader.args, event=by_headers.event, **reader.keywords)
+    if event is None:
+        reader = reader_of_event(reader, group_event(group, records.event_gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
@@ -228,6 +230,26 @@ def group_event(group: EventGroup, gap: float = GAP) -> AgreedEvent | None:
     # An origin hours away: the headers or the clocks are wrong
     stations = {record.station for record in group.records if record.event}
     return AgreedEvent(None, 0, dict.fromkeys(sorted(stations), found.event) | found.others)
+
+
+def reader_of_event(reader: Reader, found: AgreedEvent | None) -> Reader:
+    """Return a reader of stations whose records have the earthquake of most headers, if any has."""
+    if found is None:
+        return reader
+    _warn_of_contradictions(found)
+    if found.event is None:
+        return reader
+    return partial(read_station_of, event=found.event, **reader.keywords)
+
+
+def _warn_of_contradictions(found: AgreedEvent) -> None:
+    """Log which stations have headers of another earthquake than most, or that none has most."""
+    others = "; ".join(f"{name}: {event}" for name, event in found.others.items())
+    if others and found.event is None:
+        log.warning("headers of records describe no common earthquake: %s", shortened(others))
+    elif others:
+        message = "%d headers describe another earthquake than the %d of most, %s: %s"
+        log.warning(message, len(found.others), found.stations, found.event, shortened(others))
 
 
 def _facts(group: EventGroup, is_screened: bool) -> dict[str, object]:

@@ -107,7 +107,7 @@ def afad(folder: Path, station: str, change: tuple[str, str] = ("", "")) -> None
     (folder / f"{station}.asc").write_bytes("".join(lines).encode("latin-1"))
 
 
-def test_a_folder_is_of_the_earthquake_of_most_headers(tmp_path: Path):
+def test_a_folder_is_of_the_earthquake_of_most_headers(tmp_path: Path, caplog):
     for station in ("1001", "1002"):
         afad(tmp_path, station)
     afad(tmp_path, "1003", ("EVENT_LATITUDE_DEGREE", "10.0"))
@@ -121,6 +121,7 @@ def test_a_folder_is_of_the_earthquake_of_most_headers(tmp_path: Path):
             (trace,), rejected = source.reader(source.files, source.inventory)
             assert rejected == ()
             assert header_event(trace.stats.event) == right
+    assert "1 headers describe another earthquake than the 2 of most" in caplog.text
     (facts,) = find_sources(Records(folder=tmp_path), None).earthquakes
     assert facts["headers"]["stations"] == 2
     assert list(facts["headers"]["contradicting"]) == [
