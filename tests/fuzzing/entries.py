@@ -1,11 +1,9 @@
 """Every way by which a file from outside enters: a sample of the file and what reads it."""
 
-import contextlib
 import io
 import json
 import socket
 import tarfile
-import threading
 import zipfile
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -35,8 +33,7 @@ from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.processed_files import write_description, write_processed
-from per_obspy.records.seedlink.seedlink_window import seedlink_window
-from per_obspy.records.seedlink.server_address import ServerAddress
+from per_obspy.records.seedlink.seedlink_window import Conversation
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
 
@@ -423,30 +420,20 @@ def _packets() -> bytes:
 
 def _seedlink(path: Path) -> Iterable[object]:
     """Read the bytes of a file as the answers of a SeedLink server, and the records in them."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        thread = threading.Thread(target=_said, args=(server, path.read_bytes()))
-        thread.start()
-        try:
-            address = ServerAddress("127.0.0.1", server.getsockname()[1])
-            pool = web_pool(1.0, 0, 0.01, longest=2.0, largest=2**20)
-            window = (START, START + 10.0)
-            content = seedlink_window(pool, address, "CI.CLC", [("", "HN1")], window)
-        finally:
-            thread.join()
+    pool = web_pool(1.0, 0, 0.01, longest=2.0, largest=2**20)
+    ours, theirs = socket.socketpair()
+    # Everything is said at once, whatever is asked, and fits into the buffer of the connection
+    with ours, theirs:
+        ours.settimeout(1.0)
+        theirs.sendall(path.read_bytes()[:100_000])
+        theirs.shutdown(socket.SHUT_WR)
+        conversation = Conversation(ours, "seedlink://fuzz", pool)
+        is_there = conversation.selected("CI.CLC", [("", "HN1")], (START, START + 10.0))
+        content = b"".join(conversation.records()) if is_there else b""
     if not content:
         return []
     stream = read_bytes_with_obspy(obspy.read, content, str(path), format="MSEED")
     return [len(trace.data) for trace in stream]
-
-
-def _said(server: socket.socket, content: bytes) -> None:
-    """Say everything to the first client, whatever it asks."""
-    connection, _ = server.accept()
-    with connection, contextlib.suppress(OSError):
-        connection.sendall(content)
-        connection.shutdown(socket.SHUT_WR)
-        while connection.recv(4096):
-            pass
 
 
 def _event_list(path: Path) -> Iterable[object]:

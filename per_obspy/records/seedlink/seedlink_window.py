@@ -71,7 +71,7 @@ def seedlink_window(
         timeout = pool.connections.connection_pool_kw["timeout"]
         connection = socket.create_connection(server, timeout=timeout)
         with closing(connection):
-            conversation = _Conversation(connection, shown, pool)
+            conversation = Conversation(connection, shown, pool)
             if not conversation.selected(station, channels, window):
                 return b""
             return b"".join(conversation.records())
@@ -79,8 +79,19 @@ def seedlink_window(
         raise ServiceError(f"{shown}: no answer: {error or type(error).__name__}") from error
 
 
-class _Conversation:
-    """What is said on a connection, within the limits of a pool."""
+class Conversation:
+    """
+    Commands and answers on a connection, within the limits of a pool.
+
+    Parameters
+    ----------
+    connection : socket
+        With a time-out.
+    shown : str
+        The server, for messages.
+    pool : WebPool
+        Longest and largest answer.
+    """
 
     def __init__(self, connection: socket.socket, shown: str, pool: WebPool) -> None:
         self.connection, self.shown, self.pool = connection, shown, pool
