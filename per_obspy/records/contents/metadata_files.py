@@ -30,8 +30,11 @@ _MARKS = {
     b'"shard": ': "description",
 }
 
-#: Beginning of dataless SEED: number of the record and type V, a volume header.
-_DATALESS = re.compile(rb"\d{6}V[ *]")
+#: Beginnings of logical records of SEED: a number, and the type of a volume header or of data.
+_VOLUME, _DATA = re.compile(rb"\d{6}V[ *]"), re.compile(rb"\d{6}[DRQM] ")
+
+#: Smallest logical record of SEED that networks write, bytes.
+_LOGICAL_RECORD = 256
 
 #: Kinds of files that describe stations.
 METADATA = ("inventory", "station text", "station table", "ITACA metadata")
@@ -44,9 +47,15 @@ def kind_of(path: Path, content: bytes) -> str:
         return "station table"
     if is_itaca_metadata(start):
         return "ITACA metadata"
-    if _DATALESS.match(start):
+    if _VOLUME.match(start) and not _has_data(content):
         return "inventory"
     return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
+
+
+def _has_data(content: bytes) -> bool:
+    """Return whether a volume of SEED holds records of data beside its headers."""
+    starts = range(0, len(content), _LOGICAL_RECORD)
+    return any(_DATA.match(content, start) for start in starts)
 
 
 def named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
