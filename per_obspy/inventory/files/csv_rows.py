@@ -15,17 +15,31 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
+from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.csv_lines import (
     LONGEST_NAME,
+    Layout,
     RowLines,
     header_names,
     row_lines,
 )
-from per_obspy.inventory.files.csv_text import check_separator, check_text
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
 from per_obspy.inventory.files.text_cells import given_text, given_texts
+from per_obspy.inventory.recognition.decimal_marks import (
+    evidence_of,
+    has_quoted_commas,
+    marks_of,
+    with_points,
+)
+from per_obspy.inventory.recognition.encodings import TURKISH
+from per_obspy.inventory.recognition.table_form import text_form
+from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
+
+
+#: Nothing is said about the form of a table.
+PLAIN = TableForm()
 
 
 class CsvFile:
@@ -33,16 +47,83 @@ class CsvFile:
     Pairs in a CSV file.
 
     Every cell is read as text, so that a message can contain a bad value as it is in the file.
+
+    Parameters
+    ----------
+    file : Path
+        Text of any form that :func:`~.table_form.text_form` recognises.
+    given : TableForm
+        What the user says about its form.
     """
 
-    def __init__(self, file: Path) -> None:
-        self.file = file
-        self._lines = check_text(file)
-        names = header_names(file)
-        check_separator(file, names)
-        self._columns = [given_text(name.strip()) for name in names]
+    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
+        self.file, self._given = file, given
+        form = text_form(file, given)
+        self._form = form
+        self._layout = Layout(form.lines, form.header, form.separator, form.encoding)
+        self.headings = header_names(file, self._layout)
+        self.meanings = form.meanings
+        self._columns = [given_text(name.strip()) for name in form.meanings.names]
         # Spreadsheets leave columns without a name
         self.names: Sequence[str] = [name for name in self._columns if name]
+
+    @property
+    def recognised(self) -> str:
+        """What is not plain about the file, empty if nothing is; reads the whole file."""
+        return "; ".join(text for text in (self._form.sentence(), self.recognised_numbers) if text)
+
+    @property
+    def recognised_numbers(self) -> str:
+        """Which columns have decimal commas, or commas between thousands."""
+        commas = [name for name, mark in self._marks.items() if mark == ","]
+        thousands = [name for name, mark in self._marks.items() if mark == "."]
+        texts = [f"decimal commas in {', '.join(commas)}"] if commas else []
+        texts += [f"commas between thousands in {', '.join(thousands)}"] if thousands else []
+        return "; ".join(texts)
+
+    @cached_property
+    def _marks(self) -> dict[str, str]:
+        """
+        Return the decimal mark of each column of numbers that has commas.
+
+        Raises
+        ------
+        CatalogError
+            If a number may be read in two ways, or a text of a known column may be.
+        """
+        self._check_letters()
+        numbers = [name for name in self.names if name in COLUMNS and COLUMNS[name].dtype != "str"]
+        # Between commas only quoted numbers can have one
+        if self._layout.separator == "," and not has_quoted_commas(self.file, self._form.encoding):
+            return {}
+        blocks = ((rows.table, rows.lines.tolist()) for rows in self._blocks(numbers))
+        evidence = evidence_of(blocks)
+        if self._given.decimal:
+            commas = [name for name, found in evidence.items() if any(found[:3])]
+            return dict.fromkeys(commas, self._given.decimal)
+        marks, doubtful = marks_of(evidence)
+        for name, found in doubtful.items():
+            comma, none = found.example.replace(",", "."), found.example.replace(",", "")
+            reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
+            mend = "give decimal = \",\" (or \".\") in [pairs]"
+            raise CatalogError(str(self.file), f"{reason}, and no other number decides: {mend}")
+        return marks
+
+    def _check_letters(self) -> None:
+        """Raise CatalogError if the text of a known column depends on the code page."""
+        if not self._form.is_doubtful:
+            return
+        texts = [name for name in self.names if name in COLUMNS and COLUMNS[name].dtype == "str"]
+        for rows in self._blocks(texts):
+            for name, cells in zip(texts, rows.table.columns, strict=True):
+                place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
+                if place >= 0:
+                    text = cells[place].as_py()
+                    turkish = text.encode("cp1252").decode("cp1254")
+                    reason = f"{name} = {text!r:.40} in cp1252 and {turkish!r:.40} in cp1254"
+                    mend = "give encoding = one of them in [pairs]"
+                    line = f"line {rows.lines[place]}"
+                    raise CatalogError(str(self.file), f"{line}: {reason}: {mend}")
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:
@@ -64,7 +145,7 @@ class CsvFile:
             yield given_texts(block.table.column(0)).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows; lines without any content are left out."""
+        """Yield blocks of so many rows in plain units; lines without any content are left out."""
         for rows in _regrouped(self._blocks(self.names), size):
             full = _has_content(rows.table)
             cells = {name: self._converted(name, rows.table[name]) for name in self.names}
@@ -78,7 +159,16 @@ class CsvFile:
             return given_texts(cells) if kind is None else _as_numbers(cells, kind)
         if COLUMNS[name].dtype == "str":
             return given_texts(cells)
-        return _as_numbers(cells, pa.float64()) or cells
+        return self._plain_numbers(name, cells)
+
+    def _plain_numbers(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
+        """Return numbers of a known column in the unit of the schema, else text."""
+        mark, unit = self._marks.get(name), self.meanings.units.get(name)
+        points = with_points(cells, mark) if mark else cells
+        numbers = _as_numbers(points, pa.float64())
+        if unit is None:
+            return points if numbers is None else numbers
+        return converted_texts(points, unit) if numbers is None else converted(numbers, unit)
 
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
         """Yield these columns as text, some thousands of rows at a time, and the broken lines."""
@@ -88,8 +178,8 @@ class CsvFile:
         options = pa.csv.ConvertOptions(
             column_types=dict.fromkeys(chosen, pa.string()), include_columns=chosen
         )
-        for rows in row_lines(self.file, self._columns, self._lines):
-            table, skipped = _parsed(rows.text, columns, options)
+        for rows in row_lines(self.file, self._columns, self._layout):
+            table, skipped = _parsed(rows.text, columns, options, self._layout.separator)
             lines = np.delete(rows.numbers, list(skipped))
             # Every line that was given is a row or a broken one
             if len(table) != lines.size:
@@ -102,12 +192,13 @@ class CsvFile:
         """Return the broken lines and those with too few or too many cells, in their order."""
         broken = [*rows.broken]
         for position, invalid in skipped.items():
-            broken.append(_rejection(self.file, int(rows.numbers[position]), invalid))
+            line = int(rows.numbers[position])
+            broken.append(_rejection(self.file, line, invalid, self._layout.separator))
         return sorted(broken, key=lambda line: line.row or 0)
 
 
 def _parsed(
-    text: bytes, columns: list[str], options: pa.csv.ConvertOptions
+    text: bytes, columns: list[str], options: pa.csv.ConvertOptions, separator: str
 ) -> tuple[pa.Table, dict[int, pa.csv.InvalidRow]]:
     """Return rows as a table of text, and the invalid ones by their position."""
     skipped: dict[int, pa.csv.InvalidRow] = {}
@@ -121,15 +212,17 @@ def _parsed(
         return pa.table(empty, names=options.include_columns), skipped
     # With threads, the reader does not number the rows; a block is read in one piece
     reading = pa.csv.ReadOptions(use_threads=False, column_names=columns, block_size=len(text) + 1)
-    parsing = pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=skip)
+    parsing = pa.csv.ParseOptions(
+        delimiter=separator, ignore_empty_lines=False, invalid_row_handler=skip
+    )
     table = pa.csv.read_csv(pa.BufferReader(text), reading, parsing, options)
     return table, skipped
 
 
-def _rejection(file: Path, line: int, row: pa.csv.InvalidRow) -> Rejection:
+def _rejection(file: Path, line: int, row: pa.csv.InvalidRow, separator: str) -> Rejection:
     """Return the rejection of a line with too few or too many cells."""
     reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
-    name = row.text.split(",")[0][:LONGEST_NAME]
+    name = row.text.split(separator)[0][:LONGEST_NAME]
     return Rejection("pair", name, str(file), line, (reason,))
 
 

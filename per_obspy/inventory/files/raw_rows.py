@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
+from per_obspy.inventory.recognition.column_meanings import Meanings
 
 #: Column with the name of the pair.
 IDENTIFIER = "pair_id"
@@ -43,9 +44,26 @@ class RawRows(NamedTuple):
 
 
 class PairFile(Protocol):
-    """A file of pairs: its columns, the identifiers of its pairs, its rows."""
+    """
+    A file of pairs: its columns, the identifiers of its pairs, its rows.
+
+    Attributes
+    ----------
+    names : sequence of str
+        Columns, by the schema where it knows them.
+    headings : sequence of str
+        The header as it is in the file.
+    meanings : Meanings
+        Of the headings.
+    """
 
     names: Sequence[str]
+    headings: Sequence[str]
+    meanings: Meanings
+
+    @property
+    def recognised(self) -> str:
+        """What is not plain about the file, empty if nothing is."""
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""

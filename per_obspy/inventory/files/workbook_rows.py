@@ -1,0 +1,178 @@
+"""
+Pairs in a sheet of a workbook, transcribed once to a plain table.
+
+Each row of the sheet is one line of a temporary CSV file, so that everything after it is as with
+any table, and the line of a row is its number in the sheet.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pyarrow as pa
+
+from per_obspy.config import TableForm
+from per_obspy.errors import CatalogError, did_you_mean, printable
+from per_obspy.files import writing
+from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
+from per_obspy.inventory.files.raw_rows import RawRows
+from per_obspy.inventory.recognition.column_meanings import Meanings, meanings_of
+from per_obspy.inventory.recognition.headings import is_complete
+from per_obspy.inventory.recognition.table_form import HEADER_LINES
+from per_obspy.inventory.recognition.workbook import (
+    cells_without_value,
+    sheet_list,
+    sheet_rows,
+    workbook_sheets,
+)
+
+
+class _Found:
+    """A sheet with the row of its header and what its cells mean."""
+
+    def __init__(self, sheet: str, header: int, meanings: Meanings) -> None:
+        self.sheet, self.header, self.meanings = sheet, header, meanings
+        self.names = {means.column for means in meanings.columns.values()}
+
+
+class WorkbookFile:
+    """
+    Pairs in a workbook (.xlsx, .xlsm).
+
+    Parameters
+    ----------
+    file : Path
+        The workbook.
+    given : TableForm
+        Sheet, names and units of the user.
+
+    Raises
+    ------
+    CatalogError
+        If it cannot be read, or more than one sheet has a pair table and none is named.
+    """
+
+    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
+        self.file, self._given = file, given
+        self._found = _found_sheet(file, given)
+        self.source = f"{file}, sheet {self._found.sheet!r}"
+        self.meanings = meanings_of(self._found.meanings.cells, given, self.source)
+        self.headings = self.meanings.cells
+        self.names: Sequence[str] = [name for name in self.meanings.names if name]
+
+    @property
+    def recognised(self) -> str:
+        """Sheet, names and units."""
+        found = self._found
+        header = f" with the header in row {found.header}" if found.header > 1 else ""
+        texts = [f"sheet {found.sheet!r}{header}", self.meanings.sentence()]
+        # Numbers that are text may have decimal commas
+        with self._named():
+            texts.append(self._table.recognised_numbers)
+        return "; ".join(text for text in texts if text)
+
+    def identifiers(self) -> Iterator[pa.Array]:
+        """Yield the identifiers of the pairs, block by block."""
+        with self._named():
+            yield from self._table.identifiers()
+
+    def rows(self, size: int) -> Iterator[RawRows]:
+        """Yield blocks of so many rows."""
+        with self._named():
+            for rows in self._table.rows(size):
+                broken = tuple(line._replace(source=self.source) for line in rows.broken)
+                yield rows._replace(source=self.source, broken=broken)
+
+    @cached_property
+    def _folder(self) -> "TemporaryDirectory[str]":
+        """Folder of the transcribed table, removed with this object."""
+        return TemporaryDirectory(prefix="per-obspy-")
+
+    @cached_property
+    def _table(self) -> CsvFile:
+        """The sheet as a plain table, whose lines are the rows of the sheet."""
+        self._check_values()
+        path = Path(self._folder.name, "sheet.csv")
+        names, header = self.meanings.names, self._found.header
+        rows = sheet_rows(self.file, self._found.sheet)
+        with writing(path), path.open("w", encoding="utf-8", errors="replace", newline="") as text:
+            writer = csv.writer(text, lineterminator="\n")
+            for number, cells in enumerate(rows, 1):
+                if number <= header:
+                    writer.writerow(names if number == header else [])
+                    continue
+                # Cells behind the header have no name
+                padded = [*cells[: len(names)], *[""] * (len(names) - len(cells))]
+                writer.writerow([_on_one_line(cell) for cell in padded] if cells else [])
+        units = {name: unit.name for name, unit in self.meanings.units.items()}
+        return CsvFile(path, TableForm(encoding="utf-8", separator=",", units=units, **self._mark))
+
+    @property
+    def _mark(self) -> dict[str, str]:
+        """The decimal mark of numbers that are text, if it is given."""
+        return {"decimal": self._given.decimal} if self._given.decimal else {}
+
+    def _check_values(self) -> None:
+        """Raise CatalogError if a cell of a known column is a formula that was never computed."""
+        known = {place + 1: means.column for place, means in self.meanings.columns.items()}
+        for row, column in cells_without_value(self.file, self._found.sheet):
+            if row > self._found.header and column in known:
+                reason = f"row {row}, {known[column]}: a formula without a stored value"
+                mend = "open the workbook in a spreadsheet program and save it"
+                raise CatalogError(self.source, f"{reason}: {mend}")
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Name the workbook and its sheet in errors of the transcribed table."""
+        try:
+            yield
+        except CatalogError as error:
+            if error.source != str(Path(self._folder.name, "sheet.csv")):
+                raise
+            raise CatalogError(self.source, error.problem) from error
+
+
+def _on_one_line(cell: str) -> str:
+    """Return a cell without line breaks."""
+    return " ".join(cell.splitlines()) if not cell.isprintable() else cell
+
+
+def _found_sheet(file: Path, given: TableForm) -> _Found:
+    """Return the sheet that is named, else the only one that has a pair table."""
+    sheets = {sheet.name: sheet.head for sheet in workbook_sheets(file, HEADER_LINES)}
+    if given.sheet is not None:
+        if given.sheet not in sheets:
+            meant = did_you_mean(given.sheet, sheets) or f", there are {sheet_list(sheets)}"
+            raise CatalogError(str(file), f"no sheet {given.sheet!r:.60}{meant}")
+        return _with_header(given.sheet, sheets[given.sheet], given, file)
+    found = [_with_header(name, head, given, file) for name, head in sheets.items() if head]
+    if not found:
+        raise CatalogError(str(file), "the workbook has no sheet with cells")
+    whole = [sheet for sheet in found if is_complete(sheet.names)]
+    if len(whole) > 1:
+        tables = sheet_list({sheet.sheet: None for sheet in whole})
+        mend = f'give sheet = "{whole[0].sheet}" or another one in [pairs]'
+        raise CatalogError(str(file), f"{len(whole)} sheets have a pair table, {tables}: {mend}")
+    # Of no whole table, the one with most of its columns, whose lack is told later
+    return whole[0] if whole else max(found, key=lambda sheet: len(sheet.names))
+
+
+def _with_header(
+    sheet: str, head: Sequence[Sequence[str]], given: TableForm, file: Path
+) -> _Found:
+    """Return a sheet with the row whose cells mean most columns, the first filled one else."""
+    rows = [
+        (number, [" ".join(printable(cell).split()) for cell in cells])
+        for number, cells in enumerate(head, 1)
+        if cells
+    ]
+    found = [
+        _Found(sheet, number, meanings_of(cells, given, str(file), must_have=False))
+        for number, cells in rows
+    ]
+    if not found:
+        raise CatalogError(str(file), f"sheet {sheet!r:.60} has no cells")
+    return max(found, key=lambda row: len(row.names))
