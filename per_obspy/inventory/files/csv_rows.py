@@ -81,6 +81,10 @@ class CsvFile:
         texts += [f"commas between thousands in {', '.join(thousands)}"] if thousands else []
         return "; ".join(texts)
 
+    def check_numbers(self) -> None:
+        """Raise CatalogError if a number or letter of a known column can be read in two ways."""
+        _ = self._marks
+
     @cached_property
     def _marks(self) -> dict[str, str]:
         """

@@ -52,6 +52,9 @@ class ParquetFile:
         """Names and units that are not those of the schema, empty if all are."""
         return self.meanings.sentence()
 
+    def check_numbers(self) -> None:
+        """Do nothing: numbers of a Parquet file can be read in one way only."""
+
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
         column = self.headings[self.names.index(IDENTIFIER)]

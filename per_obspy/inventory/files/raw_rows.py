@@ -65,6 +65,9 @@ class PairFile(Protocol):
     def recognised(self) -> str:
         """What is not plain about the file, empty if nothing is."""
 
+    def check_numbers(self) -> None:
+        """Raise CatalogError if a number or letter of a known column can be read in two ways."""
+
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
 

@@ -16,7 +16,9 @@ from per_obspy.errors import CatalogError, Rejection, printable
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows, name_hashes
-from per_obspy.inventory.gap_units import GAP, GapCounts, gap_counts
+from per_obspy.inventory.gap_units import GAP, GapCounts, gap_counts, gap_suspicions
+from per_obspy.inventory.recognition.proposals import proposed_units
+from per_obspy.inventory.schema import COLUMNS
 
 #: More rows than any table has.
 ALL = 1 << 40
@@ -89,7 +91,10 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
     rows = RawRows(blocks[0].source, pa.concat_tables(tables), lines, broken)
     pairs = _checked(rows, None)
     pairs.attrs["recognised"] = file.recognised
-    pairs.attrs["gaps"] = gap_counts(rows.table[GAP])
+    pairs.attrs["gaps"] = gaps = gap_counts(rows.table[GAP])
+    columns = [name for name in file.names if name in COLUMNS]
+    raw = rows.table.select(columns).to_pandas()
+    pairs.attrs["proposed_units"] = proposed_units(raw, bool(gap_suspicions(gaps)))
     return pairs
 
 

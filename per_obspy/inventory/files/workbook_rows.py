@@ -74,6 +74,11 @@ class WorkbookFile:
             texts.append(self._table.recognised_numbers)
         return "; ".join(text for text in texts if text)
 
+    def check_numbers(self) -> None:
+        """Raise CatalogError for numbers that can be read in two ways or were never computed."""
+        with self._named():
+            self._table.check_numbers()
+
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
         with self._named():

@@ -7,6 +7,7 @@ from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, did_you_mean
 from per_obspy.inventory.recognition.headings import (
     Heading,
+    is_building_list,
     plain_heading,
     proposals,
     recognised,
@@ -61,11 +62,28 @@ class Meanings(NamedTuple):
                 texts.append(f"{named} in {unit.name}" if unit else named)
         return ", ".join(texts)
 
-    def asked(self) -> str:
-        """Return the headings that may be meant for missing columns, as a mend; empty if none."""
+    def as_form(self, form: TableForm) -> TableForm:
+        """Return a form with the names and units that were recognised."""
+        units = {name: unit.name for name, unit in self.units.items()}
+        names = {**self.renamed, **form.columns}
+        return form.model_copy(update={"columns": names, "units": {**units, **form.units}})
+
+    def proposals(self) -> dict[str, list[str]]:
+        """Return columns that are not found -> headings that may be meant."""
         possible = proposals(self.cells, self.columns)
+        return {name: [self.cells[place] for place in places] for name, places in possible.items()}
+
+    def asked(self) -> str:
+        """Return what mends missing columns, as the end of a message; empty if nothing is known."""
+        if is_building_list(self.cells):
+            return (
+                "; it is a list of buildings, a pair table has a gap and both buildings in each row:"
+                " per-obspy pairs makes one of outlines"
+            )
         texts = [
-            f'{name} = "{self.cells[place]}"' for name, places in possible.items() for place in places
+            f'{name} = "{heading}"'
+            for name, headings in self.proposals().items()
+            for heading in headings
         ]
         return f"; in [pairs.columns] give those that are meant: {', '.join(texts)}" if texts else ""
 

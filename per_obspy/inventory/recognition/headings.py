@@ -185,10 +185,30 @@ def _column_of(tokens: list[str]) -> Heading | None:
     return None
 
 
+def missing_columns(names: set[str]) -> list[str]:
+    """Return required columns that are not among these; of a group the first, if none of it is."""
+    missing = [name for name, column in COLUMNS.items() if column.required and name not in names]
+    return missing + [group[0] for group in ONE_OF if not names & set(group)]
+
+
 def is_complete(names: set[str]) -> bool:
     """Return whether these columns of the schema are all that a pair table needs."""
-    required = {column.name for column in COLUMNS.values() if column.required}
-    return required <= names and all(names & set(group) for group in ONE_OF)
+    return not missing_columns(names)
+
+
+def is_building_list(headings: Sequence[str]) -> bool:
+    """
+    Return whether headings have one position only, as lists of single buildings do.
+
+    Examples
+    --------
+    >>> is_building_list(["id", "Longitude", "Latitude"]), is_building_list(["lon 1", "lat 1"])
+    (True, False)
+    """
+    bare = {text: word for text, word in _bare_names().items() if word in ("longitude", "latitude")}
+    words = {text: word.column for text, word in _words().items() if word.is_sure}
+    found = {(bare | words).get(_joined(_tokens(heading))) for heading in headings}
+    return {"longitude", "latitude"} <= found
 
 
 def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Heading]:
