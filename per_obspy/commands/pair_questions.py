@@ -55,16 +55,18 @@ def _choice(name: str, proposed: "Sequence[str]", others: "Sequence[str]") -> st
     """Return the heading that the user takes for a column, empty if none."""
     from per_obspy.inventory.schema import COLUMNS
 
+    # The column, and the headings that may be meant
     column = COLUMNS[name]
     unit = f", {column.unit}" if column.unit not in ("", "1") else ""
     print(printable(f"{name} ({column.meaning}{unit}) is missing."))
     headings = [*proposed, *(heading for heading in others if heading not in proposed)]
     for number, heading in enumerate(headings, 1):
         print(printable(f"  {number} {heading}"))
-    default = "1" if proposed else "none"
+    # Until the answer is one of them
+    default = "1" if proposed else "0"
     while True:
-        answer = input(f"Which heading is it? number, or 0 for none [{default}]: ").strip()
-        answer = answer or ("1" if proposed else "0")
+        question = f"Which heading is it? number, or 0 for none [{default}]: "
+        answer = input(question).strip() or default
         if answer == "0":
             return ""
         if answer.isdecimal() and int(answer) <= len(headings):
@@ -78,6 +80,7 @@ def asked_units(units: "Mapping[str, str]") -> dict[str, str]:
 
     confirmed = dict[str, str]()
     for name, proposed in units.items():
+        # Until the answer is a unit of the column
         known = COLUMNS[name].unit
         while True:
             question = f"Numbers of {name} look like {proposed}. Unit? [{proposed}; {known}]: "

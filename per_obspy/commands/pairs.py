@@ -99,7 +99,9 @@ def check_pairs(
     file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx.")],
     write: Annotated[
         bool,
-        typer.Option("--write", help="Write names and units of its columns to FILE.toml beside it."),
+        typer.Option(
+            "--write", help="Write names and units of its columns to FILE.toml beside it."
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -135,34 +137,34 @@ def check_pairs(
 def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     """Print what a pair table gives, for machines or people."""
     from per_obspy.inventory.files.reading import recognised_line
-    from per_obspy.inventory.table_checks import (
-        derived_counts,
-        inventory_profile,
-        suspicions,
-        unused_columns,
-    )
+    from per_obspy.inventory.table_checks import suspicions
 
-    rejected, recognised = table.attrs["rejected"], table.attrs["recognised"]
-    profile = inventory_profile(table)
-    touching = int((table["gap"] == 0.0).sum())
-    derived, unused, odd = derived_counts(table), unused_columns(table), suspicions(table)
+    # Counts, and what is said about the table as a whole
+    counts = {"pairs": len(table), "touching": int((table["gap"] == 0.0).sum())}
+    rejected, odd = table.attrs["rejected"], suspicions(table)
+    found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
     if as_json:
-        columns = json.loads(profile.to_json(orient="records"))
-        faults = [rejection._asdict() for rejection in rejected]
-        known = {"pairs": len(table), "touching": touching, "rejected": faults, "columns": columns}
-        said = {"derived": derived, "unused": unused, "suspicions": odd, "recognised": recognised}
-        print(json.dumps({**known, **said, "proposed_units": table.attrs["proposed_units"]}))
+        known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
+        print(json.dumps({**counts, **known, "suspicions": odd, **found}))
         return
-    # People first read how the table is read
-    if recognised:
-        print(recognised_line(file, recognised))
-    counted = f"{len(table)} usable pairs, {touching} of them touching"
+    # People first learn how the table is read
+    if found["recognised"]:
+        print(recognised_line(file, found["recognised"]))
+    counted = f"{counts['pairs']} usable pairs, {counts['touching']} of them touching"
     print(f"{file}: {counted}, {len(rejected)} rejected rows")
     _print_rejected(rejected)
     if not table.empty:
-        _print_profile(profile, derived, unused)
+        _print_profile(table)
     for suspicion in odd:
         print("Suspicious:", suspicion)
+
+
+def _described(table: "pd.DataFrame") -> "dict[str, Any]":
+    """Return the columns of a pair table, those that are derived and those that are unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    columns = json.loads(inventory_profile(table).to_json(orient="records"))
+    return {"columns": columns, "derived": derived_counts(table), "unused": unused_columns(table)}
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
@@ -178,10 +180,15 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
 
 
-def _print_profile(
-    profile: "pd.DataFrame", derived: dict[str, int], unused: list[str]
-) -> None:
-    """Print the columns of a pair table."""
+def _print_profile(table: "pd.DataFrame") -> None:
+    """Print the columns of a pair table, what is derived and what is unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    profile, derived, unused = (
+        inventory_profile(table),
+        derived_counts(table),
+        unused_columns(table),
+    )
     # The most frequent of many numbers is meaningless
     frequent = profile["most_frequent"].where(profile["median"].isna(), "")
     described = profile.assign(most_frequent=frequent)

@@ -50,6 +50,7 @@ class Pairs(TableForm):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
+        # One source, whose other keys belong to it
         if sum(source is not None for source in (self.file, self.catalog, self.simulated)) != 1:
             raise ValueError("give one of file, catalog and simulated")
         if self.names and self.catalog is None:

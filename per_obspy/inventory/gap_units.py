@@ -34,12 +34,9 @@ class GapCounts(NamedTuple):
     wide: int = 0
     whole: int = 0
 
-    def __add__(self, other: tuple[object, ...]) -> Self:
+    def joined(self, other: Self) -> Self:
         """Return the numbers of both."""
         return type(self)(*(first + second for first, second in zip(self, other, strict=True)))
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        return self
 
 
 def gap_counts(gaps: pa.ChunkedArray) -> GapCounts:
@@ -56,6 +53,7 @@ def gap_counts(gaps: pa.ChunkedArray) -> GapCounts:
     >>> gap_counts(pa.chunked_array([["0", "5", "0.05", "five", ""]]))
     GapCounts(above_zero=2, wide=1, whole=1)
     """
+    # Text is a number where it looks like one
     if pa.types.is_string(gaps.type):
         is_number = pc.match_substring_regex(gaps, r"^\s*[+-]?\d{1,300}(\.\d{0,300})?\s*$")
         text = pc.utf8_trim_whitespace(pc.if_else(is_number, gaps, None))
@@ -78,7 +76,9 @@ def gap_suspicions(gaps: GapCounts) -> list[str]:
     """
     mend = "given in centimetres or millimetres?"
     if 2 * gaps.wide > gaps.above_zero:
-        return [f"{gaps.wide} of {gaps.above_zero} gaps above 0 are wider than {WIDE_GAP:g} m: {mend}"]
+        return [
+            f"{gaps.wide} of {gaps.above_zero} gaps above 0 are wider than {WIDE_GAP:g} m: {mend}"
+        ]
     if gaps.whole == gaps.above_zero >= FEWEST_WHOLE:
         return [f"all {gaps.whole} gaps above 0 are whole metres: {mend}"]
     return []

@@ -213,6 +213,7 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs is None or pairs.simulated is not None:
         return []
     if pairs.catalog is None:
+        # A file beside the table may say how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []
     stored = stored_inventories(pairs.catalog)
     chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]

@@ -104,15 +104,13 @@ def screened(
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
-    has_motion = bool(stations or maps)
     parts, notes = list[Part](), PairNotes()
-    if has_motion:
+    if stations or maps:
         parts, notes = _parts(settings, folder, ground, executor, progress)
     outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
     kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
     # The parts of the chunks become one table, worst pair first
-    tables = [part.path for part in parts if part.path]
-    if tables:
+    if tables := [part.path for part in parts if part.path]:
         progress("ranking", 0, 1)
         risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
         outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
@@ -160,6 +158,7 @@ def _parts(
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
     _remove_others(_chunk_folder(folder), parts)
+    # What is said about the tables, after all their rows were read
     notes = PairNotes(tuple(inventory.recognised()), tuple(gap_suspicions(inventory.gaps)))
     return sorted(parts, key=lambda part: part.number), notes
 

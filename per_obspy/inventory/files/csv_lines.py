@@ -150,7 +150,9 @@ def row_lines(file: Path, names: Sequence[str], layout: Layout) -> Iterator[RowL
     yield scanner.rows(b"", is_last=True)
     if scanner.number != layout.lines + 1:
         read = scanner.number - 1
-        problem = f"{layout.lines} lines, of which {read} were read: was the file changed meanwhile?"
+        problem = (
+            f"{layout.lines} lines, of which {read} were read: was the file changed meanwhile?"
+        )
         raise CatalogError(str(file), problem)
 
 
@@ -233,7 +235,11 @@ class _Scanner:
 
     def _rejection(self, line: bytes, fault: str) -> Rejection:
         """Return the rejection of the next line."""
-        name = line.partition(self._separator.encode())[0].strip(b'" ')[:LONGEST_NAME].decode("utf-8", "replace")
+        name = (
+            line.partition(self._separator.encode())[0]
+            .strip(b'" ')[:LONGEST_NAME]
+            .decode("utf-8", "replace")
+        )
         return Rejection("pair", name, str(self._file), self.number, (fault,))
 
 

@@ -30,13 +30,13 @@ from per_obspy.inventory.recognition.decimal_marks import (
     evidence_of,
     has_quoted_commas,
     marks_of,
+    two_readings,
     with_points,
 )
-from per_obspy.inventory.recognition.encodings import TURKISH
+from per_obspy.inventory.recognition.encodings import TURKISH, two_pages
 from per_obspy.inventory.recognition.table_form import text_form
 from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
-
 
 #: Nothing is said about the form of a table.
 PLAIN = TableForm()
@@ -75,6 +75,7 @@ class CsvFile:
     @property
     def recognised_numbers(self) -> str:
         """Which columns have decimal commas, or commas between thousands."""
+        # Columns by their decimal mark
         commas = [name for name, mark in self._marks.items() if mark == ","]
         thousands = [name for name, mark in self._marks.items() if mark == "."]
         texts = [f"decimal commas in {', '.join(commas)}"] if commas else []
@@ -96,38 +97,36 @@ class CsvFile:
             If a number may be read in two ways, or a text of a known column may be.
         """
         self._check_letters()
-        numbers = [name for name in self.names if name in COLUMNS and COLUMNS[name].dtype != "str"]
         # Between commas only quoted numbers can have one
         if self._layout.separator == "," and not has_quoted_commas(self.file, self._form.encoding):
             return {}
-        blocks = ((rows.table, rows.lines.tolist()) for rows in self._blocks(numbers))
-        evidence = evidence_of(blocks)
+        blocks = self._blocks(self._known(is_text=False))
+        evidence = evidence_of((rows.table, rows.lines.tolist()) for rows in blocks)
         if self._given.decimal:
-            commas = [name for name, found in evidence.items() if any(found[:3])]
+            commas = [name for name, found in evidence.items() if found.has_commas]
             return dict.fromkeys(commas, self._given.decimal)
+        # What no number decides, the user has to
         marks, doubtful = marks_of(evidence)
-        for name, found in doubtful.items():
-            comma, none = found.example.replace(",", "."), found.example.replace(",", "")
-            reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
-            mend = "give decimal = \",\" (or \".\") in [pairs]"
-            raise CatalogError(str(self.file), f"{reason}, and no other number decides: {mend}")
+        if doubtful:
+            raise CatalogError(str(self.file), two_readings(*next(iter(doubtful.items()))))
         return marks
+
+    def _known(self, is_text: bool) -> list[str]:
+        """Return the columns of the schema that hold text, or numbers."""
+        known = [name for name in self.names if name in COLUMNS]
+        return [name for name in known if (COLUMNS[name].dtype == "str") == is_text]
 
     def _check_letters(self) -> None:
         """Raise CatalogError if the text of a known column depends on the code page."""
-        if not self._form.is_doubtful:
-            return
-        texts = [name for name in self.names if name in COLUMNS and COLUMNS[name].dtype == "str"]
-        for rows in self._blocks(texts):
-            for name, cells in zip(texts, rows.table.columns, strict=True):
-                place = pc.index(pc.match_substring_regex(cells, f"[{TURKISH}]"), True).as_py()
+        names = self._known(is_text=True)
+        for rows in self._blocks(names) if self._form.is_doubtful else ():
+            for name, cells in zip(names, rows.table.columns, strict=True):
+                # The first cell with a letter that is another one in Turkey
+                is_other = pc.match_substring_regex(cells, f"[{TURKISH}]")
+                place = pc.index(is_other, True).as_py()
                 if place >= 0:
-                    text = cells[place].as_py()
-                    turkish = text.encode("cp1252").decode("cp1254")
-                    reason = f"{name} = {text!r:.40} in cp1252 and {turkish!r:.40} in cp1254"
-                    mend = "give encoding = one of them in [pairs]"
-                    line = f"line {rows.lines[place]}"
-                    raise CatalogError(str(self.file), f"{line}: {reason}: {mend}")
+                    problem = two_pages(name, cells[place].as_py())
+                    raise CatalogError(str(self.file), f"line {rows.lines[place]}: {problem}")
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:

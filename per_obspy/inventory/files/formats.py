@@ -72,6 +72,7 @@ class ParquetFile:
             for batch in stored.iter_batches(batch_size=size, columns=self.headings):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
+                # Names and units of the schema
                 table, faults = plain_columns(pa.Table.from_batches([batch]))
                 table = self._in_units(table.select(self.headings).rename_columns(self.names))
                 broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
@@ -83,6 +84,7 @@ class ParquetFile:
     def _in_units(self, table: pa.Table) -> pa.Table:
         """Return a table in the units of the schema; what is no number stays as it is."""
         for name, unit in self.meanings.units.items():
+            # Truth values and dates stay, and are rejected as such
             place, column = table.column_names.index(name), table[name]
             if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
                 table = table.set_column(place, name, converted(column, unit))
@@ -156,7 +158,9 @@ def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
     # Layers of footprints are a common mistake
     suffix = path.suffix.lower()
     if suffix not in _KINDS:
-        advice = "; per-obspy pairs makes such a table of footprints" if suffix in FOOTPRINTS else ""
+        advice = (
+            "; per-obspy pairs makes such a table of footprints" if suffix in FOOTPRINTS else ""
+        )
         advice = "; save the workbook as .xlsx" if suffix in WORKBOOKS else advice
         expected = f"{', '.join(list(_KINDS)[:-1])} or {list(_KINDS)[-1]}"
         raise CatalogError(
@@ -164,4 +168,5 @@ def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
         )
     if not path.is_file():
         raise CatalogError(str(path), "no such file")
-    return _KINDS[suffix](path, form_of(path, given))
+    file: PairFile = _KINDS[suffix](path, form_of(path, given))
+    return file

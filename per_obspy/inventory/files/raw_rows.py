@@ -44,22 +44,19 @@ class RawRows(NamedTuple):
 
 
 class PairFile(Protocol):
-    """
-    A file of pairs: its columns, the identifiers of its pairs, its rows.
+    """A file of pairs: its columns, the identifiers of its pairs, its rows."""
 
-    Attributes
-    ----------
-    names : sequence of str
-        Columns, by the schema where it knows them.
-    headings : sequence of str
-        The header as it is in the file.
-    meanings : Meanings
-        Of the headings.
-    """
+    @property
+    def names(self) -> Sequence[str]:
+        """Columns, by the schema where it knows them."""
 
-    names: Sequence[str]
-    headings: Sequence[str]
-    meanings: Meanings
+    @property
+    def headings(self) -> Sequence[str]:
+        """The header as it is in the file."""
+
+    @property
+    def meanings(self) -> Meanings:
+        """What the headings mean."""
 
     @property
     def recognised(self) -> str:

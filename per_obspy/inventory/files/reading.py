@@ -79,23 +79,29 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
     if not isinstance(path, str | Path):
         raise TypeError(f"path must be a path or a DataFrame, got {type(path).__name__}")
     file = checked_file(Path(path), form)
+    rows = _all_rows(file, str(path))
+    pairs = _checked(rows, None)
+    # How the file is read, and in which units it may be
+    gaps = gap_counts(rows.table[GAP])
+    known = rows.table.select([name for name in file.names if name in COLUMNS]).to_pandas()
+    units = proposed_units(known, bool(gap_suspicions(gaps)))
+    pairs.attrs |= {"recognised": file.recognised, "gaps": gaps, "proposed_units": units}
+    return pairs
+
+
+def _all_rows(file: PairFile, path: str) -> RawRows:
+    """Return the rows of a file in one piece."""
     blocks = list(file.rows(ALL))
     if not any(len(block.table) or block.broken for block in blocks):
-        raise CatalogError(str(path), "the table has no rows")
-    if not any(len(block.table) for block in blocks):
-        _refuse_commas(str(path), [line for block in blocks for line in block.broken])
-    # Join the blocks; empty ones may have other types
-    tables = [block.table for block in blocks if len(block.table)] or [blocks[0].table]
-    lines = np.concatenate([block.lines for block in blocks])
+        raise CatalogError(path, "the table has no rows")
     broken = tuple(line for block in blocks for line in block.broken)
-    rows = RawRows(blocks[0].source, pa.concat_tables(tables), lines, broken)
-    pairs = _checked(rows, None)
-    pairs.attrs["recognised"] = file.recognised
-    pairs.attrs["gaps"] = gaps = gap_counts(rows.table[GAP])
-    columns = [name for name in file.names if name in COLUMNS]
-    raw = rows.table.select(columns).to_pandas()
-    pairs.attrs["proposed_units"] = proposed_units(raw, bool(gap_suspicions(gaps)))
-    return pairs
+    # Join the blocks; empty ones may have other types
+    tables = [block.table for block in blocks if len(block.table)]
+    if not tables:
+        _refuse_commas(path, broken)
+    lines = np.concatenate([block.lines for block in blocks])
+    table = pa.concat_tables(tables or [blocks[0].table])
+    return RawRows(blocks[0].source, table, lines, broken)
 
 
 def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
@@ -122,7 +128,9 @@ def _refuse_commas(source: str, broken: Sequence[Rejection]) -> None:
     found = [re.match(r"(\d+) columns, the header has (\d+)", line.reasons[0]) for line in broken]
     if all(counts and int(counts[1]) > int(counts[2]) for counts in found):
         reason = f"every row has more columns than the header ({broken[0].reasons[0]})"
-        mend = "with decimal commas, separate columns by semicolons or put numbers in quotation marks"
+        mend = (
+            "with decimal commas, separate columns by semicolons or put numbers in quotation marks"
+        )
         raise CatalogError(source, f"{reason}: {mend}")
 
 
@@ -191,9 +199,8 @@ class PairInventory:
         self.gaps = GapCounts()
         for file in self._files.values():
             for rows in file.rows(size):
-                self.gaps += gap_counts(rows.table[GAP])
+                self.gaps = self.gaps.joined(gap_counts(rows.table[GAP]))
                 yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], self._repeated, seen))
-
 
     def recognised(self) -> list[str]:
         """Return a sentence for each file that is not plain: how it is read."""

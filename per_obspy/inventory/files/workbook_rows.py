@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import pyarrow as pa
 
 from per_obspy.config import TableForm
-from per_obspy.errors import CatalogError, did_you_mean, printable
+from per_obspy.errors import CatalogError, printable
 from per_obspy.files import writing
 from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
 from per_obspy.inventory.files.raw_rows import RawRows
@@ -100,6 +100,7 @@ class WorkbookFile:
     def _table(self) -> CsvFile:
         """The sheet as a plain table, whose lines are the rows of the sheet."""
         self._check_values()
+        # What stands above the header becomes blank lines
         path = Path(self._folder.name, "sheet.csv")
         names, header = self.meanings.names, self._found.header
         rows = sheet_rows(self.file, self._found.sheet)
@@ -122,6 +123,7 @@ class WorkbookFile:
 
     def _check_values(self) -> None:
         """Raise CatalogError if a cell of a known column is a formula that was never computed."""
+        # Columns of the sheet are counted from 1
         known = {place + 1: means.column for place, means in self.meanings.columns.items()}
         for row, column in cells_without_value(self.file, self._found.sheet):
             if row > self._found.header and column in known:
@@ -148,27 +150,24 @@ def _on_one_line(cell: str) -> str:
 def _found_sheet(file: Path, given: TableForm) -> _Found:
     """Return the sheet that is named, else the only one that has a pair table."""
     sheets = {sheet.name: sheet.head for sheet in workbook_sheets(file, HEADER_LINES)}
-    if given.sheet is not None:
-        if given.sheet not in sheets:
-            meant = did_you_mean(given.sheet, sheets) or f", there are {sheet_list(sheets)}"
-            raise CatalogError(str(file), f"no sheet {given.sheet!r:.60}{meant}")
-        return _with_header(given.sheet, sheets[given.sheet], given, file)
-    found = [_with_header(name, head, given, file) for name, head in sheets.items() if head]
+    names = [name for name in sheets if given.sheet in (None, name)]
+    found = [_with_header(name, sheets[name], given, file) for name in names if sheets[name]]
     if not found:
-        raise CatalogError(str(file), "the workbook has no sheet with cells")
+        reason = f"no sheet {given.sheet!r:.60} with cells" if given.sheet else "no sheet has cells"
+        raise CatalogError(str(file), f"{reason}; there are {sheet_list(sheets)}")
+    # Of several pair tables the user chooses one
     whole = [sheet for sheet in found if is_complete(sheet.names)]
     if len(whole) > 1:
-        tables = sheet_list({sheet.sheet: None for sheet in whole})
+        tables = sheet_list(sheet.sheet for sheet in whole)
         mend = f'give sheet = "{whole[0].sheet}" or another one in [pairs]'
         raise CatalogError(str(file), f"{len(whole)} sheets have a pair table, {tables}: {mend}")
-    # Of no whole table, the one with most of its columns, whose lack is told later
-    return whole[0] if whole else max(found, key=lambda sheet: len(sheet.names))
+    # Of none, that with most columns, whose lack is told later
+    return max(whole or found, key=lambda sheet: len(sheet.names))
 
 
-def _with_header(
-    sheet: str, head: Sequence[Sequence[str]], given: TableForm, file: Path
-) -> _Found:
+def _with_header(sheet: str, head: Sequence[Sequence[str]], given: TableForm, file: Path) -> _Found:
     """Return a sheet with the row whose cells mean most columns, the first filled one else."""
+    # Headings of workbooks often have line breaks
     rows = [
         (number, [" ".join(printable(cell).split()) for cell in cells])
         for number, cells in enumerate(head, 1)
@@ -178,6 +177,4 @@ def _with_header(
         _Found(sheet, number, meanings_of(cells, given, str(file), must_have=False))
         for number, cells in rows
     ]
-    if not found:
-        raise CatalogError(str(file), f"sheet {sheet!r:.60} has no cells")
     return max(found, key=lambda row: len(row.names))

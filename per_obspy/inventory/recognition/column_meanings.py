@@ -71,21 +71,25 @@ class Meanings(NamedTuple):
     def proposals(self) -> dict[str, list[str]]:
         """Return columns that are not found -> headings that may be meant."""
         possible = proposals(self.cells, self.columns)
-        return {name: [self.cells[place] for place in places] for name, places in possible.items()}
+        headings = {}
+        for name, places in possible.items():
+            headings[name] = [self.cells[place] for place in places]
+        return headings
 
     def asked(self) -> str:
         """Return what mends missing columns, as the end of a message; empty if nothing is known."""
         if is_building_list(self.cells):
             return (
-                "; it is a list of buildings, a pair table has a gap and both buildings in each row:"
-                " per-obspy pairs makes one of outlines"
+                "; it is a list of buildings: a pair table has the gap and both buildings in each "
+                "row, per-obspy pairs makes one of outlines"
             )
         texts = [
             f'{name} = "{heading}"'
             for name, headings in self.proposals().items()
             for heading in headings
         ]
-        return f"; in [pairs.columns] give those that are meant: {', '.join(texts)}" if texts else ""
+        known = ", ".join(texts)
+        return f"; in [pairs.columns] give those that are meant: {known}" if texts else ""
 
 
 def meanings_of(
@@ -112,6 +116,7 @@ def meanings_of(
     """
     known = _given_places(cells, given, source, must_have)
     found = recognised(cells, known)
+    # Units of the headings, and those that are given
     units = {means.column: means.unit for means in found.values() if means.unit is not None}
     for name, text in given.units.items():
         unit = unit_of(text, name) if name in COLUMNS else None
@@ -121,6 +126,7 @@ def meanings_of(
     absent = set(given.units) - {means.column for means in found.values()}
     if absent and must_have:
         raise CatalogError(source, f"[pairs.units] {min(absent)}: the table has no such column")
+    # A unit that is the schema's own changes nothing
     others = {name: unit for name, unit in units.items() if unit.numerator != unit.denominator}
     return Meanings(tuple(cells), found, others)
 
@@ -141,6 +147,7 @@ def _given_places(
         if len(same) == 1 and same[0] not in places:
             places[same[0]] = name
         elif must_have:
+            # None of it, or several
             how = "no such heading" if not same else "more than one of it"
             meant = did_you_mean(heading, cells) if not same else ""
             problem = f"[pairs.columns] {name} = {heading!r:.60}: the table has {how}{meant}"

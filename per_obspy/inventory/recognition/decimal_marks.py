@@ -6,8 +6,7 @@ thousands; ``1,234`` may be either, so that another number of the table has to d
 """
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +29,14 @@ _THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})\s*$"
 
 #: Numbers whose comma may be either.
 _EITHER = r"^\s*[+-]?[1-9]\d{0,2},\d{3}\s*$"
+
+#: Numbers with a decimal point that can be nothing else.
+_DECIMAL_POINT = (
+    r"^\s*[+-]?(?:\d*\.\d{1,2}|\d*\.\d{4,}|0*\.\d+|0\d*\.\d+|\d{4,}\.\d+)(?:[eE][+-]?\d+)?\s*$"
+)
+
+#: In the order of :class:`Evidence`.
+_KINDS = (_DECIMAL, _THOUSANDS, _EITHER, _DECIMAL_POINT)
 
 #: What becomes a plain number in a column of decimal commas; of these, what is in groups.
 _WITH_COMMA = (
@@ -55,8 +62,8 @@ class Evidence(NamedTuple):
 
     Attributes
     ----------
-    decimal, thousands, either : int
-        Number of cells of each kind.
+    decimal, thousands, either, point : int
+        Number of cells of each kind; ``point`` are decimal points that can be nothing else.
     example : str
         The first cell that may be either.
     line : int
@@ -66,8 +73,14 @@ class Evidence(NamedTuple):
     decimal: int = 0
     thousands: int = 0
     either: int = 0
+    point: int = 0
     example: str = ""
     line: int = 0
+
+    @property
+    def has_commas(self) -> bool:
+        """Whether a number has a comma."""
+        return self.decimal + self.thousands + self.either > 0
 
 
 def has_quoted_commas(file: Path, encoding: str) -> bool:
@@ -81,34 +94,29 @@ def has_quoted_commas(file: Path, encoding: str) -> bool:
     return False
 
 
-def evidence_of(blocks: Iterable[tuple[pa.Table, Iterable[int]]]) -> dict[str, Evidence]:
+def evidence_of(blocks: Iterable[tuple[pa.Table, Sequence[int]]]) -> dict[str, Evidence]:
     """Return the evidence of every column, from blocks of text with the lines of their rows."""
     found: dict[str, Evidence] = {}
     for table, lines in blocks:
-        numbers = list(lines)
         for name, cells in zip(table.column_names, table.columns, strict=True):
-            found[name] = _more(found.get(name, Evidence()), cells, numbers)
+            found[name] = _more(found.get(name, Evidence()), cells, lines)
     return found
 
 
-def _more(known: Evidence, cells: pa.ChunkedArray, lines: list[int]) -> Evidence:
+def _more(known: Evidence, cells: pa.ChunkedArray, lines: Sequence[int]) -> Evidence:
     """Return the evidence with that of further cells."""
-    if not pc.any(pc.match_substring(cells, ",")).as_py():
-        return known
-    kinds = (_DECIMAL, _THOUSANDS, _EITHER)
-    decimal, thousands, either = (pc.match_substring_regex(cells, kind) for kind in kinds)
-    counts = Counter({"decimal": pc.sum(decimal).as_py() or 0})
-    counts["thousands"], counts["either"] = (pc.sum(k).as_py() or 0 for k in (thousands, either))
+    matches = [pc.match_substring_regex(cells, kind) for kind in _KINDS]
+    counts = [pc.sum(match).as_py() or 0 for match in matches]
     # The first one that may be either is what a message names
-    place = pc.index(either, value=True).as_py()
-    if known.either or place < 0:
-        example, line = known.example, known.line
-    else:
+    example, line = known.example, known.line
+    place = pc.index(matches[2], value=True).as_py()
+    if not example and place >= 0:
         example, line = str(cells[place].as_py()).strip(), lines[place]
     return Evidence(
-        known.decimal + counts["decimal"],
-        known.thousands + counts["thousands"],
-        known.either + counts["either"],
+        known.decimal + counts[0],
+        known.thousands + counts[1],
+        known.either + counts[2],
+        known.point + counts[3],
         example,
         line,
     )
@@ -118,24 +126,28 @@ def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str
     """
     Return the decimal mark of each column that has commas, and the columns that nothing decides.
 
-    A column with both kinds of commas keeps its text, so that each of these rows is rejected.
+    A column whose numbers contradict each other keeps its text, so that rows with a comma in it are
+    rejected.
     """
-    # Kinds of commas in the whole table
-    kinds = set[str]()
-    for column in evidence.values():
-        kinds |= {","} if column.decimal else set()
-        kinds |= {"."} if column.thousands else set()
-    marks, open_ones = dict[str, str](), dict[str, Evidence]()
+    columns = evidence.values()
+    has_points = any(column.point for column in columns)
+    has_decimals = any(column.decimal for column in columns)
+    has_thousands = any(column.thousands for column in columns)
+    # What decides for numbers that may be either: the only kind of commas in the table
+    others = "," if has_decimals and not has_points else "." if has_thousands else ""
+    marks, doubtful = dict[str, str](), dict[str, Evidence]()
     for name, column in evidence.items():
-        if column.decimal and not column.thousands:
+        # Its own numbers decide, else those of the others
+        kinds = (column.decimal > 0, column.thousands > 0, column.point > 0)
+        if kinds == (True, False, False):
             marks[name] = ","
-        elif column.thousands and not column.decimal:
+        elif kinds[:2] == (False, True):
             marks[name] = "."
-        elif column.either and not column.decimal and len(kinds) == 1:
-            marks[name] = next(iter(kinds))
+        elif column.either and not any(kinds) and others and has_decimals != has_thousands:
+            marks[name] = others
         elif column.either and not column.decimal:
-            open_ones[name] = column
-    return marks, open_ones
+            doubtful[name] = column
+    return marks, doubtful
 
 
 def with_points(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
@@ -166,3 +178,10 @@ def with_points(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
     other = pc.binary_join_element_wise(cells, " (or ", bare, "?)", "")
     doubtful = pc.if_else(pc.match_substring_regex(cells, _POINT), other, cells)
     return pc.if_else(pc.or_(is_comma, is_grouped), plain, doubtful)
+
+
+def two_readings(name: str, found: Evidence) -> str:
+    """Return what is doubtful about the commas of a column, and the mend."""
+    comma, none = found.example.replace(",", "."), found.example.replace(",", "")
+    reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
+    return f'{reason}, and no other number decides: give decimal = "," or "." in [pairs]'

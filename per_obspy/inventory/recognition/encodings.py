@@ -1,4 +1,4 @@
-"""Encodings in which a text may be: UTF-8, UTF-16 by its mark, or the code pages of spreadsheets."""
+"""Encodings of a text: UTF-8, UTF-16 by its mark, or a code page of spreadsheet programs."""
 
 import codecs
 import re
@@ -10,8 +10,8 @@ from per_obspy.inventory.recognition.csv_text import BLOCK, UTF_8, check_text
 #: Code pages that are tried where a text is not UTF-8: of western Europe, Turkey and Japan.
 CODE_PAGES = ("cp1252", "cp1254", "cp932")
 
-#: The page in which other text can be as well, so that a heading has to decide for it.
-JAPANESE = "cp932"
+#: Pages for which headings have to decide, because other text can be in them as well.
+TURKISH_PAGE, JAPANESE = CODE_PAGES[1:]
 
 #: Encodings that a configuration may name: those of texts, none of which is a program.
 NAMED = (
@@ -77,6 +77,7 @@ def _named(file: Path, given: str) -> str:
         name = codecs.lookup(given).name
     except (LookupError, ValueError):
         name = ""
+    # Any spelling of a name that Python knows
     known = {codecs.lookup(encoding).name: encoding for encoding in NAMED}
     if name not in known:
         meant = did_you_mean(given, NAMED)
@@ -112,3 +113,10 @@ def _decoding(
             continue
         found[name] = decoder
     return found
+
+
+def two_pages(name: str, text: str) -> str:
+    """Return what is doubtful about the letters of a text of the western page, and the mend."""
+    turkish = text.encode("cp1252").decode("cp1254")
+    reason = f"{name} = {text!r:.40} in cp1252, {turkish!r:.40} in cp1254"
+    return f'{reason}, and no heading decides: give encoding = "cp1252" or "cp1254" in [pairs]'

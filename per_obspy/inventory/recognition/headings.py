@@ -20,14 +20,19 @@ from per_obspy.inventory.schema import COLUMNS, ONE_OF
 
 #: Words of headings that say nothing about their column.
 _FILLERS = frozenset(
-    "id no nr num number numero nombre n de di do da del della des du d of the la le el lo "
-    "between entre tra arasi".split()
+    (
+        *("id", "no", "nr", "num", "number", "numero", "nombre", "n", "of", "the", "between"),
+        *("de", "di", "do", "da", "del", "della", "des", "du", "d", "la", "le", "el", "lo"),
+        *("entre", "tra", "arasi"),
+    )
 )
 
 #: Words for a building, which headings of its columns may have.
 _BUILDINGS = frozenset(
-    "building bldg structure edificio edif estructura bina yapi fabbricato batiment bat edificio "
-    "predio 建物 棟".split()
+    (
+        *("building", "bldg", "structure", "edificio", "edif", "estructura", "bina", "yapi"),
+        *("fabbricato", "batiment", "bat", "predio", "建物", "棟"),
+    )
 )
 
 _INDICES = {"1": 1, "2": 2}
@@ -81,15 +86,15 @@ def _words() -> dict[str, _Word]:
     """Return the words by their plain form; those of two columns are left out."""
     file = Path(__file__).with_suffix(".csv")
     lines = file.read_text(encoding="utf-8").splitlines()
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     found: dict[str, list[dict[str, str]]] = defaultdict(list)
-    for row in rows:
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
         found[_joined(_tokens(row["heading"]))].append(row)
-    # A schema's own name is a word of its column, too
+    # Words of one column, which may be words of several languages
     words = {}
     for text, same in found.items():
         columns = {row["column"] for row in same}
         if len(columns) == 1:
+            # No language of its own if several have the word
             languages = {row["language"] for row in same}
             language = languages.pop() if len(languages) == 1 else ""
             is_sure = all(row["sure"] == "yes" for row in same)
@@ -114,7 +119,9 @@ def plain_heading(text: str) -> str:
     ('separacion', 'kat sayisi')
     """
     decomposed = normalize("NFKD", normalize("NFKC", text).casefold())
-    return "".join(letter for letter in decomposed if not combining(letter)).replace("ı", "i").strip()
+    return (
+        "".join(letter for letter in decomposed if not combining(letter)).replace("ı", "i").strip()
+    )
 
 
 def _tokens(text: str) -> list[str]:
@@ -155,7 +162,8 @@ def _split_unit(heading: str) -> tuple[str, str]:
         text = inside[1].strip()
         rest = heading.replace(heading[inside.start() : inside.end()], " ")
         # Brackets may hold the number of the building, or its letter
-        return (rest + " " + text, "") if plain_heading(text) in ("1", "2", "a", "b") else (rest, text)
+        is_index = plain_heading(text) in (*_INDICES, *_LETTERS)
+        return (f"{rest} {text}", "") if is_index else (rest, text)
     # height_ft_1, height_1_ft, gap cm
     parts = re.split(r"[\s_,]+", heading.strip())
     number = parts.pop() if len(parts) > 2 and parts[-1] in _INDICES else ""
@@ -228,6 +236,7 @@ def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Head
         Place -> meaning. If the names of the schema and those known make a whole table, other
         headings are left as they are; if two headings mean the same, neither is taken.
     """
+    # Names that are given, and those of the schema
     found = {place: Heading(column) for place, column in known.items()}
     for place, heading in enumerate(headings):
         if heading in COLUMNS and heading not in known.values():

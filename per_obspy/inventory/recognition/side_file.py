@@ -79,6 +79,7 @@ def form_as_toml(form: TableForm, section: str = "") -> str:
     [pairs.units]
     gap = "cm"
     """
+    # Single keys come before the tables of names and units
     values = form.model_dump(exclude_defaults=True)
     tables = [name for name in ("columns", "units") if values.get(name)]
     single = [f"{name} = {_text(value)}" for name, value in values.items() if name not in tables]

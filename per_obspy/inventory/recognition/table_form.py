@@ -7,7 +7,7 @@ one every form that can be is tried, and the one whose headings mean most column
 
 import csv
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +19,11 @@ from per_obspy.inventory.recognition.csv_text import (
     check_text,
     text_blocks,
 )
-from per_obspy.inventory.recognition.encodings import JAPANESE, possible_encodings
+from per_obspy.inventory.recognition.encodings import (
+    JAPANESE,
+    TURKISH_PAGE,
+    possible_encodings,
+)
 from per_obspy.inventory.recognition.headings import is_complete
 from per_obspy.inventory.schema import COLUMNS
 
@@ -64,6 +68,7 @@ class TextForm(NamedTuple):
     def sentence(self) -> str:
         """Return what is not plain about the form as one text, empty if nothing is."""
         texts = []
+        # Only what differs from a plain table
         if self.encoding not in ("utf-8", "ascii"):
             texts.append(f"text in {self.encoding}")
         if self.separator in OTHER_SEPARATORS:
@@ -85,47 +90,55 @@ def text_form(file: Path, given: TableForm) -> TextForm:
         If it is no text in any encoding that is known, or a column given for it is not there.
     """
     encodings = possible_encodings(file, given.encoding)
+    found = list(_possible_forms(file, given, list(encodings)))
+    if not found:
+        check_text(file)  # names the line that is not UTF-8
+        raise CatalogError(str(file), "line 1: no header can be read")
+    # A plain table, else the form with most columns that mean something
+    plain = next((form for form in found if _is_plain(form)), None)
+    best = plain or max(found, key=_rank)
+    if len(best.meanings.columns) < _FEWEST:
+        # Nothing is recognised: the first line, in most cells
+        first = [form for form in found if form.header == 1]
+        best = max(first, key=lambda form: (len(form.meanings.columns), len(form.cells)))
+    # Now every column that is given must be there
+    meanings = meanings_of(best.cells, given, str(file))
+    lines = encodings[best.encoding] or check_text(file, best.encoding)
+    is_western = best.encoding == "cp1252" and TURKISH_PAGE in encodings
+    is_doubtful = is_western and not _language(meanings)
+    return best._replace(meanings=meanings, lines=lines, is_doubtful=is_doubtful)
+
+
+def _is_plain(form: TextForm) -> bool:
+    """Return whether the first line has the names of the schema that a pair table needs."""
+    return form.header == 1 and is_complete({cell for cell in form.cells if cell in COLUMNS})
+
+
+def _rank(form: TextForm) -> tuple[int, bool]:
+    """Return what decides between forms: columns, and Turkish words in the Turkish code page."""
+    is_turkish = form.encoding == TURKISH_PAGE and _language(form.meanings) == "tr"
+    return len(form.meanings.columns), is_turkish
+
+
+def _language(meanings: Meanings) -> str:
+    """Return the language of most headings, empty if they are English or of none."""
+    languages = Counter(heading.language for heading in meanings.columns.values())
+    del languages[""], languages["en"]
+    return languages.most_common(1)[0][0] if languages else ""
+
+
+def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> Iterator[TextForm]:
+    """Yield every form that a text table may have, the usual ones first."""
     separators = (given.separator,) if given.separator else (",", *OTHER_SEPARATORS)
-    forms = list[tuple[int, int, TextForm]]()
     for encoding in encodings:
         head = _first_lines(file, encoding)
         for separator in separators:
             for number, cells in _headers(head, separator):
                 found = meanings_of(cells, given, str(file), must_have=False)
                 form = TextForm(encoding, separator, number, tuple(cells), found)
-                if number == 1 and is_complete({cell for cell in cells if cell in COLUMNS}):
-                    return _checked(form, file, given, encodings)
+                # Any bytes may be Japanese: only a heading tells
                 if encoding != JAPANESE or given.encoding or found.has_language("ja"):
-                    forms.append((len(found.columns), len(cells), form))
-    if not forms:
-        check_text(file)  # names the line that is not UTF-8
-    # Most columns that mean something; else the first line in its most cells
-    best = max(forms, key=lambda form: form[0], default=None)
-    if best is None or best[0] < _FEWEST:
-        first = [form for form in forms if form[2].header == 1]
-        best = max(first, key=lambda form: (form[0], form[1]), default=None)
-    if best is None:
-        raise CatalogError(str(file), "line 1: no header can be read")
-    return _checked(best[2], file, given, encodings)
-
-
-def _checked(
-    form: TextForm, file: Path, given: TableForm, encodings: Mapping[str, int | None]
-) -> TextForm:
-    """Return a form whose columns are there, in the encoding of its language if there are two."""
-    meanings = meanings_of(form.cells, given, str(file))
-    lines = encodings[form.encoding]
-    if lines is not None:
-        return form._replace(meanings=meanings, lines=lines)
-    # Turkish words are in the Turkish code page
-    languages = Counter(heading.language for heading in meanings.columns.values())
-    del languages[""], languages["en"]
-    likely = languages.most_common(1)[0][0] if languages else ""
-    if likely == "tr" and form.encoding == "cp1252" and "cp1254" in encodings:
-        form = form._replace(encoding="cp1254")
-    is_doubtful = not likely and "cp1254" in encodings and form.encoding == "cp1252"
-    lines = check_text(file, form.encoding)
-    return form._replace(meanings=meanings, lines=lines, is_doubtful=is_doubtful)
+                    yield form
 
 
 def _first_lines(file: Path, encoding: str) -> list[str]:

@@ -10,7 +10,7 @@ import re
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import date, time, timedelta
 from pathlib import Path, PurePosixPath
@@ -117,6 +117,7 @@ def sheet_rows(file: Path, name: str) -> Iterator[tuple[str, ...]]:
 
 def cells_without_value(file: Path, name: str) -> Iterator[tuple[int, int]]:
     """Yield row and column (from 1) of cells of a sheet whose formula was never computed."""
+    # The part of the file that is the sheet
     with _opened(file) as book:
         (sheet,) = (sheet for sheet in book.worksheets if sheet.title == name)
         part = sheet._worksheet_path
@@ -201,13 +202,12 @@ def _check_part(
             raise CatalogError(str(file), f"{part.filename} has {count} rows, at most {MOST_ROWS}")
 
 
-def _row_texts(
-    file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo
-) -> Iterator[bytes]:
+def _row_texts(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> Iterator[bytes]:
     """Yield the XML of a sheet in pieces that end with rows."""
     rest = b""
     with archive.open(part) as stream:
         while block := stream.read(1 << 18):
+            # What follows the last whole row waits for its end
             rest += block
             ends = [end.end() for end in _ROW_END.finditer(rest)]
             if ends:
@@ -224,6 +224,7 @@ def _rows(sheet: Any, count: int) -> Iterator[tuple[str, ...]]:
     blank = 0
     rows = sheet.iter_rows(max_row=count, max_col=MOST_COLUMNS, values_only=True)
     for row in rows:
+        # Rows have all columns of the sheet
         cells = tuple(_text(value) for value in row)
         while cells and not cells[-1]:
             cells = cells[:-1]
@@ -244,6 +245,6 @@ def _text(value: object) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def sheet_list(names: Mapping[str, object]) -> str:
+def sheet_list(names: Iterable[str]) -> str:
     """Return names of sheets for a message."""
     return shortened(", ".join(repr(name) for name in names), _LONGEST_LIST)

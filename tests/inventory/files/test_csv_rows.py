@@ -6,8 +6,8 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.recognition import csv_text
 from per_obspy.inventory.files.reading import PairInventory, checked_chunk, read_pairs
+from per_obspy.inventory.recognition import csv_text
 
 HEADER = "pair_id,gap,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,note,zone"
 
