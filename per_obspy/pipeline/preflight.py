@@ -38,8 +38,7 @@ def check_inputs(settings: Run) -> None:
     """
     pairs = settings.pairs
     if pairs and pairs.file:
-        # Read as a whole: a number that can be read in two ways is found now
-        checked_file(pairs.file, pairs.form).check_numbers()
+        checked_file(pairs.file, pairs.form)
     if pairs and pairs.catalog and pairs.names:
         named_files(pairs.names, pairs.catalog)
     if settings.records and settings.records.shakemap:

@@ -5,6 +5,7 @@ Each row has its line in the file, and lines that are no rows become rejections:
 file is in one of them, or blank.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -82,9 +83,21 @@ class CsvFile:
         texts += [f"commas between thousands in {', '.join(thousands)}"] if thousands else []
         return "; ".join(texts)
 
-    def check_numbers(self) -> None:
-        """Raise CatalogError if a number or letter of a known column can be read in two ways."""
+    def check_cells(self) -> None:
+        """Raise CatalogError if a cell can be read in two ways, or rows are wider than the header."""
         _ = self._marks
+        if self._layout.separator != ",":
+            return
+        # Decimal commas between commas make more cells, in every row
+        first = next(self._blocks([IDENTIFIER]))
+        counts = [
+            re.match(r"(\d+) columns, the header has", row.reasons[0]) for row in first.broken
+        ]
+        wide = [found and int(found[1]) > len(self._columns) for found in counts]
+        if len(first.lines) == 0 and wide and all(wide):
+            reason = f"no row has as many columns as the header ({first.broken[0].reasons[0]})"
+            mend = "separate columns by semicolons, or put cells with commas in quotation marks"
+            raise CatalogError(str(self.file), f"{reason}, as decimal commas make: {mend}")
 
     @cached_property
     def _marks(self) -> dict[str, str]:

@@ -52,7 +52,7 @@ class ParquetFile:
         """Names and units that are not those of the schema, empty if all are."""
         return self.meanings.sentence()
 
-    def check_numbers(self) -> None:
+    def check_cells(self) -> None:
         """Do nothing: numbers of a Parquet file can be read in one way only."""
 
     def identifiers(self) -> Iterator[pa.Array]:

@@ -62,7 +62,7 @@ class PairFile(Protocol):
     def recognised(self) -> str:
         """What is not plain about the file, empty if nothing is."""
 
-    def check_numbers(self) -> None:
+    def check_cells(self) -> None:
         """Raise CatalogError if a number or letter of a known column can be read in two ways."""
 
     def identifiers(self) -> Iterator[pa.Array]:

@@ -1,6 +1,5 @@
 """Readers of pair tables, whole or in chunks, with reasons for rejected rows."""
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -97,8 +96,6 @@ def _all_rows(file: PairFile, path: str) -> RawRows:
     broken = tuple(line for block in blocks for line in block.broken)
     # Join the blocks; empty ones may have other types
     tables = [block.table for block in blocks if len(block.table)]
-    if not tables:
-        _refuse_commas(path, broken)
     lines = np.concatenate([block.lines for block in blocks])
     table = pa.concat_tables(tables or [blocks[0].table])
     return RawRows(blocks[0].source, table, lines, broken)
@@ -111,7 +108,8 @@ def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
     Raises
     ------
     CatalogError
-        If it cannot be read or lacks a column, with the headings that may be meant.
+        If it cannot be read, or in two ways; or if it lacks a column, with the headings that may be
+        meant.
     """
     file = pair_file(path, form)
     try:
@@ -120,18 +118,8 @@ def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
         if "missing" not in error.problem:
             raise
         raise CatalogError(error.source, error.problem + file.meanings.asked()) from error
+    file.check_cells()
     return file
-
-
-def _refuse_commas(source: str, broken: Sequence[Rejection]) -> None:
-    """Raise CatalogError if every row has more cells than the header, as decimal commas make."""
-    found = [re.match(r"(\d+) columns, the header has (\d+)", line.reasons[0]) for line in broken]
-    if all(counts and int(counts[1]) > int(counts[2]) for counts in found):
-        reason = f"every row has more columns than the header ({broken[0].reasons[0]})"
-        mend = (
-            "with decimal commas, separate columns by semicolons or put numbers in quotation marks"
-        )
-        raise CatalogError(source, f"{reason}: {mend}")
 
 
 def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
@@ -187,9 +175,6 @@ class PairInventory:
             hashes[path] = [name_hashes(block) for block in file.identifiers()]
         for path, blocks in hashes.items():
             if not sum(map(len, blocks)):
-                broken = [line for rows in self._files[path].rows(ALL) for line in rows.broken]
-                if broken:
-                    _refuse_commas(str(path), broken)
                 raise CatalogError(str(path), "the table has no rows")
         return np.concatenate([block for blocks in hashes.values() for block in blocks])
 

@@ -6,11 +6,13 @@ any table, and the line of a row is its number in the sheet.
 """
 
 import csv
+import shutil
+import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 
 import pyarrow as pa
 
@@ -74,10 +76,10 @@ class WorkbookFile:
             texts.append(self._table.recognised_numbers)
         return "; ".join(text for text in texts if text)
 
-    def check_numbers(self) -> None:
+    def check_cells(self) -> None:
         """Raise CatalogError for numbers that can be read in two ways or were never computed."""
         with self._named():
-            self._table.check_numbers()
+            self._table.check_cells()
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
@@ -92,16 +94,18 @@ class WorkbookFile:
                 yield rows._replace(source=self.source, broken=broken)
 
     @cached_property
-    def _folder(self) -> "TemporaryDirectory[str]":
-        """Folder of the transcribed table, removed with this object."""
-        return TemporaryDirectory(prefix="per-obspy-")
+    def _path(self) -> Path:
+        """The transcribed table, in a folder that is removed with this object."""
+        folder = mkdtemp(prefix="per-obspy-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        return Path(folder, "sheet.csv")
 
     @cached_property
     def _table(self) -> CsvFile:
         """The sheet as a plain table, whose lines are the rows of the sheet."""
         self._check_values()
         # What stands above the header becomes blank lines
-        path = Path(self._folder.name, "sheet.csv")
+        path = self._path
         names, header = self.meanings.names, self._found.header
         rows = sheet_rows(self.file, self._found.sheet)
         with writing(path), path.open("w", encoding="utf-8", errors="replace", newline="") as text:
@@ -137,7 +141,7 @@ class WorkbookFile:
         try:
             yield
         except CatalogError as error:
-            if error.source != str(Path(self._folder.name, "sheet.csv")):
+            if error.source != str(self._path):
                 raise
             raise CatalogError(self.source, error.problem) from error
 
