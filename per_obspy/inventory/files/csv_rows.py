@@ -84,7 +84,7 @@ class CsvFile:
         return "; ".join(texts)
 
     def check_cells(self) -> None:
-        """Raise CatalogError if a cell can be read in two ways, or rows are wider than the header."""
+        """Raise CatalogError if a cell can be read in two ways, or rows exceed the header."""
         _ = self._marks
         if self._layout.separator != ",":
             return

@@ -107,16 +107,14 @@ class WorkbookFile:
         # What stands above the header becomes blank lines
         path = self._path
         names, header = self.meanings.names, self._found.header
-        rows = sheet_rows(self.file, self._found.sheet)
+        rows = sheet_rows(self.file, self._found.sheet, len(names))
         with writing(path), path.open("w", encoding="utf-8", errors="replace", newline="") as text:
             writer = csv.writer(text, lineterminator="\n")
             for number, cells in enumerate(rows, 1):
                 if number <= header:
                     writer.writerow(names if number == header else [])
                     continue
-                # Cells behind the header have no name
-                padded = [*cells[: len(names)], *[""] * (len(names) - len(cells))]
-                writer.writerow([_on_one_line(cell) for cell in padded] if cells else [])
+                writer.writerow([_on_one_line(cell) for cell in cells])
         units = {name: unit.name for name, unit in self.meanings.units.items()}
         return CsvFile(path, TableForm(encoding="utf-8", separator=",", units=units, **self._mark))
 
@@ -151,6 +149,12 @@ def _on_one_line(cell: str) -> str:
     return " ".join(cell.splitlines()) if not cell.isprintable() else cell
 
 
+def _filled(cells: Sequence[str]) -> Sequence[str]:
+    """Return the cells of a row up to the last one with text."""
+    last = max((place for place, cell in enumerate(cells, 1) if cell), default=0)
+    return cells[:last]
+
+
 def _found_sheet(file: Path, given: TableForm) -> _Found:
     """Return the sheet that is named, else the only one that has a pair table."""
     sheets = {sheet.name: sheet.head for sheet in workbook_sheets(file, HEADER_LINES)}
@@ -173,7 +177,7 @@ def _with_header(sheet: str, head: Sequence[Sequence[str]], given: TableForm, fi
     """Return a sheet with the row whose cells mean most columns, the first filled one else."""
     # Headings of workbooks often have line breaks
     rows = [
-        (number, [" ".join(printable(cell).split()) for cell in cells])
+        (number, [" ".join(printable(cell).split()) for cell in _filled(cells)])
         for number, cells in enumerate(head, 1)
         if cells
     ]

@@ -69,7 +69,7 @@ class Sheet(NamedTuple):
     name : str
         In the workbook.
     head : tuple of tuple of str
-        Its first rows, cells as text.
+        Its first rows, cells as text; blank rows have none.
     """
 
     name: str
@@ -98,12 +98,12 @@ def workbook_sheets(file: Path, rows: int) -> list[Sheet]:
         if len(book.worksheets) > MOST_SHEETS:
             problem = f"{len(book.worksheets)} sheets, at most {MOST_SHEETS} are read"
             raise CatalogError(str(file), problem)
-        return [Sheet(sheet.title, tuple(_rows(sheet, rows))) for sheet in book.worksheets]
+        return [Sheet(sheet.title, tuple(_rows(sheet, rows, MOST_COLUMNS))) for sheet in book.worksheets]
 
 
-def sheet_rows(file: Path, name: str) -> Iterator[tuple[str, ...]]:
+def sheet_rows(file: Path, name: str, columns: int) -> Iterator[tuple[str, ...]]:
     """
-    Yield the rows of a sheet, cells as text; blank rows are empty ones.
+    Yield the rows of a sheet in so many columns, cells as text; blank rows have none.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def sheet_rows(file: Path, name: str) -> Iterator[tuple[str, ...]]:
     """
     with _opened(file) as book:
         (sheet,) = (sheet for sheet in book.worksheets if sheet.title == name)
-        yield from _rows(sheet, MOST_ROWS)
+        yield from _rows(sheet, MOST_ROWS, columns)
 
 
 def cells_without_value(file: Path, name: str) -> Iterator[tuple[int, int]]:
@@ -219,21 +219,17 @@ def _row_texts(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> I
     yield rest
 
 
-def _rows(sheet: Any, count: int) -> Iterator[tuple[str, ...]]:
+def _rows(sheet: Any, rows: int, columns: int) -> Iterator[tuple[str, ...]]:
     """Yield the rows of a sheet until the last one with a cell."""
-    blank = 0
-    rows = sheet.iter_rows(max_row=count, max_col=MOST_COLUMNS, values_only=True)
-    for row in rows:
-        # Rows have all columns of the sheet
-        cells = tuple(_text(value) for value in row)
-        while cells and not cells[-1]:
-            cells = cells[:-1]
-        if not cells:
-            blank += 1
+    blank, known = 0, None
+    for row in sheet.iter_rows(max_row=rows, max_col=columns, values_only=True):
+        # Rows that the sheet leaves out are all the same object
+        if row is known or all(value is None for value in row):
+            blank, known = blank + 1, row
             continue
         yield from ((),) * blank
         blank = 0
-        yield cells
+        yield tuple(map(_text, row))
 
 
 def _text(value: object) -> str:
