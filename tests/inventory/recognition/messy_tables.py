@@ -219,3 +219,27 @@ def suspected() -> Messy:
     """Return a table whose gaps are in centimetres, under a heading that says nothing of it."""
     rows = [[*row] for row in rows_of({1: 100.0})]
     return Messy("pairs.csv", text_of(NAMES, rows[:1]).encode())
+
+
+def with_shared_texts(book: bytes) -> bytes:
+    """Return a workbook whose texts are in a part of their own, as most programs store them."""
+    texts: list[bytes] = []
+
+    def shared(cell: re.Match[bytes]) -> bytes:
+        texts.append(cell[2])
+        return b'<c r="%b" t="s"><v>%d</v></c>' % (cell[1], len(texts) - 1)
+
+    def change(name: str, content: bytes) -> bytes:
+        if name == "[Content_Types].xml":
+            kind = b"application/vnd.openxmlformats-officedocument.spreadsheetml.sharedStrings+xml"
+            part = b'<Override PartName="/xl/sharedStrings.xml" ContentType="%b"/></Types>' % kind
+            return content.replace(b"</Types>", part)
+        cell = rb'<c r="(\w+)" t="inlineStr"><is><t[^>]*>([^<]*)</t></is></c>'
+        return re.sub(cell, shared, content) if "worksheets" in name else content
+
+    changed = io.BytesIO(changed_parts(book, change))
+    with zipfile.ZipFile(changed, "a", zipfile.ZIP_DEFLATED) as archive:
+        items = b"".join(b"<si><t>%b</t></si>" % text for text in texts)
+        main = b"http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+        archive.writestr("xl/sharedStrings.xml", b'<sst xmlns="%b">%b</sst>' % (main, items))
+    return changed.getvalue()

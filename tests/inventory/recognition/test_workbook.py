@@ -5,7 +5,7 @@ import sys
 import tracemalloc
 
 import pytest
-from messy_tables import NAMES, ROWS, changed_parts, workbook_of
+from messy_tables import NAMES, ROWS, changed_parts, with_shared_texts, workbook_of
 
 from per_obspy import read_pairs
 from per_obspy.errors import CatalogError, MissingExtra
@@ -28,7 +28,7 @@ def write(tmp_path):
             return replaced[name](content) if name in replaced else content
 
         path = tmp_path / "pairs.xlsx"
-        path.write_bytes(changed_parts(workbook_of({"Pairs": rows}), change))
+        path.write_bytes(changed_parts(with_shared_texts(workbook_of({"Pairs": rows})), change))
         return path
 
     return write
