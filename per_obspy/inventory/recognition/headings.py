@@ -18,6 +18,9 @@ from unicodedata import combining, normalize
 from per_obspy.inventory.recognition.units import Unit, is_unit, unit_of
 from per_obspy.inventory.schema import COLUMNS, ONE_OF
 
+#: Most headings, and longest one, in which words are sought.
+MOST_HEADINGS, LONGEST_HEADING = 1000, 200
+
 #: Words of headings that say nothing about their column.
 _FILLERS = frozenset(
     (
@@ -146,6 +149,8 @@ def meaning(heading: str) -> Heading | None:
     """
     if heading in COLUMNS:
         return Heading(heading)
+    if not heading or len(heading) > LONGEST_HEADING:
+        return None
     words, unit_text = _split_unit(heading)
     found = _column_of(_tokens(words))
     if found is None:
@@ -215,7 +220,7 @@ def is_building_list(headings: Sequence[str]) -> bool:
     """
     bare = {text: word for text, word in _bare_names().items() if word in ("longitude", "latitude")}
     words = {text: word.column for text, word in _words().items() if word.is_sure}
-    found = {(bare | words).get(_joined(_tokens(heading))) for heading in headings}
+    found = {(bare | words).get(_joined(_tokens(heading))) for heading in headings[:MOST_HEADINGS]}
     return {"longitude", "latitude"} <= found
 
 
@@ -246,7 +251,7 @@ def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Head
         return found
     # Words that are sure, each for one column
     claims: dict[str, list[tuple[int, Heading]]] = defaultdict(list)
-    for place, heading in enumerate(headings):
+    for place, heading in enumerate(headings[:MOST_HEADINGS]):
         means = meaning(heading) if place not in found else None
         if means and means.is_sure and means.column not in taken:
             claims[means.column].append((place, means))
@@ -257,7 +262,7 @@ def proposals(headings: Sequence[str], found: dict[int, Heading]) -> dict[str, l
     """Return columns that are not found -> places of the headings that may be meant."""
     taken = {heading.column for heading in found.values()}
     possible: dict[str, list[int]] = defaultdict(list)
-    for place, heading in enumerate(headings):
+    for place, heading in enumerate(headings[:MOST_HEADINGS]):
         means = meaning(heading) if place not in found else None
         if means and means.column not in taken:
             possible[means.column].append(place)
