@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.recognition.csv_text import UTF_8, text_blocks
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 #: Most lines of one row; a quotation over more of them is one that is not closed.
 LONGEST_ROW = 100
@@ -223,15 +223,16 @@ class _Scanner:
         return len(lines), ""
 
     def _is_row(self, line: bytes) -> bool:
-        """Return whether a line inside a quotation is a row by itself: its gap is a number."""
+        """Return whether a line inside a quotation is a row by itself, by what its gap is."""
         if line.count(self._separator.encode()) < len(self._names) - 1:
             return False
         cells = dict(zip(self._names, _cells(line, self._separator), strict=False))
+        # A number, with either decimal mark, or an empty cell
+        gap = cells.get("gap", "no row").replace(",", ".")
         try:
-            float(cells["gap"].replace(",", "."))
-        except (KeyError, ValueError):
+            return gap.strip().lower() in EMPTY or float(gap) == float(gap)
+        except ValueError:
             return False
-        return True
 
     def _rejection(self, line: bytes, fault: str) -> Rejection:
         """Return the rejection of the next line."""

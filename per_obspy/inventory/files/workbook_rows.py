@@ -115,6 +115,7 @@ class WorkbookFile:
                     writer.writerow(names if number == header else [])
                     continue
                 writer.writerow([_on_one_line(cell) for cell in cells])
+        # The names are those of the schema now, the numbers as they were
         units = {name: unit.name for name, unit in self.meanings.units.items()}
         return CsvFile(path, TableForm(encoding="utf-8", separator=",", units=units, **self._mark))
 

@@ -260,6 +260,7 @@ def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Head
 
 def proposals(headings: Sequence[str], found: dict[int, Heading]) -> dict[str, list[int]]:
     """Return columns that are not found -> places of the headings that may be meant."""
+    # Sure or not, the user decides
     taken = {heading.column for heading in found.values()}
     possible: dict[str, list[int]] = defaultdict(list)
     for place, heading in enumerate(headings[:MOST_HEADINGS]):

@@ -98,7 +98,9 @@ def workbook_sheets(file: Path, rows: int) -> list[Sheet]:
         if len(book.worksheets) > MOST_SHEETS:
             problem = f"{len(book.worksheets)} sheets, at most {MOST_SHEETS} are read"
             raise CatalogError(str(file), problem)
-        return [Sheet(sheet.title, tuple(_rows(sheet, rows, MOST_COLUMNS))) for sheet in book.worksheets]
+        return [
+            Sheet(sheet.title, tuple(_rows(sheet, rows, MOST_COLUMNS))) for sheet in book.worksheets
+        ]
 
 
 def sheet_rows(file: Path, name: str, columns: int) -> Iterator[tuple[str, ...]]:
