@@ -54,12 +54,14 @@ def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviat
     integers = np.empty(count, np.int64)
     for pair in range(rows.size):
         spectrum = stored[rows[pair]]
+        # Both buildings at all nodes
         for i in range(2):
             building = oscillators[i * OSCILLATOR_ROWS : (i + 1) * OSCILLATOR_ROWS, pair]
             normal = deviates[2 * i : 2 * i + 2]
             _oscillators(
                 building, normal, periods, dampings, spectrum, work[3 * i : 3 * i + 3], integers
             )
+        # Frequency of building 1, and the ratio of both
         for node in range(count):
             work[6, node] = -work[0, node]
             work[7, node] = 0.5 * (work[0, node] - work[3, node])
@@ -73,6 +75,7 @@ def estimate_motion(periods, dampings, stored, rows, oscillators, shifts, deviat
 def _oscillators(building, normal, periods, dampings, spectrum, out, integers):
     """Fill ln period, damping and radius of a building at all nodes, (3, n_nodes)."""
     log_period, log_damping = math.log(building[0]), math.log(max(building[2], SMALLEST))
+    # Logarithms, and the stored spectrum there
     largest = math.log(building[4])
     for node in range(normal.shape[1]):
         period = log_period + building[1] * normal[0, node]
@@ -81,6 +84,7 @@ def _oscillators(building, normal, periods, dampings, spectrum, out, integers):
         out[0, node] = period
         out[1, node] = change
         out[2, node] = _interpolated(periods, dampings, spectrum, period, damping)
+    # Damping, and radius
     exponentials(out[1], integers)
     exponentials(out[2], integers)
     for node in range(normal.shape[1]):
@@ -94,6 +98,7 @@ def _interpolated(periods, dampings, spectrum, period, damping):
     column, along = _cell(periods, period)
     plane, across = _cell(dampings, damping)
     right, above = min(column + 1, periods.size - 1), min(plane + 1, dampings.size - 1)
+    # Along the period at both dampings, then from one to the other
     lower = (1.0 - along) * spectrum[plane, column] + along * spectrum[plane, right]
     upper = (1.0 - along) * spectrum[above, column] + along * spectrum[above, right]
     return (1.0 - across) * lower + across * upper
@@ -131,6 +136,7 @@ def _relative_motion(work, node, shift, motion):
     by_noise = min(above / below, 1.0) if below > 0.0 else 1.0
     # critical gap, and the relative velocity as the gap of the velocities
     correlation = min(max(by_noise + shift, -1.0), 1.0)
+    # Speeds of both oscillators at their frequencies
     frequency = 2.0 * math.pi * work[6, node]
     speed_1, speed_2 = frequency * radius_1, frequency * ratio * radius_2
     motion[DEMAND, node] = _difference(radius_1, radius_2, correlation)

@@ -63,6 +63,7 @@ def fill_outcomes(motion, facts, deviates, out):
         pair_motion, fact = motion[:, pair], facts[:, pair]
         deviation = math.hypot(fact[GAP_STD], fact[DEMAND_STD])
         out[0, pair] = _chance(pair_motion[DEMAND], fact[GAP], deviation, work, integers)
+        # Scales of the demand, and gaps
         for node in range(count):
             work[0, node] = fact[DEMAND_STD] * deviates[0, node]
             work[1, node] = fact[GAP_STD] * deviates[1, node]
@@ -71,6 +72,7 @@ def fill_outcomes(motion, facts, deviates, out):
         for node in range(count):
             work[1, node] *= fact[GAP]
         _velocities(pair_motion, work, integers)
+        # Means over the nodes, and the quantile
         velocity, amplified = 0.0, 0.0
         for node in range(count):
             work[2, node] *= fact[FACTOR]
@@ -91,6 +93,7 @@ def fill_velocities(motion, scales, gaps, out):
     work = np.empty((4, gaps.shape[1]))
     integers = np.empty(gaps.shape[1], np.int64)
     for pair in range(gaps.shape[0]):
+        # Pair by pair, as the velocities of outcomes
         work[0], work[1] = scales[pair], gaps[pair]
         _velocities(motion[:, pair], work, integers)
         out[pair] = work[2]
@@ -116,6 +119,7 @@ def _amplification(motion, work, node, fact):
     """Return the larger ratio of both radii with and without impact, at least 1."""
     velocity = RADIUS_SHARE * work[2, node] / work[0, node]
     speed_1, speed_2 = motion[SPEED_1, node], motion[SPEED_2, node]
+    # Changes of velocity over the speeds of the oscillators
     change_1 = fact[RECEIVED_1] * velocity / speed_1 if speed_1 > 0.0 else 0.0
     change_2 = fact[RECEIVED_2] * velocity / speed_2 if speed_2 > 0.0 else 0.0
     largest = max(change_1, change_2)
@@ -158,6 +162,7 @@ def _chance(demands, gap, deviation, work, integers):
     dispersion = max(deviation, smoothing)
     if dispersion <= 0.0:
         return above / demands.size
+    # Tails of the normal distribution at the logarithms of gap over demand
     for node in range(demands.size):
         work[2, node] = demands[node] if demands[node] > 0.0 else TINY
     logarithms(work[2], integers)
@@ -219,6 +224,7 @@ def _select(values, rank):
     """Arrange values so that that of a rank is in its place, smaller ones before it."""
     first, last = 0, values.size - 1
     while first < last:
+        # Smaller ones to the left of the pivot, larger ones to its right
         pivot = values[(first + last) // 2]
         left, right = first, last
         while left <= right:

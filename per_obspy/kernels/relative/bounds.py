@@ -76,6 +76,7 @@ def present_radii(pair, motion):
 @kernel
 def tile_margins(pair, dt, radii, inputs):
     """Return :func:`between_sample_margins` over a tile, from its strongest motion (3, 2)."""
+    # Strongest motion along the pair's azimuth
     north, east = abs(pair[6]), abs(pair[7])
     peak = north * inputs[0, 0] + east * inputs[0, 1]
     rate = north * inputs[1, 0] + east * inputs[1, 1]

@@ -31,6 +31,7 @@ def grouped_inputs(inputs):
     for tile in range(inputs.shape[0]):
         for component in range(2):
             group, one = groups[tile // GROUP, :, component], inputs[tile, :, component]
+            # Largest of acceleration and rate, sum of the integrals
             group[0], group[1] = max(group[0], one[0]), max(group[1], one[1])
             group[2] += one[2]
     return groups
@@ -53,9 +54,31 @@ def bound_motion(inputs, duration, block, bounds):
         Receives the largest contact displacement of structure 1 and 2 before each group, and up to
         its end, m.
     """
+    rates = _rates(duration, block)
+    bound = np.zeros((2, PAIR_LANES))
+    for group in range(inputs.shape[0]):
+        north, east = inputs[group, 0, 0], inputs[group, 0, 1]
+        north_sum, east_sum = inputs[group, 2, 0], inputs[group, 2, 1]
+        for body in range(2):
+            for lane in range(PAIR_LANES):
+                # The smaller rise: by the largest acceleration, or by the integral of the size
+                by_peak = rates[6, lane] * north + rates[7, lane] * east
+                by_sum = rates[6, lane] * north_sum + rates[7, lane] * east_sum
+                by_peak *= rates[3 * body + 1, lane]
+                raised = min(by_peak, rates[3 * body + 2, lane] * by_sum)
+                # Before the group and up to its end
+                bounds[body, group, lane] = bound[body, lane]
+                bounds[2 + body, group, lane] = bound[body, lane] + raised
+                bound[body, lane] = rates[3 * body, lane] * bound[body, lane] + raised
+
+
+@kernel
+def _rates(duration, block):
+    """Return decay and both gains of structure 1 and of 2 over a group, and the azimuth."""
     rates = np.empty((8, PAIR_LANES))
     for lane in range(PAIR_LANES):
         for body in range(2):
+            # Structure of the pair, and phase of a group
             omega, damping, share = block[lane, 3 * body : 3 * body + 3]
             phase = omega * duration
             # Decay over a group, and gains from the largest acceleration and from the integral of
@@ -65,19 +88,7 @@ def bound_motion(inputs, duration, block, bounds):
             rates[3 * body, lane] = math.exp(-damping * phase)
             rates[3 * body + 1, lane], rates[3 * body + 2, lane] = gain * unit / omega, unit
         rates[6, lane], rates[7, lane] = abs(block[lane, 6]), abs(block[lane, 7])
-    bound = np.zeros((2, PAIR_LANES))
-    for group in range(inputs.shape[0]):
-        north, east = inputs[group, 0, 0], inputs[group, 0, 1]
-        north_sum, east_sum = inputs[group, 2, 0], inputs[group, 2, 1]
-        for body in range(2):
-            for lane in range(PAIR_LANES):
-                by_peak = rates[6, lane] * north + rates[7, lane] * east
-                by_sum = rates[6, lane] * north_sum + rates[7, lane] * east_sum
-                by_peak *= rates[3 * body + 1, lane]
-                raised = min(by_peak, rates[3 * body + 2, lane] * by_sum)
-                bounds[body, group, lane] = bound[body, lane]
-                bounds[2 + body, group, lane] = bound[body, lane] + raised
-                bound[body, lane] = rates[3 * body, lane] * bound[body, lane] + raised
+    return rates
 
 
 @kernel
@@ -86,6 +97,7 @@ def expected_motion(block, bounds, part, floors):
     floors[:] = 0.0
     for group in range(bounds.shape[1]):
         for lane in range(PAIR_LANES):
+            # Bounds of displacement and velocity in the group
             first, second = bounds[2, group, lane], bounds[3, group, lane]
             speed = block[lane, 0] * first + block[lane, 3] * second
             floors[0, lane] = max(floors[0, lane], part * (first + second))
@@ -105,6 +117,7 @@ def find_pair_windows(duration, block, bounds, floors, windows):
     for group in range(number):
         this = float(group)
         for lane in range(PAIR_LANES):
+            # Whether a bound reaches its floor
             distance = bounds[2, group, lane] + bounds[3, group, lane]
             speed = (
                 block[lane, 0] * bounds[2, group, lane] + block[lane, 3] * bounds[3, group, lane]
@@ -112,9 +125,11 @@ def find_pair_windows(duration, block, bounds, floors, windows):
             reached = distance >= floors[0, lane] or speed >= floors[1, lane]
             first[lane] = min(first[lane], this if reached else np.inf)
             last[lane] = this if reached else last[lane]
+    # Back to where the motion before is forgotten
     for lane in range(PAIR_LANES):
         start = _start(int(first[lane]), duration, block[lane], bounds[:, :, lane], floors[:, lane])
         windows[0, lane], windows[1, lane] = start, int(last[lane])
+        # A wide window becomes the whole record
         if last[lane] - start > WHOLE * number:
             windows[0, lane], windows[1, lane] = 0, number - 1
             floors[:, lane] = 0.0
@@ -128,6 +143,7 @@ def _start(first, duration, pair, bounds, floors):
     left_1 = left_2 = 1.0
     start = first
     while 0 < start < bounds.shape[1]:
+        # What is left of the motion before, at the first group that counts
         rest_1, rest_2 = left_1 * bounds[0, start], left_2 * bounds[1, start]
         forgotten = rest_1 + rest_2 <= FORGOTTEN * floors[0]
         if forgotten and pair[0] * rest_1 + pair[3] * rest_2 <= FORGOTTEN * floors[1]:

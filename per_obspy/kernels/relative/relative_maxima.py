@@ -107,6 +107,7 @@ def relative_maxima(north, east, dt, pairs, largest):
 def _reached(largest, chosen, floors):
     """Lower the floors of a block to what its pairs are known to reach."""
     for lane in range(PAIR_LANES):
+        # Displacements in both directions count
         index = chosen[min(lane, chosen.size - 1)]
         distance = REACHED * min(largest[0, index], largest[1, index])
         floors[0, lane] = min(floors[0, lane], distance)
@@ -146,6 +147,7 @@ def _shake(ground, dt, block, table, checkpoints, inputs, windows, best):
     """Raise the largest values to those during the parts of the record that count."""
     end = windows[1].max() + 1
     for first in range(windows[0].min(), end, TILES):
+        # A stretch: first the samples, then the peaks between them
         last = min(first + TILES, end)
         samples = ground[:, first * TILE : last * TILE + 1]
         run_pair_tiles(samples[0], samples[1], first, windows, table, checkpoints)
@@ -212,22 +214,11 @@ def _drop_settled(steps, dt, block, table, moving, best):
 @kernel
 def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
     """Raise the largest values to the samples of the tiles, then to the peaks between them."""
-    sampled = np.zeros((3, PAIR_LANES))
-    # Samples of all tiles that count; none of a pair at rest is below 0
-    for tile in range(inputs.shape[0]):
-        for lane in range(PAIR_LANES):
-            counts = windows[0, lane] <= first + tile <= windows[1, lane]
-            part = 1.0 if counts else 0.0
-            sampled[0, lane] = max(sampled[0, lane], part * checkpoints[tile, GREATEST, lane])
-            sampled[1, lane] = max(sampled[1, lane], -part * checkpoints[tile, LEAST, lane])
-            sampled[2, lane] = max(sampled[2, lane], part * checkpoints[tile, APPROACH, lane])
+    _raise_to_samples(block, checkpoints, inputs.shape[0], first, windows, best)
     # Limits of the samples of tiles that need no search, from bounds over all tiles
     limits = np.empty((2, PAIR_LANES))
     strongest = strongest_inputs(inputs)
     for lane in range(PAIR_LANES):
-        best[lane, 0] = max(best[lane, 0], sampled[0, lane])
-        best[lane, 1] = max(best[lane, 1], sampled[1, lane])
-        best[lane, 2] = max(best[lane, 2], block[lane, 0] * sampled[2, lane])
         radii = largest_radii(block[lane], table, lane, strongest)
         margin, _ = tile_margins(block[lane], dt, radii, strongest)
         limits[0, lane], limits[1, lane] = best[lane, 0] - margin, best[lane, 1] - margin
@@ -238,25 +229,35 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
             high = checkpoints[tile, GREATEST, lane] > limits[0, lane]
             near += high or -checkpoints[tile, LEAST, lane] > limits[1, lane]
         if near:
+            # Pair by pair
             part = ground[:, tile * TILE : (tile + 1) * TILE + 1]
-            among = first + tile
-            _search_lanes(
-                part,
-                dt,
-                block,
-                table,
-                checkpoints[tile],
-                inputs[tile],
-                among,
-                windows,
-                limits,
-                best,
-            )
+            now = checkpoints[tile], inputs[tile], first + tile
+            _search_lanes(part, dt, block, table, now, windows, limits, best)
 
 
 @kernel
-def _search_lanes(ground, dt, block, table, checkpoint, inputs, tile, windows, limits, best):
-    """Search a tile of all pairs whose samples are above their limits, where it counts."""
+def _raise_to_samples(block, checkpoints, tiles, first, windows, best):
+    """Raise the largest values to the samples of the tiles that count."""
+    sampled = np.zeros((3, PAIR_LANES))
+    for tile in range(tiles):
+        for lane in range(PAIR_LANES):
+            # Largest motion of a pair at rest is not below 0
+            counts = windows[0, lane] <= first + tile <= windows[1, lane]
+            part = 1.0 if counts else 0.0
+            sampled[0, lane] = max(sampled[0, lane], part * checkpoints[tile, GREATEST, lane])
+            sampled[1, lane] = max(sampled[1, lane], -part * checkpoints[tile, LEAST, lane])
+            sampled[2, lane] = max(sampled[2, lane], part * checkpoints[tile, APPROACH, lane])
+    # Velocities are over the frequency of structure 1
+    for lane in range(PAIR_LANES):
+        best[lane, 0] = max(best[lane, 0], sampled[0, lane])
+        best[lane, 1] = max(best[lane, 1], sampled[1, lane])
+        best[lane, 2] = max(best[lane, 2], block[lane, 0] * sampled[2, lane])
+
+
+@kernel
+def _search_lanes(ground, dt, block, table, now, windows, limits, best):
+    """Search a tile (checkpoint, inputs, number) of all pairs whose samples are above limits."""
+    checkpoint, inputs, tile = now  # the tile
     for lane in range(PAIR_LANES):
         near = checkpoint[GREATEST, lane] > limits[0, lane]
         near |= -checkpoint[LEAST, lane] > limits[1, lane]

@@ -106,6 +106,7 @@ def run_pair_tiles(north, east, first_tile, windows, table, checkpoints):
     local = np.empty((LOCAL, PAIR_LANES))  # of a size that the compiler knows: it makes vectors
     local[:] = table[:LOCAL]
     for first in range(0, north.size - 1, TILE):
+        # Pairs that start here, and the states before the tile
         tile = first_tile + first // TILE
         start_pairs_at_rest(north[first], east[first], tile, windows, table, local)
         _open_tile(north[first], east[first], tile, windows, local, checkpoints[first // TILE])

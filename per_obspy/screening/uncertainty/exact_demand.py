@@ -216,9 +216,11 @@ def _of_certain_buildings(block: _Block) -> Columns:
 
 def _sampled(block: _Block, first: int, count: int) -> Columns:
     """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
+    # first nodes
     few = _node_motion(block, NODES[:first])
     chance = chance_of_contact(few.demand, block.site.log_std, block.table)
     doubtful = (chance > CERTAIN) & (chance < 1.0 - CERTAIN) & (first < count)
+    # the others where they may change the probability
     result: Columns = {name: np.empty(chance.size) for name in COLUMNS}
     for number, mask in ((first, ~doubtful), (count, doubtful)):
         rows = np.flatnonzero(mask)
