@@ -17,6 +17,7 @@ import typer
 
 import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
+from per_obspy.commands.init import init
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
@@ -44,7 +45,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, process, spectra, screen, report, events, fetch, info):
+for command in (run, init, simulate, process, spectra, screen, report, events, fetch, info):
     app.command()(command)
 
 

@@ -1,6 +1,7 @@
 """``per-obspy run`` and its parts: ``simulate``, ``process``, ``spectra`` and ``report``."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,21 +50,52 @@ NAMED_STATIONS = 3
 PLOT_DAMPING = 0.05
 
 
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the configuration, such as screening.exact=false; repeat for several.",
+    ),
+]
+
+
 def run(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    first: Annotated[
+        str,
+        typer.Argument(
+            metavar="CONFIGURATION | RECORDS",
+            help="TOML file or a folder with one; or records: folder, archive, file or event id.",
+        ),
+    ],
+    second: Annotated[
+        str | None,
+        typer.Argument(metavar="PAIRS", help="Pair table or footprints, or a folder with one."),
+    ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    changes: Changes = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """
     Do a whole run: records to spectra to risk table to figures.
 
-    Example: per-obspy run workflows/demo.toml
+    One argument is a configuration, or a folder that holds one.
+
+    Two are records and pairs, in either order: content decides.
+
+    Results: -o, else the configured folder, else results/RECORDS-PAIRS.
+
+    Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
+    from per_obspy.pipeline.inputs.arguments import requested_run
     from per_obspy.pipeline.run import run as whole_run
 
+    asked = requested_run(first, second, output, changes or ())
+    if asked.line:
+        print(printable(asked.line), file=sys.stderr)
     with shown_progress() as progress:
-        result = whole_run(configuration, output, progress=progress)
+        result = whole_run(asked.configuration, output, progress=progress)
     print_and_end(result, as_json, print_result, strict)
 
 
@@ -215,7 +247,7 @@ def print_result(result: "Result") -> None:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
         _print_worst(folder / "risk.parquet", 10)
-    for name in sorted({*record["outputs"], "run.json"}):
+    for name in sorted({*record["outputs"], "run.json", "configuration.toml"}):
         print(f"  {folder / name}")
 
 
