@@ -258,6 +258,9 @@ def _print_counts(record: dict[str, Any]) -> None:
         print(_simulated_line(counts))
     for line in _earthquake_lines(record.get("earthquakes", ())):
         print(line)
+    if drawn := record.get("drawn"):
+        left_out = f"{drawn['rejected']} buildings or pairs rejected: pairs.rejected.csv"
+        print(f"{drawn['pairs']} pairs of footprints, {left_out}")
     from per_obspy.screening.ranking import STATES
 
     # Stations, pairs by state, and all rejections together

@@ -119,4 +119,6 @@ def nearest_key(key: str, known: Sequence[str]) -> str:
     name = key.rpartition(".")[2].lower()
     alike = get_close_matches(name, set(last.values()), n=1, cutoff=0.7)
     places = [one for one in known if alike and last[one] == alike[0]]
-    return next(iter(get_close_matches(key, places or known, n=1, cutoff=0.0 if places else 0.7)), "")
+    return next(
+        iter(get_close_matches(key, places or known, n=1, cutoff=0.0 if places else 0.7)), ""
+    )

@@ -145,7 +145,9 @@ def _toml(value: Any) -> str:
     if isinstance(value, Section):
         value = value.model_dump(mode="json")
     if isinstance(value, Mapping):
-        pairs = (f"{tomlkit.key(str(key)).as_string()} = {_toml(one)}" for key, one in value.items())
+        pairs = (
+            f"{tomlkit.key(str(key)).as_string()} = {_toml(one)}" for key, one in value.items()
+        )
         return f"{{ {', '.join(pairs)} }}" if value else "{}"
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_toml, value))}]"

@@ -32,12 +32,8 @@ class Check(Section):
 class Checks(Section):
     """Thresholds of the record checks (``processing/quality``, ``processing/filter/corners``)."""
 
-    sampling_rate: Check = Field(
-        Check(threshold=20.0, level="reject"), description="Hz, at least"
-    )
-    duration: Check = Field(
-        Check(threshold=5.0, level="reject"), description="s, at least"
-    )
+    sampling_rate: Check = Field(Check(threshold=20.0, level="reject"), description="Hz, at least")
+    duration: Check = Field(Check(threshold=5.0, level="reject"), description="s, at least")
     levels: Check = Field(
         Check(threshold=16, level="reject"), description="different values a sample takes, at least"
     )
@@ -45,37 +41,47 @@ class Checks(Section):
         Check(threshold=5, level="reject"), description="equal samples at an extreme, fewer than"
     )
     counter_use: Check = Field(
-        Check(threshold=0.8, level="warn"), description="peak over full scale of a 24-bit counter, at most"
+        Check(threshold=0.8, level="warn"),
+        description="peak over full scale of a 24-bit counter, at most",
     )
     dropout: Check = Field(
-        Check(threshold=0.5, level="reject"), description="s without change during the shaking, less than"
+        Check(threshold=0.5, level="reject"),
+        description="s without change during the shaking, less than",
     )
     spike: Check = Field(
-        Check(threshold=6.0, level="reject"), description="jump of one sample over others within 0.5 s, at most"
+        Check(threshold=6.0, level="reject"),
+        description="jump of one sample over others within 0.5 s, at most",
     )
     zero_crossings: Check = Field(
         Check(threshold=0.1, level="reject"), description="zero crossings per second, at least"
     )
     header_peak: Check = Field(
-        Check(threshold=0.01, level="warn"), description="peak, relative difference between header and samples, at most"
+        Check(threshold=0.01, level="warn"),
+        description="peak, relative difference between header and samples, at most",
     )
     outlier: Check = Field(
-        Check(threshold=5.0, level="reject"), description="peak over the largest peak of two sisters, at most"
+        Check(threshold=5.0, level="reject"),
+        description="peak over the largest peak of two sisters, at most",
     )
     late_trigger: Check = Field(
-        Check(threshold=0.1, level="warn"), description="motion of the first second over the peak, at most"
+        Check(threshold=0.1, level="warn"),
+        description="motion of the first second over the peak, at most",
     )
     cut_off: Check = Field(
-        Check(threshold=0.1, level="warn"), description="motion of the last second over the peak, at most"
+        Check(threshold=0.1, level="warn"),
+        description="motion of the last second over the peak, at most",
     )
     second_event: Check = Field(
-        Check(threshold=0.3, level="warn"), description="later peak after quiet over the peak, at most"
+        Check(threshold=0.3, level="warn"),
+        description="later peak after quiet over the peak, at most",
     )
     signal_to_noise: Check = Field(
-        Check(threshold=2.0, level="reject"), description="signal to noise at the best frequency, at least"
+        Check(threshold=2.0, level="reject"),
+        description="signal to noise at the best frequency, at least",
     )
     clear_band: Check = Field(
-        Check(threshold=2.0, level="warn"), description="signal to noise over required_band, at least"
+        Check(threshold=2.0, level="warn"),
+        description="signal to noise over required_band, at least",
     )
     bandwidth: Check = Field(
         Check(threshold=4.0, level="reject"), description="low-pass over high-pass corner, at least"
@@ -84,10 +90,12 @@ class Checks(Section):
         Check(threshold=0.1, level="reject"), description="final velocity over its peak, at most"
     )
     final_displacement: Check = Field(
-        Check(threshold=0.2, level="reject"), description="final displacement over its peak, at most"
+        Check(threshold=0.2, level="reject"),
+        description="final displacement over its peak, at most",
     )
     baseline_shift: Check = Field(
-        Check(threshold=0.5, level="warn"), description="velocity before the filter that stays, over the peak"
+        Check(threshold=0.5, level="warn"),
+        description="velocity before the filter that stays, over the peak",
     )
 
 

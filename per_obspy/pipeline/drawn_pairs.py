@@ -16,11 +16,14 @@ from per_obspy.tables.table_files import write_rejected
 #: Table of the pairs, its rejections, and the status file by which they are kept.
 PAIRS, REJECTED, STATUS = "pairs.parquet", "pairs.rejected.csv", "pairs.json"
 
+#: Names of the counts of a search.
+COUNTED = ("pairs", "rejected")
+
 #: Files of a Shapefile beside the one that is named.
 _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 
-def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> None:
+def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[str, int]:
     """
     Find the pairs of the configured footprints, unless the same ones are in the folder already.
 
@@ -33,6 +36,11 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> None:
     progress : callable
         Called when the search begins and ends.
 
+    Returns
+    -------
+    counts : dict
+        Numbers of pairs and of rejected buildings and pairs; empty without footprints.
+
     Raises
     ------
     CatalogError
@@ -42,11 +50,11 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> None:
     """
     footprints = settings.pairs.footprints if settings.pairs else None
     if footprints is None:
-        return
+        return {}
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     key = _key(footprints)
-    if earlier_status(folder / STATUS, key) is not None:
-        return
+    if earlier := earlier_status(folder / STATUS, key):
+        return {name: earlier[name] for name in COUNTED}
     from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 
     progress("finding pairs", 0, 1)
@@ -56,10 +64,11 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> None:
     write_pairs(table, folder / PAIRS)
     write_rejected(rejected, folder / REJECTED)
     # Written last: a killed search is done again
-    facts = {"pairs": len(table), "rejected": len(rejected)}
+    counts = dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
     hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED)}
-    write_status(folder / STATUS, key, hashes, facts)
+    write_status(folder / STATUS, key, hashes, counts)
     progress("finding pairs", 1, 1)
+    return counts
 
 
 def pair_table(settings: Run, folder: Path) -> Path | None:

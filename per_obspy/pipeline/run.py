@@ -39,7 +39,6 @@ from per_obspy.pipeline.stations import (
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent, timed
-from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records
 from per_obspy.resume import (
     StatusError,
@@ -108,7 +107,7 @@ def run(
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
-        write_drawn_pairs(settings, folder, progress)
+        drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
         earlier_rows = _begun(folder, settings, STATIONS)
         seconds, started = dict[str, float](), now()
@@ -116,7 +115,7 @@ def run(
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or asked.head(fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
-        record |= {"seconds": seconds | record["seconds"], "started": started}
+        record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
@@ -137,7 +136,7 @@ def screen(
     with locked_folder(folder):
         _require_stations(folder)
         stations = stations_of_earlier_run(folder)
-        write_drawn_pairs(settings, folder, progress)
+        drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
         earthquakes = _earlier_earthquakes(folder)
         earlier_rows = _begun(folder, settings, SCREENING)
@@ -148,11 +147,13 @@ def screen(
         rejected = all_rejections([], stations)
         with compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
-        record |= {"started": started, "earthquakes": earthquakes}
+        record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
-def report(configuration: Path | Run, output: Path | None = None, progress: Progress = silent) -> Result:
+def report(
+    configuration: Path | Run, output: Path | None = None, progress: Progress = silent
+) -> Result:
     """
     Write totals, figures and layers again from the risk table of a finished run.
 

@@ -15,6 +15,7 @@ from per_obspy.pipeline.inputs.recognition import (
     Kind,
     files_in,
     kind_of,
+    records_place,
 )
 
 #: Folder of the shell in which results are written where no other is named.
@@ -178,8 +179,6 @@ def _tables_in(argument: str) -> list[Path]:
 
 def _records_content(records: str, output: Path) -> dict[str, Any]:
     """Return the sections of a configuration that name the records."""
-    from per_obspy.records.asdf import ASDF_MARK
-
     kind = kind_of(records)
     if kind is Kind.EVENT_ID:
         return {"records": {"fdsn": event_records(records, output.absolute() / "fetched")}}
@@ -188,10 +187,11 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
         return {"simulation": str(path)}
     if kind is Kind.SHAKEMAP:
         return {"records": {"shakemap": str(path)}}
+    place, is_workspace = records_place(path)
+    if is_workspace:
+        return {"records": {"asdf": {"file": str(place)}}}
     if path.is_file():
-        with path.open("rb") as file:
-            is_asdf = file.read(len(ASDF_MARK)) == ASDF_MARK
-        return {"records": {"asdf": {"file": str(path)}} if is_asdf else {"folder": str(path)}}
+        return {"records": {"folder": str(path)}}
     # What lies beside the records and describes the earthquake
     found = {"folder": str(path)}
     for key, beside in (("event", Kind.EVENT), ("shakemap", Kind.SHAKEMAP)):

@@ -43,8 +43,15 @@ PAIR_KINDS = (Kind.PAIRS, Kind.FOOTPRINTS, Kind.CATALOG)
 #: Bytes at the beginning of a file by which it is recognised, and largest TOML that is read.
 HEAD, LARGEST_TOML = 8192, 2**20
 
-#: Identifier of an event, perhaps after the name of a provider: us7000abcd, GEONET:2016p858000.
-_EVENT_ID = re.compile(r"(?:[A-Za-z][\w-]*:)?(?=[\w.-]*\d)[A-Za-z0-9][\w.-]{5,}")
+#: First bytes of HDF5, as workspaces of gmprocess and netCDF files are.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+#: Identifier of an event: after the name of a provider, or in the form of the USGS (us7000abcd),
+#: of GeoNet (2016p858000), of the EMSC (20230206_0000008) or of digits alone (INGV).
+_EVENT_ID = re.compile(
+    r"[A-Za-z][\w-]*:[\w.-]+|(?:[a-z]{2,3}|official|iscgem)\d\w{5,}|\d{4}[a-z]\d{6}|\d{8}_\d{7}"
+    r"|\d{5,}"
+)
 
 #: Beginnings of files.
 _MAGIC = {
@@ -83,7 +90,7 @@ def looks_like_event_id(text: str) -> bool:
     --------
     >>> looks_like_event_id("us7000abcd"), looks_like_event_id("GEONET:2016p858000")
     (True, True)
-    >>> looks_like_event_id("pairs.csv"), looks_like_event_id("data/us7000abcd")
+    >>> looks_like_event_id("pairs.csv"), looks_like_event_id("records2019")
     (False, False)
     """
     return _EVENT_ID.fullmatch(text) is not None
@@ -120,6 +127,19 @@ def files_in(folder: Path) -> dict[Path, Kind]:
     return {path: _file_kind(path) for path in files if ".rejected" not in path.suffixes}
 
 
+def records_place(path: Path) -> tuple[Path, bool]:
+    """Return the place of records and whether it is a workspace: a folder may hold only one."""
+    files = [path] if path.is_file() else []
+    if path.is_dir():
+        inside = sorted(path.iterdir())
+        files = inside if len(inside) == 1 and inside[0].is_file() else []
+    for file in files:
+        with file.open("rb") as opened:
+            if opened.read(len(HDF5)) == HDF5:
+                return file, True
+    return path, False
+
+
 def _folder_kind(folder: Path) -> Kind:
     """Return the kind of a folder: results, one pair table or layer and no record, or records."""
     if (folder / "run.json").is_file() or (folder / "ensemble.json").is_file():
@@ -152,7 +172,7 @@ def _file_kind(path: Path) -> Kind:
     # By its first bytes, then by words, then by the columns of a table
     if head.startswith(b"PAR1"):
         return _parquet_kind(path)
-    if head.startswith(b"\x89HDF"):
+    if head.startswith(HDF5):
         return _hdf5_kind(path)
     if head.startswith(b"PK\x03\x04"):
         return _zip_kind(path)
@@ -258,4 +278,3 @@ def _table_kind(names: Sequence[str]) -> Kind | None:
     if len(columns & set(COLUMNS)) >= 3:
         return Kind.PAIRS
     return Kind.FOOTPRINTS if columns & _GEOMETRY else None
-
