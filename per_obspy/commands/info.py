@@ -67,6 +67,7 @@ def info(
     if as_json:
         print(json.dumps({"kind": found.kind, **found.values}))
     else:
+        # Records list what is wrong with them below, others among their facts
         rejected = found.values.get("rejected", []) if found.kind == "records" else []
         few = rejected if everything else rejected[:FIRST]
         for line in screen_of(path, found, len(few) + (len(few) < len(rejected))):
@@ -116,6 +117,7 @@ def _wrapped(found: "Facts", label: str, text: str) -> list[str]:
     """Return a fact as lines below each other, the last of them shortened."""
     width = max(len(known) for known, _ in [*found.lines, ("place", "")])
     lines = textwrap.wrap(printable(text), WIDTH - width - 4, break_on_hyphens=False) or [""]
+    # What is longer is cut in the last line
     if len(lines) > MOST_LINES:
         lines[MOST_LINES - 1 :] = [shortened(" ".join(lines[MOST_LINES - 1 :]), WIDTH - width - 4)]
     labels = [label, *[""] * (len(lines) - 1)]

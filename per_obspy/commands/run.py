@@ -55,7 +55,7 @@ Changes = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Change a key of the configuration, such as screening.exact=false; repeat for several.",
+        help="Change a key of the configuration, as screening.exact=false; repeat for several.",
     ),
 ]
 

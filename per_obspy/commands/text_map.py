@@ -39,25 +39,12 @@ def text_map(layers: Mapping[str, Places]) -> list[str]:
     lines : list of str
         Frame with degrees and scale; empty if fewer than two places are known.
     """
+    # One place, or the same one several times, has no scale
     known = {sign: _finite(places) for sign, places in layers.items()}
     points = [point for layer in known.values() for point in layer]
     if len(set(points)) < 2:
         return []
-    # The same metres per column and, but for the height of a character, per row
-    east = _unwrapped([longitude for longitude, _ in points])
-    north = [latitude for _, latitude in points]
-    centre = (min(east) + max(east)) / 2.0, (min(north) + max(north)) / 2.0
-    narrow = max(math.cos(math.radians(centre[1])), 1e-6)
-    width = max(max(east) - min(east), 0.0) * narrow * METRES_PER_DEGREE
-    height = (max(north) - min(north)) * METRES_PER_DEGREE
-    cell = max(width / (COLUMNS - 1), height / (TALL * (ROWS - 1)), SMALLEST / COLUMNS)
-    size = (
-        max(FEWEST_COLUMNS, math.ceil(width / cell) + 1),
-        max(FEWEST_ROWS, math.ceil(height / (TALL * cell)) + 1),
-    )
-    frame = _Frame(
-        centre, (cell / METRES_PER_DEGREE / narrow, TALL * cell / METRES_PER_DEGREE), size
-    )
+    frame, cell = _frame_around(points)
     lines = _framed(_drawn(known, frame), frame, cell)
     return lines + ([f"{'':11}{LEGEND}"] if known.get("") else [])
 
@@ -68,6 +55,21 @@ class _Frame(NamedTuple):
     centre: tuple[float, float]
     step: tuple[float, float]
     size: tuple[int, int]
+
+
+def _frame_around(points: Sequence[tuple[float, float]]) -> tuple[_Frame, float]:
+    """Return the frame of a map around its points, and the width of a column, m."""
+    east = _unwrapped([longitude for longitude, _ in points])
+    north = [latitude for _, latitude in points]
+    centre = (min(east) + max(east)) / 2.0, (min(north) + max(north)) / 2.0
+    # The same metres per column and, but for the height of a character, per row
+    degree = max(math.cos(math.radians(centre[1])), 1e-6) * METRES_PER_DEGREE
+    width, height = (max(east) - min(east)) * degree, (max(north) - min(north)) * METRES_PER_DEGREE
+    cell = max(width / (COLUMNS - 1), height / (TALL * (ROWS - 1)), SMALLEST / COLUMNS)
+    # As many columns and rows as the points need
+    columns = max(FEWEST_COLUMNS, math.ceil(width / cell) + 1)
+    rows = max(FEWEST_ROWS, math.ceil(height / (TALL * cell)) + 1)
+    return _Frame(centre, (cell / degree, TALL * cell / METRES_PER_DEGREE), (columns, rows)), cell
 
 
 def _finite(places: Places) -> list[tuple[float, float]]:
@@ -94,6 +96,7 @@ def _drawn(layers: Mapping[str, Sequence[tuple[float, float]]], frame: _Frame) -
             east = (longitude - frame.centre[0] + 180.0) % 360.0 - 180.0
             column = round((columns - 1) / 2.0 + east / frame.step[0])
             row = round((rows - 1) / 2.0 - (latitude - frame.centre[1]) / frame.step[1])
+            # Rounding may lead over the edge
             row, column = min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
             number = counts[row, column] = counts.get((row, column), 0) + (sign == "")
             grid[row][column] = sign or _count_sign(number)
@@ -107,21 +110,27 @@ def _count_sign(number: int) -> str:
 
 def _framed(grid: Sequence[Sequence[str]], frame: _Frame, cell: float) -> list[str]:
     """Return the lines of a map with latitudes at the left and longitudes below."""
-    columns, rows = frame.size
+    rows = frame.size[1]
+    # Three latitudes are enough
     labelled = {0, rows // 2, rows - 1}
     lines = []
     for row, cells in enumerate(grid):
         latitude = frame.centre[1] + ((rows - 1) / 2.0 - row) * frame.step[1]
         label = f"{latitude:9.4f}" if row in labelled else " " * 9
         lines.append(f"{label} |{''.join(cells)}|")
-    # Longitudes of the first and last column, and the size of a column
+    return [*lines, _footer(frame, cell)]
+
+
+def _footer(frame: _Frame, cell: float) -> str:
+    """Return the line with the longitudes of the first and last column and the size of a column."""
+    columns = frame.size[0]
     half = (columns - 1) / 2.0 * frame.step[0]
     ends = (frame.centre[0] - half, frame.centre[0] + half)
     west, east = (f"{(one + 180.0) % 360.0 - 180.0:.4f}" for one in ends)
-    scale = f"1 column {_rounded(cell / 1000.0)} km"
-    if cell < 1000.0:
-        scale = f"1 column {_rounded(cell)} m"
-    return [*lines, f"{'':10} {west:<10}{scale:^{columns - 20}}{east:>10}"]
+    # Kilometres where they are whole ones
+    is_large = cell >= 1000.0
+    size = f"{_rounded(cell / 1000.0)} km" if is_large else f"{_rounded(cell)} m"
+    return f"{'':10} {west:<10}{f'1 column {size}':^{columns - 20}}{east:>10}"
 
 
 def _rounded(value: float) -> str:

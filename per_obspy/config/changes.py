@@ -51,8 +51,10 @@ def merged(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     result = dict(content)
     for key, value in changes.items():
         known = result.get(key)
-        are_tables = isinstance(known, Mapping) and isinstance(value, Mapping)
-        result[key] = merged(known, value) if are_tables else value
+        if isinstance(known, Mapping) and isinstance(value, Mapping):
+            result[key] = merged(known, value)
+        else:
+            result[key] = value
     return result
 
 
@@ -88,6 +90,7 @@ def _path(text: str, section: type[Section]) -> list[str]:
     while isinstance(content, dict):
         ((name, content),) = content.items()
         names.append(name)
+    # Names inside a table of free keys are no keys of the configuration
     model: type[Section] | None = section
     for depth, name in enumerate(names):
         if model is None or name not in model.model_fields:
@@ -119,6 +122,5 @@ def nearest_key(key: str, known: Sequence[str]) -> str:
     name = key.rpartition(".")[2].lower()
     alike = get_close_matches(name, set(last.values()), n=1, cutoff=0.7)
     places = [one for one in known if alike and last[one] == alike[0]]
-    return next(
-        iter(get_close_matches(key, places or known, n=1, cutoff=0.0 if places else 0.7)), ""
-    )
+    nearest = get_close_matches(key, places or known, n=1, cutoff=0.0 if places else 0.7)
+    return nearest[0] if nearest else ""

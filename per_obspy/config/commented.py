@@ -88,6 +88,7 @@ def _block(
     field: FieldInfo, model: type[Section], entry: Mapping[str, Any], place: tuple[str, bool]
 ) -> list[str]:
     """Return the lines of one table, from its help to the tables inside."""
+    # Help, header, keys, then the tables inside
     path, repeated = place
     meaning = field.description or (model.__doc__ or "").strip().partition("\n")[0]
     header = f"[[{path}]]" if repeated else f"[{path}]"
@@ -144,11 +145,12 @@ def _toml(value: Any) -> str:
     """Return a value as TOML on one line."""
     if isinstance(value, Section):
         value = value.model_dump(mode="json")
-    if isinstance(value, Mapping):
-        pairs = (
-            f"{tomlkit.key(str(key)).as_string()} = {_toml(one)}" for key, one in value.items()
-        )
-        return f"{{ {', '.join(pairs)} }}" if value else "{}"
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_toml, value))}]"
-    return tomlkit.item(value).as_string()
+    if not isinstance(value, Mapping):
+        return str(tomlkit.item(value).as_string())
+    # A table on one line
+    names = [tomlkit.key(str(key)).as_string() for key in value]
+    values = map(_toml, value.values())
+    pairs = [f"{name} = {one}" for name, one in zip(names, values, strict=True)]
+    return f"{{ {', '.join(pairs)} }}" if pairs else "{}"

@@ -35,10 +35,12 @@ class Checks(Section):
     sampling_rate: Check = Field(Check(threshold=20.0, level="reject"), description="Hz, at least")
     duration: Check = Field(Check(threshold=5.0, level="reject"), description="s, at least")
     levels: Check = Field(
-        Check(threshold=16, level="reject"), description="different values a sample takes, at least"
+        Check(threshold=16, level="reject"),
+        description="different values a sample takes, at least",
     )
     clipped_run: Check = Field(
-        Check(threshold=5, level="reject"), description="equal samples at an extreme, fewer than"
+        Check(threshold=5, level="reject"),
+        description="equal samples at an extreme, fewer than",
     )
     counter_use: Check = Field(
         Check(threshold=0.8, level="warn"),
@@ -53,7 +55,8 @@ class Checks(Section):
         description="jump of one sample over others within 0.5 s, at most",
     )
     zero_crossings: Check = Field(
-        Check(threshold=0.1, level="reject"), description="zero crossings per second, at least"
+        Check(threshold=0.1, level="reject"),
+        description="zero crossings per second, at least",
     )
     header_peak: Check = Field(
         Check(threshold=0.01, level="warn"),
@@ -84,10 +87,12 @@ class Checks(Section):
         description="signal to noise over required_band, at least",
     )
     bandwidth: Check = Field(
-        Check(threshold=4.0, level="reject"), description="low-pass over high-pass corner, at least"
+        Check(threshold=4.0, level="reject"),
+        description="low-pass over high-pass corner, at least",
     )
     final_velocity: Check = Field(
-        Check(threshold=0.1, level="reject"), description="final velocity over its peak, at most"
+        Check(threshold=0.1, level="reject"),
+        description="final velocity over its peak, at most",
     )
     final_displacement: Check = Field(
         Check(threshold=0.2, level="reject"),

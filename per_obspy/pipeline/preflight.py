@@ -10,7 +10,7 @@ from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.checking import check_columns
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.simulated import simulated_pairs
-from per_obspy.pipeline.drawn_pairs import pair_table
+from per_obspy.pipeline.inputs.drawn_pairs import pair_table
 from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
 
@@ -50,6 +50,7 @@ def check_inputs(settings: Run, folder: Path) -> None:
     table = pair_table(settings, folder)
     if pairs and pairs.footprints and not pairs.footprints.file.is_file():
         raise CatalogError(str(pairs.footprints.file), "no such file")
+    # Pairs of footprints may be yet to be found
     if table and not _is_pending(settings, table):
         check_columns(pair_file(table).names, str(table))
     if pairs and pairs.catalog and pairs.names:
@@ -90,5 +91,5 @@ def _pair_columns(settings: Run, folder: Path) -> set[str]:
         return set[str]().union(*columns)
     # One simulated pair has the columns of all, and perhaps the site class of its station
     simulation = pair_simulation(settings).model_copy(update={"count": 1})
-    table = simulated_pairs(np.zeros(1), np.zeros(1), **simulation.model_dump())
-    return {*table.columns, "site_class"}
+    simulated = simulated_pairs(np.zeros(1), np.zeros(1), **simulation.model_dump())
+    return {*simulated.columns, "site_class"}

@@ -12,7 +12,7 @@ from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
 from per_obspy.inventory.catalogue import stored_inventories
-from per_obspy.pipeline.drawn_pairs import layer_files
+from per_obspy.pipeline.inputs.drawn_pairs import layer_files
 from per_obspy.pipeline.preflight import require_extras
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import hash_if_readable, input_files
@@ -52,8 +52,9 @@ class RunSettings:
 
     def __init__(self, configuration: Path | Run, output: Path | None) -> None:
         self.file = configuration.resolve() if isinstance(configuration, Path) else None
-        is_read = isinstance(configuration, Run)
-        self.settings = configuration if is_read else load(configuration.resolve(), Run)
+        self.settings = (
+            configuration if isinstance(configuration, Run) else load(configuration.resolve(), Run)
+        )
         require_extras(self.settings)
         self.folder = (output or self.settings.output).resolve()
         self.base = self.file.parent if self.file else self.folder
@@ -95,6 +96,7 @@ class RunSettings:
             return
         placed = self.settings.model_copy(update={"output": self.folder})
         text = commented(Run, effective_content(placed, self.folder), HEADING)
+        # A file of that name that somebody else wrote is kept
         before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
         if before is not None and not before.startswith(f"# {WRITTEN}"):
             raise CatalogError(
@@ -127,6 +129,7 @@ def _inventory_files(settings: Run) -> list[Path]:
         return layer_files(pairs.footprints.file)
     if pairs.catalog is None:
         return [pairs.file] if pairs.file else []
+    # Stored inventories, all of which the region may touch
     stored = stored_inventories(pairs.catalog)
     chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]
     return [pairs.catalog, *chosen]

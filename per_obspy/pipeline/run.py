@@ -23,7 +23,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.drawn_pairs import PAIRS, REJECTED, write_drawn_pairs
+from per_obspy.pipeline.inputs.drawn_pairs import PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs
 from per_obspy.pipeline.provenance import RunSettings

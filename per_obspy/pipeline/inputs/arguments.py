@@ -60,6 +60,7 @@ def requested_run(
         If records or pairs are missing, an argument is something else, or a change is wrong.
     """
     changed = parsed_changes(changes, Run)
+    # A configuration, as it is or with changes
     if second is None and (file := _configuration(first)):
         line = "" if file == Path(first) else f"configuration: {file}"
         if not changed:
@@ -139,11 +140,13 @@ def _require_both(
     changed: Mapping[str, Any],
 ) -> None:
     """Raise CatalogError with what is missing unless there are one source and one inventory."""
+    # Neither of them
     for argument in given:
         if kinds[argument] not in (*RECORD_KINDS, *PAIR_KINDS):
             raise CatalogError(argument, _misplaced(kinds[argument]))
     records, pairs = found
     example = "per-obspy run RECORDS PAIRS"
+    # The same twice, or one alone
     if len(records) > 1 or len(pairs) > 1:
         both = "records" if records else "pairs"
         missing = "pair table or footprints" if records else "folder, archive or file of records"
@@ -182,6 +185,7 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
     kind = kind_of(records)
     if kind is Kind.EVENT_ID:
         return {"records": {"fdsn": event_records(records, output.absolute() / "fetched")}}
+    # Motion that is simulated or mapped
     path = Path(records).absolute()
     if kind is Kind.SCENARIO:
         return {"simulation": str(path)}

@@ -1,6 +1,8 @@
 """Facts of pair tables, footprints and risk tables."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,42 +20,67 @@ from per_obspy.tables.parts import parquet_rows
 #: Rows of a table that are looked at.
 MOST_ROWS = 100_000
 
-#: Quantities of a pair or of its buildings whose range is said, with their columns.
-_RANGES = {"height": ("height_1", "height_2"), "storeys": ("storeys_1", "storeys_2")}
-_RANGES |= {"period": ("period_1", "period_2")}
+#: Rejections that are listed.
+FIRST = 2
+
+#: Quantities of a building whose range is said.
+_RANGES = ("height", "storeys", "period")
 
 
 def pair_table_facts(path: Path) -> Facts:
     """Return the facts of a pair table, by its first rows if it is large."""
     inventory = PairInventory([path])
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
-    rejected = table.attrs["rejected"]
-    looked_at = min(inventory.count, MOST_ROWS)
-    part = f"the first {looked_at} of " if inventory.count > MOST_ROWS else ""
-    # What it gives, what is derived instead, and what is odd
+    rejected = [one._asdict() for one in table.attrs["rejected"]]
+    # Sizes, what is derived instead, what is unknown and odd
     touching = int((table["gap"] == 0.0).sum())
-    lines = [("gap", f"{span(table['gap'].tolist(), 'm')}; {touching} pairs touch")]
-    for name, columns in _RANGES.items():
-        numbers = np.concatenate([numbers_in(table, column) for column in columns])
-        if not np.isnan(numbers).all():
-            lines.append((name, span(numbers.tolist(), COLUMNS[columns[0]].unit.replace("1", ""))))
+    gap = ("gap", f"{span(table['gap'].tolist(), 'm')}; {touching} pairs touch")
     derived = derived_counts(table) if len(table) else {}
-    counted = [f"{name} ({rows})" for name, rows in derived.items()]
-    lines += [("derived", some(counted, 5))] if counted else []
     unused = unused_columns(table)
-    lines += [("unknown", f"{some(unused)}: carried along unchanged")] if unused else []
-    lines += [("suspicious", sentence) for sentence in suspicions(table)]
-    lines += [("rejected", f"line {one.row}: {'; '.join(one.reasons)}") for one in rejected[:2]]
-    return Facts(
-        Kind.PAIRS,
-        f"{part}{inventory.count} rows, {len(table)} usable, {len(rejected)} rejected",
-        lines,
-        {"": _centres(table)},
-        {"rows": inventory.count, "usable": len(table), "touching": touching}
-        | {"rejected": [one._asdict() for one in rejected], "derived": derived}
-        | {"unknown": unused, "columns": [str(name) for name in table]},
-        usable=len(table) > 0,
-    )
+    lines = [gap, *_range_lines(table), *_odd_lines(table, derived, unused)]
+    lines += _rejected_lines(rejected, "line", "row")
+    # The same for machines
+    counted = {"rows": inventory.count, "usable": len(table), "touching": touching}
+    values = {**counted, "derived": derived, "unknown": unused, "rejected": rejected}
+    title = f"{_rows(inventory.count)}, {len(table)} usable, {len(rejected)} rejected"
+    return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
+
+
+def _rows(count: int) -> str:
+    """Return the number of rows, and of how many where only the first are looked at."""
+    return f"the first {MOST_ROWS} of {count} rows" if count > MOST_ROWS else f"{count} rows"
+
+
+def _rejected_lines(
+    rejected: Sequence[dict[str, Any]], word: str, key: str
+) -> list[tuple[str, str]]:
+    """Return the first rejections with their reasons."""
+    first = [(f"{word} {one[key]}".strip(), "; ".join(one["reasons"])) for one in rejected[:FIRST]]
+    return [("rejected", f"{name}: {reasons}") for name, reasons in first]
+
+
+def _range_lines(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the ranges of the quantities of the buildings that are given."""
+    lines = []
+    # Both buildings together
+    for name in _RANGES:
+        numbers = np.concatenate([numbers_in(table, f"{name}_{i}") for i in (1, 2)])
+        unit = COLUMNS[f"{name}_1"].unit.replace("1", "")
+        if not np.isnan(numbers).all():
+            lines.append((name, span(numbers.tolist(), unit)))
+    return lines
+
+
+def _odd_lines(
+    table: pd.DataFrame, derived: Mapping[str, int], unused: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return what is derived, unknown or suspicious of a pair table."""
+    lines = []
+    if derived:
+        lines.append(("derived", some([f"{name} ({rows})" for name, rows in derived.items()], 8)))
+    if unused:
+        lines.append(("unknown", f"{some(unused)}: carried along unchanged"))
+    return lines + [("suspicious", sentence) for sentence in suspicions(table)]
 
 
 def footprint_facts(path: Path) -> Facts:
@@ -64,44 +91,35 @@ def footprint_facts(path: Path) -> Facts:
     from per_obspy.inventory.footprints.layers import read_layer
 
     layer = read_layer(path)
-    centres = shapely.get_coordinates(shapely.centroid(layer.polygons))
-    names = [str(name) for name in layer.attributes]
     # How many buildings have a value under each of the names
-    given = {name: int(layer.attributes[name].notna().sum()) for name in names}
-    lines = [("columns", some([f"{name} ({count})" for name, count in given.items()], 9))]
-    lines += [("rejected", f"{one.name}: {'; '.join(one.reasons)}") for one in layer.rejected[:3]]
-    return Facts(
-        Kind.FOOTPRINTS,
-        f"{len(centres)} outlines, {len(layer.rejected)} rejected",
-        lines,
-        {"": (centres[:, 0].tolist(), centres[:, 1].tolist())},
-        {"outlines": len(centres), "columns": given}
-        | {"rejected": [one._asdict() for one in layer.rejected]},
-        usable=len(centres) > 0,
-    )
+    given = {str(name): int(values.notna().sum()) for name, values in layer.attributes.items()}
+    counted = [f"{name} ({count})" for name, count in given.items() if count]
+    lines = [("columns", some(counted, 12))]
+    rejected = [one._asdict() for one in layer.rejected]
+    lines += _rejected_lines(rejected, "", "name")
+    # Centres for the map
+    east, north = shapely.get_coordinates(shapely.centroid(layer.polygons)).T.tolist()
+    values = {"outlines": len(east), "columns": given, "rejected": rejected}
+    title = f"{len(east)} outlines, {len(rejected)} rejected"
+    return Facts(Kind.FOOTPRINTS, title, lines, {"": (east, north)}, values, usable=len(east) > 0)
 
 
 def risk_table_facts(path: Path) -> Facts:
-    """Return the facts of a risk table, CSV or Parquet."""
-    names = ["pair_id", "state", "probability", "longitude_1", "latitude_1"]
-    names += ["longitude_2", "latitude_2"]
-    if path.suffix == ".csv":
+    """Return the facts of a risk table, CSV or Parquet, by its first rows if it is large."""
+    # Only what is shown is read
+    names = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
+    if path.suffix.lower() == ".csv":
         table = pd.read_csv(path, nrows=MOST_ROWS, usecols=lambda name: name in names)
     else:
         table = parquet_rows([path], names).head(MOST_ROWS).to_pandas()
+    # States, and the first rows, which are the worst
     states = {state: int((table["state"] == state).sum()) for state in STATES}
     worst = [str(name) for name in table["pair_id"].head(5)]
-    return Facts(
-        Kind.RISK,
-        f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}",
-        [
-            ("pounding", ", ".join(f"{count} {state}" for state, count in states.items())),
-            ("worst pairs", some(worst)),
-        ],
-        {"": _centres(table)},
-        {"pairs": len(table), **states},
-        usable=len(table) > 0,
-    )
+    counted = ", ".join(f"{count} {state}" for state, count in states.items())
+    title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
+    lines = [("pounding", counted), ("worst pairs", some(worst))]
+    values = {"pairs": len(table), **states}
+    return Facts(Kind.RISK, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
 
 
 def _centres(table: pd.DataFrame) -> Places:

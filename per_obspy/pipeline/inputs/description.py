@@ -77,8 +77,11 @@ def _runs(path: Path, kind: Kind) -> Facts:
     """Return the facts of a configuration or of results."""
     from per_obspy.pipeline.inputs import described_runs
 
-    if kind is Kind.RESULT:
-        return described_runs.result_facts(path)
-    if kind is Kind.CONFIGURATION:
-        return described_runs.configuration_facts(path)
-    return described_runs.other_configuration_facts(path, kind)
+    describe = {
+        Kind.DESIGN: described_runs.design_facts,
+        Kind.ENSEMBLE: described_runs.ensemble_facts,
+        Kind.CATALOG: described_runs.catalog_facts,
+        Kind.SCENARIO: described_runs.scenario_facts,
+        Kind.RESULT: described_runs.result_facts,
+    }.get(kind, described_runs.configuration_facts)
+    return describe(path)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,14 +54,24 @@ def found_inputs(folder: Path) -> Found:
     single = [path for path in loose if path not in whole]
     records += [path for path in whole if _are_records([path])]
     records += [folder] if _are_records(single) else []
-    for path in sorted(folder.iterdir()):
-        if not path.is_dir() or path.is_symlink() or path.name.startswith("."):
-            continue
+    # Subfolders by their content
+    for path in _subfolders(folder):
         kind = kind_of(path)
         pairs += [path] if kind in PAIR_KINDS else []
-        inner = [file for file in sorted(path.rglob("*")) if file.is_file()]
-        records += [path] if kind is Kind.RECORDS and _are_records(inner) else []
+        records += [path] if kind is Kind.RECORDS and _are_records(_first_files(path)) else []
     return Found(records, pairs)
+
+
+def _subfolders(folder: Path) -> list[Path]:
+    """Return the folders in a folder, hidden ones and links left out."""
+    shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
+    return [path for path in shown if path.is_dir() and not path.is_symlink()]
+
+
+def _first_files(folder: Path) -> list[Path]:
+    """Return the first files below a folder."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return sorted(islice(files, TRIED))
 
 
 def write_first_configuration(
@@ -126,6 +137,7 @@ def _chosen(
     named: str | None, found: Sequence[Path], kinds: Sequence[Kind], role: str
 ) -> tuple[str | None, str]:
     """Return the input of a role, named or the only one found, and what is said of it."""
+    # Named, the only one found, none or several
     if named is not None:
         kind = kind_of(named)
         if kind not in kinds:

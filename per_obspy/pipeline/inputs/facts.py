@@ -61,3 +61,16 @@ def some(names: Sequence[str], count: int = 6) -> str:
     """
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(names[:count]) + more or "none"
+
+
+def unzipped(places: Sequence[tuple[float, float]]) -> Places:
+    """
+    Return longitudes and latitudes of places.
+
+    Examples
+    --------
+    >>> unzipped([(1.0, 2.0), (3.0, 4.0)])
+    ([1.0, 3.0], [2.0, 4.0])
+    """
+    longitudes = [longitude for longitude, _ in places]
+    return longitudes, [latitude for _, latitude in places]

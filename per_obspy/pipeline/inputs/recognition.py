@@ -129,6 +129,7 @@ def files_in(folder: Path) -> dict[Path, Kind]:
 
 def records_place(path: Path) -> tuple[Path, bool]:
     """Return the place of records and whether it is a workspace: a folder may hold only one."""
+    # A file, or the only file of a folder
     files = [path] if path.is_file() else []
     if path.is_dir():
         inside = sorted(path.iterdir())
@@ -256,6 +257,7 @@ def _text_kind(path: Path, head: bytes) -> Kind:
     header = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     names = [name.strip(" \"'").lower() for name in re.split(r"[,;\t]", header)]
     kind = _table_kind(names)
+    # Tables of stations have fewer names in common with pairs
     if kind is None and path.suffix.lower() == ".csv" and is_station_table(head):
         return Kind.STATIONS
     if kind is None and lines and lines[0].lstrip().startswith(("[", "{")) and _is_json(path):

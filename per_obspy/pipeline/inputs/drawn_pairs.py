@@ -52,6 +52,7 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
     if footprints is None:
         return {}
     require_extra("gis", "pyogrio", "pyproj", "shapely")
+    # The same layer and options give the same pairs
     key = _key(footprints)
     if earlier := earlier_status(folder / STATUS, key):
         return {name: earlier[name] for name in COUNTED}

@@ -8,11 +8,11 @@ import pytest
 
 from per_obspy.config import Run, checked
 from per_obspy.errors import CatalogError
-from per_obspy.pipeline.drawn_pairs import layer_files, write_drawn_pairs
+from per_obspy.pipeline.inputs.drawn_pairs import layer_files, write_drawn_pairs
 from per_obspy.pipeline.run import run
 from per_obspy.progress import silent
 
-from .small_run import InProcess
+from ..small_run import InProcess
 
 #: Width of a building and of the gap to its neighbour, degrees: about 11 m and 0.6 m.
 WIDTH, GAP = 1e-4, 5e-6
