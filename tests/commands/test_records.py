@@ -113,10 +113,10 @@ def test_the_identifier_of_an_earthquake_is_enough_for_records(server, tmp_path,
     changes += [f"records.fdsn.event_provider='{server.url}'", "pairs.simulated.count=10"]
     changes += ["screening.largest_distance=1e5", "screening.exact=false", "spectra.count=5"]
     options = [word for change in changes for word in ("--set", change)]
-    code, out, err = call("run", "HERE:xx1", *options, "-o", tmp_path / "out", "--json")
+    code, out, err = call("run", "USGS:xx1", *options, "-o", tmp_path / "out", "--json")
     assert code == 0, err
     assert json.loads(out)["counts"]["stations"] == 2
-    assert "records: HERE:xx1 (identifier of an earthquake)" in err
+    assert "records: USGS:xx1 (identifier of an earthquake)" in err
     assert (tmp_path / "out" / "fetched").is_dir()
     # its configuration runs without the network
     asked = len(server.requests)

@@ -89,6 +89,7 @@ def run_content(records: str | None, pairs: str | None, output: Path) -> dict[st
     output : Path
         Folder of the results.
     """
+    pairs = pairs and str(_one_table(pairs))
     content = dict[str, Any](name=_title(records, pairs), output=str(output.absolute()))
     if records is not None:
         content |= _records_content(records, output)

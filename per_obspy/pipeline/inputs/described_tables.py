@@ -33,8 +33,8 @@ def pair_table_facts(path: Path) -> Facts:
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
     # Sizes, what is derived instead, what is unknown and odd
-    touching = int((table["gap"] == 0.0).sum())
-    gap = ("gap", f"{span(table['gap'].tolist(), 'm')}; {touching} pairs touch")
+    touching = int(table["gap"].eq(0.0).sum())
+    gap = ("gap", f"{span(table['gap'], 'm')}; {touching} pairs touch")
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
     lines = [gap, *_range_lines(table), *_odd_lines(table, derived, unused)]
@@ -43,7 +43,7 @@ def pair_table_facts(path: Path) -> Facts:
     counted = {"rows": inventory.count, "usable": len(table), "touching": touching}
     values = {**counted, "derived": derived, "unknown": unused, "rejected": rejected}
     title = f"{_rows(inventory.count)}, {len(table)} usable, {len(rejected)} rejected"
-    return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
+    return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, not table.empty)
 
 
 def _rows(count: int) -> str:

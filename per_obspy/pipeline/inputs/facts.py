@@ -1,6 +1,6 @@
 """What is said of an input: a title, facts on a line each, and places for a map."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 Places = tuple[Sequence[float], Sequence[float]]
@@ -34,7 +34,7 @@ class Facts(NamedTuple):
     usable: bool = True
 
 
-def span(values: Sequence[float], unit: str = "") -> str:
+def span(values: Iterable[float], unit: str = "") -> str:
     """
     Return the range of numbers that are known.
 
