@@ -22,6 +22,9 @@ WIDTH, HEIGHT = 100, 24
 #: Characters of a path, and lines of a fact, that are shown.
 LONGEST_PATH, MOST_LINES = 48, 2
 
+#: Longest label of a fact: names of scenarios and keys may be longer.
+LONGEST_LABEL = 32
+
 #: Rejections that are printed without --all.
 FIRST = 3
 
@@ -115,12 +118,12 @@ def _with_place(found: "Facts", is_drawn: bool) -> list[tuple[str, str]]:
 
 def _wrapped(found: "Facts", label: str, text: str) -> list[str]:
     """Return a fact as lines below each other, the last of them shortened."""
-    width = max(len(known) for known, _ in [*found.lines, ("place", "")])
+    width = min(max(len(known) for known, _ in [*found.lines, ("place", "")]), LONGEST_LABEL)
     lines = textwrap.wrap(printable(text), WIDTH - width - 4, break_on_hyphens=False) or [""]
     # What is longer is cut in the last line
     if len(lines) > MOST_LINES:
         lines[MOST_LINES - 1 :] = [shortened(" ".join(lines[MOST_LINES - 1 :]), WIDTH - width - 4)]
-    labels = [label, *[""] * (len(lines) - 1)]
+    labels = [shortened(label, LONGEST_LABEL), *[""] * (len(lines) - 1)]
     return [f"  {one:<{width}}  {line}" for one, line in zip(labels, lines, strict=True)]
 
 

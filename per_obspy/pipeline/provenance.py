@@ -98,7 +98,7 @@ class RunSettings:
         text = commented(Run, effective_content(placed, self.folder), HEADING)
         # A file of that name that somebody else wrote is kept
         before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
-        if before is not None and not before.startswith(f"# {WRITTEN}"):
+        if before and not before.startswith(f"# {WRITTEN}"):
             raise CatalogError(
                 str(path), "is not written by a run and would be lost: name another folder with -o"
             )

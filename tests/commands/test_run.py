@@ -41,10 +41,10 @@ def test_records_and_pairs_are_a_run(records, tmp_path, monkeypatch, call):
     ("arguments", "message"),
     [
         (["RECORDS"], "records without pairs: name a pair table or footprints too"),
-        (["RECORDS", "absent.csv"], "absent.csv: no such file or folder"),
+        (["RECORDS", "absent.csv"], "absent.csv: no such folder or file"),
         (["RECORDS", "town.csv", "--set", "highpas=1"], "did you mean processing.highpass?"),
         (["RECORDS", "town.csv", "--set", "spectra.count=1"], "spectra.count: "),
-        (["absent"], "absent: no such file or folder"),
+        (["absent"], "absent: no such folder or file"),
         (["absent.toml"], "absent.toml: cannot be read: No such file or directory"),
     ],
 )

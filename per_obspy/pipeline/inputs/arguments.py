@@ -72,8 +72,9 @@ def requested_run(
     pairs = pairs and str(_one_table(pairs))
     folder = (output or _default_output(records, pairs)).absolute()
     content = run_content(records, pairs, folder)
-    line = f"{_said('records', records)}; {_said('pairs', pairs)}; results: {_shown(folder)}"
     settings = checked(Run, merged(content, changed))
+    results = _shown(output or settings.output)
+    line = f"{_said('records', records)}; {_said('pairs', pairs)}; results: {results}"
     _require_apart(settings)
     return Request(settings, line)
 
@@ -112,11 +113,10 @@ def _configuration(argument: str) -> Path | None:
             names = ", ".join(file.name for file in found)
             raise CatalogError(argument, f"holds several configurations, name one: {names}")
         return found[0] if found else None
-    is_other = path.is_file() and kind_of(path) not in (Kind.CONFIGURATION, Kind.SCENARIO)
-    # What is wrong with a file of that name is said where it is read
-    if path.suffix.lower() == ".toml" or (path.is_file() and not is_other):
-        return path
-    return None
+    if path.is_file():
+        return path if kind_of(path) is Kind.CONFIGURATION else None
+    # That it is missing is said where it is read
+    return path if path.suffix.lower() == ".toml" else None
 
 
 def _roles(
@@ -252,7 +252,7 @@ def _stem(argument: str) -> str:
 def _said(role: str, argument: str | None) -> str:
     """Return how an argument was understood."""
     if argument is None:
-        return f"{role}: by --set"
+        return f"{role}: those of the scenario or of --set"
     kind, path = kind_of(argument), Path(argument)
     if kind is Kind.RECORDS:
         return f"{role}: {argument} ({'folder' if path.is_dir() else 'file'})"

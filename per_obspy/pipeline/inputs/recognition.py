@@ -117,14 +117,22 @@ def kind_of(argument: str | Path) -> Kind:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
     if looks_like_event_id(str(argument)):
         return Kind.EVENT_ID
-    raise CatalogError(str(argument), "no such file or folder")
+    raise CatalogError(str(argument), "no such folder or file")
 
 
 def files_in(folder: Path) -> dict[Path, Kind]:
     """Return the files of a folder, not of its subfolders, with their kinds; no hidden ones."""
     shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
     files = [path for path in shown if path.is_file() and path.suffix.lower() not in SIDECARS]
-    return {path: _file_kind(path) for path in files if ".rejected" not in path.suffixes}
+    return {path: _readable_kind(path) for path in files if ".rejected" not in path.suffixes}
+
+
+def _readable_kind(path: Path) -> Kind:
+    """Return the kind of a file; one that cannot be read counts as a record, which is rejected."""
+    try:
+        return _file_kind(path)
+    except OSError:
+        return Kind.RECORDS
 
 
 def records_place(path: Path) -> tuple[Path, bool]:
@@ -232,12 +240,13 @@ def _zip_kind(path: Path) -> Kind:
 
 def _toml_kind(path: Path, head: bytes) -> Kind | None:
     """Return the kind of a TOML file, None if it is none."""
-    if path.suffix.lower() != ".toml" and (b"=" not in head or path.stat().st_size > LARGEST_TOML):
-        return None
+    is_named = path.suffix.lower() == ".toml"
+    if path.stat().st_size > LARGEST_TOML or (not is_named and b"=" not in head):
+        return Kind.CONFIGURATION if is_named else None
     try:
         content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError):
-        return Kind.CONFIGURATION if path.suffix.lower() == ".toml" else None
+        return Kind.CONFIGURATION if is_named else None
     # By the keys that other kinds do not have
     if isinstance(content.get("spectrum"), str):
         return Kind.DESIGN
@@ -247,7 +256,7 @@ def _toml_kind(path: Path, head: bytes) -> Kind | None:
         return Kind.SCENARIO
     if isinstance(content.get("inventory"), list):
         return Kind.CATALOG
-    is_run = path.suffix.lower() == ".toml" or content.keys() & {"records", "simulation"}
+    is_run = is_named or content.keys() & {"records", "simulation"}
     return Kind.CONFIGURATION if is_run else None
 
 

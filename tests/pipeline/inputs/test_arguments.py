@@ -71,6 +71,8 @@ def test_other_sources_of_motion(desk):
     (desk / "grid.xml").write_text("<shakemap_grid>")
     settings = requested_run("scenario.toml", "pairs.csv").configuration
     assert (settings.simulation, settings.records) == (desk / "scenario.toml", None)
+    # its own pairs are those of the scenario
+    assert requested_run("scenario.toml").configuration.pairs is None
     settings = requested_run("grid.xml", "pairs.csv").configuration
     assert settings.records.shakemap == desk / "grid.xml"
     settings = requested_run("GEONET:2016p858000", "pairs.csv", desk / "out").configuration
@@ -101,12 +103,13 @@ def test_a_configuration_alone_is_taken_as_before(desk):
         (("pairs.csv",), "pairs.csv: pairs without records: name a folder, archive or file of"),
         (("records", "records"), "both are records, no pair table or footprints"),
         (("pairs.csv", "town.gpkg"), "both are pairs, no folder, archive or file of records"),
-        (("records", "absent.csv"), "absent.csv: no such file or folder"),
+        (("records", "absent.csv"), "absent.csv: no such folder or file"),
         (("records", "many"), "many: holds several pair tables or layers, name one: a.csv, b.csv"),
         (("twice",), "twice: holds several configurations, name one: a.toml, b.toml"),
         (("twice/a.toml", "pairs.csv"), "a configuration names its records and pairs itself"),
         (("records", "spectrum.csv"), "design spectrum, neither records nor pairs"),
         (("records/event.xml", "pairs.csv"), "--set records.event=FILE"),
+        (("design.toml",), "configuration of a screening by a spectrum, neither records nor pairs"),
         (("records", "pairs.csv", "records/out"), "lies inside the folder of the records"),
     ],
 )
@@ -117,6 +120,7 @@ def test_what_is_missing_is_one_line(desk, arguments, message):
         (desk / "many" / f"{name}.csv").write_text(PAIRS)
         (desk / "twice" / f"{name}.toml").write_text(RUN)
     (desk / "spectrum.csv").write_text("period,damping,sd\n")
+    (desk / "design.toml").write_text('spectrum = "spectrum.csv"\npairs = "p"\noutput = "o"\n')
     (desk / "records" / "event.xml").write_text("<q:quakeml>")
     output = desk / arguments[2] if len(arguments) == 3 else None
     with pytest.raises(CatalogError) as caught:

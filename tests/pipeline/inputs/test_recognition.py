@@ -91,6 +91,14 @@ def test_a_folder_of_one_table_stands_for_it_and_notes_are_no_records(tmp_path):
     assert kind_of(tmp_path) is Kind.RECORDS
 
 
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="all files can be read here")
+def test_a_file_that_cannot_be_read_does_not_hide_the_others(tmp_path):
+    (tmp_path / "pairs.csv").write_text(PAIRS)
+    (tmp_path / "secret.txt").write_text("x")
+    (tmp_path / "secret.txt").chmod(0)
+    assert kind_of(tmp_path) is Kind.PAIRS
+
+
 def test_a_folder_of_results(tmp_path):
     (tmp_path / "run.json").write_text("{}")
     assert kind_of(tmp_path) is Kind.RESULT
@@ -105,7 +113,7 @@ def test_an_identifier_is_one_only_where_there_is_no_path(tmp_path, monkeypatch)
     # would catch a service that is asked for a folder whose name is mistyped
     for path in ("records2019", "recods", "pairs.csv", "data/ci38457511", ""):
         if path:
-            with pytest.raises(CatalogError, match="no such file or folder"):
+            with pytest.raises(CatalogError, match="no such folder or file"):
                 kind_of(path)
 
 
