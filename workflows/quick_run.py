@@ -29,7 +29,10 @@ TOWN = np.array([-117.67, 35.625])
 
 #: What is typed, and what is said of it.
 SESSION = (
-    ("ls buildings; ls records | head -5", "Two folders: what a survey drew, and what an agency sent."),
+    (
+        "ls buildings; ls records | head -5",
+        "Two folders: what a survey drew, and what an agency sent.",
+    ),
     ("per-obspy info records", "What are they?"),
     ("per-obspy info buildings", ""),
     ("per-obspy run records buildings -o out", "One command to the table."),
@@ -48,10 +51,11 @@ SESSION = (
 
 HEAD = """# A quick run
 
-From two folders to a table, as it was typed and printed; `python workflows/quick_run.py` records it again. The records
-are real (Ridgecrest 2019, M7.1, eleven stations). The outlines are a quarter of San José, **moved** to Ridgecrest so that
-records and buildings meet: the numbers are said of no town. Lines that count stations are shortened, and long lines end
-with `…`. Kernels were compiled before; the very first run of an installation takes one to two minutes more.
+From two folders to a table, as it was typed and printed; `python workflows/quick_run.py` records it
+again. The records are real (Ridgecrest 2019, M7.1, eleven stations). The outlines are a quarter of
+San José, **moved** to Ridgecrest so that records and buildings meet: the numbers are said of no
+town. Lines that count stations are shortened, and long lines end with `…`. Kernels were compiled
+before; the very first run of an installation takes one to two minutes more.
 
 """
 

@@ -37,9 +37,9 @@ class RunSettings:
 
     Parameters
     ----------
-    configuration : Path or Run
+    configuration : str, Path or Run
         TOML file, or settings that no file holds; their paths are seen from the output folder.
-    output : Path, optional
+    output : str or Path, optional
         Folder of the results, instead of the configured one.
 
     Raises
@@ -50,13 +50,14 @@ class RunSettings:
         If an optional library that it needs is not installed.
     """
 
-    def __init__(self, configuration: Path | Run, output: Path | None) -> None:
-        self.file = configuration.resolve() if isinstance(configuration, Path) else None
-        self.settings = (
-            configuration if isinstance(configuration, Run) else load(configuration.resolve(), Run)
-        )
+    def __init__(self, configuration: str | Path | Run, output: str | Path | None) -> None:
+        if isinstance(configuration, Run):
+            self.file, self.settings = None, configuration
+        else:
+            self.file = Path(configuration).resolve()
+            self.settings = load(self.file, Run)
         require_extras(self.settings)
-        self.folder = (output or self.settings.output).resolve()
+        self.folder = Path(output or self.settings.output).resolve()
         self.base = self.file.parent if self.file else self.folder
 
     def head(self, fetched: Fetched | None, hashes: Mapping[Path, str]) -> dict[str, Any]:

@@ -58,8 +58,8 @@ UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
 
 
 def run(
-    configuration: Path | Run,
-    output: Path | None = None,
+    configuration: str | Path | Run,
+    output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Result:
@@ -68,9 +68,9 @@ def run(
 
     Parameters
     ----------
-    configuration : Path or Run
+    configuration : str, Path or Run
         TOML file, or the settings themselves, see :class:`per_obspy.config.Run`.
-    output : Path, optional
+    output : str or Path, optional
         Folder of the results, instead of the configured one.
     executor : Executor, optional
         Where stations are processed; processes of this machine if not given.

@@ -104,6 +104,7 @@ def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[
     # The earthquake that was screened, and what was left out
     groups = [one for one in record.get("earthquakes") or [] if one.get("screened")]
     lines += [("earthquake", f"{one['start']}, {one['stations']} stations") for one in groups]
+    # Of footprints before the run, of everything else in it
     drawn = record.get("drawn") or {}
     if drawn.get("rejected"):
         lines.append(("footprints", f"{drawn['rejected']} rejected: pairs.rejected.csv"))

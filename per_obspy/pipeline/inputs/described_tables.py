@@ -14,7 +14,7 @@ from per_obspy.inventory.table_checks import derived_counts, suspicions, unused_
 from per_obspy.inventory.table_columns import numbers_in
 from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
 from per_obspy.pipeline.inputs.recognition import Kind
-from per_obspy.screening.ranking import STATES
+from per_obspy.screening.ranking import EVERY_STATE, STATES
 from per_obspy.tables.parts import parquet_rows
 
 #: Rows of a table that are looked at.
@@ -34,7 +34,8 @@ def pair_table_facts(path: Path) -> Facts:
     rejected = [one._asdict() for one in table.attrs["rejected"]]
     # Sizes, what is derived instead, what is unknown and odd
     touching = int(table["gap"].eq(0.0).sum())
-    gap = ("gap", f"{span(table['gap'], 'm')}; {touching} pairs touch")
+    unknown = int(table["gap"].isna().sum())
+    gap = ("gap", f"{span(table['gap'], 'm')}; {touching} pairs touch, {unknown} unknown")
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
     lines = [gap, *_range_lines(table), *_odd_lines(table, derived, unused)]
@@ -113,9 +114,10 @@ def risk_table_facts(path: Path) -> Facts:
     else:
         table = parquet_rows([path], names).head(MOST_ROWS).to_pandas()
     # States, and the first rows, which are the worst
-    states = {state: int((table["state"] == state).sum()) for state in STATES}
+    states = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
     worst = [str(name) for name in table["pair_id"].head(5)]
-    counted = ", ".join(f"{count} {state}" for state, count in states.items())
+    shown = [one for one in states.items() if one[1] or one[0] in STATES]
+    counted = ", ".join(f"{count} {state}" for state, count in shown)
     title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
     lines = [("pounding", counted), ("worst pairs", some(worst))]
     values = {"pairs": len(table), **states}

@@ -65,7 +65,7 @@ def test_a_pair_table(tmp_path):
     (tmp_path / "pairs.csv").write_text(HEADER + ROWS)
     found, lines = _facts(tmp_path / "pairs.csv")
     assert found.title == "3 rows, 2 usable, 1 rejected"
-    assert lines["gap"] == "0 to 0.05 m; 1 pairs touch"
+    assert lines["gap"] == "0 to 0.05 m; 1 pairs touch, 0 unknown"
     assert lines["height"] == "10 to 30 m"
     assert "period_1 (2)" in lines["derived"]
     assert lines["unknown"] == "ward: carried along unchanged"
