@@ -33,12 +33,12 @@ def pair_table_facts(path: Path) -> Facts:
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
     # Sizes, what is derived instead, what is unknown and odd
-    touching = int(table["gap"].eq(0.0).sum())
-    unknown = int(table["gap"].isna().sum())
-    gap = ("gap", f"{span(table['gap'], 'm')}; {touching} pairs touch, {unknown} unknown")
+    gaps = table["gap"]
+    touching, unknown = int(gaps.eq(0.0).sum()), int(gaps.isna().sum())
+    gap = f"{span(gaps, 'm')}; {touching} pairs touch, {unknown} unknown"
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
-    lines = [gap, *_range_lines(table), *_odd_lines(table, derived, unused)]
+    lines = [("gap", gap), *_range_lines(table), *_odd_lines(table, derived, unused)]
     lines += _rejected_lines(rejected, "line", "row")
     # The same for machines
     counted = {"rows": inventory.count, "usable": len(table), "touching": touching}
@@ -115,13 +115,17 @@ def risk_table_facts(path: Path) -> Facts:
         table = parquet_rows([path], names).head(MOST_ROWS).to_pandas()
     # States, and the first rows, which are the worst
     states = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
-    worst = [str(name) for name in table["pair_id"].head(5)]
-    shown = [one for one in states.items() if one[1] or one[0] in STATES]
-    counted = ", ".join(f"{count} {state}" for state, count in shown)
+    worst = some([str(name) for name in table["pair_id"]], 5)
+    lines = [("pounding", _state_text(states)), ("worst pairs", worst)]
     title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
-    lines = [("pounding", counted), ("worst pairs", some(worst))]
     values = {"pairs": len(table), **states}
     return Facts(Kind.RISK, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
+
+
+def _state_text(counts: Mapping[str, int]) -> str:
+    """Return the numbers of pairs by state, of an unknown one only where there are such pairs."""
+    shown = [one for one in counts.items() if one[1] or one[0] in STATES]
+    return ", ".join(f"{count} {state}" for state, count in shown)
 
 
 def _centres(table: pd.DataFrame) -> Places:

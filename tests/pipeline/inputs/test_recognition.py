@@ -4,13 +4,14 @@ import gzip
 import os
 import shutil
 import zipfile
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
-from per_obspy.pipeline.inputs.recognition import Kind, kind_of, records_place
+from per_obspy.pipeline.inputs.recognition import Kind, files_in, kind_of, records_place
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
 PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
@@ -91,12 +92,20 @@ def test_a_folder_of_one_table_stands_for_it_and_notes_are_no_records(tmp_path):
     assert kind_of(tmp_path) is Kind.RECORDS
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="all files can be read here")
-def test_a_file_that_cannot_be_read_does_not_hide_the_others(tmp_path):
+def test_a_file_that_cannot_be_read_does_not_hide_the_others(tmp_path, monkeypatch):
     (tmp_path / "pairs.csv").write_text(PAIRS)
     (tmp_path / "secret.txt").write_text("x")
-    (tmp_path / "secret.txt").chmod(0)
-    assert kind_of(tmp_path) is Kind.PAIRS
+    opened = Path.open
+
+    def refuse(path, *arguments, **options):
+        if path.name == "secret.txt":
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", refuse)
+    assert set(files_in(tmp_path).values()) == {Kind.PAIRS, Kind.RECORDS}
+    with pytest.raises(CatalogError, match=r"secret\.txt: cannot be read: Permission denied"):
+        kind_of(tmp_path / "secret.txt")
 
 
 def test_a_folder_of_results(tmp_path):
