@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, stop_if_nothing
+from per_obspy.commands.endings import AsJson, named_path, stop_if_nothing
 from per_obspy.commands.printing import print_table
 from per_obspy.errors import printable, shortened
 
@@ -66,6 +66,7 @@ def info(
     """
     from per_obspy.pipeline.inputs.description import described
 
+    named_path(path)  # an empty name would be the folder of the shell
     found = described(path, stationxml)
     if as_json:
         print(json.dumps({"kind": found.kind, **found.values}))

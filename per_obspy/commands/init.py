@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from per_obspy.commands.endings import output_option
+from per_obspy.commands.endings import named_path, output_option
 from per_obspy.errors import printable
 
 
@@ -29,6 +29,10 @@ def init(
     """
     from per_obspy.pipeline.inputs.discovery import write_first_configuration
 
+    # An empty name would be the folder of the shell
+    for name in (records, pairs):
+        if name is not None:
+            named_path(name)
     lines = write_first_configuration(output, records, pairs, force)
     for line in (*lines, f"{output} is written; next: per-obspy run {output}"):
         print(printable(line))

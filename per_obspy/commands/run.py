@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, Strict, output_option, print_and_end, stop_if_nothing
+from per_obspy.commands.endings import (
+    AsJson,
+    Strict,
+    named_path,
+    output_option,
+    print_and_end,
+    stop_if_nothing,
+)
 from per_obspy.commands.printing import print_table, shown_progress, state_texts
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
@@ -91,6 +98,9 @@ def run(
     from per_obspy.pipeline.inputs.arguments import requested_run
     from per_obspy.pipeline.run import run as whole_run
 
+    # An empty name would be the folder of the shell
+    for name in (first, first if second is None else second):
+        named_path(name)
     asked = requested_run(first, second, output, changes or ())
     if asked.line:
         print(printable(asked.line), file=sys.stderr)

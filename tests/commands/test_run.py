@@ -59,6 +59,21 @@ def test_wrong_arguments_are_one_line(records, tmp_path, monkeypatch, call, argu
     assert [path.name for path in tmp_path.iterdir()] == ["town.csv"]
 
 
+@pytest.mark.parametrize(
+    "command", [["run", ""], ["run", "RECORDS", ""], ["info", ""], ["init", ""]]
+)
+def test_an_empty_argument_is_not_the_folder_of_the_shell(
+    records, tmp_path, monkeypatch, call, command
+):
+    # would catch a run of whatever lies here, from a variable that was never set
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.toml").write_text('name = "x"\noutput = "out"\nsimulation = "s.toml"\n')
+    code, _, err = call(*(records if one == "RECORDS" else one for one in command))
+    assert code == 2
+    assert "the path is empty" in " ".join(err.replace("│", " ").split())
+    assert [path.name for path in tmp_path.iterdir()] == ["run.toml"]
+
+
 def test_help_says_how_arguments_are_told_apart(call):
     code, out, _ = call("run", "--help")
     assert code == 0

@@ -149,9 +149,8 @@ def _require_both(
     example = "per-obspy run RECORDS PAIRS"
     # The same twice, or one alone
     if len(records) > 1 or len(pairs) > 1:
-        both = "records" if records else "pairs"
-        missing = "pair table or footprints" if records else "folder, archive or file of records"
-        raise CatalogError(" and ".join(given), f"both are {both}, no {missing}: {example}")
+        missing = "records" if pairs else "a pair table or footprints of buildings"
+        raise CatalogError(" and ".join(given), f"neither is {missing}: {example}")
     if not pairs and "pairs" not in changed and kinds[given[0]] is not Kind.SCENARIO:
         reason = "records without pairs: name a pair table or footprints too"
         raise CatalogError(given[0], f"{reason}, {example}, or --set pairs.simulated.count=100")

@@ -33,18 +33,21 @@ def pair_table_facts(path: Path) -> Facts:
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
     # Sizes, what is derived instead, what is unknown and odd
-    gaps = table["gap"]
-    touching, unknown = int(gaps.eq(0.0).sum()), int(gaps.isna().sum())
-    gap = f"{span(gaps, 'm')}; {touching} pairs touch, {unknown} unknown"
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
-    lines = [("gap", gap), *_range_lines(table), *_odd_lines(table, derived, unused)]
+    lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(table, derived, unused)]
     lines += _rejected_lines(rejected, "line", "row")
     # The same for machines
-    counted = {"rows": inventory.count, "usable": len(table), "touching": touching}
+    counted = {"rows": inventory.count, "usable": len(table)}
     values = {**counted, "derived": derived, "unknown": unused, "rejected": rejected}
     title = f"{_rows(inventory.count)}, {len(table)} usable, {len(rejected)} rejected"
     return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, not table.empty)
+
+
+def _gap_lines(gaps: pd.Series) -> list[tuple[str, str]]:
+    """Return the range of the gaps, and how many pairs touch or have an unknown one."""
+    touching, unknown = int(gaps.eq(0.0).sum()), int(gaps.isna().sum())
+    return [("gap", f"{span(gaps, 'm')}; {touching} pairs touch, {unknown} unknown")]
 
 
 def _rows(count: int) -> str:

@@ -101,8 +101,8 @@ def test_a_configuration_alone_is_taken_as_before(desk):
     [
         (("records",), "records: records without pairs: name a pair table or footprints too"),
         (("pairs.csv",), "pairs.csv: pairs without records: name a folder, archive or file of"),
-        (("records", "records"), "both are records, no pair table or footprints"),
-        (("pairs.csv", "town.gpkg"), "both are pairs, no folder, archive or file of records"),
+        (("records", "records"), "neither is a pair table or footprints of buildings"),
+        (("pairs.csv", "town.gpkg"), "neither is records: per-obspy run RECORDS PAIRS"),
         (("records", "absent.csv"), "absent.csv: no such folder or file"),
         (("records", "many"), "many: holds several pair tables or layers, name one: a.csv, b.csv"),
         (("twice",), "twice: holds several configurations, name one: a.toml, b.toml"),
