@@ -7,7 +7,6 @@ from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
-from per_obspy.records.fdsn.providers import ROUTERS
 
 
 class FetchResult(NamedTuple):
@@ -57,24 +56,3 @@ def fetch_configured(
     fetched = fetch(records.fdsn, records.event, progress, again)
     found = fetched_stations(fetched)
     return FetchResult(fetched.folder, list(found.stations), found.rejected)
-
-
-def event_records(identifier: str, cache: Path) -> dict[str, object]:
-    """
-    Return the section ``[records.fdsn]`` for the identifier of an earthquake.
-
-    Parameters
-    ----------
-    identifier : str
-        Of the event service of the USGS, or ``PROVIDER:IDENTIFIER``.
-    cache : Path
-        Folder that keeps what is fetched.
-
-    Examples
-    --------
-    >>> event_records("GEONET:2016p858000", Path("fetched"))["event_provider"]
-    'GEONET'
-    """
-    provider, colon, event = identifier.rpartition(":")
-    known = {"event_id": event, "cache": str(cache), "providers": list(ROUTERS)}
-    return {**known, **({"event_provider": provider} if colon else {})}

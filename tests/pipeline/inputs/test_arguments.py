@@ -1,4 +1,8 @@
-"""What ``per-obspy run A B`` is taken for, and what is said where something is missing."""
+"""
+What ``per-obspy run A B`` is taken for, and what is said where something is missing.
+
+Covers ``per_obspy.pipeline.inputs.event_section``.
+"""
 
 import pytest
 
