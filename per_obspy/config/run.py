@@ -29,7 +29,12 @@ class Footprints(Section):
     gap_std: float | None = Field(
         None,
         ge=0,
-        description="m, standard deviation of drawn gaps; not given: that of per-obspy pairs",
+        le=1,
+        description="m, standard deviation of drawn gaps; not given: assumed and marked",
+    )
+    columns: dict[str, str] = Field(
+        default_factory=dict,
+        description='quantity of a building -> column of the layer, such as { height = "altura" }',
     )
 
 

@@ -23,7 +23,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.inputs.drawn_pairs import PAIRS, REJECTED, write_drawn_pairs
+from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs
 from per_obspy.pipeline.provenance import RunSettings
@@ -316,7 +316,7 @@ def _intermediate_hashes(
     """Return the hashes of the files of the first stage, which other commands or users read."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
-    made = ("simulated.json", "pairs.csv", PAIRS, REJECTED)
+    made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)
     files += [folder / name for name in made]
     # What was hashed on the way is not opened again
     hashes = dict(known)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,9 @@ from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
 from per_obspy.pipeline.inputs.recognition import Kind
 from per_obspy.screening.ranking import EVERY_STATE, STATES
 from per_obspy.tables.parts import parquet_rows
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 #: Rows of a table that are looked at.
 MOST_ROWS = 100_000
@@ -90,8 +93,6 @@ def _odd_lines(
 def footprint_facts(path: Path) -> Facts:
     """Return the facts of a layer of footprints."""
     require_extra("gis", "pyogrio", "pyproj", "shapely")
-    import shapely
-
     from per_obspy.inventory.footprints.layers import read_layer
 
     layer = read_layer(path)
@@ -101,11 +102,23 @@ def footprint_facts(path: Path) -> Facts:
     lines = [("columns", some(counted, 12))]
     rejected = [one._asdict() for one in layer.rejected]
     lines += _rejected_lines(rejected, "", "name")
-    # Centres for the map
-    east, north = shapely.get_coordinates(shapely.centroid(layer.polygons)).T.tolist()
+    east, north = _outline_centres(layer.outlines)
     values = {"outlines": len(east), "columns": given, "rejected": rejected}
     title = f"{len(east)} outlines, {len(rejected)} rejected"
     return Facts(Kind.FOOTPRINTS, title, lines, {"": (east, north)}, values, usable=len(east) > 0)
+
+
+def _outline_centres(outlines: "pa.Array") -> Places:
+    """Return the centres of outlines, block by block: as geometries they are large."""
+    import shapely
+
+    east, north = list[float](), list[float]()
+    for start in range(0, len(outlines), MOST_ROWS):
+        block = outlines[start : start + MOST_ROWS].to_numpy(zero_copy_only=False)
+        centres = shapely.get_coordinates(shapely.centroid(shapely.from_wkb(block)))
+        east += centres[:, 0].tolist()
+        north += centres[:, 1].tolist()
+    return east, north
 
 
 def risk_table_facts(path: Path) -> Facts:

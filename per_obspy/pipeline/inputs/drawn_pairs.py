@@ -16,6 +16,9 @@ from per_obspy.tables.table_files import write_rejected
 #: Table of the pairs, its rejections, and the status file by which they are kept.
 PAIRS, REJECTED, STATUS = "pairs.parquet", "pairs.rejected.csv", "pairs.json"
 
+#: Buildings with usable outlines, to which the pairs refer.
+BUILDINGS = "pairs.buildings.parquet"
+
 #: Names of the counts of a search.
 COUNTED = ("pairs", "rejected")
 
@@ -56,17 +59,19 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
     key = _key(footprints)
     if earlier := earlier_status(folder / STATUS, key):
         return {name: earlier[name] for name in COUNTED}
-    from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
+    from per_obspy.inventory.footprints.buildings import write_buildings
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
 
     progress("finding pairs", 0, 1)
     remove_file(folder / STATUS)
-    table = pairs_from_footprints(footprints.file, **_options(footprints))
+    table, buildings = find_footprint_pairs(footprints.file, **_options(footprints))
     rejected = table.attrs["rejected"]
     write_pairs(table, folder / PAIRS)
+    write_buildings(buildings, folder / BUILDINGS)
     write_rejected(rejected, folder / REJECTED)
     # Written last: a killed search is done again
     counts = dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
-    hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED)}
+    hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED, BUILDINGS)}
     write_status(folder / STATUS, key, hashes, counts)
     progress("finding pairs", 1, 1)
     return counts

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from per_obspy.records.fdsn.providers import ROUTERS
+from per_obspy.pipeline.fetch import CHANNELS
+from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
 
 
 def event_section(identifier: str, cache: Path) -> dict[str, object]:
@@ -12,7 +13,7 @@ def event_section(identifier: str, cache: Path) -> dict[str, object]:
     Parameters
     ----------
     identifier : str
-        Of the event service of the USGS, or ``PROVIDER:IDENTIFIER``.
+        As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it.
     cache : Path
         Folder that keeps what is fetched.
 
@@ -21,6 +22,11 @@ def event_section(identifier: str, cache: Path) -> dict[str, object]:
     >>> event_section("GEONET:2016p858000", Path("fetched"))["event_provider"]
     'GEONET'
     """
-    provider, colon, event = identifier.rpartition(":")
-    section = {"event_id": event, "cache": str(cache), "providers": list(ROUTERS)}
-    return {**section, **({"event_provider": provider} if colon else {})}
+    provider, event = event_of(identifier)
+    return {
+        "event_id": event,
+        "event_provider": provider,
+        "providers": list(RECORDS_OF.get(provider, OTHERS)),
+        "channels": list(CHANNELS),
+        "cache": str(cache),
+    }

@@ -46,13 +46,6 @@ HEAD, LARGEST_TOML = 8192, 2**20
 #: First bytes of HDF5, as workspaces of gmprocess and netCDF files are.
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
-#: Identifier of an event: after the name of a provider, or in the form of the USGS (us7000abcd),
-#: of GeoNet (2016p858000), of the EMSC (20230206_0000008) or of digits alone (INGV).
-_EVENT_ID = re.compile(
-    r"[A-Za-z][\w-]*:[\w.-]+|(?:[a-z]{2,3}|official|iscgem)\d\w{5,}|\d{4}[a-z]\d{6}|\d{8}_\d{7}"
-    r"|\d{5,}"
-)
-
 #: Beginnings of files.
 _MAGIC = {
     b"SQLite format 3": Kind.FOOTPRINTS,
@@ -78,22 +71,11 @@ _SUFFIXES = {".csv": Kind.PAIRS, ".tsv": Kind.PAIRS, ".xlsx": Kind.PAIRS, ".pbf"
 #: Columns of a table of footprints, and of a risk table.
 _GEOMETRY, _RISK = {"geometry", "wkt", "wkb"}, {"pair_id", "state", "rank", "probability"}
 
+#: Columns of a list of buildings that has one place per row.
+_EAST, _NORTH = {"longitude", "lon", "long", "lng"}, {"latitude", "lat"}
+
 #: Files that belong to others: parts of a Shapefile, and what this package leaves beside tables.
 SIDECARS = (".dbf", ".shx", ".prj", ".cpg", ".sbn", ".sbx", ".qix", ".qmd")
-
-
-def looks_like_event_id(text: str) -> bool:
-    """
-    Return whether an argument that is no path looks like the identifier of an earthquake.
-
-    Examples
-    --------
-    >>> looks_like_event_id("us7000abcd"), looks_like_event_id("GEONET:2016p858000")
-    (True, True)
-    >>> looks_like_event_id("pairs.csv"), looks_like_event_id("records2019")
-    (False, False)
-    """
-    return _EVENT_ID.fullmatch(text) is not None
 
 
 def kind_of(argument: str | Path) -> Kind:
@@ -115,7 +97,9 @@ def kind_of(argument: str | Path) -> Kind:
             return _file_kind(path)
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
-    if looks_like_event_id(str(argument)):
+    from per_obspy.records.fdsn.event_ids import is_event_id
+
+    if is_event_id(str(argument)):
         return Kind.EVENT_ID
     raise CatalogError(str(argument), "no such folder or file")
 
@@ -266,9 +250,11 @@ def _text_kind(path: Path, head: bytes) -> Kind:
     header = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     names = [name.strip(" \"'").lower() for name in re.split(r"[,;\t]", header)]
     kind = _table_kind(names)
-    # Tables of stations have fewer names in common with pairs
+    # Tables of stations and lists of buildings have fewer names in common with pairs
     if kind is None and path.suffix.lower() == ".csv" and is_station_table(head):
         return Kind.STATIONS
+    if kind is None and set(names) & _EAST and set(names) & _NORTH:
+        return Kind.FOOTPRINTS
     if kind is None and lines and lines[0].lstrip().startswith(("[", "{")) and _is_json(path):
         return Kind.FOOTPRINTS
     return kind or _SUFFIXES.get(path.suffix.lower(), Kind.RECORDS)

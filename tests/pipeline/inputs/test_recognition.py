@@ -33,6 +33,7 @@ TEXTS = {
     ("# design\nperiod,damping,sd\n0.1,0.05,0.01\n", ".csv"): Kind.SPECTRUM,
     ("station,latitude,longitude\nA,1,2\n", ".csv"): Kind.STATIONS,
     ("latitude,longitude,area_in_meters,confidence,geometry\n", ".csv"): Kind.FOOTPRINTS,
+    ("id,Longitude,Latitude,NumberOfStories\n", ".csv"): Kind.FOOTPRINTS,
     ('{"type": "FeatureCollection", "features": []}', ".geojson"): Kind.FOOTPRINTS,
     ('<?xml version="1.0"?><FDSNStationXML>', ".xml"): Kind.STATIONS,
     ('<?xml version="1.0"?><q:quakeml>', ".xml"): Kind.EVENT,
@@ -115,7 +116,12 @@ def test_a_folder_of_results(tmp_path):
 
 def test_an_identifier_is_one_only_where_there_is_no_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for identifier in ("us7000abcd", "GEONET:2016p858000", "EMSC:20230206_0000008", "31234567"):
+    for identifier in (
+        "us7000abcd",
+        "GEONET:2016p858000",
+        "EMSC:20230206_0000008",
+        "ingv:31234567",
+    ):
         assert kind_of(identifier) is Kind.EVENT_ID
     (tmp_path / "us7000abcd").mkdir()
     assert kind_of("us7000abcd") is Kind.RECORDS
