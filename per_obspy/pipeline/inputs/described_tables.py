@@ -95,6 +95,7 @@ def footprint_facts(path: Path) -> Facts:
     require_extra("gis", "pyogrio", "pyproj", "shapely")
     from per_obspy.inventory.footprints.layers import read_layer
 
+    # Everything in the file, as a search of pairs reads it
     layer = read_layer(path)
     # How many buildings have a value under each of the names
     given = {str(name): int(values.notna().sum()) for name, values in layer.attributes.items()}
@@ -112,6 +113,7 @@ def _outline_centres(outlines: "pa.Array") -> Places:
     """Return the centres of outlines, block by block: as geometries they are large."""
     import shapely
 
+    # As lists, which a map and JSON take
     east, north = list[float](), list[float]()
     for start in range(0, len(outlines), MOST_ROWS):
         block = outlines[start : start + MOST_ROWS].to_numpy(zero_copy_only=False)
