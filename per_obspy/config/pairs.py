@@ -31,10 +31,33 @@ class TableForm(Section):
     )
 
 
+class Footprints(Section):
+    """Outlines of buildings, of which neighbours are the pairs."""
+
+    file: RelativePath = Field(
+        description="layer of polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile, FlatGeobuf"
+    )
+    distance: float = Field(3.0, ge=0.001, le=10.0, description="m, largest gap of a pair")
+    layer: str | None = Field(None, description="name of the layer, for files that have several")
+    gap_std: float | None = Field(
+        None,
+        ge=0,
+        le=1,
+        description="m, standard deviation of drawn gaps; not given: assumed and marked",
+    )
+    columns: dict[str, str] = Field(
+        default_factory=dict,
+        description='quantity of a building -> column of the layer, such as { height = "altura" }',
+    )
+
+
 class Pairs(TableForm):
-    """Source of the building pairs: a table, stored inventories, or simulated pairs."""
+    """Source of the building pairs: a table, footprints, stored inventories, or simulated pairs."""
 
     file: RelativePath | None = Field(None, description="pair table: CSV, Parquet or workbook")
+    footprints: Footprints | None = Field(
+        None, description="outlines of buildings; their pairs are found first"
+    )
     catalog: RelativePath | None = Field(
         None, description="index of stored inventories, catalog.toml"
     )
@@ -51,8 +74,9 @@ class Pairs(TableForm):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         # One source, whose other keys belong to it
-        if sum(source is not None for source in (self.file, self.catalog, self.simulated)) != 1:
-            raise ValueError("give one of file, catalog and simulated")
+        sources = (self.file, self.footprints, self.catalog, self.simulated)
+        if sum(source is not None for source in sources) != 1:
+            raise ValueError("give one of file, footprints, catalog and simulated")
         if self.names and self.catalog is None:
             raise ValueError("names are of stored inventories: give their catalog")
         given = [name for name in TableForm.model_fields if name in self.model_fields_set]

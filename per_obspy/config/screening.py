@@ -181,8 +181,12 @@ class Screening(Section):
     shakemap_log_std: float = Field(
         0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed"
     )
-    interpolation: Interpolation = Interpolation()
-    codes: Codes = Codes()
+    interpolation: Interpolation = Field(
+        Interpolation(), description="how the motion between stations is estimated"
+    )
+    codes: Codes = Field(
+        Codes(), description="inputs of code rules; a rule is empty where its input is missing"
+    )
 
     @field_validator("classes")
     @classmethod
