@@ -1,4 +1,4 @@
-"""Counts of pairs by cell and state, for the pairs that a page does not show one by one."""
+"""Counts of pairs by cell and class, for the pairs that a page does not show one by one."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -15,29 +15,30 @@ SMALLEST_CELL = 0.001
 
 class CellCounts:
     """
-    Numbers of pairs in cells of a grid in degrees, by state, taken in pieces.
+    Numbers of pairs in cells of a grid in degrees, by class, taken in pieces.
 
     A class, because cells grow while the pieces of a table arrive.
 
     Parameters
     ----------
-    states : sequence of str
-        All states that a pair can have.
+    kinds : sequence of str
+        Risk classes that a pair can have; others are counted as the last one.
     """
 
-    def __init__(self, states: Sequence[str]) -> None:
+    def __init__(self, kinds: Sequence[str]) -> None:
         """Begin without a pair."""
-        self.states = tuple(states)
+        self.kinds = tuple(kinds)
         self.size = SMALLEST_CELL
         self._counts: Counter[tuple[int, int, int]] = Counter()
 
     def add(self, pairs: pd.DataFrame) -> None:
-        """Count pairs by ``longitude``, ``latitude`` and ``state``; without a place they are left out."""
+        """Count pairs by place and class; those without a place are left out."""
         placed = pairs[np.isfinite(pairs["longitude"]) & np.isfinite(pairs["latitude"])]
         column = np.floor(placed["longitude"].to_numpy() / self.size).astype(np.int64)
         row = np.floor(placed["latitude"].to_numpy() / self.size).astype(np.int64)
-        state = pd.Categorical(placed["state"], categories=self.states).codes
-        keys, counts = np.unique(np.stack([column, row, state]), axis=1, return_counts=True)
+        codes = pd.Categorical(placed["risk_class"], categories=self.kinds).codes
+        kind = np.where(codes < 0, len(self.kinds) - 1, codes)
+        keys, counts = np.unique(np.stack([column, row, kind]), axis=1, return_counts=True)
         for key, count in zip(keys.T.tolist(), counts.tolist(), strict=True):
             self._counts[key[0], key[1], key[2]] += count
         while len({key[:2] for key in self._counts}) > MOST_CELLS:
@@ -47,17 +48,17 @@ class CellCounts:
         """Join four cells to one."""
         self.size *= 2.0
         joined: Counter[tuple[int, int, int]] = Counter()
-        for (column, row, state), count in self._counts.items():
-            joined[column // 2, row // 2, state] += count
+        for (column, row, kind), count in self._counts.items():
+            joined[column // 2, row // 2, kind] += count
         self._counts = joined
 
     def table(self) -> pd.DataFrame:
-        """Return one row per cell: ``longitude, latitude`` of its middle, and a column per state."""
+        """Return one row per cell: ``longitude, latitude`` of its middle, and a column per class."""
         if not self._counts:
-            return pd.DataFrame(columns=["longitude", "latitude", *self.states], dtype=float)
+            return pd.DataFrame(columns=["longitude", "latitude", *self.kinds], dtype=float)
         counts = pd.Series(dict(self._counts)).unstack(fill_value=0)
-        counts = counts.reindex(columns=range(len(self.states)), fill_value=0)
-        counts.columns = pd.Index(self.states)
+        counts = counts.reindex(columns=range(len(self.kinds)), fill_value=0)
+        counts.columns = pd.Index(self.kinds)
         middle = (np.array(counts.index.to_list()) + 0.5) * self.size
         places = pd.DataFrame(middle, columns=["longitude", "latitude"])
         return pd.concat([places, counts.reset_index(drop=True)], axis=1)

@@ -11,9 +11,10 @@ from per_obspy.report.page.first_screen import Event, first_screen
 from per_obspy.report.page.packing import PackedTable, pack_table
 from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
-from per_obspy.report.style import BUILDING_COLOURS, STATE_COLOURS, UNKNOWN_COLOUR
+from per_obspy.report.style import BUILDING_COLOURS, class_colours
 from per_obspy.screening.columns import FLAGS
-from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_STATE
+from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: Columns of a pair on the page, and their kinds.
 PAIR_KINDS = {
@@ -71,6 +72,8 @@ class PageData(NamedTuple):
         Of its texts.
     simulated : bool
         Whether the motion is simulated.
+    classes : sequence of str
+        Names of the risk classes, worst first.
     event : Event
         The earthquake.
     tally : PairTally
@@ -96,6 +99,7 @@ class PageData(NamedTuple):
     title: str
     language: Language
     simulated: bool
+    classes: Sequence[str]
     event: Event
     tally: PairTally
     worst: pd.DataFrame
@@ -129,8 +133,8 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
         "title": shortened(data.title, LONGEST_CELL),
         "simulated": data.simulated,
         **screen._asdict(),
-        "states": _states(texts),
-        "state_counts": dict(data.tally.states),
+        "states": _states(data.tally, texts),
+        "classes": _classes(data, texts),
         "pair_count": data.tally.pairs,
         "building_colours": BUILDING_COLOURS,
         "cell_size": data.tally.cells.size,
@@ -147,7 +151,7 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
 
 def _tables(data: PageData) -> list[PackedTable]:
     """Return pairs, cells and buildings."""
-    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(EVERY_STATE, "number")
+    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(data.tally.cells.kinds, "number")
     buildings = pd.DataFrame() if data.buildings is None else data.buildings
     return [
         pack_table(data.worst, PAIR_KINDS),
@@ -156,18 +160,26 @@ def _tables(data: PageData) -> list[PackedTable]:
     ]
 
 
-def _states(texts: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return the states, the worst first, with label, colour and weight of their marks."""
-    colours = {**STATE_COLOURS, UNKNOWN_STATE: UNKNOWN_COLOUR}
-    weights = {name: weight for weight, name in enumerate(reversed(tuple(STATE_COLOURS)))}
+def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the states, the likeliest first, with label and number of pairs."""
+    return [
+        {"name": name, "label": texts[f"state_{name}"], "count": tally.states[name]}
+        for name in EVERY_STATE
+    ]
+
+
+def _classes(data: PageData, texts: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the classes, the worst first, with colour, weight of the mark and number of pairs."""
+    colours = class_colours(data.classes)
     return [
         {
             "name": name,
-            "label": texts[f"state_{name}"],
-            "colour": colours[name],
-            "weight": weights.get(name, 1),
+            "label": texts["state_unknown"] if name == UNKNOWN_CLASS else shortened(name, 40),
+            "colour": colour,
+            "weight": 4.0 * max(1.0 - number / max(len(colours) - 2, 1), 0.0),
+            "count": data.tally.classes[name],
         }
-        for name in EVERY_STATE
+        for number, (name, colour) in enumerate(colours.items())
     ]
 
 

@@ -9,7 +9,7 @@ SPANISH: dict[str, str] = {
     "number_pairs": "pares evaluados",
     "number_pounding": "chocan, con seguridad o probablemente",
     "number_expected": "choques esperados",
-    "number_severe": "en la peor clase, {name}",
+    "number_severe": "en la peor clase: {name}",
     "number_velocity": "impacto esperado más rápido",
     "number_buildings": "edificios que un vecino puede golpear",
     "event_time": "Los registros empiezan {time} UTC",
@@ -47,10 +47,12 @@ SPANISH: dict[str, str] = {
     "epicentre": "epicentro",
     "cells_note": (
         "Los {shown} peores de {all} pares se dibujan uno por uno; los demás se cuentan en "
-        "celdas, con el color del estado más probable en ellas."
+        "celdas, con el color de la peor clase en ellas."
     ),
     "pairs": "Pares, los peores primero",
     "state": "choque",
+    "risk_class": "severidad",
+    "legend": "Severidad, por impacto esperado:",
     "any": "todas",
     "least_probability": "probabilidad desde, %",
     "least_velocity": "impacto desde, cm/s",
@@ -64,6 +66,7 @@ SPANISH: dict[str, str] = {
     "more": "más filas",
     "column_rank": "rango",
     "column_pair_id": "par",
+    "column_risk_class": "severidad",
     "column_state": "choque",
     "column_probability": "probabilidad, %",
     "column_expected_impact_velocity": "impacto, cm/s",

@@ -1,12 +1,14 @@
 """Everything that the page says of all pairs, counted while the risk table is read in pieces."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from per_obspy.report.page.cells import CellCounts
-from per_obspy.screening.ranking import EVERY_STATE
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: Pairs that the page holds one by one, the worst; the others are counted in cells.
 PAGE_PAIRS = 20_000
@@ -22,17 +24,22 @@ class PairTally:
     Counts of pairs by state, class and flag, and of those beyond the worst by cell.
 
     A class, because the pieces of a table arrive one by one.
+
+    Parameters
+    ----------
+    classes : sequence of str
+        Names of the risk classes, worst first.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, classes: Sequence[str]) -> None:
         """Begin without a pair."""
         self.pairs = 0
         self.expected = 0.0
         self.states: Counter[str] = Counter()
         self.classes: Counter[str] = Counter()
         self.flags: Counter[str] = Counter()
-        self.cells = CellCounts(EVERY_STATE)
-        self._distances: list[np.ndarray] = []
+        self.cells = CellCounts([*classes, UNKNOWN_CLASS])
+        self._distances: list[NDArray[np.float32]] = []
 
     def add(self, piece: pd.DataFrame) -> None:
         """Count a piece of the risk table, of which the worst pairs come first."""
@@ -46,7 +53,7 @@ class PairTally:
         if "distance" in piece:
             self._distances.append(piece["distance"].to_numpy(dtype=np.float32))
         others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
-        if len(others) and "state" in piece:
+        if len(others) and {"longitude", "latitude", "risk_class"} <= set(piece):
             self.cells.add(others)
 
     def median_distance(self) -> float:

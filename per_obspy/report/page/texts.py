@@ -18,7 +18,7 @@ ENGLISH: dict[str, str] = {
     "number_pairs": "pairs screened",
     "number_pounding": "hit each other, surely or likely",
     "number_expected": "expected to hit each other",
-    "number_severe": "in the worst class, {name}",
+    "number_severe": "in the worst class: {name}",
     "number_velocity": "fastest expected impact",
     "number_buildings": "buildings that a neighbour can hit",
     "event_time": "Records start {time} UTC",
@@ -59,11 +59,13 @@ ENGLISH: dict[str, str] = {
     "epicentre": "epicentre",
     "cells_note": (
         "The worst {shown} of {all} pairs are drawn one by one; the others are counted in cells, "
-        "in the colour of the likeliest state in them."
+        "in the colour of the worst class in them."
     ),
     # Filters and table
     "pairs": "Pairs, the worst first",
     "state": "pounding",
+    "risk_class": "severity",
+    "legend": "Severity, by expected impact:",
     "any": "any",
     "least_probability": "probability from, %",
     "least_velocity": "impact from, cm/s",
@@ -77,6 +79,7 @@ ENGLISH: dict[str, str] = {
     "more": "more rows",
     "column_rank": "rank",
     "column_pair_id": "pair",
+    "column_risk_class": "severity",
     "column_state": "pounding",
     "column_probability": "probability, %",
     "column_expected_impact_velocity": "impact, cm/s",

@@ -17,9 +17,9 @@ class Details {
     const { t } = this.page;
     const close = element("button", { type: "button", class: "close" }, t("close"));
     close.addEventListener("click", () => this.page.choose(null));
-    const state = this.page.content.states[this.page.stateCodes[i]];
+    const [state, grade] = [this.page.stateOf(i), this.page.classOf(i)];
     const heading = element("h2", {}, `${t("pair")} ${this.value("pair_id", i)} `);
-    const words = element("p", {}, element("strong", {}, swatch(state), ` ${state.label}. `), this.words(i));
+    const words = element("p", {}, element("strong", {}, swatch(grade), ` ${grade.label}; ${t("state")}: ${state.label}. `), this.words(i));
     const pictures = element("div", { class: "pictures" }, ...this.circles(i), ...this.history(i));
     this.place.replaceChildren(
       close, heading, words, pictures, this.buildings(i),

@@ -5,7 +5,7 @@ const PAGE_ROWS = 100;
 
 // Columns of the table, with the factor to the unit of their heading and their decimals
 const LISTED = [
-  ["rank", 1, 0], ["pair_id"], ["state"], ["probability", 100, 0],
+  ["rank", 1, 0], ["pair_id"], ["risk_class"], ["state"], ["probability", 100, 0],
   ["expected_impact_velocity", 100, 0], ["gap", 100, 1], ["demand", 100, 1],
   ["missing_gap", 100, 1], ["expected_amplification", 1, 2], ["station"],
 ];
@@ -28,13 +28,8 @@ class PairList {
   makeFilters() {
     const { t, content, pairs } = this.page;
     const form = byId("filters");
-    const states = element("fieldset", {}, element("legend", {}, t("state")));
-    this.states = content.states.map((state) => {
-      const box = element("input", { type: "checkbox", checked: "", value: state.name });
-      states.append(element("label", {}, box, swatch(state), state.label));
-      return box;
-    });
-    form.append(states);
+    this.classes = this.boxes(t("risk_class"), content.classes);
+    this.states = this.boxes(t("state"), content.states);
     this.number("probability", t("least_probability"), 100);
     this.number("velocity", t("least_velocity"), 1000);
     this.choice("area", t("area"), pairs.column.area ? [...pairs.column.area.texts].sort() : []);
@@ -45,6 +40,19 @@ class PairList {
     this.fields.search = search;
     form.addEventListener("input", () => this.apply());
     form.addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  // Check boxes of classes or states that occur
+  boxes(label, grades) {
+    const group = element("fieldset", {}, element("legend", {}, label));
+    const boxes = grades.map((grade) => {
+      const box = element("input", { type: "checkbox", checked: "", value: grade.name });
+      const mark = grade.colour ? [swatch(grade)] : [];
+      if (grade.count) group.append(element("label", {}, box, ...mark, `${grade.label} (${this.page.whole(grade.count)})`));
+      return box;
+    });
+    byId("filters").append(group);
+    return boxes;
   }
 
   number(name, label, largest) {
@@ -75,7 +83,7 @@ class PairList {
   sort(name) {
     const again = this.sorted.name === name;
     // Names and ranks rise at first, other numbers fall: the worst is on top
-    const rises = ["rank", "pair_id", "station", "gap", "state"].includes(name);
+    const rises = ["rank", "pair_id", "station", "gap", "state", "risk_class"].includes(name);
     this.sorted = { name, ascending: again ? !this.sorted.ascending : rises };
     this.rows = PAGE_ROWS;
     this.order();
@@ -89,12 +97,11 @@ class PairList {
   }
 
   filter() {
-    const { pairs, stateCodes, content } = this.page;
+    const { pairs, stateCodes, classCodes } = this.page;
     const { column, count } = pairs;
-    const shown = this.page.shownStates;
-    shown.clear();
-    for (const box of this.states) if (box.checked) shown.add(box.value);
-    const allowed = content.states.map((state) => shown.has(state.name));
+    const states = this.states.map((box) => box.checked);
+    const classes = this.classes.map((box) => box.checked);
+    this.page.shownClasses = new Set(this.classes.filter((box) => box.checked).map((box) => box.value));
     const probability = Number(this.fields.probability.value) / 100;
     const velocity = Number(this.fields.velocity.value) / 100;
     const area = this.codesOf("area", (text, chosen) => text === chosen);
@@ -103,7 +110,7 @@ class PairList {
     this.found = [];
     for (let i = 0; i < count; i += 1) {
       // A number that is missing passes only where nothing is asked of it
-      const passes = allowed[stateCodes[i]]
+      const passes = states[stateCodes[i]] && classes[classCodes[i]]
         && (!probability || column.probability[i] >= probability)
         && (!velocity || column.expected_impact_velocity[i] >= velocity)
         && (!area || area.has(column.area.codes[i]))
@@ -147,7 +154,7 @@ class PairList {
     const sign = ascending ? 1 : -1;
     let value = (i) => values[i];
     if (values.codes) {
-      const rank = name === "state" ? this.page.stateCodes : null;
+      const rank = { state: this.page.stateCodes, risk_class: this.page.classCodes }[name];
       value = rank ? (i) => rank[i] : (i) => values.texts[values.codes[i]];
     }
     const compare = (a, b) => {
@@ -185,8 +192,10 @@ class PairList {
         button.addEventListener("click", () => page.choose(i, true));
         made.append(element("td", { class: "name" }, button));
       } else if (name === "state") {
-        const state = page.content.states[page.stateCodes[i]];
-        made.append(element("td", { class: "state" }, element("span", {}, swatch(state), state.label)));
+        made.append(element("td", { class: "state" }, page.stateOf(i).label));
+      } else if (name === "risk_class") {
+        const grade = page.classOf(i);
+        made.append(element("td", { class: "state" }, element("span", {}, swatch(grade), grade.label)));
       } else made.append(element("td", { class: "name" }, values.texts[values.codes[i]]));
     }
     return made;
@@ -225,10 +234,10 @@ function cellText(values, i) {
   return /[",\r\n]/.test(safe) || safe !== value ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
 
-// The mark of a state: its colour, and a bar that is the thicker the likelier
-function swatch(state) {
+// The mark of a class: its colour, and a bar that is the thicker the worse
+function swatch(grade) {
   const picture = drawing("svg", { width: 18, height: 12, "aria-hidden": "true" });
-  const height = 2 + 2 * state.weight;
-  picture.append(drawing("rect", { x: 0.5, y: 6 - height / 2, width: 17, height, fill: state.colour, stroke: "#333" }));
+  const height = 3 + 2 * grade.weight;
+  picture.append(drawing("rect", { x: 0.5, y: 6 - height / 2, width: 17, height, fill: grade.colour, stroke: "#333" }));
   return picture;
 }

@@ -110,15 +110,15 @@ class PairMap {
     const { column, count } = this.page.cells;
     if (!count) return;
     const side = this.page.content.cell_size;
-    const states = this.page.content.states;
+    const { classes } = this.page.content;
     for (let i = 0; i < count; i += 1) {
-      // A cell has the colour of the worst state in it, fainter where it has few such pairs
-      const worst = states.findIndex((state) => column[state.name][i] > 0);
-      if (worst < 0 || !this.page.shownStates.has(states[worst].name)) continue;
+      // A cell has the colour of the worst class in it, fainter where it has few such pairs
+      const worst = classes.findIndex(({ name }) => this.page.shownClasses.has(name) && column[name][i] > 0);
+      if (worst < 0) continue;
       const left = this.x(column.longitude[i] - side / 2);
       const top = this.y(column.latitude[i] + side / 2);
-      pen.globalAlpha = Math.min(0.75, 0.25 + 0.12 * Math.log10(1 + column[states[worst].name][i]));
-      pen.fillStyle = states[worst].colour;
+      pen.globalAlpha = Math.min(0.75, 0.25 + 0.12 * Math.log10(1 + column[classes[worst].name][i]));
+      pen.fillStyle = classes[worst].colour;
       pen.fillRect(left, top, Math.max(2, side * this.shrink * this.scale), Math.max(2, side * this.scale));
     }
     pen.globalAlpha = 1;
@@ -146,12 +146,12 @@ class PairMap {
   }
 
   drawPairs(pen) {
-    const states = this.page.content.states;
-    const codes = this.page.stateCodes;
-    const groups = states.map(() => []);
+    const { classes } = this.page.content;
+    const codes = this.page.classCodes;
+    const groups = classes.map(() => []);
     for (let i = 0; i < codes.length; i += 1) if (this.page.isShown[i]) groups[codes[i]].push(i);
     // The mildest first, so that the worst lies on top
-    for (let code = states.length - 1; code >= 0; code -= 1) {
+    for (let code = classes.length - 1; code >= 0; code -= 1) {
       const path = new Path2D();
       const marks = new Path2D();
       const half = MARK / 2 + (code === 0 ? 0.5 : 0);
@@ -167,14 +167,14 @@ class PairMap {
           path.lineTo(x2, y2);
         }
       }
-      const width = [4.5, 4, 3.5, 3, 2.5, 2.5][code];
+      const width = 2.5 + 0.5 * classes[code].weight;
       // A dark edge keeps pale colours visible
       pen.strokeStyle = "#333";
       pen.lineWidth = width + 1.6;
       pen.stroke(path);
       pen.lineWidth = 1;
       pen.stroke(marks);
-      pen.strokeStyle = pen.fillStyle = states[code].colour;
+      pen.strokeStyle = pen.fillStyle = classes[code].colour;
       pen.lineWidth = width;
       pen.stroke(path);
       pen.fill(marks);
@@ -200,6 +200,9 @@ class PairMap {
     pen.font = "11px sans-serif";
     pen.fillStyle = "#222";
     const places = this.page.content.stations.places;
+    // Names of many stations would hide the pairs' places
+    const seen = places.filter(([, x, y]) => Math.abs(this.x(x) - this.width / 2) < this.width / 2 && Math.abs(this.y(y) - this.height / 2) < this.height / 2);
+    const named = seen.length <= 12;
     for (const [name, longitude, latitude, used] of places) {
       const [x, y] = [this.x(longitude), this.y(latitude)];
       pen.setLineDash(used ? [] : [2, 2]);
@@ -207,7 +210,7 @@ class PairMap {
       pen.moveTo(x, y - 6); pen.lineTo(x + 5.5, y + 4); pen.lineTo(x - 5.5, y + 4);
       pen.closePath();
       pen.stroke();
-      if (places.length <= 60) pen.fillText(name, x + 8, y + 4);
+      if (named) pen.fillText(name, x + 8, y + 4);
     }
     pen.setLineDash([]);
   }

@@ -6,7 +6,7 @@ class Page {
     this.content = content;
     [this.pairs, this.cells, this.buildings] = content.tables;
     this.chosen = null;
-    this.shownStates = new Set(content.states.map((state) => state.name));
+    this.shownClasses = new Set(content.classes.map(({ name }) => name));
     this.isShown = new Uint8Array(this.pairs.count).fill(1);
     this.t = (key, values = {}) => {
       const text = content.texts[key] === undefined ? key : content.texts[key];
@@ -16,20 +16,31 @@ class Page {
       if (!Number.isFinite(value)) return "–";
       return value.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
     };
-    this.setStates();
+    this.setGrades();
     this.setBuildings();
   }
 
   whole(value) { return this.number(value, 0); }
 
-  setStates() {
-    const { texts, codes } = this.pairs.column.state || { texts: [], codes: [] };
-    const number = texts.map((name) => {
-      const found = this.content.states.findIndex((state) => state.name === name);
-      return found < 0 ? this.content.states.length - 1 : found;
-    });
-    this.stateCodes = Uint8Array.from(codes, (code) => number[code]);
+  setGrades() {
+    this.stateCodes = this.codes("state", this.content.states);
+    this.classCodes = this.codes("risk_class", this.content.classes);
   }
+
+  // The number of each pair's state or class; the last one stands for what has none
+  codes(name, grades) {
+    const column = this.pairs.column[name];
+    if (!column) return new Uint8Array(this.pairs.count).fill(grades.length - 1);
+    const numbers = column.texts.map((text) => {
+      const found = grades.findIndex((grade) => grade.name === text);
+      return found < 0 ? grades.length - 1 : found;
+    });
+    return Uint8Array.from(column.codes, (code) => numbers[code]);
+  }
+
+  stateOf(pair) { return this.content.states[this.stateCodes[pair]]; }
+
+  classOf(pair) { return this.content.classes[this.classCodes[pair]]; }
 
   setBuildings() {
     this.pairsOf = new Map();
@@ -63,12 +74,11 @@ class Page {
     return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
   }
 
-  colourOf(pair) { return this.content.states[this.stateCodes[pair]].colour; }
+  colourOf(pair) { return this.classOf(pair).colour; }
 
   shortText(pair) {
     const { column } = this.pairs;
-    const state = this.content.states[this.stateCodes[pair]];
-    return `${column.pair_id[pair]}: ${state.label}, ${this.number(100 * column.expected_impact_velocity[pair], 0)} cm/s`;
+    return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(100 * column.expected_impact_velocity[pair], 0)} cm/s`;
   }
 
   choose(pair, focus = false) {
@@ -107,10 +117,10 @@ class Page {
   }
 
   fillLegend() {
-    const { states, state_counts: counts } = this.content;
     const legend = byId("legend");
-    for (const state of states) {
-      if (counts[state.name]) legend.append(element("span", {}, swatch(state), `${state.label}: ${this.whole(counts[state.name])}`));
+    legend.append(element("span", {}, this.t("legend")));
+    for (const grade of this.content.classes) {
+      if (grade.count) legend.append(element("span", {}, swatch(grade), `${grade.label}: ${this.whole(grade.count)}`));
     }
     const station = drawing("svg", { width: 14, height: 12, "aria-hidden": "true" });
     station.append(drawing("path", { d: "M7 1L13 11H1Z", fill: "none", stroke: "#222", "stroke-width": 1.3 }));
@@ -135,7 +145,8 @@ class Page {
       if (name !== "rejected") section.hidden = true;
       return;
     }
-    const head = element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)));
+    const isNumber = heads.map((_, i) => rows.some((row) => typeof row[i] === "number"));
+    const head = element("tr", {}, ...heads.map((text, i) => element("th", { scope: "col", class: isNumber[i] ? "number" : "name" }, text)));
     const body = rows.map((row) => element("tr", {}, ...row.map((cell) => (typeof cell === "number"
       ? element("td", { class: "number" }, cell.toLocaleString(this.content.language, { maximumSignificantDigits: 4 }))
       : element("td", { class: cell.length > 30 ? "text" : "name" }, cell)))));
