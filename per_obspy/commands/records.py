@@ -1,4 +1,4 @@
-"""``per-obspy events``, ``fetch`` and ``info``: list earthquakes, fetch and inspect records."""
+"""``per-obspy events`` and ``fetch``: list earthquakes and fetch their records."""
 
 import json
 import sys
@@ -11,27 +11,10 @@ from per_obspy.commands.endings import AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
     from per_obspy.errors import Rejection
     from per_obspy.records.fdsn.event_list import EventRow
-    from per_obspy.records.summary import RecordInfo
-
-#: What the table of records shows of each; JSON has everything.
-SHOWN = (
-    "record",
-    "format",
-    "level",
-    "start",
-    "dt",
-    "duration",
-    "azimuth",
-    "peak",
-    "unit",
-    "event",
-    "file",
-)
-
 
 #: What the table of earthquakes shows of each.
 EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
@@ -73,74 +56,78 @@ def events(
 
 
 def fetch(
-    configuration: Annotated[
-        Path, typer.Argument(help="TOML file of a run with a section \\[records.fdsn].")
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="TOML file of a run with a section \\[records.fdsn], or an earthquake: "
+            "us7000abcd, geonet:2016p858000, emsc:20161113_0000040, ingv:8863681."
+        ),
     ],
+    folder: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of an earthquake; its name if not given."),
+    ] = None,
+    radius: Annotated[
+        float, typer.Option(help="Of the circle around the epicentre of an earthquake, m.")
+    ] = 100_000.0,
+    provider: Annotated[
+        list[str] | None,
+        typer.Option(help="Service that has records of an earthquake; may be given several times."),
+    ] = None,
+    event_service: Annotated[
+        str | None,
+        typer.Option(help="Event service of an earthquake (URL or name) instead of its own."),
+    ] = None,
+    seedlink: Annotated[
+        list[str] | None,
+        typer.Option(help="SeedLink server (host:port) for records that no service has yet."),
+    ] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Ask again for stations that had no data.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
-    Fetch the records of a run into its cache, and nothing else; what is there is not fetched again.
+    Fetch the records of a run, or of one earthquake, and nothing else; what is there stays.
 
-    Example: per-obspy fetch run.toml
+    Example: per-obspy fetch us7000abcd -o records
     """
-    from per_obspy.pipeline.fetch import fetch_configured
+    from per_obspy.pipeline.fetch import fetch_configured, fetch_event
 
+    # Options that are given count for an earthquake; a configuration has its own
+    named = {"providers": provider, "event_provider": event_service, "seedlink": seedlink}
+    settings = {name: value for name, value in named.items() if value}
     with shown_progress() as progress:
-        folder, stations, rejected = fetch_configured(configuration, again, progress)
-    # Print what the cache holds, for machines or people
-    if as_json:
-        rows = [rejection._asdict() for rejection in rejected]
-        print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
-    else:
-        print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
-        _print_rejected(rejected)
+        if Path(source).suffix == ".toml" or Path(source).is_file():
+            _require_no_options(source, settings, folder)
+            place, stations, rejected = fetch_configured(Path(source), again, progress)
+        else:
+            target = folder or Path(source.replace(":", "-").replace("/", "-"))
+            found = fetch_event(source, target, settings | {"radius": radius}, again, progress)
+            place, stations, rejected = found.folder, found.stations, found.rejected
+    _print_fetched(place, stations, rejected, as_json)
     stop_if_nothing(len(stations))
 
 
-def info(
-    path: Annotated[Path, typer.Argument(help="Folder, archive, waveform file or ASDF workspace.")],
-    stationxml: Annotated[
-        Path | None, typer.Option(help="StationXML file or folder, if not beside.")
-    ] = None,
-    as_json: AsJson = False,
+def _print_fetched(
+    folder: Path, stations: list[str], rejected: "tuple[Rejection, ...]", as_json: bool
 ) -> None:
-    """
-    Say what records there are, and why the others cannot be used.
-
-    Example: per-obspy info shared/records
-    """
-    from per_obspy.records.summary import describe_records
-
-    records, rejected = describe_records(path, stationxml)
-    # Print every record and every reason, for machines or people
+    """Print what a cache holds, for machines or people."""
     if as_json:
-        usable = [record._asdict() for record in records]
-        unusable = [rejection._asdict() for rejection in rejected]
-        print(json.dumps({"records": usable, "rejected": unusable}))
-    else:
-        print_table(f"{len(records)} records", SHOWN, [_record_cells(record) for record in records])
-        for line in _event_lines(records):
-            print(line)
-        _print_rejected(rejected)
-    stop_if_nothing(len(records))
+        rows = [rejection._asdict() for rejection in rejected]
+        print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
+        return
+    print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
+    _print_rejected(rejected)
 
 
-def _event_lines(records: "Sequence[RecordInfo]") -> list[str]:
-    """Return one line per earthquake with its records and stations, and one on simulated motion."""
-    groups: dict[str, list[RecordInfo]] = {}
-    for record in records:
-        for label in record.event.split(", "):
-            groups.setdefault(label, []).append(record)
-    # One line per earthquake, by number
-    lines = []
-    for label, members in sorted(groups.items(), key=lambda item: int(item[0].split(":")[0])):
-        stations = len({tuple(record.record.split(".")[:2]) for record in members})
-        lines.append(f"earthquake {label}: {stations} stations, {len(members)} records")
-    simulated = sum(record.simulated for record in records)
-    return [*lines, *([f"{simulated} records are SIMULATED."] if simulated else [])]
+def _require_no_options(source: str, settings: "Mapping[str, object]", folder: Path | None) -> None:
+    """Raise ``CatalogError`` if options of an earthquake are given with a configuration."""
+    from per_obspy.errors import CatalogError
+
+    if settings or folder:
+        problem = "is a configuration, whose section [records.fdsn] holds these options"
+        raise CatalogError(source, problem)
 
 
 def _event_cells(row: "EventRow") -> list[object]:
@@ -150,12 +137,6 @@ def _event_cells(row: "EventRow") -> list[object]:
     # Time to the second, position to 100 m
     position = (f"{row.latitude:.3f}", f"{row.longitude:.3f}")
     return [row.event_id, row.time[:19], *position, depth, magnitude, row.place]
-
-
-def _record_cells(record: "RecordInfo") -> list[object]:
-    """Return the cells of a record, times to the second, empty where a value is unknown."""
-    known = record._asdict() | {"start": record.start[:19]}
-    return ["" if known[name] is None else known[name] for name in SHOWN]
 
 
 def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:
