@@ -274,7 +274,7 @@ def _later_stages(
         "faults": made.faults,
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
-        "pair_tables": found.pair_tables._asdict(),
+        "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,
