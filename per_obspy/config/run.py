@@ -1,7 +1,7 @@
 """Settings of a whole run and of a screening by a spectrum, and the kind of a TOML file."""
 
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import (
     Field,
@@ -16,6 +16,14 @@ from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.errors import CatalogError
+
+
+class ReportTexts(Section):
+    """The page ``report.html``."""
+
+    language: Literal["en", "es"] = Field(
+        "en", description="of the page: en (English) or es (Spanish)"
+    )
 
 
 class Run(Section):
@@ -36,6 +44,7 @@ class Run(Section):
     building: Building = Building()
     screening: Screening = Screening()
     totals: Totals = Totals()
+    report: ReportTexts = ReportTexts()
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
     )

@@ -14,10 +14,12 @@ from per_obspy.errors import CatalogError, PerError
 from per_obspy.files import remove_file
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.page import worst_pairs, write_run_page
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.figures import draw_overview, draw_record_to_pair
+from per_obspy.report.page.tally import COUNTED, PairTally
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.risk import RankedTable, ranked_table
@@ -54,12 +56,15 @@ class RiskSummary(NamedTuple):
         Pairs whose pounding was observed.
     totals : RegionTotals
         By area.
+    page : (PairTally, DataFrame)
+        Counts and worst pairs of the page.
     """
 
     worst: pd.Series | None
     shown: pd.DataFrame
     observed: pd.DataFrame
     totals: RegionTotals
+    page: tuple[PairTally, pd.DataFrame]
 
 
 class Report(NamedTuple):
@@ -102,6 +107,7 @@ class _Pieces(NamedTuple):
     shown: list[pd.DataFrame]
     observed: list[pd.DataFrame]
     totals: list[PieceTotals]
+    tally: PairTally
 
 
 def reported(
@@ -142,6 +148,9 @@ def reported(
                 _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
         if spectra is not None:
             _draw_figures(settings, summary, spectra, stations, folder, report)
+        with report.tried(folder / "report.html"):
+            found = (*summary.page, summary.totals.table)
+            write_run_page(settings, folder, stations, found, simulated)
     progress("report", 1, 1)
     return report
 
@@ -158,10 +167,12 @@ def _summary(
 ) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
     needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
+    needed += COUNTED
     columns = None if settings.geopackage else list(dict.fromkeys(needed))
     # The layer takes the pieces one by one, and so they are noted on the way
-    pieces = _Pieces([], [], [], [], [])
+    pieces = _Pieces([], [], [], [], [], PairTally(list(settings.screening.classes)))
     with ranked_table(risk, columns) as table:
+        listed = worst_pairs(table, settings)
         noted = _noted(table, settings, pieces)
         if settings.geopackage:
             with report.tried(folder / "risk.gpkg"):
@@ -176,6 +187,7 @@ def _summary(
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
         region_totals(pieces.totals, settings.totals),
+        (pieces.tally, listed),
     )
 
 
@@ -193,6 +205,7 @@ def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.Dat
         if "observed" in piece:
             observed = piece["observed"].notna()
             found.observed.append(piece.loc[observed, OBSERVED_COLUMNS])
+        found.tally.add(piece)
         found.totals.append(piece_totals(piece, settings.totals, classes))
         yield piece
 

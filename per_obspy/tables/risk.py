@@ -69,6 +69,16 @@ class RankedTable(NamedTuple):
         for batch in self.file.iter_batches(ROWS, columns=self.columns):
             yield batch.to_pandas()
 
+    def first(self, count: int, columns: Sequence[str]) -> pd.DataFrame:
+        """Return the first rows with those of the columns that the table has."""
+        known = set(self.file.schema_arrow.names)
+        names = [name for name in dict.fromkeys(columns) if name in known]
+        found = self.file.schema_arrow.empty_table().select(names).to_pandas()
+        for batch in self.file.iter_batches(count, columns=names):
+            found = batch.to_pandas()
+            break
+        return found
+
     def row(self, index: int) -> pd.Series:
         """Return one row, counted from 0, with all columns."""
         for group in range(self.file.num_row_groups):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
@@ -94,6 +95,15 @@ def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) 
     cells = grid_cells(longitude, latitude, settings.cell)
     boxes = dict(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
     return PieceTotals(partial_totals(piece, cells.cell, classes), boxes)
+
+
+def area_names(pairs: pd.DataFrame, settings: Totals) -> NDArray[np.object_]:
+    """Return the area of each pair as in the totals; see :func:`piece_totals`."""
+    if settings.area:
+        return np.asarray(pairs[settings.area].fillna("").astype(str), dtype=object)
+    if settings.h3 is not None:
+        return np.asarray(hexagons(pairs["longitude"], pairs["latitude"], settings.h3))
+    return grid_cells(pairs["longitude"], pairs["latitude"], settings.cell).cell
 
 
 def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTotals:

@@ -18,6 +18,13 @@ INTERVALS = 300
 #: Impacts that are drawn, the fastest ones.
 MOST_IMPACTS = 300
 
+#: Columns of the risk table that a history needs.
+HISTORY_COLUMNS = (
+    "rank", "station", "gap", "restitution", "azimuth_used", "period_1", "period_2", "damping_1",
+    "damping_2", "participation_1", "participation_2", "contact_mass_1", "contact_mass_2",
+    "yield_displacement_1", "yield_displacement_2", "hardening_1", "hardening_2",
+)  # fmt: skip
+
 #: Longest record of which a history is drawn, samples: longer ones take too long.
 MOST_SAMPLES = 200_000
 
@@ -62,13 +69,13 @@ def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None
 def _structure(pair: pd.Series, number: int) -> Structure:
     """Return a building of the pair as an oscillator at contact level."""
     share = float(pair[f"participation_{number}"])
-    limit = float(pair.get(f"yield_displacement_{number}", math.inf))
+    limit = float(pair[f"yield_displacement_{number}"])
     return Structure(
         period=float(pair[f"period_{number}"]),
         damping=float(pair[f"damping_{number}"]),
         mass=float(pair[f"contact_mass_{number}"]),
         yield_displacement=share * limit if math.isfinite(limit) else math.inf,
-        hardening=float(pair.get(f"hardening_{number}", 0.0)) if math.isfinite(limit) else 0.0,
+        hardening=float(pair[f"hardening_{number}"]) if math.isfinite(limit) else 0.0,
         participation=share,
     )
 

@@ -1,0 +1,206 @@
+"""Everything that the page of a run is made of, gathered from the results in the output folder."""
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+
+from per_obspy.config import Run
+from per_obspy.jobs.ground_files import read_station_once
+from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.stations import file_stem
+from per_obspy.report.page.content import (
+    BUILDING_KINDS,
+    MOST_ROWS,
+    PAIR_KINDS,
+    REJECTED_COLUMNS,
+    PageData,
+)
+from per_obspy.report.page.document import write_page
+from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
+from per_obspy.report.page.first_screen import Event
+from per_obspy.report.page.outlines import read_outlines
+from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.page.texts import LANGUAGES
+from per_obspy.tables.risk import RankedTable
+from per_obspy.tables.totals import area_names
+
+#: Pairs whose history is drawn, the worst ones.
+HISTORIES = 50
+
+#: Period and damping of the spectra in the table of stations.
+SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
+
+#: Columns of the worst pairs that the page needs.
+PAGE_COLUMNS = tuple(dict.fromkeys((*PAIR_KINDS, *HISTORY_COLUMNS)))
+
+
+def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
+    """Return the worst pairs of a risk table with the columns of the page and their areas."""
+    area = [settings.totals.area] if settings.totals.area else []
+    worst = table.first(PAGE_PAIRS, [*PAGE_COLUMNS, *area])
+    return worst.assign(area=area_names(worst, settings.totals))
+
+
+def write_run_page(
+    settings: Run,
+    folder: Path,
+    stations: Sequence[FinishedStation],
+    found: tuple[PairTally, pd.DataFrame, pd.DataFrame],
+    simulated: bool,
+) -> None:
+    """
+    Write ``report.html`` of a run.
+
+    Parameters
+    ----------
+    settings : Run
+        What was done.
+    folder : Path
+        Of the results; its tables of stations, rejections and buildings are read.
+    stations : sequence of FinishedStation
+        With shards.
+    found : (PairTally, DataFrame, DataFrame)
+        Counts of all pairs, the worst pairs, and totals by area.
+    simulated : bool
+        Whether the motion is simulated.
+    """
+    tally, worst, areas = found
+    table = _station_table(folder / "stations.csv", stations)
+    rejected, rejections = _rejected(folder / "rejected.csv")
+    data = PageData(
+        title=settings.name,
+        language=settings.report.language,
+        simulated=simulated,
+        classes=tuple(settings.screening.classes),
+        event=_event(stations, table),
+        tally=tally,
+        worst=worst,
+        stations=table,
+        areas=areas,
+        rejected=rejected,
+        rejections=rejections,
+        buildings=_buildings(folder / "buildings.parquet"),
+        outlines=_outlines(settings, worst),
+        lines={"coast": [], "borders": []},
+        histories=_histories(worst, stations),
+        provenance=_provenance(settings),
+    )
+    write_page(data, folder / "report.html")
+
+
+def _event(stations: Sequence[FinishedStation], table: pd.DataFrame) -> Event:
+    """Return the facts of the earthquake that the spectra of the stations hold."""
+    facts = [station.spectra.attrs for station in stations if station.spectra is not None]
+    starts = [str(found["time_coverage_start"]) for found in facts if _is_dated(found)]
+    start = min(starts)[:19].replace("T", " ") if starts else ""
+    names = ("hypocentre_longitude", "hypocentre_latitude", "hypocentre_depth")
+    places = (tuple(float(found.get(name, math.nan)) for name in names) for found in facts)
+    known = [place for place in places if np.isfinite(place[:2]).all()]
+    place = (known[0][0], known[0][1], known[0][2]) if known else None
+    used = int((table["state"] == "used").sum()) if "state" in table else len(facts)
+    return Event(start, place, used, len(table) - used)
+
+
+def _is_dated(facts: Mapping[str, Any]) -> bool:
+    """Return whether a record has a start time; undated ones begin in 1970."""
+    return str(facts.get("time_coverage_start", "1970")) >= "1971"
+
+
+def _station_table(path: Path, stations: Sequence[FinishedStation]) -> pd.DataFrame:
+    """Return the table of the stations with PER and SD of each at one period, cm."""
+    if not path.is_file():
+        return pd.DataFrame()
+    texts = {name: str for name in ("station", "state", "warnings", "rejected")}
+    table = pd.read_csv(path, dtype=texts, keep_default_na=True)
+    for name in ("per", "sd"):
+        values = {
+            station.station: _at_one_period(station.spectra, name)
+            for station in stations
+            if station.spectra is not None
+        }
+        table[name] = table["station"].map(values)
+    return table
+
+
+def _at_one_period(spectra: Any, name: str) -> float:
+    """Return the largest spectral value of a station over its horizontals, cm."""
+    chosen = spectra[name].sel(damping=SHOWN_DAMPING, method="nearest")
+    values = chosen.sel(period=SHOWN_PERIOD, method="nearest").to_numpy()
+    horizontals = values[: int(spectra.attrs.get("horizontals", values.size))]
+    return 100.0 * float(np.nanmax(horizontals)) if horizontals.size else math.nan
+
+
+def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
+    """Return the first rows of the table of rejections, and how many it has."""
+    rows, count = list[list[str]](), 0
+    if path.is_file():
+        with path.open(encoding="utf-8", newline="") as file:
+            lines = csv.reader(file)
+            next(lines, None)
+            for row in lines:
+                count += 1
+                if count <= MOST_ROWS and len(row) == len(REJECTED_COLUMNS):
+                    rows.append(row)
+    return pd.DataFrame(rows, columns=list(REJECTED_COLUMNS)), count
+
+
+def _buildings(path: Path) -> pd.DataFrame | None:
+    """Return the worst buildings with the columns of the page, None without a table."""
+    if not path.is_file():
+        return None
+    with pq.ParquetFile(path) as file:
+        names = [name for name in BUILDING_KINDS if name in file.schema_arrow.names]
+        batches = file.iter_batches(PAGE_PAIRS, columns=names)
+        first = next(batches, None)
+    return None if first is None else first.to_pandas()
+
+
+def _outlines(settings: Run, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
+    """Return the outlines of the buildings of the worst pairs, if the pairs came with them."""
+    pairs = settings.pairs
+    if pairs is None or pairs.file is None or "building_id_1" not in worst:
+        return []
+    names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
+    return read_outlines(pairs.file.with_suffix(".buildings.parquet"), names.unique().tolist())
+
+
+def _histories(
+    worst: pd.DataFrame, stations: Iterable[FinishedStation]
+) -> dict[int, dict[str, Any]]:
+    """Return the histories of the worst pairs with a gap and a record, by their rank."""
+    if not set(HISTORY_COLUMNS) <= set(worst):
+        return {}
+    usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
+    shards = {station.shard.stem: station for station in stations if station.shard}
+    histories = {}
+    # Station by station, because motions are large
+    for name, pairs in usable.groupby("station", sort=False):
+        station = shards.get(file_stem(str(name)))
+        if station is None or station.shard is None:
+            continue
+        motion = read_station_once(station.shard, station.hash)
+        for _, pair in pairs.iterrows():
+            history = drawn_history(motion, pair)
+            if history is not None:
+                histories[int(pair["rank"])] = history
+    return histories
+
+
+def _provenance(settings: Run) -> list[tuple[str, str]]:
+    """Return how the results were made."""
+    texts = LANGUAGES[settings.report.language]
+    exact = {"exact": settings.screening.exact, "output": settings.output.name}
+    return [
+        (texts["made"], datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
+        (texts["made_with"], f"per_obspy {version('per_obspy')}"),
+        (texts["files"], texts["files_list"]),
+        (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
+    ]
