@@ -26,7 +26,7 @@ from per_obspy.report.page.content import (
 from per_obspy.report.page.document import write_page
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.first_screen import Event
-from per_obspy.report.page.outlines import read_outlines
+from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES
 from per_obspy.tables.risk import RankedTable

@@ -167,8 +167,8 @@ def _first(
     else:
         said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
     if len(areas) > 1 and "expected_pounding" in areas and len(hit):
-        most = areas.sort_values("expected_pounding", ascending=False)["area"]
-        said.append(texts["todo_areas"].format(names=_names(most[:3])))
+        most = areas.sort_values("expected_pounding", ascending=False)[:3]
+        said.append(texts["todo_areas"].format(names=_placed_names(most, language)))
     for state in ("unknown", "possible"):
         if tally.states[state]:
             value = written(tally.states[state], 0, language)
@@ -198,6 +198,15 @@ def _sure(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str
         said.append(texts["sure_distance"].format(value=value))
     said.append(texts["sure_nature"])
     return said
+
+
+def _placed_names(areas: pd.DataFrame, language: Language) -> str:
+    """Return the names of areas with latitude and longitude of their middle, one after the other."""
+    named = []
+    for _, area in areas.iterrows():
+        place = (written(area[name], 3, language) for name in ("latitude", "longitude"))
+        named.append(f"{_names([area['area']])} ({' / '.join(place)})")
+    return ", ".join(named)
 
 
 def _names(names: Sequence[object] | pd.Series) -> str:

@@ -124,9 +124,12 @@ class PairMap {
     pen.globalAlpha = 1;
   }
 
+  // Outlines are drawn from about 1 pixel per 5 m on
+  hasOutlines() { return this.page.outlines.length > 0 && this.scale > 20000; }
+
   drawOutlines(pen) {
+    if (!this.hasOutlines()) return;
     const shapes = this.page.outlines;
-    if (!shapes || this.scale < 20000) return;
     pen.lineWidth = 0.8;
     pen.strokeStyle = "#555";
     for (const shape of shapes) {
@@ -167,7 +170,8 @@ class PairMap {
           path.lineTo(x2, y2);
         }
       }
-      const width = 2.5 + 0.5 * classes[code].weight;
+      // Thin between outlines, which have the colours themselves
+      const width = (2.5 + 0.5 * classes[code].weight) * (this.hasOutlines() ? 0.5 : 1);
       // A dark edge keeps pale colours visible
       pen.strokeStyle = "#333";
       pen.lineWidth = width + 1.6;
@@ -265,7 +269,7 @@ class PairMap {
       const distance = Math.hypot(ax + share * bx - x, ay + share * by - y);
       if (distance < best) [nearest, best] = [i, distance];
     }
-    if (nearest !== null || !this.page.outlines || this.scale < 20000) return nearest;
+    if (nearest !== null || !this.hasOutlines()) return nearest;
     const [longitude, latitude] = this.place(x, y);
     const shape = this.page.outlines.find((candidate) => contains(candidate.ring, longitude, latitude));
     const pair = shape && shape.pairs.find((candidate) => this.page.isShown[candidate]);

@@ -159,6 +159,7 @@ async function start() {
   page.fillFirstScreen();
   page.list = new PairList(page);
   page.details = new Details(page);
+  performance.mark("drawing");
   page.map = new PairMap(byId("map"), page);
   performance.mark("drawn");
   // What is further down can wait
