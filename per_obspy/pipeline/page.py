@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
+from per_obspy.checks import FloatArray
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.stations import file_stem
+from per_obspy.report.page.coast import lines_around
 from per_obspy.report.page.content import (
     BUILDING_KINDS,
     MOST_ROWS,
@@ -89,11 +91,16 @@ def write_run_page(
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
         outlines=_outlines(settings, worst),
-        lines={"coast": [], "borders": []},
+        lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=_histories(worst, stations),
         provenance=_provenance(settings),
     )
     write_page(data, folder / "report.html")
+
+
+def _column(table: pd.DataFrame, name: str) -> FloatArray:
+    """Return a column of numbers, none of them if the table lacks it."""
+    return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
 
 
 def _event(stations: Sequence[FinishedStation], table: pd.DataFrame) -> Event:

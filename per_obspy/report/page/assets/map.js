@@ -2,6 +2,7 @@
 // The map: pairs as lines or outlines on a canvas, to be moved and enlarged.
 
 const MARK = 5; // pixels: a pair whose line would be shorter is a square
+const COARSE = 12000; // pixels per degree up to which coast lines are drawn: 1 pixel is 9 m
 const PICK = 9; // pixels: how near a click must be
 
 class PairMap {
@@ -81,8 +82,11 @@ class PairMap {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.lineCap = "round";
-    this.drawLines(pen, this.page.content.coast, "#7a8d99", 1);
-    this.drawLines(pen, this.page.content.borders, "#a58fa0", 1, [5, 4]);
+    // Coast lines are right to some hundred metres: none where that would mislead
+    if (this.scale < COARSE) {
+      this.drawLines(pen, this.page.content.coast, "#51708a", 1.2);
+      this.drawLines(pen, this.page.content.borders, "#8a6f86", 1.2, [6, 4]);
+    }
     this.drawCells(pen);
     this.drawOutlines(pen);
     this.drawStations(pen);
