@@ -3,6 +3,7 @@
 import csv
 import json
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,19 @@ if TYPE_CHECKING:
 
 #: Exit codes; 0 is done, and 1 is left to crashes, which are bugs.
 WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
+
+
+class PageLanguage(StrEnum):
+    """Languages of the page ``report.html``."""
+
+    en = "en"
+    es = "es"
+
+
+Language = Annotated[
+    PageLanguage | None,
+    typer.Option("--language", help="Of report.html, instead of the configured one."),
+]
 
 Strict = Annotated[
     bool,

@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Language,
     Strict,
     named_path,
     output_option,
@@ -82,6 +83,7 @@ def run(
     ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     changes: Changes = None,
+    language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
@@ -102,7 +104,8 @@ def run(
     # An empty name would be the folder of the shell
     for name in (first, first if second is None else second):
         named_path(name)
-    asked = requested_run(first, second, output, changes or ())
+    spoken = [f"report.language={language}"] if language else []
+    asked = requested_run(first, second, output, [*(changes or ()), *spoken])
     if asked.line:
         print(printable(asked.line), file=sys.stderr)
     with shown_progress() as progress:
@@ -113,17 +116,24 @@ def run(
 def report(
     configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    language: Language = None,
     as_json: AsJson = False,
 ) -> None:
     """
-    Write totals, figures and map layers again from the risk table of an earlier run.
+    Write totals, page, figures and map layers again from the risk table of an earlier run.
 
     Example: per-obspy report workflows/demo.toml
     """
+    from per_obspy.config import Run, load
     from per_obspy.pipeline.run import report as report_again
 
+    settings: Path | Run = configuration
+    if language is not None:
+        read = load(configuration, Run)
+        texts = read.report.model_copy(update={"language": language.value})
+        settings = read.model_copy(update={"report": texts})
     with shown_progress() as progress:
-        result = report_again(configuration, output, progress=progress)
+        result = report_again(settings, output, progress=progress)
     print_and_end(result, as_json, print_result)
 
 

@@ -36,7 +36,7 @@ class CellCounts:
         placed = pairs[np.isfinite(pairs["longitude"]) & np.isfinite(pairs["latitude"])]
         column = np.floor(placed["longitude"].to_numpy() / self.size).astype(np.int64)
         row = np.floor(placed["latitude"].to_numpy() / self.size).astype(np.int64)
-        codes = pd.Categorical(placed["risk_class"], categories=self.kinds).codes
+        codes = pd.Index(self.kinds).get_indexer(placed["risk_class"])
         kind = np.where(codes < 0, len(self.kinds) - 1, codes)
         keys, counts = np.unique(np.stack([column, row, kind]), axis=1, return_counts=True)
         for key, count in zip(keys.T.tolist(), counts.tolist(), strict=True):

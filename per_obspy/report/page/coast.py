@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 
 #: The lines reach beyond the region by this share of its size, and by this many degrees at least.
-MARGIN, LEAST_MARGIN = 1.0, 0.3
+MARGIN, LEAST_MARGIN = 1.0, 2.0
 
 #: Corners on a page, at most: every second, third, ... is kept of more.
 MOST_CORNERS = 20_000
@@ -73,9 +73,7 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
     return found
 
 
-def _pieces(
-    corners: FloatArray, near: NDArray[np.bool_], stride: int
-) -> list[list[float]]:
+def _pieces(corners: FloatArray, near: NDArray[np.bool_], stride: int) -> list[list[float]]:
     """Return the parts of a line whose corners are near, every so many corners and the last."""
     edges = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
     pieces = []

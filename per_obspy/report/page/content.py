@@ -151,7 +151,9 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
 
 def _tables(data: PageData) -> list[PackedTable]:
     """Return pairs, cells and buildings."""
-    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(data.tally.cells.kinds, "number")
+    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(
+        data.tally.cells.kinds, "number"
+    )
     buildings = pd.DataFrame() if data.buildings is None else data.buildings
     return [
         pack_table(data.worst, PAIR_KINDS),

@@ -114,4 +114,6 @@ def _envelope(displacement: FloatArray, edges: Any) -> list[float]:
     values = 1000.0 * displacement[: edges[-1] + 1]
     smallest = np.minimum.reduceat(values, edges[:-1])
     largest = np.maximum.reduceat(values, edges[:-1])
-    return [round(float(value), 1) for pair in zip(smallest, largest, strict=True) for value in pair]
+    return [
+        round(float(value), 1) for pair in zip(smallest, largest, strict=True) for value in pair
+    ]

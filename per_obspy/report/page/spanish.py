@@ -114,6 +114,10 @@ SPANISH: dict[str, str] = {
     "fact_amplification_exact": "movimiento con / sin choque",
     "circles_gap": "Círculos de energía con la separación que hay, {value} cm",
     "circles_needed": "Círculos de energía con la separación necesaria, {value} cm",
+    "circles_note": (
+        "Radio: el mayor movimiento de cada edificio a la altura de contacto, como energía (PER). "
+        "Líneas: las caras de los edificios en reposo. El edificio 2 va a trazos."
+    ),
     "history": "Desplazamientos en el tiempo, cm, y {value} impactos",
     "history_note": (
         "Edificio 1 continuo, edificio 2 a trazos y a una separación de distancia; barras abajo: "
@@ -158,6 +162,10 @@ SPANISH: dict[str, str] = {
     "head_station": "estación",
     "head_state": "estado",
     "head_pairs": "pares",
+    "head_pga": "PGA, m/s²",
+    "head_pgv": "PGV, m/s",
+    "head_per": "PER (1 s), cm",
+    "head_sd": "SD (1 s), cm",
     "head_shortest_usable_period": "utilizable desde, s",
     "head_longest_usable_period": "hasta, s",
     "head_warnings": "advertencias y razones",
@@ -229,8 +237,9 @@ SPANISH: dict[str, str] = {
         "ninguna estación al alcance: demanda del SD de un ShakeMap, sin PER, registro ni historia "
         "exacta"
     ),
-    "flag_shakemap_assumed_deviation": (
-        "el ShakeMap no da desviación: se supone la configurada"
+    "flag_shakemap_assumed_deviation": ("el ShakeMap no da desviación: se supone la configurada"),
+    "flag_contradicting_coordinates": (
+        "dos fuentes ubican la estación a más de 1 km una de otra: vea stations.csv"
     ),
     "flag_baseline_shift": (
         "la línea base del registro se desplazó durante el sismo: los períodos largos son dudosos"
@@ -243,8 +252,6 @@ SPANISH: dict[str, str] = {
         "el registro fue digitalizado de película: períodos cortos y largos menos ciertos"
     ),
     "flag_undated": "se desconoce la hora del registro: puede ser de otro sismo",
-    "flag_record_warning": (
-        "el registro falló otra revisión que solo advierte: vea stations.csv"
-    ),
+    "flag_record_warning": ("el registro falló otra revisión que solo advierte: vea stations.csv"),
     "flag_simulated": "el movimiento del suelo es simulado",
 }

@@ -128,6 +128,10 @@ ENGLISH: dict[str, str] = {
     "fact_amplification_exact": "motion with / without pounding",
     "circles_gap": "Circles of energy at the gap that there is, {value} cm",
     "circles_needed": "Circles of energy at the gap needed, {value} cm",
+    "circles_note": (
+        "Radius: the largest motion of each building at contact height, as energy (PER). Lines: "
+        "the faces of the buildings at rest. Building 2 is dashed."
+    ),
     "history": "Displacements over time, cm, and {value} impacts",
     "history_note": (
         "Building 1 solid, building 2 dashed and a gap away; bars below: impacts, the higher the "

@@ -20,7 +20,9 @@ class Details {
     const [state, grade] = [this.page.stateOf(i), this.page.classOf(i)];
     const heading = element("h2", {}, `${t("pair")} ${this.value("pair_id", i)} `);
     const words = element("p", {}, element("strong", {}, swatch(grade), ` ${grade.label}; ${t("state")}: ${state.label}. `), this.words(i));
-    const pictures = element("div", { class: "pictures" }, ...this.circles(i), ...this.history(i));
+    const circles = this.circles(i);
+    if (circles.length) circles.push(element("p", { class: "small" }, t("circles_note")));
+    const pictures = element("div", { class: "pictures" }, ...circles, ...this.history(i));
     this.place.replaceChildren(
       close, heading, words, pictures, this.buildings(i),
       ...this.prevention(i), ...this.flags(i), ...this.derived(i), ...this.sides(i),
@@ -117,18 +119,18 @@ class Details {
     const found = this.page.content.histories[String(Math.round(this.value("rank", i)))];
     if (!found) return this.value("station", i) ? [element("p", { class: "small" }, t("no_history", { value: this.page.content.history_count }))] : [];
     const caption = t("history", { value: found.impacts.length });
-    const picture = drawing("svg", { class: "picture", viewBox: "0 0 560 240", role: "img", "aria-label": caption });
+    const picture = drawing("svg", { class: "picture", viewBox: "0 0 900 240", role: "img", "aria-label": caption });
     const start = found.time[0];
     const length = found.time[found.time.length - 1] - start || 1;
     const gap = 1000 * this.value("gap", i);
     const two = found.two.map((value) => value + gap);
     const all = [...found.one, ...two];
     const [low, high] = [Math.min(...all), Math.max(...all)];
-    const x = (time) => 44 + (506 * (time - start)) / length;
+    const x = (time) => 44 + (846 * (time - start)) / length;
     const y = (value) => 12 + (196 * (high - value)) / (high - low || 1);
     const colours = this.page.content.building_colours;
     for (const tick of ticks(low / 10, high / 10)) {
-      picture.append(drawing("line", { x1: 44, x2: 550, y1: y(10 * tick), y2: y(10 * tick), stroke: "#ccc" }));
+      picture.append(drawing("line", { x1: 44, x2: 890, y1: y(10 * tick), y2: y(10 * tick), stroke: "#ccc" }));
       picture.append(drawing("text", { x: 40, y: y(10 * tick) + 4, "text-anchor": "end", "font-size": 11 }, this.page.number(tick, tickDigits(low / 10, high / 10))));
     }
     for (const tick of ticks(start, start + length)) {
@@ -144,9 +146,10 @@ class Details {
     });
     const fastest = Math.max(...found.impacts.map(([, speed]) => speed), 1e-9);
     for (const [time, speed] of found.impacts) {
+      if (time < start || time > start + length) continue;
       picture.append(drawing("line", { x1: x(time), x2: x(time), y1: 208, y2: 208 - Math.max(4, (34 * speed) / fastest), stroke: "#000", "stroke-width": 1 }));
     }
-    return [element("figure", {}, element("figcaption", {}, caption), picture, element("p", { class: "small" }, t("history_note")))];
+    return [element("figure", { class: "wide" }, element("figcaption", {}, caption), picture, element("p", { class: "small" }, t("history_note")))];
   }
 
   prevention(i) {

@@ -14,7 +14,9 @@ class Page {
     };
     this.number = (value, digits) => {
       if (!Number.isFinite(value)) return "–";
-      return value.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+      // No minus before a zero
+      const shown = Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value;
+      return shown.toLocaleString(content.language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
     };
     this.setGrades();
     this.setBuildings();

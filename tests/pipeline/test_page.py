@@ -1,0 +1,98 @@
+"""The page of a run: per_obspy.pipeline.page and per_obspy.report.page.drawn_histories."""
+
+import json
+import re
+import zlib
+from base64 import b64decode
+
+import pandas as pd
+import pytest
+
+from per_obspy.pipeline.run import report, run
+
+from .small_run import InProcess, write_configuration
+
+
+def content_of(path):
+    """Return the content of a page, without its tables of numbers."""
+    block = re.search(
+        r'<script type="application/octet-stream" id="data">([^<]*)<', path.read_text()
+    )
+    data = zlib.decompress(b64decode(block[1]))
+    return json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    result = run(write_configuration(folder), executor=InProcess())
+    assert "report.html" in result.record["outputs"]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def content(folder):
+    return content_of(folder / "out" / "report.html")
+
+
+@pytest.fixture(scope="module")
+def risk(folder):
+    return pd.read_parquet(folder / "out" / "risk.parquet")
+
+
+def test_page_states_what_the_run_found(content, risk):
+    assert content["simulated"] is True
+    assert content["pair_count"] == len(risk)
+    counts = {state["name"]: state["count"] for state in content["states"]}
+    assert counts["yes"] == (risk["state"] == "yes").sum()
+    assert content["numbers"][0][0] == str(len(risk))
+    assert "3 stations used, 0 not usable" in content["event"]
+    assert [row[0] for row in content["stations"]["rows"]] == ["XX.S001", "XX.S002", "XX.S003"]
+
+
+def test_histories_have_the_impacts_of_the_risk_table(content, risk):
+    """Both follow the pair exactly, by kernels that share no code."""
+    histories = content["histories"]
+    assert len(histories) >= 40
+    by_rank = risk.set_index("rank")
+    compared = 0
+    for rank, history in histories.items():
+        pair = by_rank.loc[int(rank)]
+        fastest = max((speed for _, speed in history["impacts"]), default=0.0)
+        # After some ten impacts the order of rounding decides; fewer are followed alike
+        if pair["impacts"] <= 10:
+            assert len(history["impacts"]) == pair["impacts"]
+            # Velocities are written in mm/s
+            assert fastest == pytest.approx(pair["impact_velocity_exact"], abs=6e-4)
+            compared += 1
+    assert compared >= 5
+
+
+def test_radius_of_a_station_is_at_least_its_displacement(content):
+    heads = content["stations"]["heads"]
+    per, sd = heads.index("PER (1 s), cm"), heads.index("SD (1 s), cm")
+    for row in content["stations"]["rows"]:
+        assert row[per] >= row[sd] > 0
+
+
+def test_areas_of_the_page_are_those_of_the_totals(folder, content):
+    totals = pd.read_csv(folder / "out" / "totals.csv")
+    (area,) = (column for column in content["tables"][0]["columns"] if column["name"] == "area")
+    assert set(area["texts"]) == set(totals["area"])
+
+
+def test_report_writes_the_page_in_the_language_of_the_configuration(folder):
+    configuration = write_configuration(folder, '[report]\nlanguage = "es"\n')
+    report(configuration, folder / "out")
+    assert content_of(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
+
+
+def test_rejections_are_counted_and_their_beginning_shown(folder, content):
+    assert content["rejected"]["rows"] == []
+    assert content["rejected"]["note"] == "Nothing was rejected."
+
+
+def test_language_on_the_command_line(folder, call):
+    code, _, error = call("report", folder / "run.toml", "-o", folder / "out", "--language", "es")
+    assert (code, error) == (0, error)
+    assert content_of(folder / "out" / "report.html")["language"] == "es"
