@@ -15,11 +15,13 @@ from per_obspy.pounding.history.pair_histories import BOUNCES_OF_PAIRS, SHORTEST
 from per_obspy.pounding.history.row_history import SPEED_SHARE
 from per_obspy.pounding.history.row_tables import (
     BUILDING_FIELDS,
-    BuildingRows,
     RowScales,
     building_table,
     checked_rows,
     row_scales,
+)
+from per_obspy.pounding.history.row_tables import (
+    BuildingRows as BuildingRows,
 )
 from per_obspy.pounding.history.tables import (
     closed_record,
@@ -130,7 +132,7 @@ def _free_radius(
     """Return the largest radius of every building alone."""
     sizes = np.diff(rows.first)
     azimuth = np.repeat(rows.azimuth, sizes)
-    radius = azimuth_maxima(*ground, dt, rows.period, rows.damping, azimuth).per
+    radius = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth).per
     # A building that may yield is a row of its own
     yielding = np.flatnonzero(np.isfinite(rows.yield_displacement))
     if yielding.size:
