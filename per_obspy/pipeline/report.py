@@ -26,6 +26,7 @@ from per_obspy.tables.totals import (
     piece_totals,
     region_totals,
     totals_columns,
+    with_buildings,
     write_totals,
 )
 
@@ -133,7 +134,9 @@ def reported(
         facts = _facts(settings, simulated)
         summary = _summary(settings, risk, folder, facts, report)
         # Totals, layers and the comparison with observations need no record
-        write_totals(summary.totals.table, folder / "totals.csv")
+        totals = with_buildings(summary.totals.table, folder / "buildings.parquet")
+        summary = summary._replace(totals=summary.totals._replace(table=totals))
+        write_totals(totals, folder / "totals.csv")
         report.outputs.append(folder / "totals.csv")
         report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
         if settings.geopackage:

@@ -14,6 +14,7 @@ from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.building_rows import BuildingRowsDone, building_rows
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
@@ -22,7 +23,7 @@ from per_obspy.tables.risk import write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
-KINDS = ("file", "record", "station", "service", "pair")
+KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
 
 class Screened(NamedTuple):
@@ -87,16 +88,21 @@ def screened(
     has_motion = bool(stations or maps)
     parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
     outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
-    kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
+    rows = BuildingRowsDone([], {})
     # The parts of the chunks become one table, worst pair first
     tables = [part.path for part in parts if part.path]
     if tables:
         progress("ranking", 0, 1)
-        risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
-        outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
+        facts = _facts(settings, stations)
+        risk = write_risk(tables, folder, facts, settings.csv_rows)
+        states, served = risk.states, risk.stations
         progress("ranking", 1, 1)
-    failed = any(part.failed for part in parts)
-    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed)
+        rows = building_rows(settings, folder, ground, facts, executor, progress)
+        outputs += [*risk.files, *rows.outputs]
+    kinds = write_rejected(chain(rejected, unplaced, rejections(parts), rows.rejected), outputs[0])
+    failed = rows.failed or any(part.failed for part in parts)
+    counts = _counts(states, kinds, parts) | rows.counts
+    return Screened(outputs, counts, served, unplaced, failed)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:

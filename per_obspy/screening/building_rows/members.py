@@ -190,5 +190,7 @@ def _is_given(derived: Any, name: str, found: FloatArray) -> FloatArray:
 def _differ(found: FloatArray) -> BoolArray:
     """Return where two descriptions differ by more than is noted."""
     low, high = np.fmin(*found), np.fmax(*found)
+    # One that yields and one that does not differ, two that do not yield do not
     with np.errstate(invalid="ignore"):
-        return np.asarray(~(high - low <= NOTED * high) & (high != low))
+        far = np.isinf(high) | ~(high - low <= NOTED * high)
+    return np.asarray(far & (high != low))
