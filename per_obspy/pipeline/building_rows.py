@@ -151,15 +151,11 @@ def _found(rows: Rows, risk: Path) -> tuple[pd.DataFrame, Contacts, tuple[Reject
     raised["no_record"] = (placed.contacts["station"].iloc[first] == "").to_numpy()
     names_of_rows = _row_names(placed, contacts, first)
     row = placed.contacts["row"]
-    table = placed.contacts.assign(
-        row_id=names_of_rows[row], flags=joined_names(raised)[row]
-    )
+    table = placed.contacts.assign(row_id=names_of_rows[row], flags=joined_names(raised)[row])
     return table, contacts, (*contacts.rejected, *joints.rejected)
 
 
-def _row_names(
-    placed: PlacedRows, contacts: Contacts, first: np.ndarray
-) -> np.ndarray:
+def _row_names(placed: PlacedRows, contacts: Contacts, first: np.ndarray) -> np.ndarray:
     """Return the name of each row: that of its first pair in alphabetical order."""
     order = contacts.order[placed.contacts["pair"]]
     smallest = np.minimum.reduceat(order, first)

@@ -129,8 +129,8 @@ def _sides_query(database: duckdb.DuckDBPyConnection, folder: Path, totals: Tota
     database.register("risk", parquet_rows([risk], list(dict.fromkeys(["pair_id", *present]))))
     joined = f"SELECT interfaces.*, {', '.join(columns)} FROM interfaces JOIN risk USING (pair_id)"
     sides = [
-        f"SELECT *, {at_left} AS at_left, building_number_{side} AS building_number FROM joined"
-        for side, at_left in (("left", "true"), ("right", "false"))
+        f"SELECT *, {leftward} AS leftward, building_number_{side} AS building_number FROM joined"
+        for side, leftward in (("left", "true"), ("right", "false"))
     ]
     order = "ORDER BY building_number, row_id, interface"
     return f"WITH joined AS ({joined}) {' UNION ALL '.join(sides)} {order}"

@@ -21,7 +21,7 @@ def schema_of(columns: Iterable[Column], facts: Mapping[str, str] | None = None)
 
 
 def table_of(values: Mapping[str, Any] | pd.DataFrame, columns: Sequence[Column]) -> pa.Table:
-    """Return columns in the order and types of a schema; NaN in whole numbers is empty."""
+    """Return columns in the order and types of a schema; NaN is an empty cell."""
     arrays = [_array(np.asarray(values[column.name]), column.dtype) for column in columns]
     return pa.table(arrays, schema=schema_of(columns))
 
@@ -29,7 +29,7 @@ def table_of(values: Mapping[str, Any] | pd.DataFrame, columns: Sequence[Column]
 def _array(values: Any, dtype: str) -> pa.Array:
     """Return values in the type of their column."""
     if dtype != "int64":
-        return pa.array(values, type=_TYPES[dtype])
+        return pa.array(values, type=_TYPES[dtype], from_pandas=True)
     numbers = np.asarray(values)
     empty = np.isnan(numbers) if numbers.dtype.kind == "f" else np.zeros(numbers.shape, dtype=bool)
     return pa.array(np.where(empty, 0, numbers).astype(np.int64), mask=empty)

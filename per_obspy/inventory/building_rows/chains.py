@@ -201,9 +201,7 @@ class _Cutter:
         """Return a row cut at the widest gap of a range of contacts, nearest to its middle."""
         middle = (first + last - 1) / 2.0
         links = row.links
-        place = max(
-            range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle))
-        )
+        place = max(range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle)))
         parts = links[:place], links[place : place + 1], links[place + 1 :]
         return [row._replace(links=part) for part in parts]
 

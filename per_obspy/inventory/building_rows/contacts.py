@@ -201,9 +201,7 @@ def _one_axis(first: float, second: float, angle: float) -> bool:
     return bool(between <= angle)
 
 
-def _repetition(
-    pair_id: NDArray[np.object_], gap: FloatArray, row: int, kept: int
-) -> Rejection:
+def _repetition(pair_id: NDArray[np.object_], gap: FloatArray, row: int, kept: int) -> Rejection:
     """Return the rejection of a pair whose contact another one describes."""
     reason = (
         f"it repeats the contact of pair {pair_id[kept]!r} between the same buildings: "

@@ -21,9 +21,7 @@ from per_obspy.screening.ranking import risk_class
 from per_obspy.screening.values import values
 
 
-def building_table(
-    sides: pd.DataFrame, classes: Mapping[str, float], angle: float
-) -> pd.DataFrame:
+def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: float) -> pd.DataFrame:
     """
     Return one row per building, in the order of their numbers.
 
@@ -58,6 +56,7 @@ def building_table(
         "worst_pair": of_worst["pair_id"],
         "worst_azimuth": of_worst["direction"],
         **prevention(sides, groups, of_worst["neighbour_id"]),
+        "floors_misaligned": groups.any(sides["floors_misaligned"].to_numpy(bool)),
         **_rows(sides, groups),
         **{name: of_worst[name] for name in ("area", "longitude", "latitude")},
         **{name: groups.largest(values(sides, name)) for name in ("importance", "occupants")},

@@ -46,9 +46,7 @@ _SIDES = tuple(
         _count(f"building_number_{side}", "its number in this run: names need not be unique"),
         _number(f"amplification_{side}", "1", "its largest radius in the row / without contact"),
         _number(f"displacement_{side}", "m", "its largest, of the oscillator, in the row"),
-        _number(
-            f"amplification_alone_{side}", "1", "the same as amplification, of the pair alone"
-        ),
+        _number(f"amplification_alone_{side}", "1", "the same as amplification, of the pair alone"),
     )
 )
 

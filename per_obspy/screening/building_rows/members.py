@@ -87,9 +87,7 @@ def members_of(contacts: Table, first: IntArray, azimuth: FloatArray) -> Members
     layout = _layout(contacts, first)
     masses = both(contacts, "contact_mass")
     shares = both(contacts, "participation")
-    modal = tuple(
-        mass * np.square(share) for mass, share in zip(masses, shares, strict=True)
-    )
+    modal = tuple(mass * np.square(share) for mass, share in zip(masses, shares, strict=True))
     # One oscillator per building
     names = ("period", "damping", "yield_displacement", "hardening")
     found = {name: layout.joined(both(contacts, name), name) for name in names}

@@ -14,7 +14,7 @@ from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.values import values
 
 #: Texts of a building that needs nothing, and of one whose own gaps are enough.
-NOTHING = "nothing: no gap closes"
+NOTHING = "nothing: its gaps are enough in this record"
 ELSEWHERE = "wider gaps elsewhere in its row: its own are enough for each pair alone"
 
 #: Missing gap below which it is not written, m.

@@ -34,7 +34,7 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     interfaces : DataFrame
-        Columns ``columns.ROWS`` and ``OF_PAIRS``, and ``at_left``: whether the building is the
+        Columns ``columns.ROWS`` and ``OF_PAIRS``, and ``leftward``: whether the building is the
         left one.
 
     Returns
@@ -43,7 +43,7 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
         The columns without ``_left``, ``_right``, ``_1`` and ``_2``, and ``neighbour_number``,
         ``neighbour_id`` and ``direction`` (towards the neighbour, degrees; NaN if unknown).
     """
-    at_left = interfaces["at_left"].to_numpy(bool)
+    at_left = interfaces["leftward"].to_numpy(bool)
     # Building 1 stands on the left of a pair that is not turned
     is_first = at_left ^ interfaces["turned"].to_numpy(bool)
     columns: dict[str, Any] = {}
