@@ -144,6 +144,7 @@ def _rows(seed: int, count: int) -> _Rows:
 
 def _names(rows: _Rows) -> Columns:
     """Return identifiers of the buildings, and whether a pair stands at the end of its row."""
+    # Each pair has a new building 2, and the first of a row a new building 1
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
     straight = rows.goes_on & ~rows.turns
     inside = straight & np.append(straight[1:], False)
@@ -250,17 +251,20 @@ def _places(
     bearing = np.deg2rad(generator.uniform(0.0, 360.0, count))
     distance = radius * np.sqrt(generator.random(count))
     first = (distance * _direction(bearing))[:, rows.start]
-    # Building 2 along the axis, by the half sides of two square buildings and the gap
-    half_sides = (np.sqrt(columns["area_1"]) + np.sqrt(columns["area_2"])) / 2.0
-    separation = half_sides + columns["gap"]
-    steps = separation * _direction(np.deg2rad(azimuth))
-    one, two = _offsets(first, steps, rows, radius)
+    offsets = _offsets(first, _steps(columns, azimuth), rows, radius)
     places = {}
-    for i, offset in ((1, one), (2, two)):
+    for i, offset in enumerate(offsets, start=1):
         longitude, latitude = _moved(stations[station, 0], stations[station, 1], *offset)
         places[f"longitude_{i}"] = np.round(longitude, 7)
         places[f"latitude_{i}"] = np.round(latitude, 7)
     return {**places, "azimuth": azimuth}
+
+
+def _steps(columns: Columns, azimuth: FloatArray) -> FloatArray:
+    """Return from building 1 to 2 along the axis, (2, count), m; buildings are square."""
+    half_sides = (np.sqrt(columns["area_1"]) + np.sqrt(columns["area_2"])) / 2.0
+    separation = half_sides + columns["gap"]
+    return np.asarray(separation * _direction(np.deg2rad(azimuth)))
 
 
 def _direction(azimuth: FloatArray) -> FloatArray:

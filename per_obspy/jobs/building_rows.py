@@ -164,15 +164,12 @@ def _outcomes(
 
     # A row among several fails: each half is computed alone
     middle = first[first.size // 2]
-    halves = slice(0, middle), slice(middle, None)
-    parts = [_outcomes(motion, _some(contacts, half)) for half in halves]
-    joined = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
-    return joined, (*parts[0][1], *parts[1][1])
-
-
-def _some(contacts: Columns, rows: slice) -> Columns:
-    """Return some rows of all columns."""
-    return {name: column[rows] for name, column in contacts.items()}
+    before = {name: column[:middle] for name, column in contacts.items()}
+    behind = {name: column[middle:] for name, column in contacts.items()}
+    (one, rejected), (other, more) = _outcomes(motion, before), _outcomes(motion, behind)
+    # Both halves in their order
+    joined = {name: np.concatenate([one[name], other[name]]) for name in one}
+    return joined, (*rejected, *more)
 
 
 def _first(row: IntArray) -> IntArray:

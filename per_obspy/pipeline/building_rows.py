@@ -1,6 +1,6 @@
 """Rows of buildings: from the risk table to the tables of rows and of buildings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import NamedTuple
@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from per_obspy.config import Run
 from per_obspy.config.rows import Rows
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
-from per_obspy.inventory.building_rows.chains import chains_of
-from per_obspy.inventory.building_rows.contacts import Contacts, contacts_of
+from per_obspy.inventory.building_rows.chains import Chains, chains_of
+from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray, contacts_of
 from per_obspy.inventory.building_rows.given import PROPERTIES, given_values
 from per_obspy.inventory.building_rows.joints import joints_of
 from per_obspy.inventory.table_columns import joined_names
@@ -25,7 +26,7 @@ from per_obspy.progress import Progress
 from per_obspy.screening.building_rows.members import NEEDED
 from per_obspy.screening.building_rows.placed import PlacedRows, placed_rows
 from per_obspy.tables.buildings import write_buildings
-from per_obspy.tables.parts import bounded_database, parquet_rows
+from per_obspy.tables.parts import batches, bounded_database, parquet_rows
 from per_obspy.tables.rows import write_rows
 from per_obspy.threads import usable_processors
 
@@ -72,6 +73,19 @@ class BuildingRowsDone(NamedTuple):
     failed: bool = False
 
 
+#: Result where there are no rows.
+NO_ROWS = BuildingRowsDone([], {})
+
+
+class _Found(NamedTuple):
+    """Contacts of all rows in their order, their buildings, number of rows, and rejections."""
+
+    placed: pd.DataFrame
+    contacts: Contacts
+    rows: int
+    rejected: tuple[Rejection, ...]
+
+
 def building_rows(
     settings: Run,
     folder: Path,
@@ -100,32 +114,45 @@ def building_rows(
     """
     risk = folder / "risk.parquet"
     if not _enabled(settings.rows, risk):
-        return BuildingRowsDone([], {})
+        return NO_ROWS
     progress("rows", 0, 1)
-    placed, contacts, rejected = _found(settings.rows, risk)
-    # The histories, chunk by chunk
-    exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
-    jobs = _jobs(folder, ground, contacts, placed, exact)
-    parts, rows = list[RowsPart](), 0
-    for part in do_row_chunks(jobs, settings.workers or usable_processors(), executor):
+    found = _found(settings.rows, risk)
+    jobs = _jobs(settings, folder, ground, found)
+    workers, parts, done = settings.workers or usable_processors(), list[RowsPart](), 0
+    for part in do_row_chunks(jobs, workers, executor):
         parts.append(part)
-        rows += part.rows
-        progress("rows", rows, len(placed))
+        done += part.rows
+        progress("rows", done, len(found.placed))
     _remove_others(folder / "rows", parts)
+    # Both tables, from the parts in their order
     parts.sort(key=lambda part: part.number)
-    # Both tables
-    outputs = write_rows([part.path for part in parts], folder, facts)
-    outputs += write_buildings(
-        folder, settings.screening, settings.totals, settings.rows.angle, facts, settings.csv_rows
-    )
-    counts = {
-        "rows": int(placed["row"].nunique()),
-        "buildings": pq.read_metadata((folder / "buildings.parquet").absolute()).num_rows,
+    outputs = _written(settings, folder, parts, facts)
+    # What was done, and what was left out
+    rejected = (*found.rejected, *rows_rejections(parts))
+    counts = _counts(found, folder, parts)
+    return BuildingRowsDone(outputs, counts, rejected, any(part.failed for part in parts))
+
+
+def _counts(found: _Found, folder: Path, parts: Sequence[RowsPart]) -> dict[str, int]:
+    """Return the numbers of rows, buildings and chunks."""
+    buildings = pq.read_metadata((folder / "buildings.parquet").absolute())
+    return {
+        "rows": found.rows,
+        "buildings": int(buildings.num_rows),
         "row_chunks": len(parts),
         "row_chunks_resumed": sum(part.resumed for part in parts),
     }
-    found = (*rejected, *rows_rejections(parts))
-    return BuildingRowsDone(outputs, counts, found, any(part.failed for part in parts))
+
+
+def _written(
+    settings: Run, folder: Path, parts: Sequence[RowsPart], facts: Mapping[str, str]
+) -> list[Path]:
+    """Write the tables of rows and of buildings, and return their files."""
+    rows = write_rows([part.path for part in parts], folder, facts)
+    # Buildings are made of the rows
+    angle, count = settings.rows.angle, settings.csv_rows
+    buildings = write_buildings(folder, settings.screening, settings.totals, angle, facts, count)
+    return [*rows, *buildings]
 
 
 def _enabled(rows: Rows, risk: Path) -> bool:
@@ -135,27 +162,36 @@ def _enabled(rows: Rows, risk: Path) -> bool:
     return set(IDENTIFIERS) <= set(pq.read_schema(risk.absolute()).names)
 
 
-def _found(rows: Rows, risk: Path) -> tuple[pd.DataFrame, Contacts, tuple[Rejection, ...]]:
-    """Return the contacts of all rows in their order, the buildings, and what was left out."""
+def _found(rows: Rows, risk: Path) -> _Found:
+    """Find the rows of all pairs, and the order in which they are followed."""
     known = pq.read_schema(risk.absolute()).names
     names = [name for name in FINDING if name in known]
     pairs = pq.read_table(risk.absolute(), columns=names, use_threads=False).to_pandas()
+    # From pairs to chains of contacts
     contacts = contacts_of(pairs, rows.angle)
     joints = joints_of(contacts, given_values(pairs), rows.angle)
     chains = chains_of(contacts, joints, rows.angle, rows.longest)
     placed = placed_rows(chains, pairs, CHUNK)
-    # Texts of each row: its name and its flags
-    first = np.flatnonzero(np.diff(placed.contacts["row"], prepend=-1))
+    # Name and flags of each row at every contact of it
+    row = placed.contacts["row"].to_numpy()
+    first = np.flatnonzero(np.diff(row, prepend=-1))
+    row_id = _row_names(placed, contacts, first)[row]
+    flags = joined_names(_raised(chains, placed, first))[row]
+    table = placed.contacts.assign(row_id=row_id, flags=flags)
+    return _Found(table, contacts, first.size, (*contacts.rejected, *joints.rejected))
+
+
+def _raised(chains: Chains, placed: PlacedRows, first: IntArray) -> dict[str, BoolArray]:
+    """Return the flags of the rows in the order in which they are followed."""
     raised = {name: flag[placed.order] for name, flag in chains.flags.items()}
-    raised["several_stations"] = placed.several_stations
-    raised["no_record"] = (placed.contacts["station"].iloc[first] == "").to_numpy()
-    names_of_rows = _row_names(placed, contacts, first)
-    row = placed.contacts["row"]
-    table = placed.contacts.assign(row_id=names_of_rows[row], flags=joined_names(raised)[row])
-    return table, contacts, (*contacts.rejected, *joints.rejected)
+    station = placed.contacts["station"].iloc[first]
+    return raised | {
+        "several_stations": placed.several_stations,
+        "no_record": np.asarray(station == ""),
+    }
 
 
-def _row_names(placed: PlacedRows, contacts: Contacts, first: np.ndarray) -> np.ndarray:
+def _row_names(placed: PlacedRows, contacts: Contacts, first: IntArray) -> NDArray[np.object_]:
     """Return the name of each row: that of its first pair in alphabetical order."""
     order = contacts.order[placed.contacts["pair"]]
     smallest = np.minimum.reduceat(order, first)
@@ -163,20 +199,14 @@ def _row_names(placed: PlacedRows, contacts: Contacts, first: np.ndarray) -> np.
     return np.array([f"R-{name}" for name in by_name[smallest]], dtype=object)
 
 
-def _jobs(
-    folder: Path,
-    ground: GroundFiles,
-    contacts: Contacts,
-    placed: pd.DataFrame,
-    exact: bool,
-) -> Iterator[RowsJob]:
+def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: _Found) -> Iterator[RowsJob]:
     """Yield one job per chunk of rows."""
+    exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
-    for number, table in _chunks(folder, contacts, placed):
-        name = table["station"].iloc[0]
-        part = folder / "rows" / f"{number:06}.parquet"
+    for number, table in _chunks(folder, found.contacts, found.placed):
         # Pairs that a map serves have no record
-        station = stations.get(name) if exact else None
+        station = stations.get(table["station"].iloc[0]) if exact else None
+        part = folder / "rows" / f"{number:06}.parquet"
         yield RowsJob(number, pa.Table.from_pandas(table, preserve_index=False), station, part)
 
 
@@ -208,7 +238,7 @@ def _pieces(folder: Path, placed: pd.DataFrame) -> Iterator[pd.DataFrame]:
         columns = ", ".join(f"risk.{name}" for name in names)
         query = f"SELECT {columns} FROM risk JOIN mapping USING (rank) ORDER BY place"
         before = 0
-        for batch in database.execute(query).to_arrow_reader(TOGETHER):
+        for batch in batches(database, query, TOGETHER):
             own = placed.iloc[before : before + batch.num_rows].reset_index(drop=True)
             before += batch.num_rows
             yield pd.concat([own, batch.to_pandas()], axis=1)
@@ -216,11 +246,11 @@ def _pieces(folder: Path, placed: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 def _with_buildings(piece: pd.DataFrame, contacts: Contacts) -> pd.DataFrame:
     """Return contacts with numbers and names of the buildings on both sides."""
-    buildings = contacts.buildings[piece["pair"]]
-    turned = piece["turned"].to_numpy(bool)
-    columns = {}
-    for side, number in (("left", turned.astype(int)), ("right", 1 - turned.astype(int))):
-        chosen = buildings[np.arange(len(piece)), number]
+    turned = piece["turned"].to_numpy(dtype=np.int64)
+    rows, columns = np.arange(len(piece)), {}
+    # The left building of a turned pair is its building 2
+    for side, number in (("left", turned), ("right", 1 - turned)):
+        chosen = contacts.buildings[piece["pair"]][rows, number]
         columns[f"building_number_{side}"] = chosen
         columns[f"building_id_{side}"] = contacts.names[chosen]
     station = piece["station"].astype(str)

@@ -134,9 +134,7 @@ def reported(
         facts = _facts(settings, simulated)
         summary = _summary(settings, risk, folder, facts, report)
         # Totals, layers and the comparison with observations need no record
-        totals = with_buildings(summary.totals.table, folder / "buildings.parquet")
-        summary = summary._replace(totals=summary.totals._replace(table=totals))
-        write_totals(totals, folder / "totals.csv")
+        write_totals(summary.totals.table, folder / "totals.csv")
         report.outputs.append(folder / "totals.csv")
         report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
         if settings.geopackage:
@@ -173,11 +171,13 @@ def _summary(
         if sum(pieces.rows) != table.pairs:
             raise CatalogError(str(risk), "cannot be read to its end: run again")
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
+    totals = region_totals(pieces.totals, settings.totals)
+    counted = with_buildings(totals.table, folder / "buildings.parquet")
     return RiskSummary(
         worst,
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        region_totals(pieces.totals, settings.totals),
+        totals._replace(table=counted),
     )
 
 

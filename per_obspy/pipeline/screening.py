@@ -14,7 +14,7 @@ from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.building_rows import BuildingRowsDone, building_rows
+from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
@@ -84,25 +84,29 @@ def screened(
     """
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
-    # Pairs need a station or a map
-    has_motion = bool(stations or maps)
-    parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
-    outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
-    rows = BuildingRowsDone([], {})
+    parts = list[Part]()
+    if stations or maps:
+        parts = _parts(settings, folder, ground, executor, progress)
+    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     tables = [part.path for part in parts if part.path]
     if tables:
-        progress("ranking", 0, 1)
         facts = _facts(settings, stations)
-        risk = write_risk(tables, folder, facts, settings.csv_rows)
-        states, served = risk.states, risk.stations
+        progress("ranking", 0, 1)
+        files, states, served = write_risk(tables, folder, facts, settings.csv_rows)
         progress("ranking", 1, 1)
         rows = building_rows(settings, folder, ground, facts, executor, progress)
-        outputs += [*risk.files, *rows.outputs]
-    kinds = write_rejected(chain(rejected, unplaced, rejections(parts), rows.rejected), outputs[0])
-    failed = rows.failed or any(part.failed for part in parts)
-    counts = _counts(states, kinds, parts) | rows.counts
-    return Screened(outputs, counts, served, unplaced, failed)
+        outputs += [*files, *rows.outputs]
+    left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
+    kinds = write_rejected(left_out, outputs[0])
+    counts = _counts(states, kinds, parts, rows)
+    return Screened(outputs, counts, served, unplaced, rows.failed or _any_failed(parts))
+
+
+def _any_failed(parts: Sequence[Part]) -> bool:
+    """Return whether the work of a chunk of pairs failed unexpectedly."""
+    return any(part.failed for part in parts)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
@@ -111,12 +115,15 @@ def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]
     return {"name": settings.name, "simulated": str(is_simulated).lower()}
 
 
-def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
-    """Return the numbers of pairs, of rejections of each kind and of chunks."""
+def _counts(
+    states: Counter[str], kinds: Counter[str], parts: Sequence[Part], rows: BuildingRowsDone
+) -> dict[str, int]:
+    """Return the numbers of pairs, of rejections of each kind, of chunks, and those of rows."""
     counts = {"pairs": states.total()}
     counts |= {state: states[state] for state in STATES}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
-    return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    return counts | rows.counts
 
 
 def _maps(settings: Run) -> tuple[Path, ...]:

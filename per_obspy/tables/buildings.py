@@ -23,7 +23,7 @@ from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.columns import BUILDING_FLAGS, BUILDINGS, FLAGS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
 from per_obspy.tables.described import schema_of, table_of, write_meanings
-from per_obspy.tables.parts import bounded_database, parquet_rows, text_columns
+from per_obspy.tables.parts import batches, bounded_database, parquet_rows, text_columns
 from per_obspy.tables.risk import write_worst
 from per_obspy.tables.totals import areas_of
 
@@ -37,6 +37,12 @@ ROWS = 50_000
 _AREA = "area_of_totals"
 
 _NUMBER = Column("building_number", "int64", "1", "")
+
+#: Both sides of all interfaces.
+_SIDES = (
+    "SELECT *, true AS leftward, building_number_left AS building_number FROM joined UNION ALL "
+    "SELECT *, false AS leftward, building_number_right AS building_number FROM joined"
+)
 
 #: Columns of a building before it has a rank.
 UNRANKED = (_NUMBER, *BUILDINGS[1:])
@@ -76,6 +82,7 @@ def write_buildings(
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
     with temporary_folder(folder) as room, bounded_database(room) as database:
+        # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
             for piece in _pieces(database, folder, totals):
@@ -93,7 +100,7 @@ def _pieces(
     """Yield the sides of buildings, all of a building in one piece."""
     query = _sides_query(database, folder, totals)
     waiting: list[pd.DataFrame] = []
-    for batch in database.execute(query).to_arrow_reader(SIDES):
+    for batch in batches(database, query, SIDES):
         waiting.append(batch.to_pandas())
         rows = pd.concat(waiting, ignore_index=True)
         # The last building may go on in the next batch
@@ -116,24 +123,19 @@ def _sides(rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
 
 def _sides_query(database: duckdb.DuckDBPyConnection, folder: Path, totals: Totals) -> str:
     """Register both tables, and return the query of all sides in the order of their buildings."""
+    # What the sides need of the pairs, and which of it there is
     rows, risk = folder / "rows.parquet", folder / "risk.parquet"
-    database.register("interfaces", parquet_rows([rows]))
     known = pq.read_schema(risk.absolute()).names
-    present = [name for name in OF_PAIRS if name in known]
-    columns = [f"risk.{name}" for name in present]
+    wanted = {name: name for name in OF_PAIRS} | ({_AREA: totals.area} if totals.area else {})
+    present = {name: column for name, column in wanted.items() if column in known}
+    database.register("interfaces", parquet_rows([rows]))
+    read = list(dict.fromkeys(["pair_id", *present.values()]))
+    database.register("risk", parquet_rows([risk], read))
     # Columns that the pair table does not have are empty
-    columns += [f"CAST(NULL AS DOUBLE) AS {name}" for name in OF_PAIRS if name not in known]
-    if totals.area:
-        present.append(totals.area)
-        columns.append(f"risk.{_quoted(totals.area)} AS {_AREA}")
-    database.register("risk", parquet_rows([risk], list(dict.fromkeys(["pair_id", *present]))))
+    columns = [f"risk.{_quoted(column)} AS {name}" for name, column in present.items()]
+    columns += [f"CAST(NULL AS DOUBLE) AS {name}" for name in wanted if name not in present]
     joined = f"SELECT interfaces.*, {', '.join(columns)} FROM interfaces JOIN risk USING (pair_id)"
-    sides = [
-        f"SELECT *, {leftward} AS leftward, building_number_{side} AS building_number FROM joined"
-        for side, leftward in (("left", "true"), ("right", "false"))
-    ]
-    order = "ORDER BY building_number, row_id, interface"
-    return f"WITH joined AS ({joined}) {' UNION ALL '.join(sides)} {order}"
+    return f"WITH joined AS ({joined}) {_SIDES} ORDER BY building_number, row_id, interface"
 
 
 def _quoted(name: str) -> str:
@@ -148,7 +150,7 @@ def _write_ranked(
     """Write all buildings in the order of their ranking, with their rank from 1."""
     database.register("buildings", parquet_rows([unranked]))
     names = ", ".join(column.name for column in BUILDINGS[1:])
-    found = database.execute(f"SELECT {names} FROM buildings ORDER BY {_ORDER}")
+    query = f"SELECT {names} FROM buildings ORDER BY {_ORDER}"
     statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
     schema = schema_of(BUILDINGS, statement)
     dictionaries = text_columns(schema)
@@ -157,7 +159,8 @@ def _write_ranked(
         written_whole(table) as part,
         pq.ParquetWriter(part, schema, use_dictionary=dictionaries) as writer,
     ):
-        for batch in found.to_arrow_reader(ROWS):
+        # Ranks count from 1
+        for batch in batches(database, query, ROWS):
             rank = pa.array(np.arange(before + 1, before + 1 + batch.num_rows))
             writer.write_table(pa.table([rank, *batch.columns], schema=schema))
             before += batch.num_rows

@@ -48,6 +48,7 @@ def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) ->
         written_whole(files[0]) as whole,
         pq.ParquetWriter(whole, schema, use_dictionary=dictionaries) as writer,
     ):
+        # Row group by row group
         for part in parts:
             with pq.ParquetFile(part.absolute()) as file:
                 for group in range(file.num_row_groups):

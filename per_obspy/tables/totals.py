@@ -136,6 +136,7 @@ def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
         return table
     names = ["area", "building_id", "impacts", "probability_common", "probability_independent"]
     found = pq.read_table(buildings.absolute(), columns=names, use_threads=False).to_pandas()
+    # The worst building stands first
     groups = found.assign(hit=found["impacts"].fillna(0) > 0).groupby("area", sort=True)
     counted = pd.DataFrame(
         {

@@ -5,7 +5,8 @@ Every pair is in exactly one row. A row that is cut at a gap leaves the pair of 
 its own, so that no contact is lost; one that is cut at a bend has the building there in both parts.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -94,20 +95,31 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         is in one of them.
     """
     cutter = _Cutter(contacts, angle, longest)
-    rows = [row for chain in _followed(contacts, joints) for row in cutter.pieces(chain)]
+    rows = list(chain.from_iterable(map(cutter.pieces, _followed(contacts, joints))))
     order = contacts.order.tolist()
     rows.sort(key=lambda row: min(order[pair] for pair, _ in row.links))
-    # Flat arrays
+    pair, turned, first = _flat(rows)
+    # Along the axis, whose azimuth is below 180 degrees
+    azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
+    pair, turned = _reversed(pair, turned, first, backwards)
+    flags = {}
+    for name in ROW_FLAGS:
+        flags[name] = np.array([name in row.flags for row in rows], dtype=bool)
+    # And those that follow from their buildings and pairs
+    for name, raised in _flags_of_buildings(contacts, joints, pair).items():
+        if raised.size:
+            flags[name] |= np.logical_or.reduceat(raised, first[:-1])
+    return Chains(pair, turned, first, azimuth, flags)
+
+
+def _flat(rows: Sequence[_Piece]) -> tuple[IntArray, BoolArray, IntArray]:
+    """Return pairs, which of them are turned, and the place of the first one of each row."""
+    # Link by link
     links = [link for row in rows for link in row.links]
     pair = np.array([link[0] for link in links], dtype=np.int64)
     turned = np.array([link[1] for link in links], dtype=bool)
-    sizes = [len(row.links) for row in rows]
-    first = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
-    azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
-    pair, turned = _reversed(pair, turned, first, backwards)
-    noted = {name: np.array([name in row.flags for row in rows], dtype=bool) for name in ROW_FLAGS}
-    flags = _with_flags_of_buildings(noted, contacts, joints, pair, first)
-    return Chains(pair, turned, first, azimuth, flags)
+    sizes = [0, *(len(row.links) for row in rows)]
+    return pair, turned, np.cumsum(sizes, dtype=np.int64)
 
 
 def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
@@ -146,9 +158,9 @@ class _Cutter:
         self._angle = angle
         self._longest = longest
 
-    def pieces(self, chain: _Piece) -> Iterator[_Piece]:
+    def pieces(self, whole: _Piece) -> Iterator[_Piece]:
         """Yield the rows of a chain."""
-        waiting = [chain]
+        waiting = [whole]
         while waiting:
             row = waiting.pop()
             parts = self._cut(row)
@@ -199,6 +211,7 @@ class _Cutter:
 
     def _at_gap(self, row: _Piece, first: int, last: int) -> list[_Piece]:
         """Return a row cut at the widest gap of a range of contacts, nearest to its middle."""
+        # Of equal gaps the one nearest to the middle
         middle = (first + last - 1) / 2.0
         links = row.links
         place = max(range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle)))
@@ -224,6 +237,7 @@ def _reversed(
     pair: IntArray, turned: BoolArray, first: IntArray, backwards: BoolArray
 ) -> tuple[IntArray, BoolArray]:
     """Return the contacts with some rows in the opposite order."""
+    # Where the row of each contact begins and ends
     sizes = np.diff(first)
     starts, ends = np.repeat(first[:-1], sizes), np.repeat(first[1:], sizes)
     back = np.repeat(backwards, sizes)
@@ -232,19 +246,14 @@ def _reversed(
     return pair[source], turned[source] ^ back
 
 
-def _with_flags_of_buildings(
-    noted: dict[str, BoolArray], contacts: Contacts, joints: Joints, pair: IntArray, first: IntArray
-) -> dict[str, BoolArray]:
-    """Return the flags of rows with those that follow from their buildings and pairs."""
+def _flags_of_buildings(contacts: Contacts, joints: Joints, pair: IntArray) -> dict[str, BoolArray]:
+    """Return which contacts raise each flag that follows from their buildings."""
     buildings = contacts.buildings[pair]
-    of_pairs = {
-        "fork": joints.forks[buildings].any(axis=1),
-        "contradictory": joints.contradictory[buildings].any(axis=1),
+    # A building raises the flags of all its rows
+    return {
+        "fork": np.asarray(joints.forks[buildings].any(axis=1)),
+        "contradictory": np.asarray(joints.contradictory[buildings].any(axis=1)),
         "ambiguous_id": contacts.ambiguous[pair] | joints.crowded[buildings].any(axis=1),
         "no_building_id": ~contacts.named[buildings].all(axis=1) & ~contacts.ambiguous[pair],
         "unknown_azimuth": np.isnan(contacts.azimuth[pair]),
     }
-    for name, raised in of_pairs.items():
-        if raised.size:
-            noted[name] = noted[name] | np.logical_or.reduceat(raised, first[:-1])
-    return noted

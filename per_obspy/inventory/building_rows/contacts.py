@@ -67,7 +67,7 @@ class Contacts(NamedTuple):
 
 def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     """
-    Number the buildings of a pair table and find contacts that are described twice.
+    Give the buildings of a pair table numbers, and find contacts that are described twice.
 
     Parameters
     ----------
@@ -81,14 +81,12 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     -------
     Contacts
     """
+    # Buildings by their identifiers
     pair_id = pairs["pair_id"].to_numpy(dtype=object)
     codes, identifiers = _identified(pairs)
     is_ambiguous, rejected = _ambiguous(pairs, codes, identifiers)
-    own = (codes < 0) | is_ambiguous[codes]
-    # Buildings of their own are numbered after those with an identifier
-    buildings = codes.copy()
-    buildings[own] = len(identifiers) + np.arange(int(own.sum()))
-    names = np.concatenate([identifiers, _own_names(pair_id, own)])
+    buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
+    # Contacts that are described twice
     azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
     order = np.asarray(pd.factorize(pair_id, sort=True)[0], dtype=np.int64)
     sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
@@ -103,9 +101,23 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         pair_id=pair_id,
         order=order,
         repeated=repeated,
-        ambiguous=(is_ambiguous[codes] & (codes >= 0)).any(axis=1),
+        ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
         rejected=(*rejected, *found),
     )
+
+
+def _numbered(
+    pair_id: NDArray[np.object_],
+    codes: IntArray,
+    identifiers: NDArray[np.object_],
+    is_ambiguous: BoolArray,
+) -> tuple[IntArray, NDArray[np.object_]]:
+    """Return the numbers of the buildings of each pair, and the names of all buildings."""
+    own = (codes < 0) | is_ambiguous[codes]
+    # Buildings of their own are numbered after those with an identifier
+    buildings = codes.copy()
+    buildings[own] = len(identifiers) + np.arange(int(own.sum()))
+    return buildings, np.concatenate([identifiers, _own_names(pair_id, own)])
 
 
 def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
@@ -116,9 +128,9 @@ def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
         sides.append(given.fillna("").astype(str).to_numpy(dtype=object))
     # Sorted, so that numbers do not depend on the order of the table
     text = np.stack(sides, axis=1).ravel()
-    codes, identifiers = pd.factorize(np.where(text == "", None, text), sort=True)
+    text[text == ""] = None
+    codes, identifiers = pd.factorize(text, sort=True)
     numbers = np.asarray(codes, dtype=np.int64).reshape(-1, 2)
-    # One more, so that the code -1 finds an entry
     return numbers, np.asarray(identifiers, dtype=object)
 
 
@@ -126,6 +138,7 @@ def _ambiguous(
     pairs: pd.DataFrame, codes: IntArray, identifiers: NDArray[np.object_]
 ) -> tuple[BoolArray, tuple[Rejection, ...]]:
     """Return which identifiers stand for several places, with one entry more, and why."""
+    # One entry more, which is that of the code -1
     spread = np.zeros(len(identifiers) + 1)
     if len(identifiers):
         spread[:-1] = _spread(pairs, codes)
@@ -143,6 +156,7 @@ def _ambiguous(
 
 def _spread(pairs: pd.DataFrame, codes: IntArray) -> FloatArray:
     """Return the diagonal of the box around the positions of each identifier, m."""
+    # Boxes in space hold across the date line too
     sides = [_on_sphere(pairs, i) for i in (1, 2)]
     places = np.stack(sides, axis=1).reshape(-1, 3)
     known = codes.ravel() >= 0
@@ -181,6 +195,7 @@ def _repeated(
     reasons, kept = [], list[int]()
     # The narrowest gap stands first; only few pairs have the buildings of another
     for place in np.flatnonzero(same).tolist():
+        # A new group of pairs of the same buildings, or one more of it
         before, row = int(order[place]), int(order[place + 1])
         if not (place and same[place - 1]):
             kept = [before]

@@ -76,6 +76,7 @@ def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float)
     -------
     Joints
     """
+    # Ends that face each other, without those whose pairs contradict each other
     count = contacts.names.size
     found, crowded = _candidates(contacts, angle)
     agrees, reasons = _agreement(contacts, given, found)
@@ -101,18 +102,24 @@ def _candidates(contacts: Contacts, angle: float) -> tuple[_Candidates, BoolArra
     # Ends in the order of their buildings: those of one building stand together
     ends = np.flatnonzero(usable & ~crowded[building])
     ends = ends[np.lexsort([np.repeat(contacts.order, 2)[ends], building[ends]])]
-    found = [np.empty((2, 0), dtype=np.int64)]
-    for step in range(1, MOST_CONTACTS):
-        first, second = ends[:-step], ends[step:]
-        together = building[first] == building[second]
-        found.append(np.stack([first[together], second[together]]))
-        if not together.any():
-            break
-    first, second = np.concatenate(found, axis=1)
+    first, second = _at_one_building(ends, building)
     # Opposite directions differ by 180 degrees
     bend = np.abs((directions[first] - directions[second]) % 360.0 - 180.0)
     opposite = bend <= angle
     return _Candidates(first[opposite], second[opposite], bend[opposite]), crowded
+
+
+def _at_one_building(ends: IntArray, building: IntArray) -> IntArray:
+    """Return every two ends at one building, (2, n), from ends in the order of their buildings."""
+    found = [np.empty((2, 0), dtype=np.int64)]
+    # Neighbours in that order, then those one further apart, as long as there are any
+    for step in range(1, MOST_CONTACTS):
+        first, second = ends[:-step], ends[step:]
+        together = building[first] == building[second]
+        if not together.any():
+            break
+        found.append(np.stack([first[together], second[together]]))
+    return np.concatenate(found, axis=1)
 
 
 def _agreement(
@@ -137,6 +144,7 @@ def _contradiction(
     contacts: Contacts, found: _Candidates, row: int, name: str, numbers: tuple[float, float]
 ) -> Rejection:
     """Return the rejection of a joint whose pairs contradict each other."""
+    # Both ends are at the same building
     ends = int(found.first[row]), int(found.second[row])
     building = contacts.names[contacts.buildings.ravel()[ends[0]]]
     first, second = (contacts.pair_id[end // 2] for end in ends)
@@ -149,8 +157,29 @@ def _contradiction(
 
 def _best(contacts: Contacts, found: _Candidates) -> BoolArray:
     """Return which candidates are taken: the best first, each end once."""
+    rank, count = _ranks(contacts, found), contacts.buildings.size
+    taken = np.zeros(rank.size, dtype=bool)
+    waiting = np.arange(rank.size)
+    while waiting.size:
+        first, second = found.first[waiting], found.second[waiting]
+        # A candidate is taken if it is the best one at both of its ends
+        lowest = np.full(count, rank.size, dtype=np.int64)
+        for ends in (first, second):
+            np.minimum.at(lowest, ends, rank[waiting])
+        now = (lowest[first] == rank[waiting]) & (lowest[second] == rank[waiting])
+        taken[waiting[now]] = True
+        # Its ends are out
+        used = np.zeros(count, dtype=bool)
+        used[first[now]] = used[second[now]] = True
+        waiting = waiting[~used[first] & ~used[second]]
+    return taken
+
+
+def _ranks(contacts: Contacts, found: _Candidates) -> IntArray:
+    """Return the rank of each candidate, from 0 for the best."""
     pairs = np.stack([found.first, found.second]) // 2
     rank = np.empty(found.first.size, dtype=np.int64)
+    # The last key counts first
     keys = [
         *np.sort(contacts.order[pairs], axis=0),
         found.bend,
@@ -158,20 +187,7 @@ def _best(contacts: Contacts, found: _Candidates) -> BoolArray:
         contacts.gap[pairs].max(axis=0),
     ]
     rank[np.lexsort(keys)] = np.arange(rank.size)
-    taken = np.zeros(rank.size, dtype=bool)
-    waiting = np.arange(rank.size)
-    # A candidate is taken if it is the best one at both of its ends; then theirs are out
-    while waiting.size:
-        first, second = found.first[waiting], found.second[waiting]
-        lowest = np.full(contacts.buildings.size, rank.size, dtype=np.int64)
-        for ends in (first, second):
-            np.minimum.at(lowest, ends, rank[waiting])
-        now = (lowest[first] == rank[waiting]) & (lowest[second] == rank[waiting])
-        taken[waiting[now]] = True
-        used = np.zeros(contacts.buildings.size, dtype=bool)
-        used[first[now]] = used[second[now]] = True
-        waiting = waiting[~used[first] & ~used[second]]
-    return taken
+    return rank
 
 
 def _at_buildings(contacts: Contacts, found: _Candidates, count: int) -> BoolArray:

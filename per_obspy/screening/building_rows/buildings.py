@@ -39,11 +39,13 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
     DataFrame
         The columns ``columns.BUILDINGS`` without ``rank``, and ``building_number``.
     """
+    # The worst side of each building
     groups = Groups(sides["building_number"].to_numpy(np.int64))
     severity = _severity(sides)
     worst = _worst(severity, sides, groups)
     largest = severity[worst]
     of_worst = sides.iloc[worst].reset_index(drop=True)
+    # All columns in any order
     columns = {
         "building_number": of_worst["building_number"],
         "building_id": of_worst["building_id"],
@@ -69,7 +71,8 @@ def _severity(sides: pd.DataFrame) -> FloatArray:
     """Return the expected impact velocity with what the row adds to that of the pair, m/s."""
     added = values(sides, "impact_velocity") - values(sides, "impact_velocity_alone")
     # A row that softens a hit once does not so in the next earthquake
-    return values(sides, "expected_impact_velocity") + np.nan_to_num(np.maximum(added, 0.0))
+    more: FloatArray = np.nan_to_num(np.maximum(added, 0.0))
+    return values(sides, "expected_impact_velocity") + more
 
 
 def _worst(severity: FloatArray, sides: pd.DataFrame, groups: Groups) -> NDArray[np.intp]:
@@ -90,13 +93,15 @@ def _chances(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray]:
 
 def _position(sides: pd.DataFrame, groups: Groups, angle: float) -> NDArray[np.object_]:
     """Return where each building stands among its neighbours."""
-    # Axes as double angles, so that both directions of an axis are one
-    axis = np.where(np.isnan(values(sides, "direction")), np.nan, values(sides, "azimuth"))
-    low, high = groups.smallest(axis % 180.0), groups.largest(axis % 180.0)
-    spread = np.nan_to_num(high - low)
-    turned = (axis + 90.0) % 180.0
-    other = np.nan_to_num(groups.largest(turned) - groups.smallest(turned))
-    corner = np.minimum(spread, other) > angle
+    known = ~np.isnan(values(sides, "direction"))
+    axis = np.where(known, values(sides, "azimuth"), np.nan)
+    # Azimuths from 0 and from 90 degrees: axes that are near each other are so in one of them
+    spreads = []
+    for zero in (0.0, 90.0):
+        turned = (axis + zero) % 180.0
+        spreads.append(np.nan_to_num(groups.largest(turned) - groups.smallest(turned)))
+    corner = np.minimum(*spreads) > angle
+    # Two neighbours in one row, or one
     inside = groups.largest(_contacts_in_row(sides)) == 2
     single = groups.largest(values(sides, "buildings")) == 2
     names = np.where(single & (groups.sizes == 1), "single", "end")
@@ -113,27 +118,36 @@ def _contacts_in_row(sides: pd.DataFrame) -> FloatArray:
 
 def _hits(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray | NDArray[np.int64]]:
     """Return numbers of neighbours and of hits, by compass side too, and the largest of them."""
-    impacts, velocity = values(sides, "impacts"), values(sides, "impact_velocity")
+    # Neighbours, each once
+    velocity = values(sides, "impact_velocity")
     neighbour = sides["neighbour_number"].to_numpy(np.int64)
     every = np.ones(neighbour.size, dtype=bool)
     can_hit = (sides["state"] != "no").to_numpy() | (velocity > 0.0)
-    found: dict[str, FloatArray | NDArray[np.int64]] = {
+    return {
         "neighbours": groups.distinct(neighbour, every),
         "neighbours_that_can_hit": groups.distinct(neighbour, can_hit),
-        "impacts": groups.sum(impacts),
+        **_impacts(sides, groups),
+        "impact_velocity": groups.largest(velocity),
+        "amplification_row": groups.largest(values(sides, "amplification")),
+        "amplification_pair": groups.largest(values(sides, "amplification_alone")),
     }
+
+
+def _impacts(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray]:
+    """Return numbers of hits, from all sides and from each side of the compass."""
+    impacts = values(sides, "impacts")
+    found = {"impacts": groups.sum(impacts)}
     # The quarter of the compass in which the neighbour is
     quarter = np.floor((values(sides, "direction") + 45.0) % 360.0 / 90.0) * 90.0
     for side, middle in COMPASS.items():
         here = np.where(np.isnan(impacts), np.nan, np.where(quarter == middle, impacts, 0.0))
         found[f"impacts_{side}"] = groups.sum(here)
-    found["impact_velocity"] = groups.largest(velocity)
-    found["amplification_row"] = groups.largest(values(sides, "amplification"))
-    found["amplification_pair"] = groups.largest(values(sides, "amplification_alone"))
     return found
 
 
-def _rows(sides: pd.DataFrame, groups: Groups) -> dict[str, NDArray[np.object_] | FloatArray]:
+def _rows(
+    sides: pd.DataFrame, groups: Groups
+) -> dict[str, NDArray[np.object_] | NDArray[np.int64]]:
     """Return the names of the rows of each building, and the length of the longest."""
     names = groups.texts(sides["row_id"].to_numpy(object), " ".join)
     longest = groups.largest(values(sides, "buildings")).astype(np.int64)
@@ -142,9 +156,13 @@ def _rows(sides: pd.DataFrame, groups: Groups) -> dict[str, NDArray[np.object_] 
 
 def _flags(sides: pd.DataFrame, groups: Groups) -> NDArray[np.object_]:
     """Return the flags of the rows of each building, and its own."""
-    words = sides["flags"].str.split(" ")
-    of_rows = {name: [name in found for found in words] for name in FLAGS}
-    raised = {name: groups.any(np.array(rows, dtype=bool)) for name, rows in of_rows.items()}
+    # Many rows share few texts
+    codes, texts = pd.factorize(sides["flags"])
+    words = [str(text).split(" ") for text in texts]
+    raised = {}
+    for name in FLAGS:
+        raised[name] = groups.any(np.array([name in found for found in words])[codes])
+    # And of the building itself
     hit, alone = values(sides, "impact_velocity"), values(sides, "impact_velocity_alone")
     own = (hit > 0.0) & (alone == 0.0), sides["floors_misaligned"].to_numpy(bool)
     for name, rows in zip(BUILDING_FLAGS, own, strict=True):

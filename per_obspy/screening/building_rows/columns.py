@@ -1,4 +1,4 @@
-"""Columns of ``rows.parquet`` and ``buildings.parquet`` with units and meanings, and their flags."""
+"""Columns of ``rows.parquet`` and ``buildings.parquet``, with units, meanings and flags."""
 
 from per_obspy.inventory.building_rows.chains import ROW_FLAGS
 from per_obspy.inventory.schema import Column

@@ -57,6 +57,7 @@ def row_outcomes(
     members = members_of(contacts, first, azimuth)
     found = row_maxima(*motion, members.rows)
     amplification = _amplification(found)
+    # Both buildings of each contact
     left, right = members.left, members.right
     outcome: Columns = {
         "impacts": found.impacts[left].astype(np.float64),
@@ -81,10 +82,12 @@ def _alone(
     """Return the outcome of each pair alone; a row of two is its pair."""
     names = ("impacts", "impact_velocity", "amplification_left", "amplification_right")
     columns = {name: outcome[name].copy() for name in names}
+    # Contacts of rows of three and more
     rows = members.rows
     sizes = np.diff(rows.first)
     longer = np.flatnonzero(np.repeat(sizes, sizes - 1) > 2)
     if longer.size:
+        # Two buildings each
         azimuth = np.repeat(rows.azimuth, sizes - 1)[longer]
         found = row_maxima(*motion, alone(rows, members.left[longer], azimuth))
         amplification = _amplification(found)

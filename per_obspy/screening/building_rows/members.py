@@ -85,27 +85,37 @@ def members_of(contacts: Table, first: IntArray, azimuth: FloatArray) -> Members
     that both pairs of a building share it whatever their contact heights.
     """
     layout = _layout(contacts, first)
-    masses = both(contacts, "contact_mass")
     shares = both(contacts, "participation")
-    modal = tuple(mass * np.square(share) for mass, share in zip(masses, shares, strict=True))
-    # One oscillator per building
-    names = ("period", "damping", "yield_displacement", "hardening")
-    found = {name: layout.joined(both(contacts, name), name) for name in names}
-    found["mass"] = layout.joined((modal[0], modal[1]), "mass")
+    found = _oscillators(contacts, layout)
     differs = np.any([joined.differs for joined in found.values()], axis=0)
-    # Interfaces; the ends of a row have none, and any value will do there
+    # Interfaces; the ends of a row have none, where any value will do
+    gap, restitution = values(contacts, "gap"), values(contacts, "restitution")
     share_left, share_right = layout.sides(*shares)
     rows = BuildingRows(
         first=first + np.arange(first.size),
         **{name: joined.values for name, joined in found.items()},
         participation_left=layout.at(layout.right, share_right, 1.0),
         participation_right=layout.at(layout.left, share_left, 1.0),
-        gap=layout.at(layout.left, values(contacts, "gap"), 0.0),
-        restitution=layout.at(layout.left, values(contacts, "restitution"), 0.0),
+        gap=layout.at(layout.left, gap, 0.0),
+        restitution=layout.at(layout.left, restitution, 0.0),
         azimuth=azimuth,
     )
     beside = differs[layout.left] | differs[layout.right]
     return Members(rows, layout.left, layout.right, beside)
+
+
+def _oscillators(contacts: Table, layout: "_Layout") -> dict[str, "_Joined"]:
+    """Return the properties of one oscillator per building."""
+    names = ("period", "damping", "yield_displacement", "hardening")
+    found = {name: layout.joined(both(contacts, name), name) for name in names}
+    return found | {"mass": layout.joined(_modal_masses(contacts), "mass")}
+
+
+def _modal_masses(contacts: Table) -> tuple[FloatArray, FloatArray]:
+    """Return the masses of the oscillators 1 and 2, kg."""
+    mass_1, mass_2 = both(contacts, "contact_mass")
+    share_1, share_2 = both(contacts, "participation")
+    return mass_1 * np.square(share_1), mass_2 * np.square(share_2)
 
 
 def alone(rows: BuildingRows, left: IntArray, azimuth: FloatArray) -> BuildingRows:
@@ -144,7 +154,7 @@ class _Layout(NamedTuple):
     right: IntArray
     turned: BoolArray
     derived: Any
-    count: int
+    buildings: int
 
     def sides(self, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return values of buildings 1 and 2 as those of the left and the right one."""
@@ -152,12 +162,13 @@ class _Layout(NamedTuple):
 
     def at(self, buildings: IntArray, given: FloatArray, other: float) -> FloatArray:
         """Return one value per building: those given of some, another one elsewhere."""
-        column = np.full(self.count, other)
+        column = np.full(self.buildings, other)
         column[buildings] = given
         return column
 
     def joined(self, pair: tuple[FloatArray, FloatArray], name: str) -> _Joined:
         """Return one value per building from the pairs on both sides of it."""
+        # 1 where a value is given, else 0
         known = [_is_given(self.derived, f"{name}_{i}", side) for i, side in enumerate(pair, 1)]
         left, right = self.sides(*pair)
         left_known, right_known = self.sides(*known)

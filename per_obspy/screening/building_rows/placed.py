@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from per_obspy.checks import FloatArray
 from per_obspy.inventory.building_rows.chains import Chains
 
 IntArray = NDArray[np.int64]
@@ -48,41 +49,46 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     size : int
         Contacts of a chunk, as far as rows are whole.
     """
+    # Stations in the order of their names
     sizes = np.diff(chains.first)
     row = np.repeat(np.arange(sizes.size), sizes)
     station, several = _stations(row, pairs.iloc[chains.pair])
-    # The worst axis of a pair whose own is unknown
-    used = pairs["azimuth_used"].to_numpy(np.float64)[chains.pair[chains.first[:-1]]]
-    used = used + 180.0 * chains.turned[chains.first[:-1]]
-    azimuth = np.where(np.isnan(chains.azimuth), used % 360.0, chains.azimuth)
     order = np.lexsort([np.arange(sizes.size), station]).astype(np.int64)
-    contacts = pd.DataFrame(
-        {
-            "pair": chains.pair,
-            "turned": chains.turned,
-            "interface": np.arange(row.size) - chains.first[row] + 1,
-            "buildings": sizes[row] + 1,
-            "azimuth": azimuth[row],
-            "station": pd.Categorical.from_codes(station[row], _names(pairs)),
-        }
-    )
-    # Rows in their order, each with its contacts
+    columns = {
+        "pair": chains.pair,
+        "turned": chains.turned,
+        "interface": np.arange(row.size) - chains.first[row] + 1,
+        "buildings": sizes[row] + 1,
+        "azimuth": _azimuths(chains, pairs)[row],
+        "station": pd.Categorical.from_codes(station[row], _names(pairs)),
+    }
+    # Contacts in the order of their rows
     place = np.empty(sizes.size, dtype=np.int64)
     place[order] = np.arange(sizes.size)
-    contacts["row"] = place[row]
-    contacts = contacts.iloc[np.argsort(place[row], kind="stable")].reset_index(drop=True)
-    contacts["chunk"] = _chunks(sizes[order], station[order], size)[contacts["row"]]
-    return PlacedRows(contacts, order, several[order])
+    chunk = _chunks(sizes[order], station[order], size)
+    contacts = pd.DataFrame(columns | {"row": place[row], "chunk": chunk[place[row]]})
+    ordered = contacts.sort_values("row", kind="stable", ignore_index=True)
+    return PlacedRows(ordered, order, several[order])
+
+
+def _azimuths(chains: Chains, pairs: pd.DataFrame) -> FloatArray:
+    """Return the azimuth of each row, degrees; the worst one of a pair whose own is unknown."""
+    first = chains.first[:-1]
+    used = pairs["azimuth_used"].to_numpy(np.float64)[chains.pair[first]]
+    used = (used + 180.0 * chains.turned[first]) % 360.0
+    return np.where(np.isnan(chains.azimuth), used, chains.azimuth)
 
 
 def _names(pairs: pd.DataFrame) -> pd.Index:
     """Return the names of stations, sorted."""
-    return pd.Index(sorted(pairs["station"].unique()), dtype=object)
+    names = sorted(map(str, pairs["station"].unique()))
+    found: pd.Index = pd.Index(np.array(names, dtype=object))
+    return found
 
 
 def _stations(row: IntArray, pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.bool_]]:
     """Return the number of the station of each row, and whether its pairs have several."""
-    codes = _names(pairs).get_indexer(pairs["station"])
+    codes = _names(pairs).get_indexer(pd.Index(pairs["station"]))
     table = pd.DataFrame({"row": row, "code": codes, "distance": pairs["distance"].to_numpy()})
     groups = table.groupby(["row", "code"])["distance"].agg(["size", "sum"]).reset_index()
     # Most pairs first, then the nearest, then the name
@@ -97,6 +103,7 @@ def _stations(row: IntArray, pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.
 def _chunks(sizes: IntArray, station: IntArray, size: int) -> IntArray:
     """Return the chunk of each row: no chunk has two stations, or more contacts than its size."""
     chunk, number, contacts, before = np.empty(sizes.size, dtype=np.int64), 0, 0, -1
+    # Rows of one station, as long as there is room
     for row, (count, code) in enumerate(zip(sizes.tolist(), station.tolist(), strict=True)):
         if row and (code != before or contacts + count > size):
             number, contacts = number + 1, 0

@@ -1,5 +1,5 @@
 """
-What would have kept a building from being hit, or softened the hits, from the measures of its pairs.
+What would have kept a building from being hit, or softened the hits: the measures of its pairs.
 
 In a row in which no gap closes every building moves as if alone. Gaps that are enough for each pair
 are therefore enough for the row, if all of the row are: the measures of the pairs hold.
@@ -46,9 +46,8 @@ def prevention(
         "bumper_restitution": _all_known(groups, bumper, groups.smallest(bumper)),
     }
     hit = groups.largest(np.nan_to_num(values(sides, "impact_velocity"))) > 0.0
-    sentences = []
-    for row in zip(*found.values(), hit, neighbour, strict=True):
-        sentences.append(_sentence(*row))
+    rows = zip(*found.values(), hit, neighbour, strict=True)
+    sentences = [_sentence(*row) for row in rows]
     return {"prevention": np.array(sentences, dtype=object), **found}
 
 
@@ -61,6 +60,7 @@ def _sentence(missing: float, damping: float, bumper: float, hit: bool, neighbou
     """Return the measures of one building in words."""
     if not missing > 0.0:
         return ELSEWHERE if hit else NOTHING
+    # Every measure that there is
     parts = [f"up to {max(missing, SHORTEST):.3f} m more gap (to {neighbour} first)"]
     if damping > 0.0:
         parts.append(f"or {damping:.2f} of critical more damping in it and its neighbours")

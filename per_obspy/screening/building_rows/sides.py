@@ -44,24 +44,31 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
         ``neighbour_id`` and ``direction`` (towards the neighbour, degrees; NaN if unknown).
     """
     at_left = interfaces["leftward"].to_numpy(bool)
+    columns = _own_columns(interfaces, at_left)
+    for name in ("number", "id"):
+        left, right = (interfaces[f"building_{name}_{side}"] for side in ("left", "right"))
+        columns[f"neighbour_{name}"] = right.where(at_left, left)
+    # Towards the neighbour
+    azimuth = interfaces["azimuth"] + np.where(at_left, 0.0, 180.0)
+    known = ~interfaces["flags"].str.contains("unknown_azimuth", regex=False)
+    columns["direction"] = (azimuth % 360.0).where(known)
+    return pd.DataFrame(columns)
+
+
+def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return the columns of the pair, and those of the building itself."""
+    columns: dict[str, Any] = {}
     # Building 1 stands on the left of a pair that is not turned
     is_first = at_left ^ interfaces["turned"].to_numpy(bool)
-    columns: dict[str, Any] = {}
-    for name in interfaces:
-        stem, _, end = str(name).rpartition("_")
+    for name in map(str, interfaces):
+        stem, _, end = name.rpartition("_")
         if end == "left":
             columns[stem] = interfaces[name].where(at_left, interfaces[f"{stem}_right"])
         elif end == "1":
             columns[stem] = interfaces[name].where(is_first, interfaces[f"{stem}_2"])
         elif end not in ("right", "2"):
-            columns[str(name)] = interfaces[name]
-    for name in ("number", "id"):
-        left, right = (interfaces[f"building_{name}_{side}"] for side in ("left", "right"))
-        columns[f"neighbour_{name}"] = right.where(at_left, left)
-    azimuth = interfaces["azimuth"] + np.where(at_left, 0.0, 180.0)
-    known = ~interfaces["flags"].str.contains("unknown_azimuth", regex=False)
-    columns["direction"] = (azimuth % 360.0).where(known)
-    return pd.DataFrame(columns)
+            columns[name] = interfaces[name]
+    return columns
 
 
 class Groups:
