@@ -84,24 +84,24 @@ def screened(
     """
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
-    parts = list[Part]()
-    if stations or maps:
-        parts = _parts(settings, folder, ground, executor, progress)
+    # Pairs need a station or a map
+    has_motion = stations or maps
+    parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
     states, served, rows = Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
-    tables = [part.path for part in parts if part.path]
-    if tables:
+    if tables := [part.path for part in parts if part.path]:
         facts = _facts(settings, stations)
         progress("ranking", 0, 1)
         files, states, served = write_risk(tables, folder, facts, settings.csv_rows)
         progress("ranking", 1, 1)
+        # Rows of buildings are read from it
         rows = building_rows(settings, folder, ground, facts, executor, progress)
         outputs += [*files, *rows.outputs]
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     kinds = write_rejected(left_out, outputs[0])
-    counts = _counts(states, kinds, parts, rows)
-    return Screened(outputs, counts, served, unplaced, rows.failed or _any_failed(parts))
+    counts, failed = _counts(states, kinds, parts, rows), rows.failed or _any_failed(parts)
+    return Screened(outputs, counts, served, unplaced, failed)
 
 
 def _any_failed(parts: Sequence[Part]) -> bool:

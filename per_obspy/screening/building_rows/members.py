@@ -86,6 +86,7 @@ def members_of(contacts: Table, first: IntArray, azimuth: FloatArray) -> Members
     """
     layout = _layout(contacts, first)
     shares = both(contacts, "participation")
+    # One oscillator per building
     found = _oscillators(contacts, layout)
     differs = np.any([joined.differs for joined in found.values()], axis=0)
     # Interfaces; the ends of a row have none, where any value will do

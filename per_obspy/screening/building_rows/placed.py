@@ -54,19 +54,18 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     row = np.repeat(np.arange(sizes.size), sizes)
     station, several = _stations(row, pairs.iloc[chains.pair])
     order = np.lexsort([np.arange(sizes.size), station]).astype(np.int64)
-    columns = {
-        "pair": chains.pair,
-        "turned": chains.turned,
-        "interface": np.arange(row.size) - chains.first[row] + 1,
-        "buildings": sizes[row] + 1,
-        "azimuth": _azimuths(chains, pairs)[row],
-        "station": pd.Categorical.from_codes(station[row], _names(pairs)),
-    }
     # Contacts in the order of their rows
     place = np.empty(sizes.size, dtype=np.int64)
     place[order] = np.arange(sizes.size)
     chunk = _chunks(sizes[order], station[order], size)
-    contacts = pd.DataFrame(columns | {"row": place[row], "chunk": chunk[place[row]]})
+    contacts = pd.DataFrame({"pair": chains.pair, "turned": chains.turned}).assign(
+        interface=np.arange(row.size) - chains.first[row] + 1,
+        buildings=sizes[row] + 1,
+        azimuth=_azimuths(chains, pairs)[row],
+        station=pd.Categorical.from_codes(station[row], _names(pairs)),
+        row=place[row],
+        chunk=chunk[place[row]],
+    )
     ordered = contacts.sort_values("row", kind="stable", ignore_index=True)
     return PlacedRows(ordered, order, several[order])
 
