@@ -8,10 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.pounding.history.pair_blocks import FIRST_ROOM
 from per_obspy.pounding.history.pair_histories import BOUNCES_OF_PAIRS, SHORTEST_BOUNCE
+from per_obspy.pounding.history.row_blocks import run_row_blocks
 from per_obspy.pounding.history.row_history import SPEED_SHARE
 from per_obspy.pounding.history.row_tables import (
     BUILDING_FIELDS,
@@ -28,13 +26,8 @@ from per_obspy.pounding.history.tables import (
     free_samples,
     largest_ground_velocity,
     refinement,
-    row_at_rest,
 )
 from per_obspy.spectra.per_pair import azimuth_maxima
-from per_obspy.threads import map_in_threads
-
-#: Rows that a thread takes at a time.
-BLOCK = 32
 
 
 class RowMaxima(NamedTuple):
@@ -149,43 +142,37 @@ def _free_radius(
 def _run(
     ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return the table of all buildings at the end, and impacts that count, from all threads."""
+    """Return the lines of all buildings at the end, and impacts that count."""
     table = building_table(rows, scales)
-    counts = np.zeros(len(table), dtype=np.int64)
-    lines = np.empty((len(table), columns.ROW_COLUMNS))
+    starts, sizes = rows.first[:-1], np.diff(rows.first)
+    frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
+    parts = np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
+
+    # Lines at rest; nothing is in contact with the last building of a row from the right
+    lines = np.zeros((len(table), columns.ROW_COLUMNS))
+    lines[:, :6] = table
+    lines[:, columns.GAP] = scales.clearance * rows.gap
+    lines[:, columns.RESTITUTION] = rows.restitution
+    lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
+
+    # Bouncing ends in contact below a separation speed, a duration, or after many impacts
     velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    largest = np.maximum.reduceat(table[:, 4], starts)
+    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * velocity * largest
+    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS * np.maximum(1, sizes - 1)
 
-    def run(numbers: NDArray[np.int64]) -> None:
-        """Run some rows, one after the other."""
-        for number in numbers:
-            part = slice(rows.first[number], rows.first[number + 1])
-            interfaces = slice(part.start, part.stop - 1)
-            row = row_at_rest(table[part], rows.gap[interfaces], rows.restitution[interfaces])
-            row[0, columns.STICKING_SPEED] = SPEED_SHARE * velocity * table[part, 4].max()
-            azimuth = np.radians(rows.azimuth[number])
-            free = free_samples(rows.period[part].max(), dt) if free_vibration else 0
-            lines[part], counts[part] = _run_row(
-                ground, dt, row, azimuth, free, scales.clearance[part]
-            )
-
-    size = rows.first.size - 1
-    map_in_threads(run, [np.arange(k, min(k + BLOCK, size)) for k in range(0, size, BLOCK)])
+    # Run the record and, where it is asked for, the free vibration after it
+    longest = np.maximum.reduceat(rows.period, starts)
+    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
+    counts = run_row_blocks(
+        ground,
+        dt,
+        rows.first,
+        lines,
+        parts,
+        free * free_vibration,
+        np.radians(rows.azimuth),
+        scales.clearance,
+    )
     return lines, counts
-
-
-def _run_row(
-    ground: FloatArray, dt: float, start: FloatArray, azimuth: float, free: int, scale: FloatArray
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return the row at its end and the impacts that count, from a log that holds all impacts."""
-    parts = refinement(np.sqrt(start[:, columns.STIFFNESS].max()), dt)
-    start[0, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
-    start[0, columns.BOUNCE_LIMIT] = BOUNCES_OF_PAIRS * max(1, len(start) - 1)
-    direction = float(np.cos(azimuth)), float(np.sin(azimuth))
-    room, impacts = -1, FIRST_ROOM
-    while room < impacts:
-        room = impacts
-        row, log = start.copy(), np.empty((room, LOG_COLUMNS))
-        if not run_row_by_events(*ground, *direction, dt, parts, row, log, free):
-            raise RuntimeError("no end of events in a step of a row")
-        impacts = int(row[:, columns.IMPACTS].sum())
-    return row, count_row_impacts(row, log, scale)
