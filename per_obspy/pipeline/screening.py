@@ -19,7 +19,7 @@ from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import STATES
-from per_obspy.tables.risk import write_risk
+from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
@@ -92,9 +92,7 @@ def screened(
     # The parts of the chunks become one table, worst pair first
     if tables := [part.path for part in parts if part.path]:
         facts = _facts(settings, stations)
-        progress("ranking", 0, 1)
-        files, states, served = write_risk(tables, folder, facts, settings.csv_rows)
-        progress("ranking", 1, 1)
+        files, states, served = _ranked(tables, folder, facts, settings.csv_rows, progress)
         # Rows of buildings are read from it
         rows = building_rows(settings, folder, ground, facts, executor, progress)
         outputs += [*files, *rows.outputs]
@@ -102,6 +100,16 @@ def screened(
     kinds = write_rejected(left_out, outputs[0])
     counts, failed = _counts(states, kinds, parts, rows), rows.failed or _any_failed(parts)
     return Screened(outputs, counts, served, unplaced, failed)
+
+
+def _ranked(
+    tables: Sequence[Path], folder: Path, facts: dict[str, str], csv_rows: int, progress: Progress
+) -> RiskFiles:
+    """Write the risk table of all parts."""
+    progress("ranking", 0, 1)
+    risk = write_risk(tables, folder, facts, csv_rows)
+    progress("ranking", 1, 1)
+    return risk
 
 
 def _any_failed(parts: Sequence[Part]) -> bool:

@@ -55,8 +55,7 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     station, several = _stations(row, pairs.iloc[chains.pair])
     order = np.lexsort([np.arange(sizes.size), station]).astype(np.int64)
     # Contacts in the order of their rows
-    place = np.empty(sizes.size, dtype=np.int64)
-    place[order] = np.arange(sizes.size)
+    place = np.argsort(order)
     chunk = _chunks(sizes[order], station[order], size)
     contacts = pd.DataFrame({"pair": chains.pair, "turned": chains.turned}).assign(
         interface=np.arange(row.size) - chains.first[row] + 1,
