@@ -5,10 +5,10 @@ Only the pipeline and the commands see a configuration as a whole. Rooms below t
 or one section. Paths in a configuration are relative to the folder of its file.
 """
 
+from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
-from per_obspy.config.rows import Rows
 from per_obspy.config.run import Design, Pairs, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load

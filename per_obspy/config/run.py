@@ -8,10 +8,10 @@ from pydantic import (
     model_validator,
 )
 
+from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
-from per_obspy.config.rows import Rows
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.config.simulation import SimulatedPairs

@@ -23,7 +23,7 @@ from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
 from per_obspy.screening.building_rows.members import IntArray
 from per_obspy.screening.values import Columns, components
-from per_obspy.tables.rows import write_rows_part
+from per_obspy.tables.building_rows import write_rows_part
 
 #: Contacts of a chunk, about: a worker needs 1 kB for each.
 CHUNK = 10_000

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from per_obspy.config import Run
-from per_obspy.config.rows import Rows
+from per_obspy.config.building_rows import Rows
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.building_rows.chains import Chains, chains_of
@@ -25,9 +25,9 @@ from per_obspy.jobs.ground_files import GroundFiles
 from per_obspy.progress import Progress
 from per_obspy.screening.building_rows.members import NEEDED
 from per_obspy.screening.building_rows.placed import PlacedRows, placed_rows
+from per_obspy.tables.building_rows import write_rows
 from per_obspy.tables.buildings import write_buildings
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
-from per_obspy.tables.rows import write_rows
 from per_obspy.threads import usable_processors
 
 #: Columns of the pair table without which no pair names its buildings.

@@ -20,7 +20,7 @@ from per_obspy.config import Screening, Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.building_rows.buildings import building_table
-from per_obspy.screening.building_rows.columns import BUILDING_FLAGS, BUILDINGS, FLAGS
+from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, BUILDINGS, FLAGS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
 from per_obspy.tables.described import schema_of, table_of, write_meanings
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows, text_columns

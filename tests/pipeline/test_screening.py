@@ -223,7 +223,7 @@ def write_map_configuration(folder, reach):
     )
 
 
-@pytest.mark.parametrize("reach", [300.0, 1.0])
+@pytest.mark.parametrize("reach", [1000.0, 1.0])
 def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     # reach 1 m: no pair has a station, there is no worst pair with a record to draw
     write_map_configuration(copied, reach)

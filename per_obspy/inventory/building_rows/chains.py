@@ -65,10 +65,11 @@ class Chains(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A part of a chain with the names of its flags."""
+    """A part of a chain, the names of its flags, and whether its ends are joined."""
 
     links: list[Link]
     flags: frozenset[str]
+    closed: bool = False
 
     def flagged(self, name: str) -> "_Piece":
         """Return the part with one flag more."""
@@ -134,7 +135,7 @@ def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
                 yield _Piece(_walked(end, joined, done), frozenset())
     for pair in by_name:
         if not done[pair]:
-            yield _Piece(_walked(2 * pair, joined, done), frozenset({"ring"}))
+            yield _Piece(_walked(2 * pair, joined, done), frozenset({"ring"}), closed=True)
 
 
 def _walked(end: int, joined: list[int], done: list[bool]) -> list[Link]:
@@ -215,8 +216,10 @@ class _Cutter:
         middle = (first + last - 1) / 2.0
         links = row.links
         place = max(range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle)))
-        parts = links[:place], links[place : place + 1], links[place + 1 :]
-        return [row._replace(links=part) for part in parts]
+        before, cut, behind = links[:place], links[place : place + 1], links[place + 1 :]
+        # What is left of a ring is one row
+        parts = [behind + before, cut] if row.closed else [before, cut, behind]
+        return [row._replace(links=part, closed=False) for part in parts]
 
 
 def _axes(azimuth: FloatArray, first: IntArray) -> tuple[FloatArray, BoolArray]:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.table_columns import joined_names
-from per_obspy.screening.building_rows.columns import BUILDING_FLAGS, COMPASS, FLAGS
 from per_obspy.screening.building_rows.prevention import prevention
+from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, COMPASS, FLAGS
 from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.ranking import risk_class
 from per_obspy.screening.values import values
@@ -37,7 +37,7 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
     Returns
     -------
     DataFrame
-        The columns ``columns.BUILDINGS`` without ``rank``, and ``building_number``.
+        The columns ``row_columns.BUILDINGS`` without ``rank``, and ``building_number``.
     """
     # The worst side of each building
     groups = Groups(sides["building_number"].to_numpy(np.int64))

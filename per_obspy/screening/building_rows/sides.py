@@ -34,7 +34,7 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     interfaces : DataFrame
-        Columns ``columns.ROWS`` and ``OF_PAIRS``, and ``leftward``: whether the building is the
+        Columns ``row_columns.ROWS`` and ``OF_PAIRS``, and ``leftward``: whether the building is the
         left one.
 
     Returns

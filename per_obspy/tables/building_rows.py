@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
-from per_obspy.screening.building_rows.columns import FLAGS, ROWS
+from per_obspy.screening.building_rows.row_columns import FLAGS, ROWS
 from per_obspy.tables.described import schema_of, table_of, write_meanings
 from per_obspy.tables.parts import text_columns
 
