@@ -1,7 +1,7 @@
 """Rows of buildings as a table, one row per interface, from the parts that the jobs leave."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
 from per_obspy.screening.building_rows.row_columns import FLAGS, ROWS
-from per_obspy.tables.described import schema_of, table_of, write_meanings
+from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.parts import text_columns
 
-#: Rows of a group of a part.
+#: Rows of a row group.
 TOGETHER = 10_000
 
 
@@ -25,6 +25,13 @@ def write_rows_part(interfaces: Mapping[str, Any], path: Path) -> None:
         pq.write_table(
             table, part, row_group_size=TOGETHER, use_dictionary=text_columns(table.schema)
         )
+
+
+def _tables(parts: Sequence[Path]) -> Iterator[pa.Table]:
+    """Yield the rows of each part."""
+    for part in parts:
+        with pq.ParquetFile(part.absolute()) as file:
+            yield file.read(use_threads=False)
 
 
 def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) -> list[Path]:
@@ -48,11 +55,7 @@ def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) ->
         written_whole(files[0]) as whole,
         pq.ParquetWriter(whole, schema, use_dictionary=dictionaries) as writer,
     ):
-        # Row group by row group
-        for part in parts:
-            with pq.ParquetFile(part.absolute()) as file:
-                for group in range(file.num_row_groups):
-                    rows: pa.Table = file.read_row_group(group, use_threads=False)
-                    writer.write_table(rows.replace_schema_metadata(statement))
+        for rows in regrouped(_tables(parts), schema, TOGETHER):
+            writer.write_table(rows)
     write_meanings(ROWS, FLAGS, files[1])
     return files

@@ -22,7 +22,7 @@ from per_obspy.inventory.schema import Column
 from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, BUILDINGS, FLAGS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
-from per_obspy.tables.described import schema_of, table_of, write_meanings
+from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows, text_columns
 from per_obspy.tables.risk import write_worst
 from per_obspy.tables.totals import areas_of
@@ -154,13 +154,14 @@ def _write_ranked(
     statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
     schema = schema_of(BUILDINGS, statement)
     dictionaries = text_columns(schema)
-    before = 0
+    found = (pa.Table.from_batches([batch]) for batch in batches(database, query, ROWS))
+    before, unnumbered = 0, pa.schema(list(schema)[1:])
     with (
         written_whole(table) as part,
         pq.ParquetWriter(part, schema, use_dictionary=dictionaries) as writer,
     ):
         # Ranks count from 1
-        for batch in batches(database, query, ROWS):
-            rank = pa.array(np.arange(before + 1, before + 1 + batch.num_rows))
-            writer.write_table(pa.table([rank, *batch.columns], schema=schema))
-            before += batch.num_rows
+        for rows in regrouped(found, unnumbered, ROWS):
+            rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))
+            writer.write_table(pa.table([rank, *rows.columns], schema=schema))
+            before += rows.num_rows

@@ -1,6 +1,6 @@
 """Tables of one schema: types of their columns, and the file that explains them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,23 @@ def _array(values: Any, dtype: str) -> pa.Array:
     numbers = np.asarray(values)
     empty = np.isnan(numbers) if numbers.dtype.kind == "f" else np.zeros(numbers.shape, dtype=bool)
     return pa.array(np.where(empty, 0, numbers).astype(np.int64), mask=empty)
+
+
+def regrouped(tables: Iterable[pa.Table], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
+    """
+    Yield rows so many at a time, however many the given tables hold.
+
+    A Parquet file that is written piece by piece depends on the size of the pieces.
+    """
+    waiting = schema.empty_table()
+    for table in tables:
+        waiting = pa.concat_tables([waiting, table.replace_schema_metadata(schema.metadata)])
+        # Full pieces; the rest waits for the next table
+        while waiting.num_rows >= size:
+            yield waiting.slice(0, size).combine_chunks()
+            waiting = waiting.slice(size)
+    if waiting.num_rows:
+        yield waiting.combine_chunks()
 
 
 def write_meanings(columns: Sequence[Column], flags: Mapping[str, str], path: Path) -> None:

@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pytest
 
 from per_obspy.inventory.schema import Column
-from per_obspy.tables.described import schema_of, table_of, write_meanings
+from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
 
 COLUMNS = (
     Column("count", "int64", "1", "how many"),
@@ -37,3 +38,15 @@ def test_every_column_and_flag_is_explained(tmp_path):
     table = pd.read_csv(tmp_path / "columns.csv", keep_default_na=False)
     assert table["name"].tolist() == ["count", "size", "name", "old", "flag_odd"]
     assert table["meaning"].iloc[-1] == "it is odd"
+
+
+@pytest.mark.parametrize("sizes", [[7], [1] * 7, [5, 0, 2], []])
+def test_rows_are_regrouped_whatever_their_pieces(sizes):
+    schema = schema_of(COLUMNS[:1])
+    ends = np.cumsum([0, *sizes])
+    tables = [
+        pa.table({"count": np.arange(begin, end)}, schema=schema)
+        for begin, end in zip(ends[:-1], ends[1:], strict=True)
+    ]
+    found = [table["count"].to_pylist() for table in regrouped(tables, schema, 3)]
+    assert found == ([[0, 1, 2], [3, 4, 5], [6]] if sizes else [])

@@ -83,9 +83,7 @@ def test_a_ring_around_a_square_is_cut_at_its_widest_gap():
     # twelve buildings, each turned by 30 degrees against the one before
     count = 12
     gaps = np.where(np.arange(count) == 7, 0.5, 0.1)
-    pairs = [
-        (f"b{k:02}", f"b{(k + 1) % count:02}", 30.0 * k, gaps[k]) for k in range(count)
-    ]
+    pairs = [(f"b{k:02}", f"b{(k + 1) % count:02}", 30.0 * k, gaps[k]) for k in range(count)]
     rows, flags, _ = rows_of(street(*pairs), angle=40.0)
     assert ["b07", "b08"] in rows or ["b08", "b07"] in rows
     # the rest turns by 300 degrees, and a row by 40 at most
@@ -147,7 +145,9 @@ def test_rows_do_not_depend_on_the_order_of_the_table():
 
 def test_a_row_read_backwards_is_the_same_row():
     table = street(("a", "b", 80, 0.1), ("b", "c", 90, 0.2), ("c", "d", 95, 0.3))
-    turned = table.rename(columns={"building_id_1": "building_id_2", "building_id_2": "building_id_1"})
+    turned = table.rename(
+        columns={"building_id_1": "building_id_2", "building_id_2": "building_id_1"}
+    )
     turned["azimuth"] += 180.0
     rows, _, chains = rows_of(table)
     backwards, _, same = rows_of(turned)

@@ -15,7 +15,9 @@ def joined_pairs(table, angle=30.0):
     contacts = contacts_of(table, angle)
     joints = joints_of(contacts, given_values(table), angle)
     ends = np.flatnonzero(joints.joined >= 0)
-    found = {frozenset((contacts.pair_id[e // 2], contacts.pair_id[joints.joined[e] // 2])) for e in ends}
+    found = {
+        frozenset((contacts.pair_id[e // 2], contacts.pair_id[joints.joined[e] // 2])) for e in ends
+    }
     return found, joints
 
 

@@ -192,7 +192,9 @@ def test_without_histories_what_they_tell_is_empty():
     )
     none |= {f"amplification_{side}": np.nan for side in ("left", "right")}
     found = buildings(**none)
-    assert found[["impacts", "impacts_east", "impact_velocity", "amplification_row"]].isna().all(
-        axis=None
+    assert (
+        found[["impacts", "impacts_east", "impact_velocity", "amplification_row"]]
+        .isna()
+        .all(axis=None)
     )
     assert found["severity"].tolist() == pytest.approx([0.05, 0.05, 0.15, 0.15])
