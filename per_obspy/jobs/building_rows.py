@@ -22,7 +22,7 @@ from per_obspy.jobs.parallel import Work, results
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
 from per_obspy.screening.building_rows.members import IntArray
-from per_obspy.screening.values import Columns, components
+from per_obspy.screening.values import Columns, chosen, components
 from per_obspy.tables.building_rows import write_rows_part
 
 #: Contacts of a chunk, about: a worker needs 1 kB for each.
@@ -139,8 +139,7 @@ def do_rows(job: RowsJob) -> RowsPart:
     if one_horizontal:
         contacts["flags"] = _flagged(contacts["flags"], "one_horizontal", None)
     axis = np.zeros(job.contacts.num_rows) if one_horizontal else contacts["azimuth"]
-    motion = components(dataset)
-    outcomes, rejected = _outcomes(motion, contacts | {"axis": axis})
+    outcomes, rejected = _known_outcomes(components(dataset), contacts | {"axis": axis})
     return _recorded(job, contacts, outcomes, rejected)
 
 
@@ -148,6 +147,21 @@ def _columns(table: pa.Table) -> Columns:
     """Return a table as arrays."""
     frame = table.to_pandas()
     return {str(name): frame[name].to_numpy() for name in frame}
+
+
+def _known_outcomes(
+    motion: tuple[np.ndarray, np.ndarray, float], contacts: Columns
+) -> tuple[Columns, tuple[Rejection, ...]]:
+    """Compute the outcomes of all rows but those of unknown gap, which are rows of two."""
+    known = np.flatnonzero(np.isfinite(contacts["gap"]))
+    found = no_outcomes(contacts["row"].size)
+    if not known.size:
+        return found, ()
+    # Rows of unknown gap stay empty
+    outcomes, rejected = _outcomes(motion, chosen(contacts, known))
+    for name, column in outcomes.items():
+        found[name][known] = column
+    return found, rejected
 
 
 def _outcomes(

@@ -18,7 +18,7 @@ from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
-from per_obspy.screening.ranking import STATES
+from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
@@ -128,7 +128,7 @@ def _counts(
 ) -> dict[str, int]:
     """Return the numbers of pairs, of rejections of each kind, of chunks, and those of rows."""
     counts = {"pairs": states.total()}
-    counts |= {state: states[state] for state in STATES}
+    counts |= {state: states[state] for state in EVERY_STATE}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
     counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
     return counts | rows.counts

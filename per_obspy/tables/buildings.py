@@ -49,8 +49,8 @@ UNRANKED = (_NUMBER, *BUILDINGS[1:])
 
 #: Order of the ranking; the last ones only break ties.
 _ORDER = (
-    "severity DESC, greatest(amplification_row, amplification_pair) DESC NULLS LAST, "
-    "probability_independent DESC, importance DESC NULLS LAST, occupants DESC NULLS LAST, "
+    "severity DESC NULLS LAST, greatest(amplification_row, amplification_pair) DESC NULLS LAST, "
+    "probability_independent DESC NULLS LAST, importance DESC NULLS LAST, occupants DESC NULLS LAST, "
     "building_id, building_number"
 )
 

@@ -34,6 +34,8 @@ ROW_FLAGS: dict[str, str] = {
     "no_building_id": "the pair names no building: a row of two buildings of its own",
     "ambiguous_id": "an identifier stands for buildings at different places, or for too many: each "
     "pair is a row of its own there",
+    "unknown_gap": "the pair table gives no gap: a row of two without a history, or with the gap "
+    "that the configuration assumes",
     "unknown_azimuth": "the axis is not given: a row of two along the worst azimuth",
 }
 
@@ -258,5 +260,6 @@ def _flags_of_buildings(contacts: Contacts, joints: Joints, pair: IntArray) -> d
         "contradictory": np.asarray(joints.contradictory[buildings].any(axis=1)),
         "ambiguous_id": contacts.ambiguous[pair] | joints.crowded[buildings].any(axis=1),
         "no_building_id": ~contacts.named[buildings].all(axis=1) & ~contacts.ambiguous[pair],
+        "unknown_gap": ~contacts.gap_given[pair],
         "unknown_azimuth": np.isnan(contacts.azimuth[pair]),
     }

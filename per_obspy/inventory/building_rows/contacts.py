@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
+from per_obspy.inventory.building_rows.given import is_derived
 from per_obspy.inventory.table_columns import numbers_in
 
 #: Largest distance between the positions that the pairs of a building give for it, m: a survey may
@@ -39,7 +40,9 @@ class Contacts(NamedTuple):
     azimuth : (n_pairs,) ndarray
         From building 1 to 2, degrees; NaN if unknown.
     gap, facing_length : (n_pairs,) ndarray
-        m; 0 where the facing length is unknown.
+        m; NaN where the gap is unknown, 0 where the facing length is.
+    gap_given : (n_pairs,) ndarray of bool
+        Whether the table gives the gap.
     pair_id : (n_pairs,) ndarray of str
         Identifiers of the pairs.
     order : (n_pairs,) ndarray of int
@@ -58,6 +61,7 @@ class Contacts(NamedTuple):
     azimuth: FloatArray
     gap: FloatArray
     facing_length: FloatArray
+    gap_given: BoolArray
     pair_id: NDArray[np.object_]
     order: IntArray
     repeated: BoolArray
@@ -72,7 +76,7 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     Parameters
     ----------
     pairs : DataFrame
-        With ``pair_id, gap, longitude_i, latitude_i``, and ``building_id_i, azimuth,
+        With ``pair_id, gap, derived, longitude_i, latitude_i``, and ``building_id_i, azimuth,
         facing_length`` where they are known.
     angle : float
         Pairs of the same two buildings are one contact if their axes differ by no more, degrees.
@@ -98,6 +102,7 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         azimuth=azimuth,
         gap=gap,
         facing_length=np.nan_to_num(numbers_in(pairs, "facing_length")),
+        gap_given=np.isfinite(gap) & ~is_derived(pairs["derived"], "gap"),
         pair_id=pair_id,
         order=order,
         repeated=repeated,
@@ -220,6 +225,11 @@ def _repetition(pair_id: NDArray[np.object_], gap: FloatArray, row: int, kept: i
     """Return the rejection of a pair whose contact another one describes."""
     reason = (
         f"it repeats the contact of pair {pair_id[kept]!r} between the same buildings: "
-        f"rows take the gap of {gap[kept]:g} m instead of {gap[row]:g} m"
+        f"rows take the gap of {_metres(gap[kept])} instead of {_metres(gap[row])}"
     )
     return Rejection("row", pair_id[row], "", None, (reason,))
+
+
+def _metres(gap: float) -> str:
+    """Return a gap as a text."""
+    return f"{gap:g} m" if np.isfinite(gap) else "unknown width"

@@ -96,7 +96,8 @@ def _candidates(contacts: Contacts, angle: float) -> tuple[_Candidates, BoolArra
     """Return all ends that could be joined, and the buildings that have too many."""
     directions = np.stack([contacts.azimuth, contacts.azimuth + 180.0], axis=1).ravel()
     building = contacts.buildings.ravel()
-    usable = np.isfinite(directions) & np.repeat(~contacts.repeated, 2)
+    joinable = np.isfinite(contacts.gap) & ~contacts.repeated
+    usable = np.isfinite(directions) & np.repeat(joinable, 2)
     number = np.bincount(building[usable], minlength=contacts.names.size)
     crowded = number > MOST_CONTACTS
     # Ends in the order of their buildings: those of one building stand together

@@ -18,6 +18,7 @@ from per_obspy.screening.building_rows.prevention import prevention
 from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, COMPASS, FLAGS
 from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.ranking import risk_class
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.screening.values import values
 
 
@@ -50,7 +51,7 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
         "building_number": of_worst["building_number"],
         "building_id": of_worst["building_id"],
         "severity": largest,
-        "risk_class": risk_class(largest, dict(classes)),
+        "risk_class": _classes(largest, classes),
         **_chances(sides, groups),
         "position": _position(sides, groups, angle),
         **_hits(sides, groups),
@@ -65,6 +66,12 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
         "flags": _flags(sides, groups),
     }
     return pd.DataFrame(columns)
+
+
+def _classes(severity: FloatArray, classes: Mapping[str, float]) -> NDArray[np.object_]:
+    """Return the risk class of each building, that of unknown gaps where no gap is known."""
+    named = risk_class(np.nan_to_num(severity), dict(classes))
+    return np.where(np.isnan(severity), UNKNOWN_CLASS, named).astype(object)
 
 
 def _severity(sides: pd.DataFrame) -> FloatArray:
@@ -83,11 +90,12 @@ def _worst(severity: FloatArray, sides: pd.DataFrame, groups: Groups) -> NDArray
 
 
 def _chances(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray]:
-    """Return both bounds of the probability that any neighbour hits the building."""
-    probability = np.nan_to_num(values(sides, "probability"))
+    """Return both bounds of the probability that any neighbour of known gap hits the building."""
+    probability = values(sides, "probability")
     common = groups.largest(probability)
     # Rounding must not take the bound of independent pairs below the other one
-    independent = np.maximum(1.0 - groups.product(1.0 - probability), common)
+    missed = groups.product(1.0 - np.nan_to_num(probability))
+    independent = np.maximum(1.0 - missed, common)
     return {"probability_independent": independent, "probability_common": common}
 
 

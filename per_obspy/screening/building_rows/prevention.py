@@ -17,6 +17,9 @@ from per_obspy.screening.values import values
 NOTHING = "nothing: its gaps are enough in this record"
 ELSEWHERE = "wider gaps elsewhere in its row: its own are enough for each pair alone"
 
+#: Text of a building with a gap that is not known.
+MEASURE = "measure the gaps that are not known"
+
 #: Missing gap below which it is not written, m.
 SHORTEST = 5e-4
 
@@ -36,12 +39,12 @@ def prevention(
     neighbour : Series
         Name of the worst neighbour of each.
     """
-    missing = groups.largest(values(sides, "missing_gap"))
+    missing = values(sides, "missing_gap")
     # Where one pair finds no measure there is none for the building
     damping = values(sides, "supplemental_damping")
     bumper = values(sides, "bumper_restitution")
     found: dict[str, FloatArray | NDArray[np.object_]] = {
-        "missing_gap": missing,
+        "missing_gap": _all_known(groups, missing, groups.largest(missing)),
         "supplemental_damping": _all_known(groups, damping, groups.largest(damping)),
         "bumper_restitution": _all_known(groups, bumper, groups.smallest(bumper)),
     }
@@ -58,7 +61,9 @@ def _all_known(groups: Groups, column: FloatArray, reduced: FloatArray) -> Float
 
 def _sentence(missing: float, damping: float, bumper: float, hit: bool, neighbour: str) -> str:
     """Return the measures of one building in words."""
-    if not missing > 0.0:
+    if np.isnan(missing):
+        return MEASURE
+    if missing <= 0.0:
         return ELSEWHERE if hit else NOTHING
     # Every measure that there is
     parts = [f"up to {max(missing, SHORTEST):.3f} m more gap (to {neighbour} first)"]

@@ -165,3 +165,16 @@ def test_of_a_ring_only_one_gap_is_cut():
     assert sum(len(row) - 1 for row in rows) == count
     assert sorted(map(len, rows))[0] == 2
     assert max(map(len, rows)) == 5
+
+
+def test_no_row_goes_on_across_an_unknown_gap():
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0), ("b", "c", 90, np.nan), ("c", "d", 90, 0)))
+    assert rows == [["a", "b"], ["b", "c"], ["c", "d"]]
+    assert flags == [set(), {"unknown_gap"}, set()]
+
+
+def test_an_assumed_gap_is_followed_and_flagged():
+    table = street(("a", "b", 90, 0), ("b", "c", 90, 0.5), derived=["", "gap"])
+    rows, flags, _ = rows_of(table)
+    assert rows == [["a", "b", "c"]]
+    assert flags == [{"unknown_gap"}]

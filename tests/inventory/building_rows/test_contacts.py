@@ -74,3 +74,9 @@ def test_numbers_do_not_depend_on_the_order_of_the_table(order):
     found = contacts_of(table.iloc[order].reset_index(drop=True), 30.0)
     assert found.names[:3].tolist() == ["a", "b", "c"]
     assert found.pair_id[np.argsort(found.order)].tolist() == ["p0", "p1", "p2"]
+
+
+def test_a_known_gap_goes_before_an_unknown_one():
+    found = contacts_of(street(("a", "b", 90, np.nan), ("b", "a", 270, 0.4)), 30.0)
+    assert found.repeated.tolist() == [True, False]
+    assert "rows take the gap of 0.4 m instead of unknown width" in found.rejected[0].reasons[0]

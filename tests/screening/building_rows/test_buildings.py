@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.screening.building_rows.buildings import building_table
-from per_obspy.screening.building_rows.prevention import ELSEWHERE, NOTHING
+from per_obspy.screening.building_rows.prevention import ELSEWHERE, MEASURE, NOTHING
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
 
@@ -198,3 +198,21 @@ def test_without_histories_what_they_tell_is_empty():
         .all(axis=None)
     )
     assert found["severity"].tolist() == pytest.approx([0.05, 0.05, 0.15, 0.15])
+
+
+def test_an_unknown_gap_is_never_taken_for_a_wide_one():
+    unknown = {
+        "probability": [np.nan, 0.001, np.nan],
+        "state": ["unknown", "no", "unknown"],
+        "expected_impact_velocity": [np.nan, 0.0, np.nan],
+        "missing_gap": [np.nan, 0.0, np.nan],
+    }
+    nothing = {"impact_velocity": np.nan, "impact_velocity_alone": np.nan, "impacts": np.nan}
+    found = buildings(**unknown, **nothing)
+    assert found["neighbours_that_can_hit"].tolist() == [1, 1, 1, 1]
+    assert found["prevention"].tolist() == [MEASURE] * 4
+    # b and c have one known gap; nothing is known of a and d
+    assert found["risk_class"].tolist() == ["unknown", "low", "low", "unknown"]
+    np.testing.assert_array_equal(found["severity"], [np.nan, 0.0, 0.0, np.nan])
+    np.testing.assert_array_equal(found["probability_common"].isna(), [True, False, False, True])
+    assert found["missing_gap"].isna().all()
