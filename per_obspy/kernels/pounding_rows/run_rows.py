@@ -96,8 +96,8 @@ def _repeat_tile(lanes, first, memory, record, grounds, count):
 
 @lean
 def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
-    """Treat the flagged lanes of one row after the sweep of a tile; return whether it is through."""
-    members, row, log, states, deferred = memory
+    """Treat the flagged lanes of a row after the sweep; return whether it got through."""
+    members, row, _, _, deferred = memory
     together = 0
     for i in range(row.shape[0]):
         together |= flags[first + i]
@@ -154,7 +154,7 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
 
     Return the number of the others.
     """
-    members, lines, logs, states, deferred = memory
+    members, lines, _, _, deferred = memory
     active = 0
     for number in range(firsts.size - 1):
         if free_steps[number] >= 0:
@@ -210,8 +210,7 @@ def run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free_s
     bool
         Whether all rows got through: no step had too many events.
     """
-    members, lines, logs, states, deferred = memory
-    _prepare(lanes, members, lines, firsts, cosine, sine, record.duration)
+    _prepare(lanes, memory[0], memory[1], firsts, cosine, sine, record.duration)
     # the record
     last = (record.components.shape[1] - 1) * record.refinement
     is_through = _advance(lanes, flags, memory, firsts, record, grounds, 0, last)

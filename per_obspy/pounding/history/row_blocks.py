@@ -9,7 +9,7 @@ from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.kernels.pounding_rows.row_steps import STATE_COLUMNS
+from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
 from per_obspy.pounding.history.pair_blocks import aligned
 from per_obspy.threads import map_in_threads
@@ -114,7 +114,6 @@ def _run_block(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the lines of a block at the end, and logs that hold all impacts of its rows."""
     direction = np.cos(azimuth), np.sin(azimuth)
-    kernel = _run_alone if len(start) > PAIR_LANES else _run_in_lanes
     room, impacts = -1, FIRST_ROOM
     # Grow the logs until all impacts of every row have room
     while room < impacts:
@@ -122,30 +121,25 @@ def _run_block(
         logs = np.empty((firsts.size - 1, room, LOG_COLUMNS))
         # The kernels change the lines and the steps of free vibration
         own = start.copy()
-        if not kernel(record, own, logs, firsts, *direction, free.copy()):
+        if len(own) > PAIR_LANES:
+            is_through = _run_alone(record, own, logs[0], direction, int(free[0]))
+        else:
+            is_through = _run_in_lanes(record, own, logs, firsts, direction, free.copy())
+        if not is_through:
             raise RuntimeError("no end of events in a step of a row")
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
     return own, logs
 
 
 def _run_alone(
-    record: Record,
-    row: FloatArray,
-    logs: FloatArray,
-    firsts: IntArray,
-    cosine: FloatArray,
-    sine: FloatArray,
-    free: IntArray,
+    record: Record, row: FloatArray, log: FloatArray, direction: tuple[FloatArray, ...], free: int
 ) -> bool:
     """Run a row of more buildings than there are lanes; return whether it got through."""
     north, east = record.components
+    cosine, sine = (float(component[0]) for component in direction)
     dt = record.duration * record.refinement
-    direction = float(cosine[0]), float(sine[0])
-    return bool(
-        run_row_by_events(
-            north, east, *direction, dt, record.refinement, row, logs[0], int(free[0])
-        )
-    )
+    run = run_row_by_events(north, east, cosine, sine, dt, record.refinement, row, log, free)
+    return bool(run)
 
 
 def _run_in_lanes(
@@ -153,8 +147,7 @@ def _run_in_lanes(
     own: FloatArray,
     logs: FloatArray,
     firsts: IntArray,
-    cosine: FloatArray,
-    sine: FloatArray,
+    direction: tuple[FloatArray, ...],
     free: IntArray,
 ) -> bool:
     """Run the rows of a block in lanes; return whether all got through."""
@@ -163,10 +156,12 @@ def _run_in_lanes(
     lanes = aligned(LANE_ROWS * PAIR_LANES)
     flags = aligned(PAIR_LANES).view(np.int64)
     grounds = np.empty((2, 2, TILE_STEPS + 1))
+
+    # Lanes as lines, states of a step and deferred tiles
     members = np.zeros((PAIR_LANES, LANE_ROWS))
     states = np.zeros((PAIR_LANES, STATE_COLUMNS))
     deferred = np.zeros((PAIR_LANES, DEFERRED_COLUMNS))
     memory = members, lines, logs, states, deferred
-    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free)
+    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, *direction, free)
     own[:] = lines[: len(own)]
     return bool(is_through)
