@@ -49,11 +49,11 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import (
 from per_obspy.kernels.pounding_rows.member_phases import update_phases
 
 # columns of the states of a row in a step: displacement, velocity over omega and acceleration over
-# omega² (m), at its start and at its end
-START, END = 0, 3
+# omega² (m), at the start of a piece, at the end of the step, and at an event
+START, END, REACHED = 0, 3, 6
 #: share of the step at which the interface after a building closes; UNKNOWN before it is located
-NEXT_HIT = 6
-STATE_COLUMNS = 7
+NEXT_HIT = 9
+STATE_COLUMNS = 10
 UNKNOWN = -1.0
 
 
@@ -112,11 +112,11 @@ def may_yield_in_piece(members, row, states):
 
 
 @lean
-def raise_maxima(members, row, states, change, share):
-    """Raise the maxima of every building to those of a piece: this share of a step."""
+def raise_maxima(members, row, states, column, change, share):
+    """Raise the maxima of every building to those from its start to the state in a column."""
     for i in range(row.shape[0]):
         start = state(states, i, START)
-        end = state(states, i, END)
+        end = state(states, i, column)
         one = row[i : i + 1]
         if may_exceed_maxima(members[i], one, 0, start, end):
             raise_maxima_inside(members[i], one, 0, start, end, change, share)
@@ -185,21 +185,16 @@ def _find_hit(members, row, states, elapsed, segment):
 
 @lean
 def _advance_to_hit(members, row, states, share, change):
-    """Move the start of the piece by a share of the step, with all maxima in between."""
+    """Move the start of the piece, and the row, by a share of the step, with all maxima."""
     for i in range(row.shape[0]):
-        member = members[i]
-        one = row[i : i + 1]
         start = state(states, i, START)
-        reached = state_inside_step(member, one, 0, start, change, share)
-        if may_exceed_maxima(member, one, 0, start, reached):
-            raise_maxima_inside(member, one, 0, start, reached, change, share)
-        set_state(states, i, START, reached)
-
-
-@lean
-def _write_to_row(members, row, states):
-    """Write the states at the start of the piece to the row."""
+        one = row[i : i + 1]
+        reached = state_inside_step(members[i], one, 0, start, change, share)
+        set_state(states, i, REACHED, reached)
+    raise_maxima(members, row, states, REACHED, change, share)
     for i in range(row.shape[0]):
+        set_state(states, i, START, state(states, i, REACHED))
+        row[i, CLEARANCE_ORDER] = 0.0
         row[i, U] = states[i, START]
         row[i, V] = states[i, START + 1] * members[i, OMEGA]
 
@@ -260,7 +255,8 @@ def run_row_impacts(members, row, log, states, segment):
     """
     change = segment.slope * segment.duration
     elapsed = 0.0
-    states[:, NEXT_HIT] = UNKNOWN
+    for j in range(row.shape[0]):
+        states[j, NEXT_HIT] = UNKNOWN
     for _ in range(100 * int(row[0, BOUNCE_LIMIT])):
         share = UNKNOWN
         hit = 0
@@ -268,17 +264,16 @@ def run_row_impacts(members, row, log, states, segment):
             share, hit = _find_hit(members, row, states, elapsed, segment)
         # no further impact: the end of the step
         if share == math.inf:
-            raise_maxima(members, row, states, change, 1.0 - elapsed)
-            row[:, CLEARANCE_ORDER] = 0.0
+            raise_maxima(members, row, states, END, change, 1.0 - elapsed)
+            for i in range(row.shape[0]):
+                row[i, CLEARANCE_ORDER] = 0.0
             return True
         is_hit = share != UNKNOWN
         if is_hit:
             # the impact
             if share > elapsed:
                 _advance_to_hit(members, row, states, share - elapsed, change)
-                row[:, CLEARANCE_ORDER] = 0.0
             elapsed = share
-            _write_to_row(members, row, states)
             is_hit = row[hit, V] - row[hit + 1, V] > row[0, STICKING_SPEED]
         if is_hit:
             resolve_contact(row, log, segment, elapsed * segment.duration, hit)

@@ -33,10 +33,10 @@ from per_obspy.kernels.pounding_rows.row_impacts import (
 
 
 @lean
-def _may_hold_event(members, row, states, grounds):
+def _may_hold_event(members, row, states, before, after):
     """Return whether bounds do not exclude contact, release, yielding or unloading in a step."""
     for j in range(row.shape[0] - 1):
-        if may_meet_or_part(members, row, states, j, grounds[0], grounds[1]):
+        if may_meet_or_part(members, row, states, j, before, after):
             return True
     return may_yield_in_piece(members, row, states)
 
@@ -47,16 +47,6 @@ def set_members(members, row, states, column):
     for i in range(row.shape[0]):
         members[i, DISPLACEMENT] = states[i, column]
         members[i, VELOCITY] = states[i, column + 1]
-
-
-@lean
-def _repeat_step(members, row, log, states, grounds, duration):
-    """Carry a row through a step that may hold an event; return whether it got through."""
-    set_members(members, row, states, START)
-    load_row(members, row)
-    row[0, BOUNCES] = 0.0
-    segment = segment_of_step(row, grounds[0], grounds[1], duration)
-    return run_row_impacts(members, row, log, states, segment)
 
 
 @lean
@@ -99,11 +89,15 @@ def step_row_through_tile(members, row, log, states, ground, count, duration):
         for i in range(row.shape[0]):
             start = state(states, i, START)
             set_state(states, i, END, state_after_step(members[i], 0, start, before, after))
-        grounds = before, after
-        if _may_hold_event(members, row, states, grounds):
-            is_through &= _repeat_step(members, row, log, states, grounds, duration)
+        if _may_hold_event(members, row, states, before, after):
+            # the step again, from event to event
+            set_members(members, row, states, START)
+            load_row(members, row)
+            row[0, BOUNCES] = 0.0
+            segment = segment_of_step(row, before, after, duration)
+            is_through &= run_row_impacts(members, row, log, states, segment)
         else:
-            raise_maxima(members, row, states, after - before, 1.0)
+            raise_maxima(members, row, states, END, after - before, 1.0)
         # on to the next step
         for i in range(row.shape[0]):
             set_state(states, i, START, state(states, i, END))

@@ -99,7 +99,9 @@ def run_row_blocks(
         record = Record(ground, int(parts[block[0]]), dt / int(parts[block[0]]))
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         starts = np.concatenate([[0], np.cumsum(np.diff(first)[block])])
-        own, logs = _run_block(record, lines[members], starts, azimuth[block], free_steps[block])
+        own, logs = run_logged_block(
+            record, lines[members], starts, azimuth[block], free_steps[block]
+        )
         lines[members] = own
         for begin, end, log in zip(starts[:-1], starts[1:], logs, strict=True):
             part = members[begin:end]
@@ -109,10 +111,37 @@ def run_row_blocks(
     return counts
 
 
-def _run_block(
+def run_logged_block(
     record: Record, start: FloatArray, firsts: IntArray, azimuth: FloatArray, free: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the lines of a block at the end, and logs that hold all impacts of its rows."""
+    """
+    Carry the rows of one block through a record, with a log of every impact.
+
+    Parameters
+    ----------
+    record : Record
+        Ground motion and the steps through it.
+    start : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at rest.
+    firsts : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    azimuth : (n_rows,) ndarray
+        Of the axis of each row, rad.
+    free : (n_rows,) ndarray of int
+        Sampling intervals of free vibration at most.
+
+    Returns
+    -------
+    lines : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at the end.
+    logs : (n_rows, n_lines, LOG_COLUMNS) ndarray
+        All impacts of each row.
+
+    Raises
+    ------
+    RuntimeError
+        If a step has more events than any record causes.
+    """
     direction = np.cos(azimuth), np.sin(azimuth)
     room, impacts = -1, FIRST_ROOM
     # Grow the logs until all impacts of every row have room
