@@ -27,6 +27,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair
 from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
+from per_obspy.kernels.pounding_rows.last_impacts import is_over
 from per_obspy.kernels.pounding_rows.member_phases import load_row, write_constants
 from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 
@@ -123,7 +124,8 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
                 _search_deferred(lanes, lane, own, record, grounds[1])
                 read_lane(lanes, lane, members[lane])
             load_row(members[first:end], lines[first:end])
-            if elapsed >= free_steps[number] or is_settled(lines[first:end]):
+            row = lines[first:end]
+            if elapsed >= free_steps[number] or is_settled(row) or is_over(row):
                 free_steps[number] = -1
                 for lane in range(first, end):
                     rest_pair(members[lane])
