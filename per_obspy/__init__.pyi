@@ -7,6 +7,7 @@ from .inventory.periods import asce7_period as asce7_period
 from .inventory.periods import ec8_period as ec8_period
 from .inventory.shear_building import equivalent_sdof as equivalent_sdof
 from .inventory.shear_building import shear_building as shear_building
+from .pipeline.run import run as run
 from .pounding.correlation.covariance import ground_correlation as ground_correlation
 from .pounding.correlation.ground_spectrum import psd_correlation as psd_correlation
 from .pounding.correlation.record import record_correlation as record_correlation
@@ -61,3 +62,4 @@ from .spectra.bilinear import constant_yield_spectra as constant_yield_spectra
 from .spectra.elastic import per_spectrum as per_spectrum
 from .spectra.elastic import response_spectra as response_spectra
 from .spectra.station import station_spectra as station_spectra
+from .spectra.stream import stream_spectra as stream_spectra

@@ -8,9 +8,13 @@ number.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy import typing
+from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
-FloatArray = NDArray[np.float64]
+# named, so that signatures print these names instead of everything that they stand for
+ArrayLike = TypeAliasType("ArrayLike", typing.ArrayLike)
+FloatArray = TypeAliasType("FloatArray", NDArray[np.float64])
 
 
 def numbers(name: str, values: ArrayLike) -> FloatArray:

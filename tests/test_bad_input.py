@@ -346,7 +346,6 @@ ROWS = {
     "negative gap": ({"gap": -0.05}, "gap = -0.05 m is outside"),
     "text for a gap": ({"gap": "five"}, "gap = 'five' is not a number"),
     "decimal comma": ({"gap": "0,05"}, "gap = '0,05' is not a number"),
-    "no gap": ({"gap": ""}, "gap is empty"),
     "height of 0": ({"height_1": 0}, "height_1 = 0 m is outside"),
     "no height": ({"height_2": ""}, "none of height_2, storeys_2, period_2 is a number"),
     "period of 0": ({"period_1": 0}, "period_1 = 0 s is outside"),
@@ -394,6 +393,18 @@ def test_a_run_lists_every_wrong_row_and_judges_the_others(write, call, tmp_path
     assert rejected.index.tolist() == list(range(3, 3 + len(ROWS)))
     for reason, (_, message) in zip(rejected, ROWS.values(), strict=True):
         assert message in reason
+
+
+def test_a_pair_without_a_gap_is_kept(write, call, tmp_path):
+    write({"pairs.csv": _table({}, {"pair_id": "b", "gap": ""})})
+    write_simulation(simulate(Scenario(stations=1, dt=0.02)), tmp_path / "records")
+    code, out, _ = call("run", "run.toml")
+    assert code == 0
+    assert "1 unknown; 0 rejected" in out
+    row = pd.read_csv("out/risk.csv").set_index("pair_id").loc["b"]
+    assert row["demand"] > 0
+    assert (row["state"], row["risk_class"]) == ("unknown", "gap unknown")
+    assert np.isnan(row["probability"])
 
 
 def test_the_ends_of_every_range_can_be_computed(write, call, tmp_path):

@@ -61,10 +61,12 @@ NAMES = {
     "response_spectra",
     "risk_table",
     "rotd",
+    "run",
     "shear_building",
     "single_hit",
     "srss_gap",
     "station_spectra",
+    "stream_spectra",
     "supplemental_damping",
     "transfer_energies",
 }
@@ -85,6 +87,7 @@ WITHOUT_EXAMPLE = {
     "process",
     "read_pairs",
     "risk_table",
+    "run",
     "station_spectra",
 }
 

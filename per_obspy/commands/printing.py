@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from per_obspy.errors import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from per_obspy.progress import Progress
 
@@ -25,6 +25,14 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
     for row in rows:
         table.add_row(*(Text(cell(value)) for value in row))
     Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+
+def state_texts(counts: "Mapping[str, int]") -> list[str]:
+    """Return the number of pairs in each state as texts; unknown gaps only where there are any."""
+    from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_STATE
+
+    shown = [state for state in EVERY_STATE if counts[state] or state != UNKNOWN_STATE]
+    return [f"{counts[state]} {state}" for state in shown]
 
 
 def cell(value: object) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from per_obspy.commands.endings import AsJson, Strict, output_option, print_and_end, stop_if_nothing
-from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.commands.printing import print_table, shown_progress, state_texts
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
 
@@ -226,14 +226,10 @@ def _print_counts(record: dict[str, Any]) -> None:
         print(_simulated_line(counts))
     for line in _earthquake_lines(record.get("earthquakes", ())):
         print(line)
-    from per_obspy.screening.ranking import STATES
-
     # Stations, pairs by state, and all rejections together
+    states = ", ".join(state_texts(counts))
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))
-    print(
-        f"{counts['stations']} stations, {counts['pairs']} pairs: "
-        f"{', '.join(f'{counts[state]} {state}' for state in STATES)}; {rejected} rejected"
-    )
+    print(f"{counts['stations']} stations, {counts['pairs']} pairs: {states}; {rejected} rejected")
 
 
 def _print_warnings(warnings: dict[str, list[str]]) -> None:

@@ -14,7 +14,7 @@ from per_obspy.commands.endings import (
     stop_if_nothing,
     why_nothing,
 )
-from per_obspy.commands.printing import print_table, shown_progress
+from per_obspy.commands.printing import print_table, shown_progress, state_texts
 from per_obspy.commands.run import print_result
 
 if TYPE_CHECKING:
@@ -116,16 +116,16 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
 
 def _state_counts(table: "pd.DataFrame") -> dict[str, int]:
     """Return the number of pairs in each state."""
-    from per_obspy.screening.ranking import STATES
+    from per_obspy.screening.ranking import EVERY_STATE
 
-    return {state: int((table["state"] == state).sum()) for state in STATES}
+    return {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
 
 
 def _print_spectrum_result(
     table: "pd.DataFrame", counts: dict[str, int], rejected: int, files: list[Path]
 ) -> None:
     """Print counts, worst pairs and files of a screening by a spectrum."""
-    words = ", ".join(f"{count} {state}" for state, count in counts.items())
+    words = ", ".join(state_texts(counts))
     print(
         f"{len(table)} pairs ({words}), {rejected} rejected; "
         "the radius is SD, a design spectrum has no PER"

@@ -27,6 +27,14 @@ class Building(Section):
         200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters"
     )
     restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
+    gap: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="median of the gap where the pair table gives none, m; without it such pairs "
+        "have a demand, but no probability",
+    )
+    gap_log_std: float = Field(1.0, gt=0, le=2, description="log-standard deviation of that gap")
     floor_tolerance: float = Field(
         FLOOR_TOLERANCE,
         ge=0,

@@ -222,8 +222,8 @@ def plain_numbers(values: pd.Series) -> pd.Series:
 
 
 def _missing(column: Column, empty: NDArray[np.bool_]) -> list[Fault]:
-    """Return a fault for each empty cell of a required column."""
-    if not column.required:
+    """Return a fault for each empty cell of a column that every row needs."""
+    if not column.required or column.may_be_empty:
         return []
     return [(i, f"{column.name} is empty") for i in _rows(empty)]
 

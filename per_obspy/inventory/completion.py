@@ -67,6 +67,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * A building without yield displacement and yield coefficient stays linear (infinite yield
       displacement); a pair without azimuth keeps NaN, which means every direction. Neither counts
       as derived.
+    * An empty gap is a lognormal one of the median and deviation in ``building``, if it has one;
+      else it stays NaN.
     * Log-standard deviations of given periods and dampings are 0 unless the table gives them.
     """
     columns: Columns = {}
@@ -169,10 +171,25 @@ def _add_contact(
     for i in (1, 2):
         _add_participation(columns, derived, pairs, i)
     _add_floor_offset(columns, derived, pairs)
-    # Impact and gap
     given = numbers_in(pairs, "restitution")
     _add_column(columns, derived, "restitution", given, building.restitution)
-    columns["gap_std"] = _given_or(numbers_in(pairs, "gap_std"), 0.0)
+    _add_gap(columns, derived, pairs, building)
+
+
+def _add_gap(
+    columns: Columns, derived: Derived, pairs: pd.DataFrame, building: config.Building
+) -> None:
+    """Add gap and its deviation, m: those of the assumed lognormal gap where it is unknown."""
+    gap, deviation = numbers_in(pairs, "gap"), numbers_in(pairs, "gap_std")
+    if building.gap is None:
+        columns["gap"], columns["gap_std"] = gap, _given_or(deviation, 0.0)
+        return
+    # Mean and standard deviation of the lognormal distribution
+    variance = building.gap_log_std**2
+    mean = building.gap * np.exp(variance / 2.0)
+    _add_column(columns, derived, "gap", gap, mean)
+    spread = np.where(derived["gap"], mean * np.sqrt(np.expm1(variance)), _given_or(deviation, 0.0))
+    columns["gap_std"] = spread
 
 
 def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int) -> None:

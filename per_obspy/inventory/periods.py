@@ -8,10 +8,10 @@ logarithmic standard deviation, ``period_log_std``.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.inventory.schema import SYSTEMS
 
 #: system -> (best fit / lower bound, coefficient of the lower bound in s/m**exponent, exponent);

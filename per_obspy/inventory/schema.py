@@ -45,6 +45,8 @@ class Column(NamedTuple):
         One line for the user.
     required : bool
         Whether every file must have the column and every row a value in it.
+    may_be_empty : bool
+        Whether rows of a required column may be empty.
     low, high : float
         Closed range of numbers, in the column's unit.
     choices : tuple of str
@@ -62,6 +64,7 @@ class Column(NamedTuple):
     high: float = inf
     choices: tuple[str, ...] = ()
     hint: str = ""
+    may_be_empty: bool = False
 
 
 #: Smallest quantity that counts as above zero: a tenth of a millimetre, a tenth of a millisecond.
@@ -70,8 +73,9 @@ TINY = 1e-4
 _PAIR = (
     Column("pair_id", "str", "", "identifier of the pair, unique in its file", required=True),
     Column("gap", "float64", "m",
-           "clear distance between the buildings at the contact height, 0 if they touch",
-           required=True, low=0.0, high=10.0,
+           "clear distance between the buildings at the contact height, 0 if they touch; empty if "
+           "unknown",
+           required=True, may_be_empty=True, low=0.0, high=10.0,
            hint="given in millimetres or centimetres by mistake?"),
     Column("gap_std", "float64", "m", "standard deviation of the gap",
            low=0.0, high=1.0, hint="in millimetres?"),

@@ -18,6 +18,7 @@ from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.figures import draw_overview, draw_record_to_pair
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.risk import RankedTable, ranked_table
 from per_obspy.tables.totals import (
@@ -181,7 +182,7 @@ def _summary(
 def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.DataFrame]:
     """Yield the pieces of a risk table, and note what the report takes of each."""
     step = -(-table.pairs // SHOWN)
-    classes = list(settings.screening.classes)
+    classes = [*settings.screening.classes, UNKNOWN_CLASS]
     for piece in table.pieces():
         found.rows.append(len(piece))
         rank = piece["rank"].to_numpy()

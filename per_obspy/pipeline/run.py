@@ -61,8 +61,8 @@ UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
 
 
 def run(
-    configuration: Path,
-    output: Path | None = None,
+    configuration: str | Path,
+    output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Result:
@@ -71,9 +71,9 @@ def run(
 
     Parameters
     ----------
-    configuration : Path
+    configuration : str or Path
         TOML file, see :class:`per_obspy.config.Run`.
-    output : Path, optional
+    output : str or Path, optional
         Folder of the results, instead of the configured one.
     executor : Executor, optional
         Where stations are processed; processes of this machine if not given.
@@ -97,9 +97,9 @@ def run(
     Unfinished
         If the machine failed at some stations or chunks of pairs, after all others of this stage.
     """
-    configuration = configuration.resolve()
+    configuration = Path(configuration).resolve()
     settings = _settings(configuration)
-    folder = (output or settings.output).resolve()
+    folder = Path(output or settings.output).resolve()
     with locked_folder(folder):
         fetched = fetched_records(settings.records, progress)
         # Inputs are hashed here only to compare them with those of a finished run

@@ -17,7 +17,7 @@ from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
-from per_obspy.screening.ranking import STATES
+from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.tables.risk import write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
@@ -108,7 +108,7 @@ def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]
 def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
     """Return the numbers of pairs, of rejections of each kind and of chunks."""
     counts = {"pairs": states.total()}
-    counts |= {state: states[state] for state in STATES}
+    counts |= {state: states[state] for state in EVERY_STATE}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
     return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
 

@@ -1,10 +1,9 @@
 """Critical gap of a pair: the smallest clear distance at which two structures do not touch."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 
 
 def critical_gap(per_1: ArrayLike, per_2: ArrayLike, correlation: ArrayLike) -> FloatArray:

@@ -1,10 +1,9 @@
 """Dispersions of radii and gaps: how independent sources of uncertainty combine."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 
 
 def combined_dispersion(dispersions: ArrayLike) -> FloatArray:

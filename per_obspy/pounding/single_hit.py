@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pairs.single_hit import NO_POUNDING, PAIRS, estimate
 from per_obspy.pounding.impact import mass_shares
 from per_obspy.threads import map_in_threads

@@ -4,10 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, pi
 
-from numpy.typing import ArrayLike
-
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,19 @@ from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
     STATE_COLOURS,
+    UNKNOWN_COLOUR,
     fit_titles,
     save,
     title_name,
 )
+from per_obspy.screening.ranking import STATES, UNKNOWN_STATE
 from per_obspy.screening.values import components
 
 #: States in the order in which they are drawn: the likeliest on top.
-DRAWN_STATES = tuple(reversed(STATE_COLOURS))
+DRAWN_STATES = (UNKNOWN_STATE, *reversed(STATES))
+
+#: Colour of every state.
+COLOURS = STATE_COLOURS | {UNKNOWN_STATE: UNKNOWN_COLOUR}
 
 
 def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> None:
@@ -97,14 +102,18 @@ def _draw_circles(axes: Axes, pair: pd.Series) -> None:
     """Draw the largest energy circle of each building, a gap apart (the paper's Fig. 4)."""
     # Dashes for the second building, as equal circles touch all around
     _draw_circle(axes, pair, 1, centre=0.0, line="-")
-    _draw_circle(axes, pair, 2, centre=pair["gap"], line="--")
+    # where the gap is unknown, as far apart as is needed
+    known = not np.isnan(pair["gap"])
+    apart = pair["gap"] if known else pair["demand"]
+    _draw_circle(axes, pair, 2, centre=apart, line="--")
 
     # The faces of both buildings at rest
     axes.axvline(0.0, color=BUILDING_COLOURS[0], linewidth=0.8)
-    axes.axvline(pair["gap"], color=BUILDING_COLOURS[1], linewidth=0.8)
+    axes.axvline(apart, color=BUILDING_COLOURS[1], linewidth=0.8)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="displacement at contact height (m)", ylabel="velocity / frequency (m)")
-    verdict = f"gap {100 * pair['gap']:.0f} cm, needed {100 * pair['demand']:.0f} cm"
+    gap = f"gap {100 * pair['gap']:.0f} cm" if known else "gap unknown"
+    verdict = f"{gap}, needed {100 * pair['demand']:.0f} cm"
     name = title_name(str(pair["pair_id"]))
     axes.set_title(f"3  pair {name}\n{verdict}", fontsize=11, parse_math=False)
     axes.legend(fontsize=8, loc="upper right")
@@ -151,7 +160,7 @@ def _draw_map(axes: Axes, table: pd.DataFrame, spectra: xr.Dataset) -> None:
     drawn = [state for state in DRAWN_STATES if state in set(table["state"])]
     for state in drawn:
         chosen = table[table["state"] == state]
-        colour, label = STATE_COLOURS[state], f"{len(chosen)} pairs: {state}"
+        colour, label = COLOURS[state], f"{len(chosen)} pairs: {state}"
         axes.scatter(chosen["longitude"], chosen["latitude"], s=5, color=colour, label=label)
     axes.scatter(
         spectra["longitude"], spectra["latitude"], marker="^", s=45, color="black", label="stations"
@@ -168,7 +177,7 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame) -> None:
     """Draw gaps over demands, cm, in the colours of the states."""
     for state in DRAWN_STATES:
         chosen = table[table["state"] == state]
-        axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=STATE_COLOURS[state])
+        axes.scatter(100 * chosen["demand"], 100 * chosen["gap"], s=6, color=COLOURS[state])
     # The demand of the medians; the state is that of the whole population
     demand, gap = 100 * float(table["demand"].max()), 100 * float(table["gap"].max())
     axes.plot([0.0, demand], [0.0, demand], color="black", linewidth=0.8, label="gap = demand")

@@ -18,7 +18,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.gdal_paths import literal_path
-from per_obspy.report.style import STATE_COLOURS
+from per_obspy.report.style import STATE_COLOURS, UNKNOWN_COLOUR
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
 CRS = "EPSG:4326"
@@ -231,6 +232,12 @@ def _add_categories(renderer: ElementTree.Element, classes: Sequence[str]) -> No
             categories, "category", value=name, label=name, symbol=str(number), render="true"
         )
         _add_marker(symbols, number, to_hex(colours(share)), size)
+    # pairs of unknown gap are of no class of severity
+    name, symbol = UNKNOWN_CLASS, str(len(classes))
+    ElementTree.SubElement(
+        categories, "category", value=name, label=name, symbol=symbol, render="true"
+    )
+    _add_marker(symbols, len(classes), UNKNOWN_COLOUR, SMALLEST)
 
 
 def _add_marker(symbols: ElementTree.Element, number: int, colour: str, size: float) -> None:

@@ -17,6 +17,9 @@ STATE_COLOURS = {
     "no": "#009E73",
 }
 
+#: Pairs whose gap is unknown.
+UNKNOWN_COLOUR = "#999999"
+
 #: Buildings 1 and 2, the ground motion, and whatever is only for comparison.
 BUILDING_COLOURS = ("#0072B2", "#CC79A7")
 MOTION_COLOUR = "#444444"

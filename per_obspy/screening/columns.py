@@ -42,11 +42,11 @@ RESULTS: dict[str, Column] = {
         ),
         _text(
             "risk_class",
-            "by expected impact velocity; names and thresholds are in the configuration",
+            "by expected impact velocity, thresholds are configured; gap unknown without a gap",
         ),
         _text(
             "state",
-            "by probability: yes, likely, possible, unlikely or no; thresholds are configured",
+            "by probability: yes, likely, possible, unlikely or no; unknown if the gap is unknown",
         ),
         _number(
             "probability", "1", "of pounding in this event, with what is uncertain of the pair"
@@ -212,6 +212,10 @@ RECORD_FLAGS = (
 
 #: Flags of a pair and the meaning of each.
 FLAGS: dict[str, str] = {
+    "unknown_gap": (
+        "the pair table gives no gap: the demand is the gap needed; probability, state and impacts "
+        "are empty, or those of the gap that the configuration assumes"
+    ),
     "touching": "gap 0: the single hit is outside its reliable range",
     "single_hit_unreliable": (
         "gap below 0.6 of the demand: several impacts are likely, the single hit may be too low"

@@ -32,8 +32,12 @@ def joined_flags(raised: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]
 
 def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
     """Return the rows that raise each flag which needs no record."""
+    gap = values(table, "gap")
+    # Tables that are computed for a screening have a gap in every row, and a mark
+    unknown = table["unknown_gap"] if "unknown_gap" in table else np.isnan(gap)
     return {
-        "touching": values(table, "gap") == 0.0,
+        "unknown_gap": np.asarray(unknown, dtype=bool),
+        "touching": gap == 0.0,
         "single_hit_unreliable": values(table, "demand_ratio") < UNRELIABLE_SINGLE_HIT,
         "derived_inputs": np.asarray(table["derived"] != ""),
         "derived_period": period_is_derived(table),

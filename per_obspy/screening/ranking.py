@@ -10,11 +10,18 @@ from per_obspy.config import States
 #: States of a pair, likeliest first.
 STATES = ("yes", "likely", "possible", "unlikely", "no")
 
+#: State of a pair whose gap is unknown.
+UNKNOWN_STATE = "unknown"
+
+#: All states that a row can have.
+EVERY_STATE = (*STATES, UNKNOWN_STATE)
+
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
 KEYS = (
     "order_velocity",
     "order_amplification",
     "order_probability",
+    "order_demand",
     "order_importance",
     "order_occupants",
 )
@@ -92,7 +99,8 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
     -----
     The order is by expected impact velocity, then by expected amplification; ties are broken by
     probability, importance, occupants and at last the name, so that it does not depend on the order
-    in which pairs were computed.
+    in which pairs were computed. Pairs without a probability, because their gap is unknown, follow
+    all others, the largest demand first.
     """
     keys = _order_keys(table)
     # lexsort sorts by its last row first
@@ -115,6 +123,7 @@ def _order_keys(table: pd.DataFrame) -> dict[str, FloatArray]:
         -_largest(table, "expected_impact_velocity"),
         -_largest(table, "expected_amplification"),
         -_largest(table, "probability"),
+        _demand_of_unknown(table),
         -_largest(table, "importance_1", "importance_2"),
         -_largest(table, "occupants_1", "occupants_2"),
     )
@@ -135,6 +144,12 @@ def _ties_by_name(
     result = order.copy()
     result[tied] = rows[np.lexsort([names[rows].astype(str), group])]
     return result
+
+
+def _demand_of_unknown(table: pd.DataFrame) -> FloatArray:
+    """Return the negated demand of pairs without a probability, 0 of the others."""
+    unknown = table.reindex(columns=["probability"]).isna().to_numpy(bool)[:, 0]
+    return np.where(unknown, -_largest(table, "demand"), 0.0)
 
 
 def _largest(table: pd.DataFrame, *names: str) -> FloatArray:

@@ -38,6 +38,7 @@ from per_obspy.screening.ground_motion.site_motion import RegionalMotion, motion
 from per_obspy.screening.mitigation import mitigation_columns
 from per_obspy.screening.ranking import KEYS, pounding_state, risk_class
 from per_obspy.screening.uncertainty.exact_demand import record_population
+from per_obspy.screening.uncertainty.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import Columns, at_contact, chosen, joined, values
 
 #: Columns that other columns are computed from and that are dropped at the end; flags report what
@@ -79,7 +80,7 @@ def risk_rows(
     rejected : tuple of Rejection
         Pairs that neither a station nor the map serves.
     """
-    complete = completed_pairs(_without_results(pairs), building)
+    complete = kept_apart(completed_pairs(_without_results(pairs), building))
     placed, rejected = assigned(complete, ground.stations, screening.largest_distance)
     tables = []
     if len(placed):
@@ -88,8 +89,9 @@ def risk_rows(
     if ground.shakemap is not None and rejected:
         mapped, rejected = shakemap_fallback(ground.shakemap, complete, rejected, screening)
         tables += [mapped] if len(mapped) else []
-    rows = pd.concat(tables, ignore_index=True) if tables else placed.reindex(columns=[*ORDER])
-    return _ordered(rows), rejected
+    if not tables:
+        return _ordered(placed.reindex(columns=[*ORDER])), rejected
+    return _ordered(without_gap(pd.concat(tables, ignore_index=True))), rejected
 
 
 def _without_results(pairs: pd.DataFrame) -> pd.DataFrame:

@@ -3,10 +3,10 @@
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import azimuth_samples as kernels
 from per_obspy.kernels.spectra import azimuth_steps
@@ -20,6 +20,7 @@ from per_obspy.spectra.oscillator_blocks import (
     stretches,
     tiled_record,
 )
+from per_obspy.spectra.trace_arguments import takes_traces
 
 #: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times
 #: the pass over them.
@@ -32,6 +33,7 @@ MOST_DOUBLINGS = 6
 EVERY_AZIMUTH = np.arange(180.0)
 
 
+@takes_traces
 def azimuthal_per_spectrum(
     north: ArrayLike,
     east: ArrayLike,
@@ -45,10 +47,10 @@ def azimuthal_per_spectrum(
 
     Parameters
     ----------
-    north, east : (n_samples,) array_like
+    north, east : (n_samples,) array_like or obspy Trace
         Components of the ground acceleration, m/s², as for `per_spectrum`.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     periods : (n_periods,) array_like
         Undamped periods, s.
     damping : float or (n_damping,) array_like

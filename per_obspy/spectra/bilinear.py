@@ -3,14 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import STANDARD_GRAVITY
 from per_obspy.kernels.oscillator import bilinear as kernels
 from per_obspy.spectra.elastic import row_of
+from per_obspy.spectra.trace_arguments import takes_trace
 
 #: Ratio of neighbouring yield displacements in the search for the largest one that gives a
 #: ductility.
@@ -84,6 +84,7 @@ class InelasticSpectra(NamedTuple):
     hysteretic_energy: FloatArray
 
 
+@takes_trace
 def bilinear_response(
     acceleration: ArrayLike,
     dt: float,
@@ -97,10 +98,10 @@ def bilinear_response(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s², as for `per_spectrum`.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     period : float
         Undamped elastic period, s.
     damping : float
@@ -141,6 +142,7 @@ def bilinear_response(
     return _response(record, dt, omega, ratio, limit, _hardening(hardening))
 
 
+@takes_trace
 def constant_yield_spectra(
     acceleration: ArrayLike,
     dt: float,
@@ -154,10 +156,10 @@ def constant_yield_spectra(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s², as for `per_spectrum`.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     periods : (n_periods,) array_like
         Undamped elastic periods, s.
     damping, hardening : float
@@ -203,6 +205,7 @@ def constant_yield_spectra(
     return _spectra(rows, coefficients.copy())
 
 
+@takes_trace
 def constant_ductility_spectra(
     acceleration: ArrayLike,
     dt: float,
@@ -216,10 +219,10 @@ def constant_ductility_spectra(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s², as for `per_spectrum`.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     periods : (n_periods,) array_like
         Undamped elastic periods, s.
     damping, hardening : float

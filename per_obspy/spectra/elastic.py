@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.kernels.spectra import radius, response
 from per_obspy.kernels.spectra import tile_search as blocks
@@ -21,6 +20,7 @@ from per_obspy.spectra.oscillator_blocks import (
     stretches,
     tiled_record,
 )
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
 class ResponseSpectra(NamedTuple):
@@ -51,6 +51,7 @@ class ResponseSpectra(NamedTuple):
     psa: FloatArray
 
 
+@takes_trace
 def per_spectrum(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> FloatArray:
@@ -59,11 +60,11 @@ def per_spectrum(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s², linear between samples; the structure is at rest at the first
         sample, and a last sample that is not zero is followed by a ramp of one ``dt`` to zero.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     periods : (n_periods,) array_like
         Undamped periods ``2 pi / omega``, s.
     damping : float or (n_damping,) array_like
@@ -106,6 +107,7 @@ def per_spectrum(
     return _radii(tiled_record(record), prepare_oscillators(dt, *grid), exact=True).reshape(shape)
 
 
+@takes_trace
 def response_spectra(
     acceleration: ArrayLike, dt: float, periods: ArrayLike, damping: ArrayLike = REFERENCE_DAMPING
 ) -> ResponseSpectra:
@@ -114,10 +116,10 @@ def response_spectra(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s², as for `per_spectrum`.
     dt : float
-        Time between samples, s.
+        Time between samples, s; not given with a Trace.
     periods : (n_periods,) array_like
         Undamped periods, s.
     damping : float or (n_damping,) array_like

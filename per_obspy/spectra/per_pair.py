@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.maxima.oscillator_maxima import largest_responses
 from per_obspy.spectra.elastic import row_of, two_components
 from per_obspy.spectra.oscillator_blocks import (

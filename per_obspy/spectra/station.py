@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
 from obspy import Stream, Trace
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.constants import (
     LONGEST_STORED_PERIOD,
     SHORTEST_STORED_PERIOD,

@@ -44,7 +44,6 @@ FRACTION = "(a fraction is expected, not per cent)"
     [
         ({"gap": -0.01}, "gap = -0.01 m is outside 0 to 10 m"),
         ({"gap": 50.0}, f"gap = 50 m is outside 0 to 10 m {UNIT_OF_GAP}"),
-        ({"gap": np.nan}, "gap is empty"),
         ({"gap": np.inf}, f"gap = inf m is outside 0 to 10 m {UNIT_OF_GAP}"),
         ({"gap": "a lot"}, "gap = 'a lot' is not a number"),
         ({"pair_id": ""}, "pair_id is empty"),

@@ -75,13 +75,13 @@ def test_qgis_finds_its_style(tmp_path):
 def test_every_class_has_a_mark_of_its_own_and_the_worst_is_on_top():
     root = ElementTree.fromstring(class_style(CLASSES))
     categories = [(c.get("value"), c.get("symbol")) for c in root.iter("category")]
-    assert categories == [("severe", "0"), ("high", "1"), ("low", "2")]
+    assert categories == [*zip([*CLASSES, "gap unknown"], "0123", strict=True)]
     marks = [
         {o.get("name"): o.get("value") for o in symbol.iter("Option") if o.get("name")}
         for symbol in root.iter("symbol")
     ]
-    assert [symbol.get("name") for symbol in root.iter("symbol")] == ["0", "1", "2"]
-    assert len({mark["color"] for mark in marks}) == 3
+    assert [symbol.get("name") for symbol in root.iter("symbol")] == [*"0123"]
+    assert len({mark["color"] for mark in marks}) == 4
     assert marks[0]["color"] == "213,94,0,255"  # Okabe & Ito's vermilion
     assert float(marks[0]["size"]) > float(marks[2]["size"])
     # drawn by falling rank: the worst, rank 1, last

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.csv_text import BLOCK
-from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 #: Most lines of one row; a quotation over more of them is one that is not closed.
 LONGEST_ROW = 100
@@ -178,15 +178,15 @@ class _Scanner:
         return len(lines), ""
 
     def _is_row(self, line: bytes) -> bool:
-        """Return whether a line inside a quotation is a row by itself: its gap is a number."""
+        """Return whether a line inside a quotation is a row by itself, by what its gap is."""
         if line.count(b",") < len(self._names) - 1:
             return False
         cells = dict(zip(self._names, _cells(line), strict=False))
+        gap = cells.get("gap", "no row")
         try:
-            float(cells["gap"])
-        except (KeyError, ValueError):
+            return gap.strip().lower() in EMPTY or float(gap) == float(gap)
+        except ValueError:
             return False
-        return True
 
     def _rejection(self, line: bytes, fault: str) -> Rejection:
         """Return the rejection of the next line."""

@@ -10,11 +10,11 @@ operations whatever the record's length.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import fft
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.relative.input_moments import LAG_TILE, input_moments
 from per_obspy.kernels.relative.worst_azimuth import largest_separation
 from per_obspy.pounding.structure import checked_oscillators

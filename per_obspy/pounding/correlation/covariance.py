@@ -1,11 +1,10 @@
 """Covariance of linear structures and the ground filter that drives them: the Lyapunov equation."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_continuous_lyapunov
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 
 

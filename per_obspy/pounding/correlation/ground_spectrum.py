@@ -1,10 +1,10 @@
 """Correlation of two linear structures under stationary ground motion of any spectral shape."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 
 ComplexArray = NDArray[np.complex128]
 

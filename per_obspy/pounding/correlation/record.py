@@ -1,13 +1,14 @@
 """Correlation of the two responses of a pair to one component of a record."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation.by_azimuth import directional_correlation
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
+@takes_trace
 def record_correlation(
     acceleration: ArrayLike,
     dt: float,
@@ -21,11 +22,11 @@ def record_correlation(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, linear between samples, m/s². A record that does not end at zero is
         closed by a ramp of dt.
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     period_1, period_2 : array_like
         Undamped periods, s.
     damping_1, damping_2 : array_like

@@ -1,10 +1,9 @@
 """Correlation of two linear structures under white noise: double difference, equation (16)."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 
 
 def ddc_correlation(

@@ -1,14 +1,15 @@
 """Critical gap over a grid of two periods, for the worst azimuth of each pair."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.relative import directional_relative_displacement
+from per_obspy.spectra.trace_arguments import takes_traces
 
 
+@takes_traces
 def azimuthal_gap_surface(
     north: ArrayLike,
     east: ArrayLike,
@@ -23,10 +24,10 @@ def azimuthal_gap_surface(
 
     Parameters
     ----------
-    north, east : (n_samples,) array_like
+    north, east : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     periods_1, periods_2 : (n_1,), (n_2,) array_like
         Undamped periods, s.
     damping_1, damping_2 : float, optional

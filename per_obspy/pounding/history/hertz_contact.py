@@ -3,13 +3,13 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.history.tables import closed_record
 from per_obspy.pounding.structure import Structure, refuse_bilinear
+from per_obspy.spectra.trace_arguments import takes_trace
 
 #: Relative and absolute (m, m/s) tolerance of the integration.
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
@@ -38,6 +38,7 @@ class HertzHistory(NamedTuple):
     force_maximum: float
 
 
+@takes_trace
 def hertz_damp_history(
     acceleration: ArrayLike,
     dt: float,
@@ -57,10 +58,10 @@ def hertz_damp_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, positive from structure 1 to 2, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structure_1, structure_2 : Structure
         Linear; 1 is left of 2.
     gap : float

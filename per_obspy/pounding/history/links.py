@@ -4,10 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events.links import ELASTIC, OPEN, Element, run_linked
 from per_obspy.kernels.pounding_events.motion import MOST_TERMS
 from per_obspy.pounding.history.tables import (
@@ -18,6 +17,7 @@ from per_obspy.pounding.history.tables import (
     structure_table,
 )
 from per_obspy.pounding.structure import Structure, refuse_bilinear
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
 class LinkedHistory(NamedTuple):
@@ -50,6 +50,7 @@ class LinkedHistory(NamedTuple):
     force_maximum: float
 
 
+@takes_trace
 def linked_history(
     acceleration: ArrayLike,
     dt: float,
@@ -70,11 +71,11 @@ def linked_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, positive from structure 1 to 2, m/s². If it does not end at zero, it is
         closed by one ramp.
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structure_1, structure_2 : Structure
         Linear; 1 is left of 2.
     stiffness : float
@@ -124,6 +125,7 @@ def linked_history(
     return _history(acceleration, dt, structure_1, structure_2, element, ELASTIC, free_vibration)
 
 
+@takes_trace
 def kelvin_voigt_history(
     acceleration: ArrayLike,
     dt: float,
@@ -143,11 +145,11 @@ def kelvin_voigt_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, positive from structure 1 to 2, m/s². If it does not end at zero, it is
         closed by one ramp.
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structure_1, structure_2 : Structure
         Linear; 1 is left of 2.
     gap : float

@@ -4,10 +4,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS
 from per_obspy.kernels.pounding_lanes.run_block import run_block
@@ -24,6 +24,7 @@ from per_obspy.pounding.history.tables import (
     largest_ground_velocity,
     row_at_rest,
 )
+from per_obspy.spectra.trace_arguments import takes_trace
 
 #: A bounce that lasts less than this share of a sampling interval ends in contact.
 SHORTEST_BOUNCE = 1e-3
@@ -57,6 +58,7 @@ class PoundingMaxima(NamedTuple):
     impact_velocity: FloatArray
 
 
+@takes_trace
 def pounding_histories(
     acceleration: ArrayLike,
     dt: float,
@@ -86,11 +88,11 @@ def pounding_histories(
 
     Parameters
     ----------
-    acceleration : (n_samples,) or (2, n_samples) array_like
+    acceleration : (n_samples,) or (2, n_samples) array_like, or obspy Trace
         Ground acceleration along the pairs, positive from structure 1 to 2; or its north and east
         components, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     period_1, period_2 : (n_pairs,) array_like
         Undamped natural periods, s.
     damping_1, damping_2 : (n_pairs,) array_like

@@ -3,13 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.relative.relative_maxima import relative_maxima
 from per_obspy.pounding.history.tables import closed_record
 from per_obspy.pounding.structure import checked_oscillators
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
 class RelativeDisplacement(NamedTuple):
@@ -26,6 +27,7 @@ class RelativeDisplacement(NamedTuple):
     largest: FloatArray
 
 
+@takes_trace
 def relative_displacement(
     acceleration: ArrayLike,
     dt: float,
@@ -46,10 +48,10 @@ def relative_displacement(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     period_1, period_2 : array_like
         Undamped periods, s.
     damping_1, damping_2 : array_like
@@ -166,6 +168,7 @@ def _maxima(motion: FloatArray, dt: float, pairs: FloatArray) -> FloatArray:
     return largest
 
 
+@takes_trace
 def critical_gap_surface(
     acceleration: ArrayLike,
     dt: float,
@@ -179,10 +182,10 @@ def critical_gap_surface(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     periods_1, periods_2 : (n_1,), (n_2,) array_like
         Undamped periods, s.
     damping_1, damping_2 : float, optional

@@ -4,10 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_lanes.run_without_contact import (
     LANE_ROWS_WITHOUT_CONTACT,

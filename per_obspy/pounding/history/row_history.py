@@ -7,10 +7,9 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import (
     COUNTED_SHARE,
@@ -28,6 +27,7 @@ from per_obspy.pounding.history.tables import (
     structure_table,
 )
 from per_obspy.pounding.structure import Structure
+from per_obspy.spectra.trace_arguments import takes_trace
 
 #: Bouncing ends in contact once the separation speed is below this share of the largest ground
 #: velocity.
@@ -112,6 +112,7 @@ class _KernelRun(NamedTuple):
     work: FloatArray
 
 
+@takes_trace
 def pounding_history(
     acceleration: ArrayLike,
     dt: float,
@@ -132,11 +133,11 @@ def pounding_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, positive from the first structure towards the last, m/s². If it does
         not end at zero, it is closed by one ramp of length dt.
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structures : sequence of Structure
         From left to right, two or more.
     gaps : float or (n_structures - 1,) array_like

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.history.links import LinkedHistory, linked_history
 from per_obspy.pounding.structure import Structure
+from per_obspy.spectra.trace_arguments import takes_trace
 
 #: Values tried over the range, evenly spaced in their logarithm.
 TRIALS = 25
@@ -42,6 +42,7 @@ class RequiredLink(NamedTuple):
     force_maximum: float
 
 
+@takes_trace
 def required_link_stiffness(
     acceleration: ArrayLike,
     dt: float,
@@ -56,10 +57,10 @@ def required_link_stiffness(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration from structure 1 to 2, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structure_1, structure_2 : Structure
         Left and right, linear.
     gap : float
@@ -108,6 +109,7 @@ def required_link_stiffness(
     )
 
 
+@takes_trace
 def required_link_damping(
     acceleration: ArrayLike,
     dt: float,
@@ -123,10 +125,10 @@ def required_link_damping(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration from structure 1 to 2, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     structure_1, structure_2 : Structure
         Left and right, linear.
     gap : float

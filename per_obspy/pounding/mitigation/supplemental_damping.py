@@ -4,15 +4,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap
 from per_obspy.pounding.single_hit import single_hit
 from per_obspy.spectra.elastic import per_spectrum
+from per_obspy.spectra.trace_arguments import takes_trace
 
 STEP = 0.01  # largest step of added damping in the scan: one-sided damping is not monotone
 SPLITS = 21  # shares between only structure 2 and only structure 1 that are tried
@@ -42,6 +43,7 @@ class DampingSplit(NamedTuple):
     added: SupplementalDamping
 
 
+@takes_trace
 def supplemental_damping(
     acceleration: ArrayLike,
     dt: float,
@@ -63,10 +65,10 @@ def supplemental_damping(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     period_1, period_2 : float
         Undamped periods, s.
     damping_1, damping_2 : float
@@ -154,6 +156,7 @@ def _least(
     return SupplementalDamping(float(damping), smallest_gap, robust)
 
 
+@takes_trace
 def optimal_damping_split(
     acceleration: ArrayLike,
     dt: float,
@@ -169,10 +172,10 @@ def optimal_damping_split(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     period_1, period_2 : float
         Undamped periods, s.
     damping_1, damping_2 : float

@@ -8,10 +8,9 @@ its response, which follow from the joint covariance of both structures and the 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.correlation.stochastic_ground import StochasticGround
 from per_obspy.pounding.structure import Structure
 from per_obspy.pounding.yielding.estimate import LinearizedEstimate

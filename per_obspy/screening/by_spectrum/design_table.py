@@ -34,6 +34,7 @@ from per_obspy.screening.uncertainty.estimated import (
     UncertainMotion,
     estimated_population,
 )
+from per_obspy.screening.uncertainty.unknown_gaps import kept_apart, without_gap
 from per_obspy.screening.values import both, values
 
 #: Columns of this table besides those that a risk table has as well.
@@ -111,13 +112,13 @@ def design_table(
         completed pair table; ``attrs["rejected"]`` holds the pairs outside the periods or dampings
         of the spectrum, with both.
     """
-    complete = completed_pairs(pairs, building)
+    complete = kept_apart(completed_pairs(pairs, building))
     first, second = _oscillators(complete)
     inside = np.all([within(spectrum, *first), within(spectrum, *second)], axis=0)
     rejected = _outside(spectrum, complete[~inside])
     # demand of the pairs inside the spectrum, worst first
     table = _rows(spectrum, complete[inside].reset_index(drop=True), screening)
-    ranked = worst_first(table)
+    ranked = worst_first(without_gap(table))
     others = [name for name in ranked if name not in LEADING]
     ranked = ranked[[*LEADING, *others]]
     ranked.attrs["rejected"] = (*pairs.attrs.get("rejected", ()), *rejected)

@@ -209,12 +209,16 @@ def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> I
         lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
         if lacking:
             names = ", ".join(lacking)
-            reasons.append(f"no probability in {names}: not in its inventory, or rejected there")
+            reasons.append(
+                f"no probability in {names}: not in its inventory, rejected there, or its gap is "
+                "unknown"
+            )
 
         # Smallest and largest value of what must be the same
         for name, unit in SAME.items():
             smallest, largest = row[name], row[f"{name}_largest"]
-            if smallest != largest:
+            # An unknown gap is NaN in all of them
+            if smallest != largest and smallest == smallest:
                 reasons.append(
                     f"{name} = {smallest:.9g} {unit} in one scenario "
                     f"and {largest:.9g} {unit} in another"

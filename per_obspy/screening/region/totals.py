@@ -12,7 +12,7 @@ from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.constants import EARTH_RADIUS
 from per_obspy.inventory.schema import Column
-from per_obspy.screening.ranking import STATES
+from per_obspy.screening.ranking import EVERY_STATE
 
 #: Numbers of cells per row: more than any row has, so that row and column make one number.
 ROW_FACTOR = 1 << 32
@@ -29,12 +29,12 @@ TOTALS: dict[str, Column] = {
             "name of the area or of the cell; empty where the pair table does not tell",
         ),
         Column("pairs", "int64", "1", "pairs in the area"),
-        *(Column(state, "int64", "1", f"pairs of the state {state}") for state in STATES),
+        *(Column(state, "int64", "1", f"pairs of the state {state}") for state in EVERY_STATE),
         Column(
             "expected_pounding",
             "float64",
             "1",
-            "expected number of pounding pairs: sum of their probabilities",
+            "expected number of pounding pairs: sum of the probabilities, without unknown gaps",
         ),
         Column(
             "expected_pounding_std_independent",
@@ -181,7 +181,7 @@ def partial_totals(table: pd.DataFrame, area: ArrayLike, classes: Iterable[str])
     # Truth values and ones, which are summed up to numbers of pairs
     rows = table.assign(area=np.asarray(area, dtype=object))
     added: dict[str, object] = {"pairs": 1}
-    for state in STATES:
+    for state in EVERY_STATE:
         added[state] = rows["state"] == state
     for name in classes:
         added[f"class_{name}"] = rows["risk_class"] == name

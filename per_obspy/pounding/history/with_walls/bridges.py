@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from per_obspy import checks
-from per_obspy.checks import FloatArray
+from per_obspy.checks import ArrayLike, FloatArray
 from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
 class BridgeHistory(NamedTuple):
@@ -31,6 +32,7 @@ class BridgeHistory(NamedTuple):
     unseated: NDArray[np.bool_]
 
 
+@takes_trace
 def bridge_history(
     acceleration: ArrayLike,
     dt: float,
@@ -45,10 +47,10 @@ def bridge_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration along the bridge, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     decks : sequence of Structure
         From left to right; abutments are walls (infinite mass, participation 0).
     gaps : float or (n_decks - 1,) array_like

@@ -2,12 +2,13 @@
 
 import math
 
-from numpy.typing import ArrayLike
-
+from per_obspy.checks import ArrayLike
 from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
+from per_obspy.spectra.trace_arguments import takes_trace
 
 
+@takes_trace
 def moat_history(
     acceleration: ArrayLike,
     dt: float,
@@ -22,10 +23,10 @@ def moat_history(
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
+    acceleration : (n_samples,) array_like or obspy Trace
         Ground acceleration, positive from the left wall to the right one, m/s².
     dt : float
-        Sampling interval, s.
+        Sampling interval, s; not given with a Trace.
     building : Structure
         The isolated building; bilinear for lead-rubber or friction isolators.
     gap_left, gap_right : float

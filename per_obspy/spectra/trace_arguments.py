@@ -1,0 +1,185 @@
+"""
+Accept ObsPy Traces where a function takes samples of acceleration and their interval.
+
+A Trace brings its own interval, so that all other arguments are given by keyword. It is recognised
+by its samples and header: ObsPy is not imported.
+"""
+
+import re
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from per_obspy.checks import ArrayLike
+
+#: Unit of ``stats.units`` of the package's readers and of processed records.
+ACCELERATION = "m/s2"
+
+#: Times of differentiation from displacement to each output of ``remove_response``.
+OUTPUTS = {"DISP": 0, "VEL": 1, "ACC": 2}
+
+#: Steps of ``stats.processing`` that change the unit, with the output of ``remove_response``.
+_STEP = re.compile(r": (remove_response|differentiate|integrate|simulate)\(")
+_OUTPUT = re.compile(r"output='(\w+)'")
+
+P = ParamSpec("P")
+Result = TypeVar("Result", covariant=True)
+
+
+class AccelerationTrace(Protocol):
+    """Trace of ObsPy: samples ``data`` and header ``stats``."""
+
+    data: NDArray[Any]
+    stats: Any
+
+
+class OfOneComponent(Protocol[P, Result]):
+    """Function of one component: of samples and ``dt``, or of a Trace."""
+
+    @overload
+    def __call__(
+        self, acceleration: ArrayLike, dt: float, *args: P.args, **kwargs: P.kwargs
+    ) -> Result: ...
+    @overload
+    def __call__(
+        self, acceleration: AccelerationTrace, *args: P.args, **kwargs: P.kwargs
+    ) -> Result: ...
+
+
+class OfTwoComponents(Protocol[P, Result]):
+    """Function of both horizontals: of samples and ``dt``, or of two Traces."""
+
+    @overload
+    def __call__(
+        self, north: ArrayLike, east: ArrayLike, dt: float, *args: P.args, **kwargs: P.kwargs
+    ) -> Result: ...
+    @overload
+    def __call__(
+        self,
+        north: AccelerationTrace,
+        east: AccelerationTrace,
+        *args: P.args,
+        **kwargs: P.kwargs,
+    ) -> Result: ...
+
+
+def takes_trace(
+    function: Callable[Concatenate[ArrayLike, float, P], Result],
+) -> OfOneComponent[P, Result]:
+    """Let a function of ``acceleration, dt`` take one Trace instead of both."""
+    of_samples: Callable[..., Result] = function
+
+    @wraps(function)
+    def with_trace(*args: Any, **kwargs: Any) -> Result:
+        traces = _leading_traces(("acceleration",), args, kwargs)
+        if traces is None:
+            return of_samples(*args, **kwargs)
+        # In m/s², with the interval of its header
+        samples = _samples("acceleration", traces[0])
+        others = _others(function.__name__, ("acceleration",), args, kwargs)
+        return of_samples(samples, float(traces[0].stats.delta), **others)
+
+    return with_trace
+
+
+def takes_traces(
+    function: Callable[Concatenate[ArrayLike, ArrayLike, float, P], Result],
+) -> OfTwoComponents[P, Result]:
+    """Let a function of ``north, east, dt`` take two Traces instead of these three."""
+    of_samples: Callable[..., Result] = function
+
+    @wraps(function)
+    def with_traces(*args: Any, **kwargs: Any) -> Result:
+        traces = _leading_traces(("north", "east"), args, kwargs)
+        if traces is None:
+            return of_samples(*args, **kwargs)
+        _require_same_times(*traces)
+        # Both in m/s², and neither in the place of the other
+        north = _samples("north", traces[0], unlike="EZ")
+        east = _samples("east", traces[1], unlike="NZ")
+        others = _others(function.__name__, ("north", "east"), args, kwargs)
+        return of_samples(north, east, float(traces[0].stats.delta), **others)
+
+    return with_traces
+
+
+def _leading_traces(
+    names: tuple[str, ...], args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> list[AccelerationTrace] | None:
+    """Return the leading arguments if they are Traces, None if they are samples."""
+    # By position or by keyword
+    given = [*args[: len(names)], *(kwargs[name] for name in names if name in kwargs)]
+    traces = [value for value in given if hasattr(value, "stats") and hasattr(value, "data")]
+    if not traces:
+        return None
+    if len(traces) < len(names):
+        raise ValueError(f"{' and '.join(names)} must both be Traces, or both arrays of samples")
+    return traces
+
+
+def _others(
+    function: str, names: tuple[str, ...], args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the keywords that follow the Traces; refuse a second interval and bare values."""
+    # A bare value could be meant as dt or as the argument after it
+    if len(args) > len(names) or "dt" in kwargs:
+        traces = "two Traces" if len(names) > 1 else "a Trace"
+        raise ValueError(
+            f"{function} takes dt from {traces}: leave dt out, and give all other arguments by "
+            f"keyword"
+        )
+    return {name: value for name, value in kwargs.items() if name not in names}
+
+
+def _samples(name: str, trace: AccelerationTrace, unlike: str = "") -> NDArray[Any]:
+    """Return the samples of a Trace of acceleration in m/s²."""
+    stats = trace.stats
+    # The last letter of a channel is the direction of its sensor
+    component = str(stats.channel)[-1:]
+    if component and component in unlike:
+        raise ValueError(f"{name} is the Trace {trace.stats.channel!r}: give north, then east")
+    unit = stats.get("units")
+    if unit == ACCELERATION or (unit is None and _is_acceleration(stats.get("processing", ()))):
+        return trace.data
+    known = "an unknown unit, maybe counts" if unit is None else repr(unit)
+    raise ValueError(
+        f"{name} is a Trace in {known}, not in m/s2: use per_obspy.process, or remove_response "
+        f"with output='ACC'; of samples that are in m/s2 set stats.units = 'm/s2'"
+    )
+
+
+def _is_acceleration(processing: ArrayLike) -> bool:
+    """Return whether ObsPy's list of steps leads from counts to acceleration in m/s²."""
+    order = None
+    for step in np.atleast_1d(np.asarray(processing, dtype=object)).tolist():
+        name = _STEP.search(str(step))
+        if name is None:
+            continue
+        # Every differentiation is one step from displacement to acceleration
+        if name[1] == "remove_response":
+            output = _OUTPUT.search(str(step))
+            order = OUTPUTS.get(output[1]) if output else None
+        elif name[1] == "simulate" or order is None:
+            order = None
+        else:
+            order += 1 if name[1] == "differentiate" else -1
+    return order == OUTPUTS["ACC"]
+
+
+def _require_same_times(north: AccelerationTrace, east: AccelerationTrace) -> None:
+    """Raise ``ValueError`` if two Traces differ in interval, length or start."""
+    first, second = north.stats, east.stats
+    # A shift by less than half an interval is that of the clock
+    if (first.delta, first.npts) != (second.delta, second.npts):
+        raise ValueError(
+            f"north has {first.npts} samples of {first.delta:g} s, east {second.npts} of "
+            f"{second.delta:g} s: trim both to the same times"
+        )
+    if abs(first.starttime - second.starttime) > first.delta / 2.0:
+        raise ValueError(
+            f"north starts at {first.starttime}, east at {second.starttime}: trim both to the same "
+            f"times"
+        )
