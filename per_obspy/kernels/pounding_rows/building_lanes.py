@@ -160,7 +160,7 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         contact_2 = _contact_value(lanes, lane, STEPPED + 1, STEPPED_VELOCITY + 1, a2)
         contact_3 = _contact_value(lanes, lane, STEPPED + 2, STEPPED_VELOCITY + 2, a3)
         contact_4 = _contact_value(lanes, lane, STEPPED + 3, STEPPED_VELOCITY + 3, a4)
-        least = min(least, min(min(contact_1, contact_2), min(contact_3, contact_4)))
+        least = min(least, contact_1, contact_2, contact_3, contact_4)
         lanes[at(TILE_CONTACT, lane)] = least
 
 

@@ -34,6 +34,7 @@ from per_obspy.kernels.pounding_events.motion import (
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
     ACCELERATION,
+    ACCELERATION_ERROR,
     ANGLE,
     AXIS_COSINE,
     AXIS_SINE,
@@ -43,6 +44,7 @@ from per_obspy.kernels.pounding_lanes.lanes import (
     OMEGA,
     STEP_DISPLACEMENT,
     STEP_VELOCITY,
+    STRUCTURE_ROWS,
     VELOCITY,
     YIELD_CENTRE,
     YIELD_LIMIT,
@@ -57,7 +59,7 @@ from per_obspy.kernels.pounding_lanes.pair_rows import (
 # rows of a lane that structure 2 has in ``lanes``
 #: first and last member of the cluster for which the coefficients were written, and whether they
 #: have to be written again
-CLUSTER_FIRST, CLUSTER_LAST, IS_OUTDATED = 50, 51, 52
+CLUSTER_FIRST, CLUSTER_LAST, IS_OUTDATED = 43, 44, 45
 
 #: Rounding of a contact force, over the stiffness times displacement.
 FORCE_ROUNDING = 1e-12
@@ -203,16 +205,29 @@ def write_phases(members, row, duration):
                     _write_clearance(member, row, i)
                 member[CLUSTER_FIRST] = first
                 member[CLUSTER_LAST] = last
+                # structure 2 of the interface on the left
+                if i > 0:
+                    for k in range(ACCELERATION, ACCELERATION_ERROR + 1):
+                        members[i - 1, STRUCTURE_ROWS + k] = member[k]
         first = last + 1
+
+
+@lean
+def update_phases(members, row, duration):
+    """Write the numbers of new phases; return whether there is one."""
+    is_any = _mark_outdated(members, row)
+    if is_any:
+        write_phases(members, row, duration)
+    return is_any
 
 
 @lean
 def write_constants(members, row, cosine, sine, duration):
     """Write all numbers of a row at rest, for steps of a duration, s."""
     terms = taylor_terms(row, duration)
+    members[: row.shape[0], :] = 0.0
     for i in range(row.shape[0]):
         member = members[i]
-        member[:] = 0.0
         row[i, TERM_COUNT] = terms
         member[AXIS_COSINE] = cosine
         member[AXIS_SINE] = sine
@@ -240,13 +255,3 @@ def load_row(members, row):
             row[i, PLASTIC] = row[i, U] - row[i, PHASE] * row[i, YIELD]
         # the energy radius is not computed for lanes
         row[i, LARGEST_ENERGY_RADIUS_SQUARED] = math.inf
-
-
-@lean
-def store_row(members, row, duration):
-    """Copy the states from the row to the lanes, with the coefficients of new phases."""
-    if _mark_outdated(members, row):
-        write_phases(members, row, duration)
-    for i in range(row.shape[0]):
-        members[i, DISPLACEMENT] = row[i, U]
-        members[i, VELOCITY] = row[i, V] / members[i, OMEGA]

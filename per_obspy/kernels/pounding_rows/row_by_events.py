@@ -1,4 +1,4 @@
-"""Complete history of one row of buildings from event to event, with its maxima alone."""
+"""Maxima of a row of more buildings than there are lanes, from event to event."""
 
 import math
 
@@ -21,10 +21,8 @@ from per_obspy.kernels.pounding_events.motion import (
     taylor_terms,
 )
 from per_obspy.kernels.pounding_events.row_history import is_settled
+from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
 from per_obspy.kernels.pounding_lanes.step_by_step import run_events
-
-#: Sampling intervals of free vibration between two checks whether a row is settled.
-SETTLING_STEPS = 16
 
 
 @lean

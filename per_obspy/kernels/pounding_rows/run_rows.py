@@ -27,6 +27,7 @@ from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair
 from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
+from per_obspy.kernels.pounding_rows.last_impacts import is_over
 from per_obspy.kernels.pounding_rows.member_phases import load_row, write_constants
 from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 
@@ -48,8 +49,9 @@ def _prepare(lanes, members, lines, firsts, cosine, sine, duration):
 
 
 @lean
-def _search_deferred(lanes, lane, member, line, deferred, record, ground):
+def _search_deferred(lanes, lane, memory, record, ground):
     """Search the deferred tile of a building if it may hold a maximum; none remains deferred."""
+    member, line, deferred = memory
     if may_hold_maximum(deferred, line, 0):
         # coefficients of the lane and ground motion of the tile
         read_lane(lanes, lane, member)
@@ -64,26 +66,35 @@ def _search_deferred(lanes, lane, member, line, deferred, record, ground):
 
 
 @lean
-def _raise_maxima_of_tile(lanes, lane, member, line, deferred, record, ground, step, count):
+def _raise_maxima_of_tile(lanes, lane, memory, record, ground, step, count):
     """Raise the maxima of a building to the samples of a tile, and defer its search."""
+    _, line, deferred = memory
     raise_maxima_to_samples(lanes, lane, line, 0)
     # an earlier tile may still hold more
     if may_hold_maximum(deferred, line, 0):
-        _search_deferred(lanes, lane, member, line, deferred, record, ground)
+        _search_deferred(lanes, lane, memory, record, ground)
     defer_tile(lanes, lane, deferred, 0, step, count)
 
 
 @lean
-def _repeat_tile(lanes, first, memory, record, grounds, count):
-    """Carry a row through a tile that may hold an event, from its first lane on."""
+def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
+    """Treat the flagged lanes of a row after the sweep; return whether it got through."""
     members, row, log, states, deferred = memory
-    # earlier maxima first, then the tile again from its start
+    together = 0
     for i in range(row.shape[0]):
-        lane = first + i
-        _search_deferred(
-            lanes, lane, members[i], row[i : i + 1], deferred[i : i + 1], record, grounds[1]
-        )
-        read_lane(lanes, lane, members[i])
+        together |= flags[first + i]
+    if not together & EVENT_FLAG:
+        # maxima only
+        for i in range(row.shape[0]):
+            if flags[first + i]:
+                own = members[i], row[i : i + 1], deferred[i : i + 1]
+                _raise_maxima_of_tile(lanes, first + i, own, record, grounds[1], step, count)
+        return True
+    # an event: earlier maxima first, then the tile again from its start
+    for i in range(row.shape[0]):
+        own = members[i], row[i : i + 1], deferred[i : i + 1]
+        _search_deferred(lanes, first + i, own, record, grounds[1])
+        read_lane(lanes, first + i, members[i])
     is_through = step_row_through_tile(
         members, row, log, states, grounds[0], count, record.duration
     )
@@ -95,66 +106,13 @@ def _repeat_tile(lanes, first, memory, record, grounds, count):
 
 
 @lean
-def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
-    """Treat the flagged lanes of one row after the sweep of a tile; return whether it is through."""
-    members, row, log, states, deferred = memory
-    together = 0
-    for i in range(row.shape[0]):
-        together |= flags[first + i]
-    if together & EVENT_FLAG:
-        return _repeat_tile(lanes, first, memory, record, grounds, count)
-    # maxima only
-    for i in range(row.shape[0]):
-        if flags[first + i]:
-            line = row[i : i + 1]
-            _raise_maxima_of_tile(
-                lanes,
-                first + i,
-                members[i],
-                line,
-                deferred[i : i + 1],
-                record,
-                grounds[1],
-                step,
-                count,
-            )
-    return True
-
-
-@lean
-def _advance(lanes, flags, memory, firsts, record, grounds, step, last):
-    """Carry all rows from a step to the last one; return whether all got through."""
-    members, lines, logs, states, deferred = memory
-    is_through = True
-    while step < last:
-        # all lanes side by side through one tile
-        fill_ground(record, step, grounds[0])
-        count = min(TILE_STEPS, last - step)
-        if sweep_tile(lanes, flags, grounds[0], count):
-            # flagged rows one by one
-            for number in range(firsts.size - 1):
-                first = firsts[number]
-                end = firsts[number + 1]
-                own = (
-                    members[first:end],
-                    lines[first:end],
-                    logs[number],
-                    states[first:end],
-                    deferred[first:end],
-                )
-                is_through &= _treat_row(lanes, flags, first, own, record, grounds, step, count)
-        step += count
-    return is_through
-
-
-@lean
 def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
     """
     Rest the rows whose result is final after so many sampling intervals of free vibration.
 
     Return the number of the others.
     """
-    members, lines, logs, states, deferred = memory
+    members, lines, _, _, deferred = memory
     active = 0
     for number in range(firsts.size - 1):
         if free_steps[number] >= 0:
@@ -162,12 +120,12 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
             end = firsts[number + 1]
             # maxima so far, and the state as a row
             for lane in range(first, end):
-                line = lines[lane : lane + 1]
-                waiting = deferred[lane : lane + 1]
-                _search_deferred(lanes, lane, members[lane], line, waiting, record, grounds[1])
+                own = members[lane], lines[lane : lane + 1], deferred[lane : lane + 1]
+                _search_deferred(lanes, lane, own, record, grounds[1])
                 read_lane(lanes, lane, members[lane])
             load_row(members[first:end], lines[first:end])
-            if elapsed >= free_steps[number] or is_settled(lines[first:end]):
+            row = lines[first:end]
+            if elapsed >= free_steps[number] or is_settled(row) or is_over(row):
                 free_steps[number] = -1
                 for lane in range(first, end):
                     rest_pair(members[lane])
@@ -212,14 +170,30 @@ def run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free_s
     """
     members, lines, logs, states, deferred = memory
     _prepare(lanes, members, lines, firsts, cosine, sine, record.duration)
-    # the record
+    is_through = True
+    step = elapsed = 0
+    # the record, then free vibration until every row is settled
     last = (record.components.shape[1] - 1) * record.refinement
-    is_through = _advance(lanes, flags, memory, firsts, record, grounds, 0, last)
-    # free vibration, until every row is settled
-    elapsed = 0
-    while _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
-        step = last
+    while True:
+        while step < last:
+            # all lanes side by side through one tile
+            fill_ground(record, step, grounds[0])
+            count = min(TILE_STEPS, last - step)
+            if sweep_tile(lanes, flags, grounds[0], count):
+                # flagged rows one by one
+                for number in range(firsts.size - 1):
+                    first = firsts[number]
+                    end = firsts[number + 1]
+                    own = (
+                        members[first:end],
+                        lines[first:end],
+                        logs[number],
+                        states[first:end],
+                        deferred[first:end],
+                    )
+                    is_through &= _treat_row(lanes, flags, first, own, record, grounds, step, count)
+            step += count
+        if not _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
+            return is_through
         last += SETTLING_STEPS * record.refinement
-        is_through &= _advance(lanes, flags, memory, firsts, record, grounds, step, last)
         elapsed += SETTLING_STEPS
-    return is_through

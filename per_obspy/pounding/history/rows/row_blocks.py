@@ -9,7 +9,7 @@ from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
-from per_obspy.kernels.pounding_rows.row_steps import STATE_COLUMNS
+from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
 from per_obspy.pounding.history.pair_blocks import aligned
 from per_obspy.threads import map_in_threads
@@ -99,7 +99,9 @@ def run_row_blocks(
         record = Record(ground, int(parts[block[0]]), dt / int(parts[block[0]]))
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         starts = np.concatenate([[0], np.cumsum(np.diff(first)[block])])
-        own, logs = _run_block(record, lines[members], starts, azimuth[block], free_steps[block])
+        own, logs = run_logged_block(
+            record, lines[members], starts, azimuth[block], free_steps[block]
+        )
         lines[members] = own
         for begin, end, log in zip(starts[:-1], starts[1:], logs, strict=True):
             part = members[begin:end]
@@ -109,12 +111,38 @@ def run_row_blocks(
     return counts
 
 
-def _run_block(
+def run_logged_block(
     record: Record, start: FloatArray, firsts: IntArray, azimuth: FloatArray, free: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the lines of a block at the end, and logs that hold all impacts of its rows."""
+    """
+    Carry the rows of one block through a record, with a log of every impact.
+
+    Parameters
+    ----------
+    record : Record
+        Ground motion and the steps through it.
+    start : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at rest.
+    firsts : (n_rows + 1,) ndarray of int
+        First building of each row, then the number of buildings.
+    azimuth : (n_rows,) ndarray
+        Of the axis of each row, rad.
+    free : (n_rows,) ndarray of int
+        Sampling intervals of free vibration at most.
+
+    Returns
+    -------
+    lines : (n_buildings, ROW_COLUMNS) ndarray
+        Buildings at the end.
+    logs : (n_rows, n_lines, LOG_COLUMNS) ndarray
+        All impacts of each row.
+
+    Raises
+    ------
+    RuntimeError
+        If a step has more events than any record causes.
+    """
     direction = np.cos(azimuth), np.sin(azimuth)
-    kernel = _run_alone if len(start) > PAIR_LANES else _run_in_lanes
     room, impacts = -1, FIRST_ROOM
     # Grow the logs until all impacts of every row have room
     while room < impacts:
@@ -122,30 +150,25 @@ def _run_block(
         logs = np.empty((firsts.size - 1, room, LOG_COLUMNS))
         # The kernels change the lines and the steps of free vibration
         own = start.copy()
-        if not kernel(record, own, logs, firsts, *direction, free.copy()):
+        if len(own) > PAIR_LANES:
+            is_through = _run_alone(record, own, logs[0], direction, int(free[0]))
+        else:
+            is_through = _run_in_lanes(record, own, logs, firsts, direction, free.copy())
+        if not is_through:
             raise RuntimeError("no end of events in a step of a row")
         impacts = int(np.add.reduceat(own[:, columns.IMPACTS], firsts[:-1]).max())
     return own, logs
 
 
 def _run_alone(
-    record: Record,
-    row: FloatArray,
-    logs: FloatArray,
-    firsts: IntArray,
-    cosine: FloatArray,
-    sine: FloatArray,
-    free: IntArray,
+    record: Record, row: FloatArray, log: FloatArray, direction: tuple[FloatArray, ...], free: int
 ) -> bool:
     """Run a row of more buildings than there are lanes; return whether it got through."""
     north, east = record.components
+    cosine, sine = (float(component[0]) for component in direction)
     dt = record.duration * record.refinement
-    direction = float(cosine[0]), float(sine[0])
-    return bool(
-        run_row_by_events(
-            north, east, *direction, dt, record.refinement, row, logs[0], int(free[0])
-        )
-    )
+    run = run_row_by_events(north, east, cosine, sine, dt, record.refinement, row, log, free)
+    return bool(run)
 
 
 def _run_in_lanes(
@@ -153,8 +176,7 @@ def _run_in_lanes(
     own: FloatArray,
     logs: FloatArray,
     firsts: IntArray,
-    cosine: FloatArray,
-    sine: FloatArray,
+    direction: tuple[FloatArray, ...],
     free: IntArray,
 ) -> bool:
     """Run the rows of a block in lanes; return whether all got through."""
@@ -163,10 +185,12 @@ def _run_in_lanes(
     lanes = aligned(LANE_ROWS * PAIR_LANES)
     flags = aligned(PAIR_LANES).view(np.int64)
     grounds = np.empty((2, 2, TILE_STEPS + 1))
+
+    # Lanes as lines, states of a step and deferred tiles
     members = np.zeros((PAIR_LANES, LANE_ROWS))
     states = np.zeros((PAIR_LANES, STATE_COLUMNS))
     deferred = np.zeros((PAIR_LANES, DEFERRED_COLUMNS))
     memory = members, lines, logs, states, deferred
-    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free)
+    is_through = run_rows(record, lanes, flags, grounds, memory, firsts, *direction, free)
     own[:] = lines[: len(own)]
     return bool(is_through)
