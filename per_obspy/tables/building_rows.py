@@ -47,6 +47,7 @@ def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) ->
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
     """
+    # The same facts as in the risk table
     files = [folder / "rows.parquet", folder / "rows.columns.csv"]
     statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
     schema = schema_of(ROWS, statement)

@@ -49,9 +49,10 @@ UNRANKED = (_NUMBER, *BUILDINGS[1:])
 
 #: Order of the ranking; the last ones only break ties.
 _ORDER = (
-    "severity DESC NULLS LAST, greatest(amplification_row, amplification_pair) DESC NULLS LAST, "
-    "probability_independent DESC NULLS LAST, importance DESC NULLS LAST, occupants DESC NULLS LAST, "
-    "building_id, building_number"
+    "severity DESC NULLS LAST, "
+    "greatest(amplification_row, amplification_pair) DESC NULLS LAST, "
+    "probability_independent DESC NULLS LAST, importance DESC NULLS LAST, "
+    "occupants DESC NULLS LAST, building_id, building_number"
 )
 
 
@@ -148,6 +149,7 @@ def _write_ranked(
     database: duckdb.DuckDBPyConnection, unranked: Path, table: Path, facts: Mapping[str, str]
 ) -> None:
     """Write all buildings in the order of their ranking, with their rank from 1."""
+    # By their ranking, without the numbers by which they were made
     database.register("buildings", parquet_rows([unranked]))
     names = ", ".join(column.name for column in BUILDINGS[1:])
     query = f"SELECT {names} FROM buildings ORDER BY {_ORDER}"

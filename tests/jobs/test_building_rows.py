@@ -50,7 +50,7 @@ def test_the_same_chunk_is_not_done_again(jobs):
 def test_a_chunk_that_fails_has_a_reason_for_every_row_and_is_done_again(jobs, monkeypatch):
     computed = building_rows.no_outcomes
 
-    def failing(count):
+    def failing(_count):
         monkeypatch.setattr(building_rows, "no_outcomes", computed)
         raise TypeError("a fault of the program")
 

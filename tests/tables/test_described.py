@@ -1,5 +1,7 @@
 """Tables of one schema: types, empty cells, and the meaning of every column."""
 
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -46,7 +48,7 @@ def test_rows_are_regrouped_whatever_their_pieces(sizes):
     ends = np.cumsum([0, *sizes])
     tables = [
         pa.table({"count": np.arange(begin, end)}, schema=schema)
-        for begin, end in zip(ends[:-1], ends[1:], strict=True)
+        for begin, end in pairwise(ends.tolist())
     ]
     found = [table["count"].to_pylist() for table in regrouped(tables, schema, 3)]
     assert found == ([[0, 1, 2], [3, 4, 5], [6]] if sizes else [])

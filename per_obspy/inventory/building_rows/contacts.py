@@ -101,14 +101,24 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         named=np.arange(names.size) < len(identifiers),
         azimuth=azimuth,
         gap=gap,
-        facing_length=np.nan_to_num(numbers_in(pairs, "facing_length")),
-        gap_given=np.isfinite(gap) & ~is_derived(pairs["derived"], "gap"),
+        facing_length=_facing(pairs),
+        gap_given=_given(pairs, gap),
         pair_id=pair_id,
         order=order,
         repeated=repeated,
         ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
         rejected=(*rejected, *found),
     )
+
+
+def _facing(pairs: pd.DataFrame) -> FloatArray:
+    """Return lengths over which walls face each other, m; 0 where they are unknown."""
+    return np.asarray(np.nan_to_num(numbers_in(pairs, "facing_length")))
+
+
+def _given(pairs: pd.DataFrame, gap: FloatArray) -> BoolArray:
+    """Return which gaps are neither unknown nor assumed."""
+    return np.isfinite(gap) & ~is_derived(pairs["derived"], "gap")
 
 
 def _numbered(

@@ -1,6 +1,7 @@
 """Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row."""
 
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,13 +20,13 @@ def rows_of(table, angle=30.0, longest=30):
     joints = joints_of(contacts, given_values(table), angle)
     chains = chains_of(contacts, joints, angle, longest)
     rows, flags = [], []
-    for number, (begin, end) in enumerate(zip(chains.first[:-1], chains.first[1:], strict=True)):
+    for number, (begin, end) in enumerate(pairwise(chains.first.tolist())):
         sides = [
             contacts.names[contacts.buildings[pair][:: -1 if turned else 1]].tolist()
             for pair, turned in zip(chains.pair[begin:end], chains.turned[begin:end], strict=True)
         ]
         # each contact begins with the building with which the one before ends
-        assert all(one[1] == two[0] for one, two in zip(sides[:-1], sides[1:], strict=True))
+        assert all(one[1] == two[0] for one, two in pairwise(sides))
         rows.append([sides[0][0], *(side[1] for side in sides)])
         flags.append({name for name in ROW_FLAGS if chains.flags[name][number]})
     kept = np.flatnonzero(~contacts.repeated)

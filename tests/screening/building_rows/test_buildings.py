@@ -1,4 +1,9 @@
-"""One row per building, of per_obspy.screening.building_rows.sides, .prevention and .row_columns."""
+"""
+One row per building: what its sides and their pairs tell of it.
+
+Tested here as well: per_obspy.screening.building_rows.sides,
+per_obspy.screening.building_rows.prevention and per_obspy.screening.building_rows.row_columns.
+"""
 
 import numpy as np
 import pandas as pd
@@ -8,6 +13,7 @@ from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.prevention import ELSEWHERE, MEASURE, NOTHING
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 CLASSES = {"high": 0.2, "low": 0.0}
 
@@ -212,7 +218,7 @@ def test_an_unknown_gap_is_never_taken_for_a_wide_one():
     assert found["neighbours_that_can_hit"].tolist() == [1, 1, 1, 1]
     assert found["prevention"].tolist() == [MEASURE] * 4
     # b and c have one known gap; nothing is known of a and d
-    assert found["risk_class"].tolist() == ["unknown", "low", "low", "unknown"]
+    assert found["risk_class"].tolist() == [UNKNOWN_CLASS, "low", "low", UNKNOWN_CLASS]
     np.testing.assert_array_equal(found["severity"], [np.nan, 0.0, 0.0, np.nan])
     np.testing.assert_array_equal(found["probability_common"].isna(), [True, False, False, True])
     assert found["missing_gap"].isna().all()
