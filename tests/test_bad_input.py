@@ -124,7 +124,7 @@ WHOLE = {
         "pairs town.gpkg",
         "town.gpkg: not a GeoPackage: it is a PDF document",
     ),
-    "pairs as footprints": ({}, "pairs pairs.csv", "pairs.csv: a table has no walls"),
+    "pairs as footprints": ({}, "pairs pairs.csv", "pairs.csv: a table of pairs already"),
     "no such footprints": ({}, "pairs absent.csv", "absent.csv: no such file"),
     "unknown output": (
         {"town.gpkg": PDF},

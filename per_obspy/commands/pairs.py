@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
+    from per_obspy.inventory.footprints.footprint_pairs import FootprintPairs
 
 #: Rejected rows that are printed, the others are counted; and the most common reasons for
 #: rejections.
@@ -52,7 +53,11 @@ CATALOG = Path("catalogs/catalog.toml")
 @pairs.command("find")
 def find_pairs(
     footprints: Annotated[
-        Path, typer.Argument(help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile.")
+        Path,
+        typer.Argument(
+            help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile; or a list of buildings, "
+            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth."
+        ),
     ],
     output: Annotated[Path, output_option("Pair table, .parquet or .csv.")] = Path("pairs.parquet"),
     distance: Annotated[
@@ -60,38 +65,86 @@ def find_pairs(
     ] = 3.0,
     layer: Annotated[str | None, typer.Option(help="Layer, for files that have several.")] = None,
     gap_std: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviation of drawn gaps, m.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="Standard deviation of drawn gaps, m, touching ones too; 0 for exact outlines. "
+            "0.1 is assumed and marked if it is not given.",
+        ),
+    ] = None,
+    id_column: Annotated[str | None, typer.Option(help="Column of the identifiers.")] = None,
+    height_column: Annotated[str | None, typer.Option(help="Column of the heights, m.")] = None,
+    storeys_column: Annotated[str | None, typer.Option(help="Column of the storeys.")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="Column of any other quantity, such as period=T1; may be repeated."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
-    Find neighbouring buildings in footprints.
+    Find neighbouring buildings in footprints; their outlines are kept beside the pairs.
 
     Example: per-obspy pairs town.gpkg -o pairs.parquet
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+
+    # Names of columns, each of which may be given by an option of its own
+    given = {"building_id": id_column, "height": height_column, "storeys": storeys_column}
+    columns = {name: known for name, known in given.items() if known is not None}
+    columns |= _named_columns(column or [])
+    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns)
+    places = _write_footprint_pairs(found, output)
+    _print_footprint_pairs(found.pairs, places, as_json)
+    stop_if_nothing(len(found.pairs))
+
+
+def _named_columns(options: "Sequence[str]") -> dict[str, str]:
+    """Return quantities and columns of options such as ``period=T1``."""
+    from per_obspy.inventory.footprints.building_columns import GIVEN
+
+    columns = {}
+    for option in options:
+        name, equals, column = option.partition("=")
+        if not equals or name not in GIVEN:
+            problem = f"{option!r} is not QUANTITY=COLUMN with one of {', '.join(GIVEN)}"
+            raise typer.BadParameter(problem, param_hint="--column")
+        columns[name] = column
+    return columns
+
+
+def _write_footprint_pairs(found: "FootprintPairs", output: Path) -> dict[str, Path]:
+    """Write pairs, rejections and buildings; return where."""
     from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
+    from per_obspy.inventory.footprints.buildings import write_buildings
     from per_obspy.tables.table_files import write_rejected
 
-    # Find the pairs and write them with their rejections
-    table = pairs_from_footprints(footprints, distance, layer, gap_std)
-    rejected = table.attrs["rejected"]
-    write_pairs(table, output)
-    write_rejected(rejected, output.with_suffix(".rejected.csv"))
+    buildings = output.with_suffix(".buildings.parquet")
+    write_pairs(found.pairs, output)
+    write_rejected(found.pairs.attrs["rejected"], output.with_suffix(".rejected.csv"))
+    write_buildings(found.buildings, buildings)
+    return {"output": output, "buildings": buildings}
 
-    # Print the counts, for machines or with the most common reasons for rejection
+
+def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_json: bool) -> None:
+    """Print the counts, for machines or with the most common reasons for rejection."""
+    # Counts
+    rejected = table.attrs["rejected"]
     touching = int((table["gap"] == 0.0).sum())
     if as_json:
         counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
-        print(json.dumps({"output": str(output), **counts}))
-    else:
-        counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
-        print(f"{counted}: {output}")
-        reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
-        for reason, count in reasons.most_common(COMMON):
-            print(printable(f"  {count} times: {reason}"))
-    stop_if_nothing(len(table))
+        print(json.dumps({name: str(path) for name, path in places.items()} | counts))
+        return
+    counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
+    print(f"{counted}: {places['output']}")
+    # What lies beside the pairs, what was assumed, why rows were rejected
+    print(f"  outlines and columns of all buildings: {places['buildings']}")
+    if "assumed" in table["gap_std_source"].to_numpy():
+        print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")
+    reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
+    for reason, count in reasons.most_common(COMMON):
+        print(printable(f"  {count} times: {reason}"))
 
 
 @pairs.command("check")

@@ -181,6 +181,9 @@ def _add_gap(
 ) -> None:
     """Add gap and its deviation, m: those of the assumed lognormal gap where it is unknown."""
     gap, deviation = numbers_in(pairs, "gap"), numbers_in(pairs, "gap_std")
+    # A deviation may be a default of the command that made the table
+    if "gap_std_source" in pairs:
+        derived["gap_std"] = (pairs["gap_std_source"] == "assumed").to_numpy(dtype=bool)
     if building.gap is None:
         columns["gap"], columns["gap_std"] = gap, _given_or(deviation, 0.0)
         return

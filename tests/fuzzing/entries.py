@@ -2,6 +2,7 @@
 
 import io
 import json
+import socket
 import tarfile
 import zipfile
 from collections.abc import Callable, Iterable
@@ -28,9 +29,11 @@ from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.records.asdf import find_asdf_stations, read_asdf_station
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.event_list import find_events
+from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.processed_files import write_description, write_processed
+from per_obspy.records.seedlink.seedlink_window import Conversation
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
 
@@ -55,6 +58,13 @@ OBSPY_FORMATS = {
 KNET = "nied/tests/data/test.knet"
 
 STATIONS = b"network,station,latitude,longitude,elevation\nCI,CLC,35.0,-117.0,700\n"
+
+ITACA = (
+    b"event.ev_sourcedb.shortname,event.datetime,event.latitude,event.longitude,"
+    b"event.focaldepth,event.pref_mag,station.code,station.sourceid,station.latitude,"
+    b"station.longitude,station.altitude,station.vs30,station.ec8\n"
+    b"ITACA,2009-04-06 01:32:39,42.3,13.3,8.8,6.3,AQG,2987,42.37,13.33,721,684.8,B\n"
+)
 
 CONFIGURATION = b"""
 name = "x"
@@ -135,6 +145,7 @@ def _archives() -> dict[str, Entry]:
     """Return archives of two records."""
     return {
         "zip": Entry("all.zip", _zip, _records),
+        "zip_in_zip": Entry("bundle.zip", _bundle, _records),
         "tar": Entry("all.tar", partial(_tar, "w"), _records),
         "tgz": Entry("all.tgz", partial(_tar, "w:gz"), _records),
     }
@@ -145,6 +156,8 @@ def _metadata() -> dict[str, Entry]:
     return {
         "stationxml": Entry("station.xml", _station_xml, _records_beside),
         "stations": Entry("stations.csv", lambda: STATIONS, _text_beside),
+        "itaca_metadata": Entry("x.metadata", lambda: ITACA, _text_beside),
+        "seedlink": Entry("answer.seedlink", _packets, _seedlink),
         "description": Entry("record.json", _description, _described_record),
         "quakeml": Entry("event.xml", _quakeml, _event),
         "event_list": Entry("events.xml", _quakeml, _event_list),
@@ -197,6 +210,17 @@ def _zip() -> bytes:
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in _members().items():
             archive.writestr(name, content)
+    return packed.getvalue()
+
+
+def _bundle() -> bytes:
+    """Return a zip of a zip and a tar, as centres of strong motion pack stations."""
+    packed = io.BytesIO()
+    # Stored, so that damage reaches the archives inside as well
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("one/station.zip", _zip())
+        archive.writestr("two.tar", _tar("w"))
+        archive.writestr("README.txt", b"words")
     return packed.getvalue()
 
 
@@ -385,6 +409,31 @@ def _event(path: Path) -> Iterable[object]:
     """Read the event of a run."""
     origin = read_event(path).preferred_origin() or read_event(path).origins[0]
     return [origin.latitude, origin.longitude]
+
+
+def _packets() -> bytes:
+    """Return what a SeedLink server says, from its greeting to its end."""
+    records = _written("MSEED")[:4096]
+    packets = [b"SL%06X" % n + records[512 * n : 512 * n + 512] for n in range(len(records) // 512)]
+    return b"SeedLink v3.1\r\nfuzz\r\nOK\r\nOK\r\nOK\r\n" + b"".join(packets) + b"END"
+
+
+def _seedlink(path: Path) -> Iterable[object]:
+    """Read the bytes of a file as the answers of a SeedLink server, and the records in them."""
+    pool = web_pool(1.0, 0, 0.01, longest=2.0, largest=2**20)
+    ours, theirs = socket.socketpair()
+    # Everything is said at once, whatever is asked, and fits into the buffer of the connection
+    with ours, theirs:
+        ours.settimeout(1.0)
+        theirs.sendall(path.read_bytes()[:100_000])
+        theirs.shutdown(socket.SHUT_WR)
+        conversation = Conversation(ours, "seedlink://fuzz", pool)
+        is_there = conversation.selected("CI.CLC", [("", "HN1")], (START, START + 10.0))
+        content = b"".join(conversation.records()) if is_there else b""
+    if not content:
+        return []
+    stream = read_bytes_with_obspy(obspy.read, content, str(path), format="MSEED")
+    return [len(trace.data) for trace in stream]
 
 
 def _event_list(path: Path) -> Iterable[object]:
