@@ -108,11 +108,14 @@ def row_maxima(
     Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
     (8).
     """
+    # Check every argument; the ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
     ground = np.stack([checks.record("north", north), checks.record("east", east)])
     if free_vibration:
         ground = closed_record(ground)
+
+    # Rows of plain structures; the lines of the kernels hold squares of the largest radii
     scales = row_scales(checked)
     table, impacts = _run(ground, step, checked, scales, free_vibration)
     return RowMaxima(
@@ -128,6 +131,7 @@ def _free_radius(
     ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 ) -> FloatArray:
     """Return the largest radius of every building alone."""
+    # Elastic ones from the record directly
     sizes = np.diff(rows.first)
     azimuth = np.repeat(rows.azimuth, sizes)
     radius = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth).per
@@ -149,11 +153,30 @@ def _run(
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return the lines of all buildings at the end, and impacts that count."""
     table = building_table(rows, scales)
-    starts, sizes = rows.first[:-1], np.diff(rows.first)
+    starts = rows.first[:-1]
     frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
     parts = np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
+    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    lines = _lines_at_rest(table, rows, scales, velocity, dt / parts)
 
-    # Lines at rest; nothing is in contact with the last building of a row from the right
+    # Run the record and, where it is asked for, the free vibration after it
+    longest = np.maximum.reduceat(rows.period, starts)
+    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
+    steps = parts, free * free_vibration
+    azimuth = np.radians(rows.azimuth)
+    counts = run_row_blocks(ground, dt, rows.first, lines, *steps, azimuth, scales.clearance)
+    return lines, counts
+
+
+def _lines_at_rest(
+    table: FloatArray,
+    rows: BuildingRows,
+    scales: RowScales,
+    ground_velocity: float,
+    duration: FloatArray,
+) -> FloatArray:
+    """Return the kernels' lines of all buildings; ``duration`` is that of a step of each row."""
+    # Nothing is in contact with the last building of a row from the right: its gap is 1
     lines = np.zeros((len(table), columns.ROW_COLUMNS))
     lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap
@@ -161,23 +184,9 @@ def _run(
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
 
     # Bouncing ends in contact below a separation speed, a duration, or after many impacts
-    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    starts, sizes = rows.first[:-1], np.diff(rows.first)
     largest = np.maximum.reduceat(table[:, 4], starts)
-    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * velocity * largest
-    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * largest
+    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * duration
     lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, sizes - 1)
-
-    # Run the record and, where it is asked for, the free vibration after it
-    longest = np.maximum.reduceat(rows.period, starts)
-    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
-    counts = run_row_blocks(
-        ground,
-        dt,
-        rows.first,
-        lines,
-        parts,
-        free * free_vibration,
-        np.radians(rows.azimuth),
-        scales.clearance,
-    )
-    return lines, counts
+    return lines
