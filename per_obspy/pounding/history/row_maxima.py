@@ -34,6 +34,11 @@ from per_obspy.spectra.per_pair import azimuth_maxima
 #: start change by 1e-6.
 BOUNCES_OF_ROWS = 100
 
+#: Rows of which the kernels' lines are held at a time.
+PART = 4096
+#: Columns of these lines that hold the results.
+RESULTS = [columns.LARGEST_RADIUS_SQUARED, columns.LARGEST_DISPLACEMENT, columns.APPROACH]
+
 
 class RowMaxima(NamedTuple):
     """
@@ -117,13 +122,14 @@ def row_maxima(
 
     # Rows of plain structures; the lines of the kernels hold squares of the largest radii
     scales = row_scales(checked)
-    table, impacts = _run(ground, step, checked, scales, free_vibration)
+    results, impacts = _run(ground, step, checked, scales, free_vibration)
+    radius_squared, displacement, approach = results.T
     return RowMaxima(
-        radius=np.sqrt(table[:, columns.LARGEST_RADIUS_SQUARED]) / scales.displacement,
+        radius=np.sqrt(radius_squared) / scales.displacement,
         free_radius=_free_radius(ground, step, checked, free_vibration),
-        displacement=table[:, columns.LARGEST_DISPLACEMENT] / scales.displacement,
+        displacement=displacement / scales.displacement,
         impacts=impacts,
-        impact_velocity=table[:, columns.APPROACH] / scales.clearance,
+        impact_velocity=approach / scales.clearance,
     )
 
 
@@ -143,15 +149,38 @@ def _free_radius(
         }
         alone = BuildingRows(np.arange(yielding.size + 1), **fields, azimuth=azimuth[yielding])
         ones = RowScales(np.ones(yielding.size), np.ones(yielding.size))
-        table, _ = _run(ground, dt, alone, ones, free_vibration)
-        radius[yielding] = np.sqrt(table[:, columns.LARGEST_RADIUS_SQUARED])
+        results, _ = _run(ground, dt, alone, ones, free_vibration)
+        radius[yielding] = np.sqrt(results[:, 0])
     return radius
 
 
 def _run(
     ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
 ) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return results (n_buildings, 3) by RESULTS, and impacts that count, part by part."""
+    results = np.empty((rows.period.size, len(RESULTS)))
+    counts = np.empty(rows.period.size, dtype=np.int64)
+
+    # The lines of the kernels take 900 bytes per building
+    for begin in range(0, rows.azimuth.size, PART):
+        end = min(begin + PART, rows.azimuth.size)
+        place = slice(rows.first[begin], rows.first[end])
+        fields = {name: getattr(rows, name)[place] for name in BUILDING_FIELDS}
+
+        # Rows of this part, counted from its first building
+        first = rows.first[begin : end + 1] - rows.first[begin]
+        part = BuildingRows(first, **fields, azimuth=rows.azimuth[begin:end])
+        own = RowScales(*(values[place] for values in scales))
+        lines, counts[place] = _run_part(ground, dt, part, own, free_vibration)
+        results[place] = lines[:, RESULTS]
+    return results, counts
+
+
+def _run_part(
+    ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
+) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return the lines of all buildings at the end, and impacts that count."""
+    # Steps per sampling interval, from the shortest period of each row
     table = building_table(rows, scales)
     starts = rows.first[:-1]
     frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
