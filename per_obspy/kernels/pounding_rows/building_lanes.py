@@ -42,6 +42,7 @@ STEPPED, STEPPED_VELOCITY = STRUCTURE_ROWS, STRUCTURE_ROWS + UNROLLED_STEPS
 @lean
 def _contact_value(lanes, lane, displacement, velocity, ground):
     """Return the contact function after a building, from the rows of its states."""
+    # displacements on both sides, then the part of the velocity and the ground
     left = lanes[at(displacement, lane)]
     right = lanes[at(displacement, lane + 1)]
     form = lanes[at(CONTACT_FUNCTION + 2, lane)] * lanes[at(velocity, lane)] + (

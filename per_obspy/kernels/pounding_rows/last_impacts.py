@@ -23,6 +23,7 @@ def recoverable_energy(row):
     for i in range(row.shape[0]):
         if row[i, YIELD] < math.inf or row[i, MASS] == math.inf:
             return math.inf
+        # kinetic and potential energy
         radius_squared = row[i, V] * row[i, V] + row[i, STIFFNESS] * row[i, U] * row[i, U]
         energy += 0.5 * row[i, MASS] * radius_squared
     return energy

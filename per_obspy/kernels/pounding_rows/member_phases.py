@@ -108,6 +108,7 @@ def _equation_of(row, first, last, i):
 @lean
 def _write_clearance(member, row, j):
     """Write the clearance of an open interface; that after the last building is always 1."""
+    # gap - u_left + u_right
     is_last = j == row.shape[0] - 1
     member[CONTACT_FUNCTION] = 0.0 if is_last else -1.0
     member[CONTACT_FUNCTION + 1] = 0.0 if is_last else 1.0
@@ -126,6 +127,7 @@ def _write_contact_force(member, row, first, last, j, equation):
     move with the cluster.
     """
     damping, stiffness, drive, constant = equation
+    # the side without a wall
     begin = first
     end = j
     sign = -1.0
@@ -144,8 +146,10 @@ def _write_contact_force(member, row, first, last, j, equation):
         by_ground += row[i, MASS] * (row[i, PARTICIPATION] - drive)
         offset = own_stiffness * (row[i, U] - row[j, U])
         rest += row[i, MASS] * (constant + offset - own_constant)
+    # its rounding is that of the stiffest member
     for i in range(first, last + 1):
         largest = max(largest, row[i, STIFFNESS])
+    # as a function of the motion of building j
     member[CONTACT_FUNCTION] = sign * by_displacement / mass
     member[CONTACT_FUNCTION + 1] = 0.0
     member[CONTACT_FUNCTION + 2] = sign * by_velocity / mass * math.sqrt(row[j, STIFFNESS])
@@ -238,6 +242,7 @@ def write_constants(members, row, cosine, sine, duration):
         yielded = stiffness * row[i, HARDENING]
         fill_responses(one, 0, ELASTIC_RESPONSES, damping, stiffness, duration)
         fill_responses(one, 0, YIELDED_RESPONSES, damping, yielded, duration)
+        # frequency, and the angle of a step
         omega = math.sqrt(stiffness)
         member[OMEGA] = omega
         member[ANGLE] = omega * duration

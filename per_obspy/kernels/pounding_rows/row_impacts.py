@@ -18,6 +18,7 @@ from per_obspy.kernels.pounding_events.motion import (
     LARGEST_DISPLACEMENT,
     STICKING_SPEED,
     TERM_COUNT,
+    UNLOADING,
     YIELD,
     U,
     V,
@@ -74,6 +75,7 @@ def set_state(states, i, column, value):
 @inlined
 def _contact_value(members, states, j, column, ground):
     """Return the contact function of interface j: positive until its buildings meet or part."""
+    # part of the velocity and the ground, then both displacements
     form = members[j, CONTACT_FUNCTION + 2] * states[j, column + 1] + (
         members[j, CONTACT_FUNCTION + 3] * ground + members[j, CONTACT_FUNCTION + 4]
     )
@@ -85,6 +87,7 @@ def _contact_value(members, states, j, column, ground):
 @lean
 def may_meet_or_part(members, row, states, j, ground_start, ground_end):
     """Return whether the contact function of an interface may fall through zero in a piece."""
+    # least value at the ends of the piece
     least = min(
         _contact_value(members, states, j, START, ground_start),
         _contact_value(members, states, j, END, ground_end),
@@ -128,6 +131,7 @@ def _exact_closing_share(members, row, states, j, elapsed, segment):
     change = segment.slope * segment.duration
     for i in (j, j + 1):
         fill_displacement_in_step(members[i], row[i : i + 1], 0, 0, state(states, i, START), change)
+    # first fall of the clearance, with time as the share of the step
     terms = int(row[0, TERM_COUNT])
     remaining = 1.0 - elapsed
     rounding, size, curvature = fill_clearance(row, j, terms, remaining)
@@ -191,10 +195,12 @@ def _advance_to_hit(members, row, states, share, change):
         one = row[i : i + 1]
         reached = state_inside_step(members[i], one, 0, start, change, share)
         set_state(states, i, REACHED, reached)
+    # maxima on the way, then the new start
     raise_maxima(members, row, states, REACHED, change, share)
     for i in range(row.shape[0]):
         set_state(states, i, START, state(states, i, REACHED))
         row[i, CLEARANCE_ORDER] = 0.0
+        row[i, UNLOADING] = 0.0
         row[i, U] = states[i, START]
         row[i, V] = states[i, START + 1] * members[i, OMEGA]
 
@@ -267,6 +273,7 @@ def run_row_impacts(members, row, log, states, segment):
             raise_maxima(members, row, states, END, change, 1.0 - elapsed)
             for i in range(row.shape[0]):
                 row[i, CLEARANCE_ORDER] = 0.0
+                row[i, UNLOADING] = 0.0
             return True
         is_hit = share != UNKNOWN
         if is_hit:

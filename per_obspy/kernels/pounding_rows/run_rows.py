@@ -36,11 +36,13 @@ from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 def _prepare(lanes, members, lines, firsts, cosine, sine, duration):
     """Set all rows to rest in their lanes, and for good the lanes without a building."""
     used = firsts[firsts.size - 1]
+    # rows
     for number in range(firsts.size - 1):
         first = firsts[number]
         last = firsts[number + 1]
         row = lines[first:last]
         write_constants(members[first:last], row, cosine[number], sine[number], duration)
+    # lanes without a building
     for lane in range(used, PAIR_LANES):
         members[lane, :] = 0.0
         rest_pair(members[lane])
@@ -80,6 +82,7 @@ def _raise_maxima_of_tile(lanes, lane, memory, record, ground, step, count):
 def _treat_row(lanes, flags, first, memory, record, grounds, step, count):
     """Treat the flagged lanes of a row after the sweep; return whether it got through."""
     members, row, log, states, deferred = memory
+    # flags of the row
     together = 0
     for i in range(row.shape[0]):
         together |= flags[first + i]
@@ -125,6 +128,7 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
                 read_lane(lanes, lane, members[lane])
             load_row(members[first:end], lines[first:end])
             row = lines[first:end]
+            # at rest from now on
             if elapsed >= free_steps[number] or is_settled(row) or is_over(row):
                 free_steps[number] = -1
                 for lane in range(first, end):

@@ -34,6 +34,11 @@ from per_obspy.spectra.per_pair import azimuth_maxima
 #: start change by 1e-6.
 BOUNCES_OF_ROWS = 100
 
+#: Rows of which the kernels' lines are held at a time.
+PART = 4096
+#: Columns of these lines that hold the results.
+RESULTS = [columns.LARGEST_RADIUS_SQUARED, columns.LARGEST_DISPLACEMENT, columns.APPROACH]
+
 
 class RowMaxima(NamedTuple):
     """
@@ -108,19 +113,23 @@ def row_maxima(
     Valles-Mattox & Reinhorn (1996), An energy approach to pounding of structures, 11WCEE, eq. (7),
     (8).
     """
+    # Check every argument; the ground comes to rest before free vibration
     step = checks.number("dt", dt, checks.positive)
     checked = checked_rows(rows)
     ground = np.stack([checks.record("north", north), checks.record("east", east)])
     if free_vibration:
         ground = closed_record(ground)
+
+    # Rows of plain structures; the lines of the kernels hold squares of the largest radii
     scales = row_scales(checked)
-    table, impacts = _run(ground, step, checked, scales, free_vibration)
+    results, impacts = _run(ground, step, checked, scales, free_vibration)
+    radius_squared, displacement, approach = results.T
     return RowMaxima(
-        radius=np.sqrt(table[:, columns.LARGEST_RADIUS_SQUARED]) / scales.displacement,
+        radius=np.sqrt(radius_squared) / scales.displacement,
         free_radius=_free_radius(ground, step, checked, free_vibration),
-        displacement=table[:, columns.LARGEST_DISPLACEMENT] / scales.displacement,
+        displacement=displacement / scales.displacement,
         impacts=impacts,
-        impact_velocity=table[:, columns.APPROACH] / scales.clearance,
+        impact_velocity=approach / scales.clearance,
     )
 
 
@@ -128,6 +137,7 @@ def _free_radius(
     ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
 ) -> FloatArray:
     """Return the largest radius of every building alone."""
+    # Elastic ones from the record directly
     sizes = np.diff(rows.first)
     azimuth = np.repeat(rows.azimuth, sizes)
     radius = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth).per
@@ -139,21 +149,63 @@ def _free_radius(
         }
         alone = BuildingRows(np.arange(yielding.size + 1), **fields, azimuth=azimuth[yielding])
         ones = RowScales(np.ones(yielding.size), np.ones(yielding.size))
-        table, _ = _run(ground, dt, alone, ones, free_vibration)
-        radius[yielding] = np.sqrt(table[:, columns.LARGEST_RADIUS_SQUARED])
+        results, _ = _run(ground, dt, alone, ones, free_vibration)
+        radius[yielding] = np.sqrt(results[:, 0])
     return radius
 
 
 def _run(
     ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
 ) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return results (n_buildings, 3) by RESULTS, and impacts that count, part by part."""
+    results = np.empty((rows.period.size, len(RESULTS)))
+    counts = np.empty(rows.period.size, dtype=np.int64)
+
+    # The lines of the kernels take 900 bytes per building
+    for begin in range(0, rows.azimuth.size, PART):
+        end = min(begin + PART, rows.azimuth.size)
+        place = slice(rows.first[begin], rows.first[end])
+        fields = {name: getattr(rows, name)[place] for name in BUILDING_FIELDS}
+
+        # Rows of this part, counted from its first building
+        first = rows.first[begin : end + 1] - rows.first[begin]
+        part = BuildingRows(first, **fields, azimuth=rows.azimuth[begin:end])
+        own = RowScales(*(values[place] for values in scales))
+        lines, counts[place] = _run_part(ground, dt, part, own, free_vibration)
+        results[place] = lines[:, RESULTS]
+    return results, counts
+
+
+def _run_part(
+    ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
+) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return the lines of all buildings at the end, and impacts that count."""
+    # Steps per sampling interval, from the shortest period of each row
     table = building_table(rows, scales)
-    starts, sizes = rows.first[:-1], np.diff(rows.first)
+    starts = rows.first[:-1]
     frequencies = np.sqrt(np.maximum.reduceat(table[:, 1], starts))
     parts = np.array([refinement(omega, dt) for omega in frequencies], dtype=np.int64)
+    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    lines = _lines_at_rest(table, rows, scales, velocity, dt / parts)
 
-    # Lines at rest; nothing is in contact with the last building of a row from the right
+    # Run the record and, where it is asked for, the free vibration after it
+    longest = np.maximum.reduceat(rows.period, starts)
+    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
+    steps = parts, free * free_vibration
+    azimuth = np.radians(rows.azimuth)
+    counts = run_row_blocks(ground, dt, rows.first, lines, *steps, azimuth, scales.clearance)
+    return lines, counts
+
+
+def _lines_at_rest(
+    table: FloatArray,
+    rows: BuildingRows,
+    scales: RowScales,
+    ground_velocity: float,
+    duration: FloatArray,
+) -> FloatArray:
+    """Return the kernels' lines of all buildings; ``duration`` is that of a step of each row."""
+    # Nothing is in contact with the last building of a row from the right: its gap is 1
     lines = np.zeros((len(table), columns.ROW_COLUMNS))
     lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap
@@ -161,23 +213,9 @@ def _run(
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
 
     # Bouncing ends in contact below a separation speed, a duration, or after many impacts
-    velocity = sum(largest_ground_velocity(component, dt) for component in ground)
+    starts, sizes = rows.first[:-1], np.diff(rows.first)
     largest = np.maximum.reduceat(table[:, 4], starts)
-    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * velocity * largest
-    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * dt / parts
+    lines[starts, columns.STICKING_SPEED] = SPEED_SHARE * ground_velocity * largest
+    lines[starts, columns.STICKING_DELAY] = 0.5 * SHORTEST_BOUNCE * duration
     lines[starts, columns.BOUNCE_LIMIT] = BOUNCES_OF_ROWS * np.maximum(1, sizes - 1)
-
-    # Run the record and, where it is asked for, the free vibration after it
-    longest = np.maximum.reduceat(rows.period, starts)
-    free = np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
-    counts = run_row_blocks(
-        ground,
-        dt,
-        rows.first,
-        lines,
-        parts,
-        free * free_vibration,
-        np.radians(rows.azimuth),
-        scales.clearance,
-    )
-    return lines, counts
+    return lines

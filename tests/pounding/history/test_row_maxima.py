@@ -313,6 +313,15 @@ class TestCompany:
             for found, expected in zip(row_maxima(NORTH, EAST, DT, few), together, strict=True):
                 assert_array_equal(found, expected[index])
 
+    def test_nor_on_the_rows_held_at_a_time(self, monkeypatch):
+        # catches: numbers of buildings that do not begin at 0 in a later part
+        rows = random_rows([5, 2, 1, 7, 3], seed=20)
+        rows.yield_displacement[::3] = 0.02
+        expected = row_maxima(NORTH, EAST, DT, rows)
+        monkeypatch.setattr("per_obspy.pounding.history.row_maxima.PART", 2)
+        for found, one in zip(row_maxima(NORTH, EAST, DT, rows), expected, strict=True):
+            assert_array_equal(found, one)
+
     @pytest.mark.parametrize("processors", [1, 3])
     def test_nor_on_the_number_of_threads(self, processors, monkeypatch):
         # catches: memory shared by threads

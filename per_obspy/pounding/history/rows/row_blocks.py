@@ -92,21 +92,26 @@ def run_row_blocks(
     RuntimeError
         If a step has more events than any record causes.
     """
+    # Impacts that count, building by building
     counts = np.zeros(len(lines), dtype=np.int64)
 
     def run(block: IntArray) -> None:
         """Run the rows of one block."""
+        # Its buildings, one row after the other
         record = Record(ground, int(parts[block[0]]), dt / int(parts[block[0]]))
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         starts = np.concatenate([[0], np.cumsum(np.diff(first)[block])])
         own, logs = run_logged_block(
             record, lines[members], starts, azimuth[block], free_steps[block]
         )
+
+        # Results, to the places of the rows
         lines[members] = own
         for begin, end, log in zip(starts[:-1], starts[1:], logs, strict=True):
             part = members[begin:end]
             counts[part] = count_row_impacts(own[begin:end], log, scale[part])
 
+    # Blocks do not depend on each other
     map_in_threads(run, packed_rows(first, parts))
     return counts
 

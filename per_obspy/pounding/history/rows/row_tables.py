@@ -88,6 +88,7 @@ def checked_rows(rows: BuildingRows) -> BuildingRows:
         If a field has the wrong shape or is out of range, a row is empty, or two walls (infinite
         masses) are pressed together.
     """
+    # Shapes
     first = _checked_first(rows.first)
     count = int(first[-1])
     fields = {name: checks.numbers(name, getattr(rows, name)) for name in BUILDING_FIELDS}
@@ -109,6 +110,7 @@ def checked_rows(rows: BuildingRows) -> BuildingRows:
 
 def _checked_first(first: ArrayLike) -> IntArray:
     """Return the number of the first building of each row, in ascending order from 0."""
+    # Whole numbers, each row with a building
     numbers = np.asarray(first)
     if numbers.ndim != 1 or numbers.size < 2 or numbers.dtype.kind not in "iu":
         raise ValueError(
@@ -141,6 +143,7 @@ def _check_ranges(fields: dict[str, FloatArray]) -> None:
 
 def _refuse_pressed_walls(rows: BuildingRows) -> None:
     """Refuse two walls of a row with an interface or without a gap between them."""
+    # Neighbouring walls of one row
     walls = np.flatnonzero(np.isinf(rows.mass))
     row = np.searchsorted(rows.first, walls, side="right") - 1
     for (left, row_left), (right, row_right) in pairwise(zip(walls, row, strict=True)):
@@ -209,6 +212,7 @@ def building_table(rows: BuildingRows, scales: RowScales) -> FloatArray:
     table[:, 0] = rows.damping * frequency
     table[:, 1] = frequency**2
     table[:, 2] = rows.hardening
+    # In the unit of the table: yield displacement, drive and mass
     table[:, 3] = scales.displacement * rows.yield_displacement
     table[:, 4] = scales.displacement
     table[:, 5] = rows.mass / scales.displacement**2
