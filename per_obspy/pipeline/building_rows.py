@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from pyarrow.dataset import Dataset
 
 from per_obspy.config import Run
 from per_obspy.config.building_rows import Rows
@@ -26,8 +27,8 @@ from per_obspy.progress import Progress
 from per_obspy.screening.building_rows.members import NEEDED
 from per_obspy.screening.building_rows.placed import PlacedRows, placed_rows
 from per_obspy.tables.building_rows import write_rows
-from per_obspy.tables.buildings import write_buildings
-from per_obspy.tables.parts import batches, bounded_database, parquet_rows
+from per_obspy.tables.buildings import BuildingWays, write_buildings
+from per_obspy.tables.parts import batches, bounded_database, parquet_rows, some_columns
 from per_obspy.threads import usable_processors
 
 #: Columns of the pair table without which no pair names its buildings.
@@ -35,6 +36,7 @@ IDENTIFIERS = ("building_id_1", "building_id_2")
 
 #: Columns of the risk table by which rows are found and placed; some may be absent.
 FINDING = (
+    "rank",
     "pair_id",
     *IDENTIFIERS,
     *(f"{name}_{i}" for name in ("longitude", "latitude", *PROPERTIES) for i in (1, 2)),
@@ -112,12 +114,13 @@ def building_rows(
     progress : callable
         Called for every chunk.
     """
-    risk = folder / "risk.parquet"
+    # Opened for its columns, then once for every pass over it
+    risk = parquet_rows([folder / "risk.parquet"])
     if not _enabled(settings.rows, risk):
         return NO_ROWS
     progress("rows", 0, 1)
     found = _found(settings.rows, risk)
-    jobs = _jobs(settings, folder, ground, found)
+    jobs = _jobs(settings, folder, ground, risk, found)
     workers, parts, done = settings.workers or usable_processors(), list[RowsPart](), 0
     for part in do_row_chunks(jobs, workers, executor):
         parts.append(part)
@@ -126,7 +129,7 @@ def building_rows(
     _remove_others(folder / "rows", parts)
     # Both tables, from the parts in their order
     parts.sort(key=lambda part: part.number)
-    outputs = _written(settings, folder, parts, facts)
+    outputs = _written(settings, folder, risk, parts, facts)
     # What was done, and what was left out
     rejected = (*found.rejected, *rows_rejections(parts))
     counts = _counts(found, folder, parts)
@@ -145,39 +148,42 @@ def _counts(found: _Found, folder: Path, parts: Sequence[RowsPart]) -> dict[str,
 
 
 def _written(
-    settings: Run, folder: Path, parts: Sequence[RowsPart], facts: Mapping[str, str]
+    settings: Run,
+    folder: Path,
+    risk: Dataset,
+    parts: Sequence[RowsPart],
+    facts: Mapping[str, str],
 ) -> list[Path]:
     """Write the tables of rows and of buildings, and return their files."""
     rows = write_rows([part.path for part in parts], folder, facts)
     # Buildings are made of the rows
-    angle, count = settings.rows.angle, settings.csv_rows
-    buildings = write_buildings(folder, settings.screening, settings.totals, angle, facts, count)
-    return [*rows, *buildings]
+    ways = BuildingWays(settings.screening.classes, settings.totals, settings.rows.angle)
+    return [*rows, *write_buildings(folder, risk, ways, facts, settings.csv_rows)]
 
 
-def _enabled(rows: Rows, risk: Path) -> bool:
+def _enabled(rows: Rows, risk: Dataset) -> bool:
     """Return whether rows are wanted: if not configured, where pairs name their buildings."""
     if rows.enabled is not None:
         return rows.enabled
-    return set(IDENTIFIERS) <= set(pq.read_schema(risk.absolute()).names)
+    return set(IDENTIFIERS) <= set(risk.schema.names)
 
 
-def _found(rows: Rows, risk: Path) -> _Found:
+def _found(rows: Rows, risk: Dataset) -> _Found:
     """Find the rows of all pairs, and the order in which they are followed."""
-    known = pq.read_schema(risk.absolute()).names
-    names = [name for name in FINDING if name in known]
-    pairs = pq.read_table(risk.absolute(), columns=names, use_threads=False).to_pandas()
+    names = [name for name in FINDING if name in risk.schema.names]
+    pairs = risk.to_table(columns=names, use_threads=False).to_pandas()
     # From pairs to chains of contacts
     contacts = contacts_of(pairs, rows.angle)
     joints = joints_of(contacts, given_values(pairs), rows.angle)
     chains = chains_of(contacts, joints, rows.angle, rows.longest)
     placed = placed_rows(chains, pairs, CHUNK)
+    ranks = pairs["rank"].to_numpy(np.int64)[placed.contacts["pair"]]
     # Name and flags of each row at every contact of it
     row = placed.contacts["row"].to_numpy()
     first = np.flatnonzero(np.diff(row, prepend=-1))
     row_id = _row_names(placed, contacts, first)[row]
     flags = joined_names(_raised(chains, placed, first))[row]
-    table = placed.contacts.assign(row_id=row_id, flags=flags)
+    table = placed.contacts.assign(row_id=row_id, flags=flags, rank=ranks)
     return _Found(table, contacts, first.size, (*contacts.rejected, *joints.rejected))
 
 
@@ -199,24 +205,24 @@ def _row_names(placed: PlacedRows, contacts: Contacts, first: IntArray) -> NDArr
     return np.array([f"R-{name}" for name in by_name[smallest]], dtype=object)
 
 
-def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: _Found) -> Iterator[RowsJob]:
+def _jobs(
+    settings: Run, folder: Path, ground: GroundFiles, risk: Dataset, found: _Found
+) -> Iterator[RowsJob]:
     """Yield one job per chunk of rows."""
     exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
-    for number, table in _chunks(folder, found.contacts, found.placed):
+    for number, table in _chunks(folder, risk, found):
         # Pairs that a map serves have no record
         station = stations.get(table["station"].iloc[0]) if exact else None
         part = folder / "rows" / f"{number:06}.parquet"
         yield RowsJob(number, pa.Table.from_pandas(table, preserve_index=False), station, part)
 
 
-def _chunks(
-    folder: Path, contacts: Contacts, placed: pd.DataFrame
-) -> Iterator[tuple[int, pd.DataFrame]]:
+def _chunks(folder: Path, risk: Dataset, found: _Found) -> Iterator[tuple[int, pd.DataFrame]]:
     """Yield the contacts of each chunk with what their histories need, read in their order."""
     waiting = list[pd.DataFrame]()
-    for piece in _pieces(folder, placed):
-        waiting.append(_with_buildings(piece, contacts))
+    for piece in _pieces(folder, risk, found.placed):
+        waiting.append(_with_buildings(piece, found.contacts))
         table = pd.concat(waiting, ignore_index=True)
         # The last chunk may go on in the next piece
         last = (table["chunk"] == table["chunk"].iloc[-1]).to_numpy()
@@ -227,13 +233,13 @@ def _chunks(
         yield int(table["chunk"].iloc[0]), table.drop(columns="chunk").reset_index(drop=True)
 
 
-def _pieces(folder: Path, placed: pd.DataFrame) -> Iterator[pd.DataFrame]:
+def _pieces(folder: Path, risk: Dataset, placed: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Yield the contacts with their pairs, some thousands at a time, in memory that is bounded."""
     names = ["pair_id", "longitude", "latitude", *NEEDED]
-    # Rows of the risk table are in the order of their ranks, from 1
-    mapping = pa.table({"rank": placed["pair"].to_numpy() + 1, "place": np.arange(len(placed))})
+    mapping = pa.table({"rank": placed["rank"].to_numpy(), "place": np.arange(len(placed))})
     with bounded_database(folder) as database:
-        database.register("risk", parquet_rows([folder / "risk.parquet"], ["rank", *names]))
+        # The rank of a pair tells it from all others
+        database.register("risk", some_columns(risk, ["rank", *names]))
         database.register("mapping", mapping)
         columns = ", ".join(f"risk.{name}" for name in names)
         query = f"SELECT {columns} FROM risk JOIN mapping USING (rank) ORDER BY place"
@@ -254,7 +260,7 @@ def _with_buildings(piece: pd.DataFrame, contacts: Contacts) -> pd.DataFrame:
         columns[f"building_number_{side}"] = chosen
         columns[f"building_id_{side}"] = contacts.names[chosen]
     station = piece["station"].astype(str)
-    return piece.drop(columns="pair").assign(**columns, station=station)
+    return piece.drop(columns=["pair", "rank"]).assign(**columns, station=station)
 
 
 def _remove_others(folder: Path, parts: list[RowsPart]) -> None:

@@ -9,21 +9,29 @@ import json
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 import duckdb
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow.dataset import Dataset
 
-from per_obspy.config import Screening, Totals
+from per_obspy.config import Totals
 from per_obspy.files import temporary_folder, written_whole
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.row_columns import BUILDING_FLAGS, BUILDINGS, FLAGS
 from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
 from per_obspy.tables.described import regrouped, schema_of, table_of, write_meanings
-from per_obspy.tables.parts import batches, bounded_database, parquet_rows, text_columns
+from per_obspy.tables.parts import (
+    batches,
+    bounded_database,
+    parquet_rows,
+    some_columns,
+    text_columns,
+)
 from per_obspy.tables.risk import write_worst
 from per_obspy.tables.totals import areas_of
 
@@ -56,13 +64,27 @@ _ORDER = (
 )
 
 
+class BuildingWays(NamedTuple):
+    """
+    How buildings are classed, counted and placed.
+
+    Attributes
+    ----------
+    classes : mapping of str to float
+        Name and smallest severity of each risk class, m/s.
+    totals : Totals
+        Areas.
+    angle : float
+        Rows whose axes differ by more make their building a corner, degrees.
+    """
+
+    classes: Mapping[str, float]
+    totals: Totals
+    angle: float
+
+
 def write_buildings(
-    folder: Path,
-    screening: Screening,
-    totals: Totals,
-    angle: float,
-    facts: Mapping[str, str],
-    csv_rows: int,
+    folder: Path, risk: Dataset, ways: BuildingWays, facts: Mapping[str, str], csv_rows: int
 ) -> list[Path]:
     """
     Write ``buildings.parquet``, ``buildings.csv`` and ``buildings.columns.csv``.
@@ -70,11 +92,11 @@ def write_buildings(
     Parameters
     ----------
     folder : Path
-        With ``rows.parquet`` and ``risk.parquet``.
-    screening, totals : Screening, Totals
-        Risk classes; areas.
-    angle : float
-        Rows whose axes differ by more make their building a corner, degrees.
+        With ``rows.parquet``.
+    risk : Dataset
+        The risk table.
+    ways : BuildingWays
+        Classes, areas and corners.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
     csv_rows : int
@@ -86,8 +108,8 @@ def write_buildings(
         # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
-            for piece in _pieces(database, folder, totals):
-                found = building_table(piece, screening.classes, angle)
+            for piece in _pieces(database, folder, risk, ways.totals):
+                found = building_table(piece, ways.classes, ways.angle)
                 writer.write_table(table_of(found, UNRANKED))
         _write_ranked(database, unranked, table, facts)
     write_worst(table, csv_rows, text)
@@ -96,10 +118,11 @@ def write_buildings(
 
 
 def _pieces(
-    database: duckdb.DuckDBPyConnection, folder: Path, totals: Totals
+    database: duckdb.DuckDBPyConnection, folder: Path, risk: Dataset, totals: Totals
 ) -> Iterator[pd.DataFrame]:
     """Yield the sides of buildings, all of a building in one piece."""
-    query = _sides_query(database, folder, totals)
+    database.register("interfaces", parquet_rows([folder / "rows.parquet"]))
+    query = _sides_query(database, risk, totals)
     waiting: list[pd.DataFrame] = []
     for batch in batches(database, query, SIDES):
         waiting.append(batch.to_pandas())
@@ -122,16 +145,14 @@ def _sides(rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
     return sides.assign(area=area)
 
 
-def _sides_query(database: duckdb.DuckDBPyConnection, folder: Path, totals: Totals) -> str:
-    """Register both tables, and return the query of all sides in the order of their buildings."""
+def _sides_query(database: duckdb.DuckDBPyConnection, risk: Dataset, totals: Totals) -> str:
+    """Register the risk table, and return the query of all sides, ordered by their buildings."""
     # What the sides need of the pairs, and which of it there is
-    rows, risk = folder / "rows.parquet", folder / "risk.parquet"
-    known = pq.read_schema(risk.absolute()).names
+    known = risk.schema.names
     wanted = {name: name for name in OF_PAIRS} | ({_AREA: totals.area} if totals.area else {})
     present = {name: column for name, column in wanted.items() if column in known}
-    database.register("interfaces", parquet_rows([rows]))
     read = list(dict.fromkeys(["pair_id", *present.values()]))
-    database.register("risk", parquet_rows([risk], read))
+    database.register("risk", some_columns(risk, read))
     # Columns that the pair table does not have are empty
     columns = [f"risk.{_quoted(column)} AS {name}" for name, column in present.items()]
     columns += [f"CAST(NULL AS DOUBLE) AS {name}" for name in wanted if name not in present]
