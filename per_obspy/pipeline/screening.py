@@ -118,9 +118,8 @@ def screened(
         rows = building_rows(settings, folder, ground, facts, executor, progress)
         outputs += [*files, *rows.outputs]
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
-    kinds = write_rejected(left_out, outputs[0])
-    counts, failed = _counts(states, kinds, parts, rows), rows.failed or _any_failed(parts)
-    return Screened(outputs, counts, served, unplaced, failed, notes)
+    counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
+    return Screened(outputs, counts, served, unplaced, _any_failed(parts, rows), notes)
 
 
 def _ranked(
@@ -133,9 +132,9 @@ def _ranked(
     return risk
 
 
-def _any_failed(parts: Sequence[Part]) -> bool:
-    """Return whether the work of a chunk of pairs failed unexpectedly."""
-    return any(part.failed for part in parts)
+def _any_failed(parts: Sequence[Part], rows: BuildingRowsDone) -> bool:
+    """Return whether the work of a chunk failed unexpectedly."""
+    return rows.failed or any(part.failed for part in parts)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
