@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from per_obspy.errors import Rejection
     from per_obspy.inventory.catalogue import StoredInventory
+    from per_obspy.inventory.footprints.footprint_pairs import FootprintPairs
 
 #: Rejected rows that are printed, the others are counted; and the most common reasons for
 #: rejections.
@@ -52,7 +53,11 @@ CATALOG = Path("catalogs/catalog.toml")
 @pairs.command("find")
 def find_pairs(
     footprints: Annotated[
-        Path, typer.Argument(help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile.")
+        Path,
+        typer.Argument(
+            help="Polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile; or a list of buildings, "
+            ".csv with outlines (wkt) or longitude, latitude, width, length and azimuth."
+        ),
     ],
     output: Annotated[Path, output_option("Pair table, .parquet or .csv.")] = Path("pairs.parquet"),
     distance: Annotated[
@@ -60,78 +65,159 @@ def find_pairs(
     ] = 3.0,
     layer: Annotated[str | None, typer.Option(help="Layer, for files that have several.")] = None,
     gap_std: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviation of drawn gaps, m.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="Standard deviation of drawn gaps, m, touching ones too; 0 for exact outlines. "
+            "0.1 is assumed and marked if it is not given.",
+        ),
+    ] = None,
+    id_column: Annotated[str | None, typer.Option(help="Column of the identifiers.")] = None,
+    height_column: Annotated[str | None, typer.Option(help="Column of the heights, m.")] = None,
+    storeys_column: Annotated[str | None, typer.Option(help="Column of the storeys.")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="Column of any other quantity, such as period=T1; may be repeated."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """
-    Find neighbouring buildings in footprints.
+    Find neighbouring buildings in footprints; their outlines are kept beside the pairs.
 
     Example: per-obspy pairs town.gpkg -o pairs.parquet
     """
     require_extra("gis", "pyogrio", "pyproj", "shapely")
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+
+    # Names of columns, each of which may be given by an option of its own
+    given = {"building_id": id_column, "height": height_column, "storeys": storeys_column}
+    columns = {name: known for name, known in given.items() if known is not None}
+    columns |= _named_columns(column or [])
+    found = find_footprint_pairs(footprints, distance, layer, gap_std, columns)
+    places = _write_footprint_pairs(found, output)
+    _print_footprint_pairs(found.pairs, places, as_json)
+    stop_if_nothing(len(found.pairs))
+
+
+def _named_columns(options: "Sequence[str]") -> dict[str, str]:
+    """Return quantities and columns of options such as ``period=T1``."""
+    from per_obspy.inventory.footprints.building_columns import GIVEN
+
+    columns = {}
+    for option in options:
+        name, equals, column = option.partition("=")
+        if not equals or name not in GIVEN:
+            problem = f"{option!r} is not QUANTITY=COLUMN with one of {', '.join(GIVEN)}"
+            raise typer.BadParameter(problem, param_hint="--column")
+        columns[name] = column
+    return columns
+
+
+def _write_footprint_pairs(found: "FootprintPairs", output: Path) -> dict[str, Path]:
+    """Write pairs, rejections and buildings; return where."""
     from per_obspy.inventory.files.writing import write_pairs
-    from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
+    from per_obspy.inventory.footprints.buildings import write_buildings
     from per_obspy.tables.table_files import write_rejected
 
-    # Find the pairs and write them with their rejections
-    table = pairs_from_footprints(footprints, distance, layer, gap_std)
-    rejected = table.attrs["rejected"]
-    write_pairs(table, output)
-    write_rejected(rejected, output.with_suffix(".rejected.csv"))
+    buildings = output.with_suffix(".buildings.parquet")
+    write_pairs(found.pairs, output)
+    write_rejected(found.pairs.attrs["rejected"], output.with_suffix(".rejected.csv"))
+    write_buildings(found.buildings, buildings)
+    return {"output": output, "buildings": buildings}
 
-    # Print the counts, for machines or with the most common reasons for rejection
+
+def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_json: bool) -> None:
+    """Print the counts, for machines or with the most common reasons for rejection."""
+    # Counts
+    rejected = table.attrs["rejected"]
     touching = int((table["gap"] == 0.0).sum())
     if as_json:
         counts = {"pairs": len(table), "touching": touching, "rejected": len(rejected)}
-        print(json.dumps({"output": str(output), **counts}))
-    else:
-        counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
-        print(f"{counted}: {output}")
-        reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
-        for reason, count in reasons.most_common(COMMON):
-            print(printable(f"  {count} times: {reason}"))
-    stop_if_nothing(len(table))
+        print(json.dumps({name: str(path) for name, path in places.items()} | counts))
+        return
+    counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
+    print(f"{counted}: {places['output']}")
+    # What lies beside the pairs, what was assumed, why rows were rejected
+    print(f"  outlines and columns of all buildings: {places['buildings']}")
+    if "assumed" in table["gap_std_source"].to_numpy():
+        print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")
+    reasons = Counter(reason for rejection in rejected for reason in rejection.reasons)
+    for reason, count in reasons.most_common(COMMON):
+        print(printable(f"  {count} times: {reason}"))
 
 
 @pairs.command("check")
 def check_pairs(
-    file: Annotated[Path, typer.Argument(help="Pair table, .csv or .parquet.")],
+    file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx.")],
+    write: Annotated[
+        bool,
+        typer.Option(
+            "--write", help="Write names and units of its columns to FILE.toml beside it."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
-    Check a pair table and say what it gives.
+    Check a pair table and say what it gives; in a terminal, ask for headings and units.
 
-    Example: per-obspy pairs check pairs.csv
+    Example: per-obspy pairs check pairs.xlsx --write
     """
-    from per_obspy.inventory.files.reading import read_pairs
-    from per_obspy.inventory.table_checks import (
-        derived_counts,
-        inventory_profile,
-        suspicions,
-        unused_columns,
-    )
+    from per_obspy.commands.pair_questions import asked_columns, asked_units, is_terminal
+    from per_obspy.inventory.files.reading import checked_file, read_pairs
+    from per_obspy.inventory.recognition.side_file import form_as_toml, form_of, write_form
 
-    # Read the table and describe it
-    table = read_pairs(file)
-    rejected = table.attrs["rejected"]
-    profile = inventory_profile(table)
-    touching = int((table["gap"] == 0.0).sum())
-    derived, unused, odd = derived_counts(table), unused_columns(table), suspicions(table)
+    # Names and units that are not plain, which a person confirms
+    asks = is_terminal() and not as_json
+    form = asked_columns(file, form_of(file)) if asks else form_of(file)
+    table = read_pairs(file, form)
+    proposed = table.attrs["proposed_units"]
+    if asks and proposed:
+        form = form.model_copy(update={"units": {**form.units, **asked_units(proposed)}})
+        table = read_pairs(file, form)
+    _show_check(file, table, as_json)
 
-    # Print the description, for machines or people
-    if as_json:
-        columns = json.loads(profile.to_json(orient="records"))
-        faults = [rejection._asdict() for rejection in rejected]
-        known = {"pairs": len(table), "touching": touching, "rejected": faults, "columns": columns}
-        print(json.dumps({**known, "derived": derived, "unused": unused, "suspicions": odd}))
-    else:
-        counted = f"{len(table)} usable pairs, {touching} of them touching"
-        print(f"{file}: {counted}, {len(rejected)} rejected rows")
-        _print_rejected(rejected)
-        if not table.empty:
-            _print_profile(profile, derived, unused, odd)
+    # What is written, or may be
+    found = checked_file(file, form).meanings.as_form(form)
+    if write:
+        print(f"written: {write_form(file, found)}", file=sys.stderr)
+    elif proposed and not as_json:
+        print("\nUnits for a configuration, or for --write in a terminal:\n")
+        print(form_as_toml(form.model_copy(update={"units": proposed}), "pairs"))
     stop_if_nothing(len(table), f"no usable row in {file}")
+
+
+def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
+    """Print what a pair table gives, for machines or people."""
+    from per_obspy.inventory.files.reading import recognised_line
+    from per_obspy.inventory.table_checks import suspicions
+
+    # Counts, and what is said about the table as a whole
+    counts = {"pairs": len(table), "touching": int((table["gap"] == 0.0).sum())}
+    rejected, odd = table.attrs["rejected"], suspicions(table)
+    found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
+    if as_json:
+        known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
+        print(json.dumps({**counts, **known, "suspicions": odd, **found}))
+        return
+    # People first learn how the table is read
+    if found["recognised"]:
+        print(recognised_line(file, found["recognised"]))
+    counted = f"{counts['pairs']} usable pairs, {counts['touching']} of them touching"
+    print(f"{file}: {counted}, {len(rejected)} rejected rows")
+    _print_rejected(rejected)
+    if not table.empty:
+        _print_profile(table)
+    for suspicion in odd:
+        print("Suspicious:", suspicion)
+
+
+def _described(table: "pd.DataFrame") -> "dict[str, Any]":
+    """Return the columns of a pair table, those that are derived and those that are unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    columns = json.loads(inventory_profile(table).to_json(orient="records"))
+    return {"columns": columns, "derived": derived_counts(table), "unused": unused_columns(table)}
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
@@ -147,10 +233,15 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
 
 
-def _print_profile(
-    profile: "pd.DataFrame", derived: dict[str, int], unused: list[str], suspicions: list[str]
-) -> None:
-    """Print the columns of a pair table, and the warnings about the table as a whole."""
+def _print_profile(table: "pd.DataFrame") -> None:
+    """Print the columns of a pair table, what is derived and what is unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    profile, derived, unused = (
+        inventory_profile(table),
+        derived_counts(table),
+        unused_columns(table),
+    )
     # The most frequent of many numbers is meaningless
     frequent = profile["most_frequent"].where(profile["median"].isna(), "")
     described = profile.assign(most_frequent=frequent)
@@ -161,14 +252,12 @@ def _print_profile(
         described[name] = described[name].astype(object).mask(degrees, digits)
     titles = [str(name).replace("_", " ") for name in profile.columns]
     print_table("What it gives", titles, described.itertuples(index=False))
-    # Derived values, unknown columns, suspicions
+    # Derived values, unknown columns
     if derived:
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
     if unused:
         print("Unknown columns, carried along unchanged:", printable("; ".join(unused)))
-    for suspicion in suspicions:
-        print("Suspicious:", suspicion)
 
 
 @catalog.command("add")

@@ -11,7 +11,7 @@ from per_obspy.commands.endings import AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from per_obspy.errors import Rejection
     from per_obspy.records.fdsn.event_list import EventRow
@@ -73,31 +73,78 @@ def events(
 
 
 def fetch(
-    configuration: Annotated[
-        Path, typer.Argument(help="TOML file of a run with a section \\[records.fdsn].")
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="TOML file of a run with a section \\[records.fdsn], or an earthquake: "
+            "us7000abcd, geonet:2016p858000, emsc:20161113_0000040, ingv:8863681."
+        ),
     ],
+    folder: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of an earthquake; its name if not given."),
+    ] = None,
+    radius: Annotated[
+        float, typer.Option(help="Of the circle around the epicentre of an earthquake, m.")
+    ] = 100_000.0,
+    provider: Annotated[
+        list[str] | None,
+        typer.Option(help="Service that has records of an earthquake; may be given several times."),
+    ] = None,
+    event_service: Annotated[
+        str | None,
+        typer.Option(help="Event service of an earthquake (URL or name) instead of its own."),
+    ] = None,
+    seedlink: Annotated[
+        list[str] | None,
+        typer.Option(help="SeedLink server (host:port) for records that no service has yet."),
+    ] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Ask again for stations that had no data.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
-    Fetch the records of a run into its cache, and nothing else; what is there is not fetched again.
+    Fetch the records of a run, or of one earthquake, and nothing else; what is there stays.
 
-    Example: per-obspy fetch run.toml
+    Example: per-obspy fetch us7000abcd -o records
     """
-    from per_obspy.pipeline.fetch import fetch_configured
+    from per_obspy.pipeline.fetch import fetch_configured, fetch_event
 
+    # Options that are given count for an earthquake; a configuration has its own
+    named = {"providers": provider, "event_provider": event_service, "seedlink": seedlink}
+    settings = {name: value for name, value in named.items() if value}
     with shown_progress() as progress:
-        folder, stations, rejected = fetch_configured(configuration, again, progress)
-    # Print what the cache holds, for machines or people
+        if Path(source).suffix == ".toml" or Path(source).is_file():
+            _require_no_options(source, settings, folder)
+            place, stations, rejected = fetch_configured(Path(source), again, progress)
+        else:
+            target = folder or Path(source.replace(":", "-").replace("/", "-"))
+            found = fetch_event(source, target, settings | {"radius": radius}, again, progress)
+            place, stations, rejected = found.folder, found.stations, found.rejected
+    _print_fetched(place, stations, rejected, as_json)
+    stop_if_nothing(len(stations))
+
+
+def _print_fetched(
+    folder: Path, stations: list[str], rejected: "tuple[Rejection, ...]", as_json: bool
+) -> None:
+    """Print what a cache holds, for machines or people."""
     if as_json:
         rows = [rejection._asdict() for rejection in rejected]
         print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))
-    else:
-        print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
-        _print_rejected(rejected)
-    stop_if_nothing(len(stations))
+        return
+    print(f"{len(stations)} stations are in {folder}; {len(rejected)} rejected")
+    _print_rejected(rejected)
+
+
+def _require_no_options(source: str, settings: "Mapping[str, object]", folder: Path | None) -> None:
+    """Raise ``CatalogError`` if options of an earthquake are given with a configuration."""
+    from per_obspy.errors import CatalogError
+
+    if settings or folder:
+        problem = "is a configuration, whose section [records.fdsn] holds these options"
+        raise CatalogError(source, problem)
 
 
 def info(

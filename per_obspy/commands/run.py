@@ -38,6 +38,7 @@ WARNINGS = {
     "assumed_corners": "with assumed corners",
     "digitised": "digitised from film",
     "undated": "without a date",
+    "contradicting_coordinates": "with contradicting coordinates",
     "record_warning": "with other warnings",
     "one_horizontal": "with one horizontal",
 }

@@ -14,6 +14,9 @@ from per_obspy.names import code_problem, public_url
 #: A provider of services, which records of a run show without user and password.
 Provider = Annotated[str, PlainSerializer(public_url)]
 
+#: Host of a SeedLink server, with its port where that is not 18000.
+SeedLinkServer = Annotated[str, Field(pattern=r"^(seedlink://)?[A-Za-z0-9.-]{1,253}(:\d{1,5})?/?$")]
+
 
 class Columns(Section):
     """How to read a plain table of samples (``records/text_table.py``)."""
@@ -98,6 +101,13 @@ class Fdsn(Window):
         ),
     )
     cache: RelativePath = Field(description="folder that keeps what was fetched")
+    seedlink: tuple[SeedLinkServer, ...] = Field(
+        (),
+        description=(
+            "SeedLink servers (host or host:port; port 18000 if none) that are asked for records "
+            "of listed stations which no provider has, as minutes after an earthquake"
+        ),
+    )
     event_id: str | None = Field(None, description="of the event service, instead of records.event")
     event_provider: Provider = Field(
         "USGS", description="ObsPy's name or base URL of the event service"
@@ -183,6 +193,15 @@ class Archives(Section):
     )
     most_members: int = Field(
         1_000_000, gt=0, description="files of an archive; one of more is left out"
+    )
+    most_levels: int = Field(
+        3,
+        ge=1,
+        le=5,
+        description=(
+            "levels of archives inside archives, whose files share the limits of the outermost; "
+            "1: none inside another is opened"
+        ),
     )
 
 

@@ -22,6 +22,9 @@ class Building(Section):
         0.3, ge=0, description="log-standard deviation of an assumed damping"
     )
     storey_height: float = Field(3.0, ge=2, le=12, description="m")
+    storey_height_log_std: float = Field(
+        0.13, ge=0, le=1, description="log-standard deviation of a height derived from storeys"
+    )
     mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
     area: float = Field(
         200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters"

@@ -97,7 +97,7 @@ def read_toml(path: Path) -> dict[str, object]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
-    except ValueError as error:  # also numbers of too many digits
+    except (ValueError, RecursionError) as error:  # also too many digits, or lists in lists
         kind = looks_like(path)
         raise CatalogError(
             str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}"

@@ -11,7 +11,7 @@ from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import GAL, STANDARD_GRAVITY
-from per_obspy.formats.text.conversions import first_known, metres, utc
+from per_obspy.formats.text.conversions import first_known, metres, utc, utc_from_words
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -51,6 +51,12 @@ _CHANNEL = re.compile(
 )
 _FILTERED = re.compile(rf"below\s++{DECIMAL}\s*+Hz.*above\s++{DECIMAL}\s*+Hz")
 _SERIAL = re.compile(r"Recorder:\s*+(.*?)\s*+s/n\s*+(\S++)")
+_NAME = re.compile(r"Record\s++of\s++(.{1,60}?)\s++Earthquake\b", re.IGNORECASE)
+_ORIGIN = re.compile(
+    r"Origin:\s*+(\d{1,4})/(\d{1,2})/(\d{1,4}),?\s++(\d{1,2}):(\d{1,2}):(\d{1,2}(?:\.\d{0,6})?)"
+    r"\s*+(?:UTC|GMT)"
+)
+_VS30 = re.compile(r"\bVs30\s*+[=:]?\s*+(\d{2,4}(?:\.\d{0,3})?)\s*+m/s", re.IGNORECASE)
 _TEXT_LINES = 13
 _UNKNOWN = -999.0
 
@@ -104,7 +110,7 @@ def _channel(text: Text, first: int) -> tuple[Trace, int]:
     _check_end(text, end)
     dt = _interval(text, header, len(values))
     # Words of the header
-    words = _words(header) | {"starttime": _start(text, header), "event": _event(header)}
+    words = _words(header) | {"starttime": _start(text, header), "event": _event(text, header)}
     words |= {"units": unit, "quantity": quantity}
     words["processing_level"] = "processed" if state == "Corrected" else "raw"
     words.setdefault("channel", _channel_code(header, words, dt))
@@ -238,12 +244,32 @@ def _start(text: Text, header: _Header) -> UTCDateTime | None:
     return utc(text, header.first + 7, "start time", (year, month, day), (hour, minute, second))
 
 
+def _origin(text: Text, header: _Header) -> UTCDateTime | None:
+    """Return the origin time of the fourth line of text; None unless it is in UTC."""
+    found = _ORIGIN.match(header.text_lines[3])
+    if found is None:
+        return None
+    # Agencies write month/day/year or year/month/day
+    first, second, third, *clock = found.groups()
+    date = (first, second, third) if len(first) == 4 else (third, first, second)
+    return utc_from_words(text, header.first + 3, "origin time", (*date, *clock))
+
+
+def _vs30(header: _Header) -> float | None:
+    """Return Vs30, m/s, where the geology of the site or a comment says it in words."""
+    for line in (header.text_lines[5], *header.comments):
+        if found := _VS30.search(line):
+            return float(found[1])
+    return None
+
+
 def _words(header: _Header) -> dict[str, Any]:
     """Return codes, place, instrument and orientation; codes of SEED are in a comment."""
     channel = _CHANNEL.match(header.text_lines[8])
     words = _station(header)
     words["sensor_location"] = (channel[3] or None) if channel else None
     words["instrument"] = _instrument(header)
+    words["vs30"] = _vs30(header)
     # Names of SEED take the place of the station's number
     seed = _seed_names(header)
     words |= seed
@@ -314,9 +340,12 @@ def _gain(text: Text, header: _Header) -> float:
     return 1e-6 * step / sensitivity * STANDARD_GRAVITY / (gain or 1.0)
 
 
-def _event(header: _Header) -> dict[str, Any]:
-    """Return hypocentre and magnitude: moment, or else local, or else surface wave."""
+def _event(text: Text, header: _Header) -> dict[str, Any]:
+    """Return name, time, hypocentre and magnitude: moment, else local, else surface wave."""
+    named = _NAME.match(header.text_lines[1].strip())
     return {
+        "name": named[1] if named else None,
+        "time": _origin(text, header),
         "latitude": _real(header, 9),
         "longitude": _real(header, 10),
         "depth": metres(_real(header, 11)),

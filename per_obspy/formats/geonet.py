@@ -1,12 +1,13 @@
 """GeoNet (New Zealand): V1A (uncorrected) and V2A (corrected), three components per file."""
 
 import re
+from datetime import UTC, datetime
 from typing import Any
 
 from obspy import Stream, Trace, UTCDateTime
 
 from per_obspy.checks import FloatArray
-from per_obspy.formats.text.conversions import metres, sexagesimal, utc
+from per_obspy.formats.text.conversions import MONTHS, metres, sexagesimal, utc
 from per_obspy.formats.text.lines import (
     DECIMAL,
     Text,
@@ -38,6 +39,9 @@ _TITLE = re.compile(r"(Uncorrected|Corrected) accelerogram \S+_(\w+)_(\w++)\b")
 _ANGLE = r"(\d{1,3})\s++(\d{1,2})\s++(\d{1,2})([NSEW])"
 _SITE = re.compile(rf"Site (\S++)\s++{_ANGLE}\s++{_ANGLE}")
 _EPICENTRE = re.compile(rf"Epicentre\s++{_ANGLE}\s++{_ANGLE}")
+_ORIGIN = re.compile(
+    r"(\d{4})\s++([A-Za-z]{3,9})\s++(\d{1,2})\s++(\d{2}:\d{2}:\d{2}(?:\.\d{1,6})?)\s++UT"
+)
 _DEPTH = re.compile(rf"Depth\s*+{DECIMAL}\s*+km")
 _MAGNITUDE = re.compile(rf"\sM\w?\s*+{DECIMAL}")
 _POINTS = re.compile(r"Number of points\s++(\S+)")
@@ -171,17 +175,31 @@ def _described(lines: list[str]) -> dict[str, Any]:
 
 def _event(lines: list[str]) -> dict[str, Any]:
     """Return name, hypocentre and magnitude of the event."""
-    epicentre = _EPICENTRE.match(lines[8])
+    epicentre, origin = _EPICENTRE.match(lines[8]), _ORIGIN.match(lines[7])
     depth, magnitude = (pattern.search(lines[8]) for pattern in (_DEPTH, _MAGNITUDE))
     # Groups: four parts of each angle; depth in km
     place = epicentre_place(*_angles(epicentre.groups(""))) if epicentre else {}
     return {
         "name": lines[6].strip() or None,
+        "time": _origin_time(origin) if origin else None,
         "latitude": place.get("latitude"),
         "longitude": place.get("longitude"),
         "depth": metres(float(depth[1])) if depth else None,
         "magnitude": float(magnitude[1]) if magnitude else None,
     }
+
+
+def _origin_time(found: re.Match[str]) -> UTCDateTime | None:
+    """Return the origin time, UTC; None where it is no time."""
+    month = found[2][:3].upper()
+    if month not in MONTHS:
+        return None
+    # A day or clock that does not exist is no time
+    words = f"{found[1]}-{MONTHS.index(month) + 1:02d}-{int(found[3]):02d}T{found[4]}"
+    try:
+        return UTCDateTime(datetime.fromisoformat(words).replace(tzinfo=UTC))
+    except ValueError:
+        return None
 
 
 def _instrument(lines: list[str]) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """K-NET and KiK-net: ObsPy reads them; their header is put into the words of the vocabulary."""
 
+from typing import Any
+
 from obspy import Trace
 
 from per_obspy.constants import GAL
@@ -34,14 +36,24 @@ def with_knet_words(record: Trace) -> Trace:
     stats.coordinates = coordinates(header.stla, header.stlo, header.stel)
     # The header's peak is in gal, the samples are counts
     stats.header_peak = header.accmax * GAL / record.stats.calib
-    stats.event = {
+    stats.event = knet_event(record)
+    return trace
+
+
+def knet_event(record: Trace) -> dict[str, Any]:
+    """
+    Return the event of a K-NET header, in the words of the vocabulary.
+
+    The origin time is often rounded to the minute.
+    """
+    header = record.stats.knet
+    return {
         "time": header.evot,
         "latitude": header.evla,
         "longitude": header.evlo,
         "depth": 1000 * header.evdp,
         "magnitude": header.mag,
     }
-    return trace
 
 
 def require_whole_numbers(content: bytes, name: str) -> None:

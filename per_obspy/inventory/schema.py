@@ -25,6 +25,9 @@ EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 #: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 
+#: Where the deviation of a gap comes from: it is known, or a default stands in for it.
+DEVIATION_SOURCES = ("given", "assumed")
+
 #: Whether both buildings are within one property.
 ONE_PROPERTY = ("yes", "no")
 
@@ -77,8 +80,10 @@ _PAIR = (
            "unknown",
            required=True, may_be_empty=True, low=0.0, high=10.0,
            hint="given in millimetres or centimetres by mistake?"),
-    Column("gap_std", "float64", "m", "standard deviation of the gap",
+    Column("gap_std", "float64", "m", "standard deviation of the measured gap",
            low=0.0, high=1.0, hint="in millimetres?"),
+    Column("gap_std_source", "str", "", "whether gap_std is given or assumed",
+           choices=DEVIATION_SOURCES),
     Column("azimuth", "float64", "degrees",
            "direction from building 1 to building 2, clockwise from north", low=0.0, high=360.0),
     Column("contact_height", "float64", "m", "height at which the buildings meet first",
@@ -110,8 +115,13 @@ _BUILDING = (
            hint="metres of a projection?"),
     Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
            hint="longitude and latitude swapped, or metres of a projection?"),
+    Column("position", "str", "", "whether the building stands at the end of its row of buildings",
+           choices=POSITIONS),
     Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
            hint="metres above ground expected"),
+    Column("height_log_std", "float64", "1",
+           "logarithmic standard deviation of an estimated height, or of the storeys from which it "
+           "follows; above 0 it marks the height as derived", low=0.0, high=2.0),
     Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
     Column("system", "str", "", "structural system", choices=SYSTEMS),
     Column("period", "float64", "s", "first natural period in the direction of the axis",

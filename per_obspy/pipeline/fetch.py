@@ -1,12 +1,21 @@
-"""Fetching alone: fill the cache of a run's FDSN section without computing anything."""
+"""Fetching alone: the FDSN section of a configuration, or everything around one earthquake."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from per_obspy.config import Run, load
+from per_obspy.config import Fdsn, Records, Run, checked, load
 from per_obspy.errors import CatalogError, Rejection
+from per_obspy.names import public_url
 from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import fetch, fetched_stations
+from per_obspy.records.fdsn.event_ids import OTHERS, RECORDS_OF, event_of
+
+#: Radius around the epicentre in which stations of a named earthquake are wanted, m.
+RADIUS = 100_000.0
+
+#: Channels of a named earthquake: accelerometers in the codes of all networks.
+CHANNELS = ("HN?", "HL?", "BN?", "BL?", "CN?", "EN?")
 
 
 class FetchResult(NamedTuple):
@@ -56,3 +65,92 @@ def fetch_configured(
     fetched = fetch(records.fdsn, records.event, progress, again)
     found = fetched_stations(fetched)
     return FetchResult(fetched.folder, list(found.stations), found.rejected)
+
+
+class FetchedEvent(NamedTuple):
+    """
+    Records of a named earthquake.
+
+    Attributes
+    ----------
+    provider, event_id : str
+        Event service, and the earthquake as it names it.
+    event : Path
+        QuakeML file.
+    folder : Path
+        With MiniSEED and StationXML of every station.
+    stations : list of str
+        ``"NET.STA"`` of those with records.
+    rejected : tuple of Rejection
+        What could not be fetched or read, with every reason.
+    records : Records
+        Section ``[records]`` of a configuration that reads all of this without the network.
+    """
+
+    provider: str
+    event_id: str
+    event: Path
+    folder: Path
+    stations: list[str]
+    rejected: tuple[Rejection, ...]
+    records: Records
+
+
+def fetch_event(
+    identifier: str,
+    folder: Path,
+    settings: Mapping[str, Any] | None = None,
+    again: bool = False,
+    progress: Progress = silent,
+) -> FetchedEvent:
+    """
+    Fetch the records around an earthquake that an event service knows by an identifier.
+
+    Parameters
+    ----------
+    identifier : str
+        As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it; of the event service in
+        ``settings`` if there is one.
+    folder : Path
+        Keeps what is fetched; a request that is complete is answered from it.
+    settings : mapping, optional
+        Keys of the section ``[records.fdsn]`` with other values than the defaults:
+        ``event_provider``, ``radius`` (m, 100 000), ``channels``, ``providers``, ``before``,
+        ``after`` and so on.
+    again : bool
+        Whether to ask again for stations of which every service had no data.
+    progress : callable
+        Called for every station: stage, done, total.
+
+    Raises
+    ------
+    CatalogError
+        If the identifier or a setting is wrong, or the service has no such event.
+    ServiceError
+        If services fail and there is no station at all.
+    """
+    given = dict(settings or {})
+    # An event service that is named takes any identifier
+    if "event_provider" in given:
+        provider, event_id = str(given["event_provider"]), identifier
+    else:
+        provider, event_id = event_of(identifier)
+    defaults = {
+        "providers": RECORDS_OF.get(provider, OTHERS),
+        "radius": RADIUS,
+        "channels": CHANNELS,
+    }
+    named = {"cache": folder, "event_id": event_id, "event_provider": provider}
+    request = checked(Fdsn, defaults | given | named, identifier)
+    fetched = fetch(request, None, progress, again)
+    assert fetched.event is not None  # which the identifier named
+    found = fetched_stations(fetched)
+    return FetchedEvent(
+        public_url(provider),
+        event_id,
+        fetched.event.path,
+        fetched.folder,
+        list(found.stations),
+        found.rejected,
+        Records(fdsn=request),
+    )

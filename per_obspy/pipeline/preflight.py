@@ -5,8 +5,8 @@ import numpy as np
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, require_extra
 from per_obspy.inventory.catalogue import stored_inventories
-from per_obspy.inventory.checking import check_columns
 from per_obspy.inventory.files.formats import pair_file
+from per_obspy.inventory.files.reading import checked_file
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
@@ -38,7 +38,7 @@ def check_inputs(settings: Run) -> None:
     """
     pairs = settings.pairs
     if pairs and pairs.file:
-        check_columns(pair_file(pairs.file).names, str(pairs.file))
+        checked_file(pairs.file, pairs.form)
     if pairs and pairs.catalog and pairs.names:
         named_files(pairs.names, pairs.catalog)
     if settings.records and settings.records.shakemap:
@@ -58,7 +58,7 @@ def _pair_columns(settings: Run) -> set[str]:
     """Return the columns of the pairs; of inventories not chosen yet, those that any has."""
     pairs = settings.pairs
     if pairs and pairs.file:
-        return set(pair_file(pairs.file).names)
+        return set(pair_file(pairs.file, pairs.form).names)
     if pairs and pairs.catalog and pairs.names:
         files = named_files(pairs.names, pairs.catalog)
         return set.intersection(*(set(pair_file(file).names) for file in files))

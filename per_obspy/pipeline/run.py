@@ -18,6 +18,7 @@ from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import content_hash, file_hash, is_part, remove_file
 from per_obspy.inventory.catalogue import stored_inventories
+from per_obspy.inventory.recognition.side_file import side_file
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -212,10 +213,11 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs is None or pairs.simulated is not None:
         return []
     if pairs.catalog is None:
-        return [pairs.file] if pairs.file else []
+        # A file beside the table may say how it is read
+        return [pairs.file, side_file(pairs.file)] if pairs.file else []
     stored = stored_inventories(pairs.catalog)
     chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]
-    return [pairs.catalog, *chosen]
+    return [pairs.catalog, *chosen, *map(side_file, chosen)]
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
@@ -317,6 +319,7 @@ def _later_stages(
         "faults": made.faults,
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
+        "pair_tables": found.pair_tables._asdict(),
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,

@@ -24,7 +24,8 @@ from obspy.core.event import Event
 
 from per_obspy.constants import GAL, STANDARD_GRAVITY
 from per_obspy.errors import CatalogError, PerError, RecordRejected, Rejection
-from per_obspy.records.folder import SourceContents, merged_inventory
+from per_obspy.records.contents.metadata_files import merged_inventory
+from per_obspy.records.folder import SourceContents
 from per_obspy.records.metadata import with_metadata
 from per_obspy.records.obspy_readers import LARGEST_UNPACKED, read_bytes_with_obspy
 

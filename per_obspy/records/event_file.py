@@ -8,7 +8,7 @@ from obspy.core.event import Event
 
 from per_obspy.errors import CatalogError, RecordRejected, reason_of
 from per_obspy.files import bytes_hash, file_hash
-from per_obspy.records.archives import open_file
+from per_obspy.records.archives.archive_files import open_file
 from per_obspy.records.asdf import ASDF_MARK, read_asdf_event
 from per_obspy.records.obspy_readers import read_content
 

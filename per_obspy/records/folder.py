@@ -4,12 +4,8 @@ A folder of records: every file that ObsPy and its plugins understand.
 StationXML may be in the same folder or elsewhere.
 """
 
-import os
-import stat
 from collections.abc import Iterable, Mapping
-from functools import reduce
 from itertools import chain
-from operator import add
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -18,38 +14,33 @@ import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
 from per_obspy.config import Archives
-from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, reason_of
-from per_obspy.files import bytes_hash, is_part
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
+from per_obspy.files import bytes_hash
+from per_obspy.formats.text.itaca_metadata import read_itaca_metadata
 from per_obspy.formats.text.station_table import (
     StationRow,
-    is_station_table,
+    bare_name,
     located_stations,
-    marked_open_starts,
     read_station_table,
-    with_open_starts,
 )
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.notes import taken
-from per_obspy.records.archives import IRREGULAR, LIMITS, archive_files, is_archive, read_file
+from per_obspy.records.archives.archive_files import LIMITS, archive_files, read_file
+from per_obspy.records.archives.walked import is_archive
+from per_obspy.records.contents.file_list import files_below, is_document
+from per_obspy.records.contents.metadata_files import (
+    METADATA,
+    kind_of,
+    merged_inventory,
+    named_metadata,
+    read_station_text,
+)
+from per_obspy.records.contents.one_series import without_doubles, without_integrals
 from per_obspy.records.earthquakes.groups import RecordSpan, record_span, station_files
+from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
 from per_obspy.records.metadata import with_metadata
-from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
+from per_obspy.records.obspy_readers import UNKNOWN_FORMAT, read_content
 from per_obspy.records.processed_files import described
-
-#: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
-#: records -> kind of file
-_MARKS = {
-    b"<FDSNStationXML": "inventory",
-    b"#Network": "station text",
-    b"quakeml": "event",
-    b'"shard": ': "description",
-}
-
-#: Kinds of files that describe stations.
-_METADATA = ("inventory", "station text", "station table")
-
-#: unit of a series -> its quantity, for the integrals of acceleration
-_INTEGRALS = {"m/s": "velocity", "m": "displacement"}
 
 
 class SourceContents(NamedTuple):
@@ -105,13 +96,13 @@ def find_stations(
     """
     files, rejected = _files(Path(folder), limits)
     found = [_read_file(path, limits) for path in files]
-    records = tuple(chain.from_iterable(file.records for file in found))
+    records = _records(found)
     # Metadata that is named comes before that of the folder
-    inventories, rows = _named_metadata(None if stationxml is None else Path(stationxml))
+    inventories, rows = named_metadata(None if stationxml is None else Path(stationxml))
     inventories += [file.inventory for file in found if file.inventory is not None]
     rows += chain.from_iterable(file.rows for file in found)
     # Unusable records come before unusable metadata
-    for kind in ("record", *_METADATA):
+    for kind in ("record", *METADATA):
         rejected += [file.rejection for file in found if file.kind == kind and file.rejection]
     if not records:
         # A folder without records may fill up; a file that was named should have been one
@@ -139,6 +130,7 @@ class _File(NamedTuple):
     records: tuple[RecordSpan, ...] = ()
     inventory: Inventory | None = None
     rows: tuple[StationRow, ...] = ()
+    events: Mapping[str, HeaderEvent] = MappingProxyType({})
     rejection: Rejection | None = None
 
 
@@ -149,7 +141,7 @@ def _read_file(path: Path, limits: Archives) -> _File:
     try:
         content = read_file(path, limits)
         # Hash, headers and metadata come from the same bytes
-        file = file._replace(hash=bytes_hash(content), kind=_kind(path, content))
+        file = file._replace(hash=bytes_hash(content), kind=kind_of(path, content))
         if file.kind == "record":
             stream = _traces(path, content, headonly=True)
             return file._replace(records=tuple(record_span(trace, path) for trace in stream))
@@ -157,33 +149,39 @@ def _read_file(path: Path, limits: Archives) -> _File:
             inventory = read_content(obspy.read_inventory, content, path)
             return file._replace(inventory=inventory)
         if file.kind == "station text":
-            return file._replace(inventory=_read_station_text(path, content))
+            return file._replace(inventory=read_station_text(path, content))
         if file.kind == "station table":
             return file._replace(rows=read_station_table(str(path), content))
+        if file.kind == "ITACA metadata":
+            return _with_itaca_metadata(file, content)
     except RecordRejected as rejection:
+        # Documents that agencies pack with records are no records
+        if is_document(path) and UNKNOWN_FORMAT in rejection.reasons[0]:
+            return file._replace(kind="document")
         return file._replace(rejection=_rejected_file(path, rejection))
     return file
 
 
-def _named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
-    """Return the descriptions of stations, or the rows of a table of them, that a user named."""
-    if path is None:
-        return [], []
-    # A table that the user named must be right
-    try:
-        if path.is_file() and _kind(path, content := read_file(path)) == "station table":
-            return [], [*read_station_table(str(path), content)]
-    except RecordRejected as rejection:
-        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
-    return read_inventories(path), []
+def _with_itaca_metadata(file: _File, content: bytes) -> _File:
+    """Return a file with the station and the earthquake of a metadata file of ITACA."""
+    found = read_itaca_metadata(str(file.path), content)
+    event = header_event(found.event)
+    events = dict.fromkeys(found.row.names, event) if event else {}
+    return file._replace(rows=(found.row,), events=events)
 
 
-def _kind(path: Path, content: bytes) -> str:
-    """Return the kind of a file: a kind of metadata, event, description, or else record."""
-    start = content[:1000]
-    if path.suffix.lower() == ".csv" and is_station_table(start):
-        return "station table"
-    return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
+def _records(found: list[_File]) -> tuple[RecordSpan, ...]:
+    """Return the records of all files, with the earthquake that metadata of their station name."""
+    events = dict(chain.from_iterable(file.events.items() for file in found))
+    records = chain.from_iterable(file.records for file in found)
+    return tuple(_with_event(record, events) for record in records)
+
+
+def _with_event(record: RecordSpan, events: Mapping[str, HeaderEvent]) -> RecordSpan:
+    """Return a record with the event of its station's metadata if that has more facts."""
+    event = events.get(bare_name(record.station.split(".", 1)[1]))
+    known = record.event.known if record.event else 0
+    return record._replace(event=event) if event and event.known > known else record
 
 
 def _traces(path: Path, content: bytes, **options: Any) -> Stream:
@@ -228,8 +226,9 @@ def read_station(
         Traces in the words of ``formats/text/vocabulary.py``; the path of each one's file is in
         ``stats.source``.
     rejected : tuple of Rejection
-        Files that cannot be read, traces whose metadata is insufficient, and velocity and
-        displacement of a channel whose acceleration is read; the rest goes on.
+        Files that cannot be read, traces whose metadata is insufficient, velocity and
+        displacement of a channel whose acceleration is read, and doubles of a record in another
+        format; the rest goes on.
     """
     stream, rejected = Stream(), []
     for path in paths:
@@ -249,27 +248,9 @@ def read_station(
                 stream[-1].stats.source = str(path)
             except RecordRejected as rejection:
                 rejected.append(Rejection("record", trace.id, str(path), None, rejection.reasons))
-    stream, integrals = _without_integrals(stream)
-    return stream, (*rejected, *integrals)
-
-
-def _without_integrals(stream: Stream) -> tuple[Stream, list[Rejection]]:
-    """
-    Return a stream without series of velocity and displacement whose acceleration it holds too.
-
-    Agencies write the integrals of a record beside it, under the same codes.
-    """
-    accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
-    # Integrals without their acceleration stay
-    kept, rejected = Stream(), []
-    for trace in stream:
-        quantity = _INTEGRALS.get(trace.stats.get("units"))
-        if quantity is None or trace.id not in accelerations:
-            kept += trace
-            continue
-        reason = f"{quantity} series, acceleration is read instead"
-        rejected.append(Rejection("record", trace.id, trace.stats.source, None, (reason,)))
-    return kept, rejected
+    stream, integrals = without_integrals(stream)
+    stream, doubles = without_doubles(stream)
+    return stream, (*rejected, *integrals, *doubles)
 
 
 def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]:
@@ -289,109 +270,6 @@ def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]
     if not files and not rejected:
         raise NothingUsable(str(folder), "the folder is empty")
     return files, rejected
-
-
-def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
-    """
-    Return the files below a folder, sorted, and whatever else is there that cannot be read.
-
-    Folders that cannot be listed, links that lead nowhere or to a folder, pipes, sockets and
-    devices are rejections; the rest goes on. Part files of this package are passed over.
-
-    Raises
-    ------
-    CatalogError
-        If it is no folder.
-    """
-    if not folder.is_dir():
-        raise CatalogError(str(folder), "is neither a folder nor a regular file")
-    unlisted: list[OSError] = []
-    paths, rejected = [], []
-    # Links to folders are among the folders, and are not entered
-    for parent, folders, names in os.walk(folder, onerror=unlisted.append):
-        for path in (Path(parent, name) for name in (*folders, *names)):
-            problem = _problem(path)
-            if problem:
-                rejected.append(Rejection("file", path.name, str(path), None, (problem,)))
-            elif not path.is_dir() and not is_part(path):
-                paths.append(path)
-    # An error may come in the middle of a folder
-    for error in unlisted:
-        path = Path(error.filename or folder)
-        reason = f"the folder cannot be listed: {reason_of(error)}"
-        rejected.append(Rejection("file", path.name, str(path), None, (reason,)))
-    return sorted(paths), sorted(rejected)
-
-
-def _problem(path: Path) -> str:
-    """Return why something in a folder is neither a file nor a folder; empty if it is one."""
-    try:
-        kind = path.stat().st_mode
-    except OSError as error:
-        if path.is_symlink():
-            return f"is a link that leads nowhere: {reason_of(error)}"
-        return f"cannot be read: {reason_of(error)}"
-    # Folders behind links could hold each other
-    if stat.S_ISDIR(kind):
-        is_link = path.is_symlink()
-        return "is a link to a folder, which is not followed: name that folder" if is_link else ""
-    return "" if stat.S_ISREG(kind) else IRREGULAR
-
-
-def _read_inventory(path: Path) -> Inventory:
-    """Read StationXML or FDSN station text."""
-    content = read_file(path)
-    if _kind(path, content) == "station text":
-        return _read_station_text(path, content)
-    return read_content(obspy.read_inventory, content, path)
-
-
-def _read_station_text(path: Path, content: bytes) -> Inventory:
-    """Read FDSN station text, whose empty start means an open one."""
-    marked = marked_open_starts(content)
-    try:
-        inventory = read_bytes_with_obspy(
-            obspy.read_inventory, marked, str(path), format="STATIONTXT"
-        )
-    except RecordRejected as rejection:
-        reason = f"is no FDSN station text: {rejection.reasons[0]}"
-        raise RecordRejected(str(path), reason) from rejection
-    return with_open_starts(inventory)
-
-
-def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
-    """Return one inventory of all; None of none."""
-    return reduce(add, inventories) if inventories else None
-
-
-def read_inventories(stationxml: Path) -> list[Inventory]:
-    """
-    Read a StationXML file, or all of a folder.
-
-    Raises
-    ------
-    CatalogError
-        If there is none, or one cannot be read.
-    """
-    paths = [stationxml]
-    # What cannot be read is tried again below, for its reason
-    if stationxml.is_dir():
-        files, unread = files_below(stationxml)
-        paths = [path for path in files if path.suffix == ".xml"]
-        paths += [Path(rejection.source) for rejection in unread if _is_needed(rejection)]
-    if not paths:
-        raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
-    try:
-        return [_read_inventory(path) for path in paths]
-    except RecordRejected as rejection:
-        raise CatalogError(
-            rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}"
-        ) from rejection
-
-
-def _is_needed(rejection: Rejection) -> bool:
-    """Return whether something that cannot be read may hold StationXML."""
-    return rejection.source.endswith(".xml") or "cannot be listed" in rejection.reasons[0]
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:

@@ -1,5 +1,5 @@
 """
-Metadata of a trace from StationXML, merged by epoch.
+Metadata of a trace from StationXML, merged by epoch, and from tables of stations.
 
 They are coordinates, orientation, response, and the ground under the station.
 """
@@ -19,6 +19,7 @@ from per_obspy.errors import RecordRejected
 from per_obspy.formats.knet import with_knet_words
 from per_obspy.formats.text.vocabulary import horizontal
 from per_obspy.names import code_problem
+from per_obspy.records.coordinate_sources import STATIONXML, Place, place_noted, table_of
 from per_obspy.records.simulation.station_metadata import MARK
 
 #: input unit of a response -> quantity of the samples
@@ -63,8 +64,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
         problem = f"{_missing(trace, inventory)}, so what its samples measure is unknown"
         raise RecordRejected(trace.id, problem)
     # Place and ground belong to the station, which may be known without the channel
-    if not result.stats.get("coordinates"):
-        _place_station(result, inventory)
+    place_noted(result, _places(result, inventory, channel))
     result.stats.update(_ground(result, inventory))
     if _is_simulated(result, inventory):
         result.stats.simulated = True
@@ -105,7 +105,7 @@ def _channel(trace: Trace, inventory: Inventory | None) -> Channel | None:
 
 
 def _stations(trace: Trace, inventory: Inventory | None) -> Iterator[Station]:
-    """Yield the descriptions of a trace's station that are valid at its start."""
+    """Yield the descriptions of a trace's station that are valid at its start, tables too."""
     stats = trace.stats
     for network in inventory or ():
         if network.code != stats.network:
@@ -116,7 +116,11 @@ def _stations(trace: Trace, inventory: Inventory | None) -> Iterator[Station]:
 
 
 def _only(
-    trace: Trace, kind: str, descriptions: list[Any], facts: Callable[[Any], dict[str, Any]]
+    trace: Trace,
+    kind: str,
+    descriptions: list[Any],
+    facts: Callable[[Any], dict[str, Any]],
+    source: str = "StationXML",
 ) -> Any:
     """Return the one description there is, or None; several must have the same facts."""
     for first, second in pairwise(descriptions):
@@ -128,7 +132,7 @@ def _only(
             if repeated[name] != value
         ]
         if differing:
-            where = f"StationXML contradicts itself about the {kind} at {trace.stats.starttime}"
+            where = f"{source} contradicts itself about the {kind} at {trace.stats.starttime}"
             raise RecordRejected(trace.id, f"{where}: {', '.join(differing)}")
     return descriptions[0] if descriptions else None
 
@@ -151,8 +155,6 @@ def _sensitivity(channel: Channel) -> float | None:
 def _describe(trace: Trace, channel: Channel) -> None:
     """Fill the gaps of a trace's words from its channel."""
     stats = trace.stats
-    if not stats.get("coordinates"):
-        stats.coordinates = _place(channel)
     if "sensor_azimuth" not in stats and "sensor_dip" not in stats:
         stats.update(_direction(channel))
     # Counts need a response, unless the file has their gain and StationXML no sensitivity
@@ -162,13 +164,17 @@ def _describe(trace: Trace, channel: Channel) -> None:
         stats.update({"units": "counts", "quantity": quantity, "processing_level": "raw"})
 
 
+def _is_agency(table: str) -> tuple[bool, str]:
+    """Return the sorting key of a table: those of users are CSV, then by name."""
+    return not table.lower().endswith(".csv"), table
+
+
 def _place(site: Channel | Station) -> AttribDict:
-    """Return the coordinates of a channel or station, degrees and m."""
-    return AttribDict(
-        latitude=float(site.latitude),
-        longitude=float(site.longitude),
-        elevation=float(site.elevation),
-    )
+    """Return the coordinates of a channel or station, degrees and m, as far as they are known."""
+    place = AttribDict(latitude=float(site.latitude), longitude=float(site.longitude))
+    # Tables may have no elevation
+    unknown = any(comment.value == "elevation=unknown" for comment in site.comments)
+    return place if unknown else AttribDict({**place, "elevation": float(site.elevation)})
 
 
 def _direction(channel: Channel) -> dict[str, float]:
@@ -202,14 +208,24 @@ def _quantity(trace: Trace, unit: str | None) -> str:
     return _QUANTITIES[str(unit).upper()]
 
 
-def _place_station(trace: Trace, inventory: Inventory | None) -> None:
-    """Fill the coordinates from StationXML; unknown ones stay absent: spectra need none."""
-    trace.stats.pop("coordinates", None)
-    station = _only(trace, "station", list(_stations(trace, inventory)), _station_facts)
-    if station is not None:
-        trace.stats.coordinates = _place(station)
-        if _comment_words(trace, inventory).get("elevation") == "unknown":
-            del trace.stats.coordinates["elevation"]
+def _places(trace: Trace, inventory: Inventory | None, channel: Channel | None) -> list[Place]:
+    """
+    Return the places that tables and StationXML give a trace, in the order of their preference.
+
+    Unknown ones stay absent: spectra need none.
+    """
+    stations = list(_stations(trace, inventory))
+    # Tables that people write go before those of agencies
+    names = sorted({table_of(station) for station in stations} - {""}, key=_is_agency)
+    places = []
+    for name in names:
+        rows = [station for station in stations if table_of(station) == name]
+        row = _only(trace, "station", rows, _station_facts, f"the table {name}")
+        places.append(Place(name, _place(row)))
+    # Of StationXML the channel, which is nearer to the sensor
+    described = [station for station in stations if not table_of(station)]
+    site = channel or _only(trace, "station", described, _station_facts)
+    return [*places, *([Place(STATIONXML, _place(site))] if site is not None else [])]
 
 
 def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]:

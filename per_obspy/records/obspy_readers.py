@@ -25,7 +25,7 @@ from per_obspy.errors import PerError, RecordRejected
 from per_obspy.files import writing
 from per_obspy.formats.knet import require_whole_numbers
 from per_obspy.formats.sac import require_coordinates
-from per_obspy.records.archives import read_file
+from per_obspy.records.archives.archive_files import read_file
 
 #: Reason of a rejection where no format plugin knows a file.
 UNKNOWN_FORMAT = "its format is unknown"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from obspy import Stream, Trace
+from obspy import Stream, Trace, UTCDateTime
 from obspy.core import AttribDict
 
 from per_obspy.errors import PerError, RecordRejected
@@ -31,6 +31,9 @@ STATS_WORDS = (
     "quantity",
     "processing_level",
     "coordinates",
+    "coordinates_source",
+    "coordinates_conflict",
+    "event",
     "sensor_azimuth",
     "sensor_dip",
     "sensor_location",
@@ -50,6 +53,11 @@ _KINDS_OF_WORDS: dict[str, type | tuple[type, ...]] = {
     "quantity": str,
     "processing_level": str,
     "coordinates": AttribDict,
+    "coordinates_source": str,
+    "coordinates_conflict": str,
+    "event": AttribDict,
+    "site_class": str,
+    "vs30": (int, float),
     "sensor_azimuth": (int, float),
     "sensor_dip": (int, float),
     "corners": AttribDict,
@@ -196,10 +204,20 @@ def _description(trace: Trace) -> dict[str, Any]:
     for name in STATS_WORDS:
         if name in trace.stats:
             word = trace.stats[name]
-            description[name] = dict(word) if isinstance(word, AttribDict) else word
+            description[name] = _plain(word) if isinstance(word, AttribDict) else word
     return description
 
 
+def _plain(group: AttribDict) -> dict[str, Any]:
+    """Return a group of words as JSON can hold it: times as text."""
+    return {
+        name: str(word) if isinstance(word, UTCDateTime) else word for name, word in group.items()
+    }
+
+
 def _group(word: Any) -> Any:
-    """Return a dictionary of JSON as a group of words; any other word as it is."""
-    return AttribDict(word) if isinstance(word, dict) else word
+    """Return a dictionary of JSON as a group of words, its time as one; any other word as it is."""
+    if not isinstance(word, dict):
+        return word
+    time = {"time": UTCDateTime(word["time"])} if "time" in word else {}
+    return AttribDict({**word, **time})

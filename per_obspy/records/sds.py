@@ -8,12 +8,8 @@ from pathlib import Path
 from obspy import Inventory, Stream, UTCDateTime
 
 from per_obspy.errors import CatalogError, Rejection, reason_of
-from per_obspy.records.folder import (
-    SourceContents,
-    merged_inventory,
-    read_inventories,
-    read_station,
-)
+from per_obspy.records.contents.metadata_files import merged_inventory, read_inventories
+from per_obspy.records.folder import SourceContents, read_station
 
 _DAY = 86400.0  # s
 

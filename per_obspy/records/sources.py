@@ -16,14 +16,21 @@ from per_obspy.errors import RecordRejected, Rejection, shortened
 from per_obspy.files import opened_hash
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
-from per_obspy.records.archives import open_file
+from per_obspy.records.archives.archive_files import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.earthquakes.choice import OneEarthquake, Reader, one_earthquake
-from per_obspy.records.earthquakes.groups import event_groups
+from per_obspy.records.contents.file_list import files_below
+from per_obspy.records.earthquakes.choice import (
+    OneEarthquake,
+    Reader,
+    group_event,
+    one_earthquake,
+    reader_of_event,
+)
+from per_obspy.records.earthquakes.groups import EventGroup, event_groups
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
 from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
-from per_obspy.records.folder import SourceContents, files_below, find_stations, read_station
+from per_obspy.records.folder import SourceContents, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
 from per_obspy.records.text_table import read_columns
 
@@ -137,7 +144,9 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
         for name, station_files in contents.stations.items():
             files[name] = (*files.get(name, ()), *station_files)
 
-    _warn_of_several_earthquakes(found)
+    groups = event_groups([record for contents in found for record in contents.records])
+    _warn_of_several_earthquakes(groups)
+    reader = _path_reader(groups)
 
     # Metadata beside one of the paths serves stations of all
     inventories = [contents.inventory for contents in found if contents.inventory]
@@ -147,7 +156,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
             station_files,
             _hashes(station_files, hashes),
             _selected(inventory, name),
-            partial(read_station),
+            reader,
         )
         for name, station_files in files.items()
     }
@@ -168,10 +177,14 @@ def _with_usable_names(found: SourceContents) -> SourceContents:
     return found._replace(stations=stations, rejected=tuple(rejected))
 
 
-def _warn_of_several_earthquakes(found: Iterable[SourceContents]) -> None:
+def _path_reader(groups: Sequence[EventGroup]) -> Reader:
+    """Return the reader of stations; records of one earthquake have that of most headers."""
+    found = group_event(groups[0]) if len(groups) == 1 else None
+    return reader_of_event(partial(read_station), found)
+
+
+def _warn_of_several_earthquakes(groups: Sequence[EventGroup]) -> None:
     """Log a warning where records of different earthquakes will be processed together."""
-    records = [record for contents in found for record in contents.records]
-    groups = event_groups(records)
     if len(groups) > 1:
         starts = ", ".join(group.label for group in groups)
         log.warning(

@@ -48,6 +48,14 @@ class RecordInfo(NamedTuple):
         where a continuous record holds them or a record has no date.
     simulated : bool
         Whether the motion is simulated.
+    coordinates_source : str
+        Name of the table of stations, ``"header"`` or ``"StationXML"``; empty if unknown.
+    coordinates_conflict : str
+        Places of other sources that are more than 1 km away.
+    site_class : str
+        Of the ground, any word; empty if unknown.
+    vs30 : float or None
+        Mean shear-wave velocity of the upper 30 m, m/s.
     """
 
     record: str
@@ -64,6 +72,10 @@ class RecordInfo(NamedTuple):
     file: str
     event: str = ""
     simulated: bool = False
+    coordinates_source: str = ""
+    coordinates_conflict: str = ""
+    site_class: str = ""
+    vs30: float | None = None
 
 
 def describe_records(
@@ -138,8 +150,9 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
     stats = trace.stats
     place = stats.get("coordinates") or {}
     peak, unit = peak_motion(trace)
+    # Seen from the folder that was named
     source = Path(stats.source)
-    # Values that the header does not have stay empty
+    # Values that neither header nor metadata have stay empty
     return RecordInfo(
         record=trace.id,
         format=stats.get("_format", "ASDF"),
@@ -154,4 +167,8 @@ def _described(trace: Trace, root: Path) -> RecordInfo:
         unit=unit,
         file=source.name if source == root else str(source.relative_to(root)),
         simulated=stats.get("simulated", False),
+        coordinates_source=stats.get("coordinates_source", ""),
+        coordinates_conflict=stats.get("coordinates_conflict", ""),
+        site_class=stats.get("site_class", ""),
+        vs30=stats.get("vs30"),
     )

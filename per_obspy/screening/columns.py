@@ -207,6 +207,7 @@ RECORD_FLAGS = (
     "assumed_corners",
     "digitised",
     "undated",
+    "contradicting_coordinates",
     "record_warning",
 )
 
@@ -269,6 +270,9 @@ FLAGS: dict[str, str] = {
     ),
     "undated": (
         "the start time of the station's record is unknown: it may be of another earthquake"
+    ),
+    "contradicting_coordinates": (
+        "two sources place the station more than 1 km apart: see stations.csv"
     ),
     "record_warning": (
         "the station's record failed another check that only warns: see stations.csv"

@@ -22,6 +22,8 @@ MEANINGS = {
     "record_flags": "flags of the horizontals, separated by spaces",
     "warnings": "failed checks that do not reject",
     "notes": "failed checks without consequence",
+    "coordinates_source": "where the coordinates of the station come from; empty if unknown",
+    "coordinates_conflict": "places of other sources more than 1 km away; empty if none",
 }
 
 #: Words of a hypocentre: degrees, and m.
@@ -66,11 +68,21 @@ def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
         "record_flags": " ".join(sorted(set(flags))),
         "warnings": _remarks(stream, "warnings"),
         "notes": _remarks(stream, "notes"),
+        **_place_facts(horizontals),
     }
     variables: dict[str, Variable] = {}
     for name, text in texts.items():
         variables[name] = ((), printable(text), {"long_name": MEANINGS[name]})
     return xr.Dataset(variables)
+
+
+def _place_facts(horizontals: list[Trace]) -> dict[str, str]:
+    """Return source and contradictions of the coordinates of the horizontals, each once."""
+    names = ("coordinates_source", "coordinates_conflict")
+    return {
+        name: "; ".join(dict.fromkeys(filter(None, (t.stats.get(name, "") for t in horizontals))))
+        for name in names
+    }
 
 
 def header_hypocentre(traces: Iterable[Trace]) -> dict[str, float]:

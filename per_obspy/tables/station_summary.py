@@ -39,7 +39,12 @@ COLUMNS: dict[str, Column] = {
         ("latitude", "degrees", "of the station, north"),
         ("elevation", "m", "of the station"),
     ),
-    **_columns("str", ("site_class", "", "of the ground; empty if unknown")),
+    **_columns(
+        "str",
+        ("coordinates_source", "", "name of the table of stations, header or StationXML"),
+        ("coordinates_conflict", "", "places of other sources more than 1 km away, with both"),
+        ("site_class", "", "of the ground; empty if unknown"),
+    ),
     **_columns(
         "float64",
         ("vs30", "m/s", "mean shear-wave velocity of the upper 30 m; empty if unknown"),
@@ -191,7 +196,10 @@ def _row(station: xr.Dataset, pairs: Mapping[str, int]) -> dict[str, Any]:
 
 def _texts(station: xr.Dataset) -> dict[str, str]:
     """Return the facts of a station that are text."""
-    known = ("site_class", "warnings", "notes", "instrument", "record_level", "source_files")
+    known = (
+        *("site_class", "coordinates_source", "coordinates_conflict", "warnings", "notes"),
+        *("instrument", "record_level", "source_files"),
+    )
     texts = {name: str(station[name].item()) for name in known if name in station}
     return {**texts, "components": " ".join(map(str, station["channel"].values))}
 

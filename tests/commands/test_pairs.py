@@ -60,6 +60,7 @@ def test_options_may_come_first_and_json_is_for_machines(call, footprints, tmp_p
     assert code == 0
     assert json.loads(out) == {
         "output": str(tmp_path / "p.csv"),
+        "buildings": str(tmp_path / "p.buildings.parquet"),
         "pairs": 1,
         "touching": 1,
         "rejected": 1,
@@ -74,9 +75,62 @@ def test_a_missing_extra_is_one_line_that_names_it(call, monkeypatch, footprints
     assert err == f"per-obspy: {missing} not installed: pip install 'per_obspy[gis]'\n"
 
 
+def test_the_deviation_that_is_assumed_is_said(call, footprints, tmp_path):
+    output = tmp_path / "p.parquet"
+    _, out, _ = call("pairs", footprints, "-o", output)
+    assert "gaps are assumed to be drawn with a deviation of 0.1 m" in out
+    assert set(read_pairs(output)["gap_std"]) == {0.1}
+    _, out, _ = call("pairs", footprints, "-o", output, "--gap-std", "0.3")
+    assert "assumed" not in out
+    assert set(read_pairs(output)["gap_std"]) == {0.3}
+
+
+def test_columns_by_name_and_all_others(call, tmp_path):
+    boxes = [shapely.box(0.3 + x * 1e-4, 0.0, 0.3 + (x + 1) * 1e-4, 1e-4) for x in (0, 1)]
+    columns = {
+        "nr": ["7", "8"],
+        "alto": ["30 ft", "6,5"],
+        "pisos": ["3", "2"],
+        "barrio": ["A", "B"],
+    }
+    columns["T1"] = ["0.3", "0.2"]
+    path = tmp_path / "town.gpkg"
+    fields = [pd.Series(values, dtype=object).to_numpy() for values in columns.values()]
+    pyogrio.raw.write(
+        path, shapely.to_wkb(boxes), fields, list(columns), geometry_type="Polygon", crs="EPSG:4326"
+    )
+    names = ("--id-column", "nr", "--height-column", "alto", "--storeys-column", "pisos")
+    code, _, _ = call("pairs", path, "-o", tmp_path / "p.csv", *names, "--column", "period=T1")
+    assert code == 0
+    (pair,) = read_pairs(tmp_path / "p.csv").to_dict("records")
+    assert pair["pair_id"] == "7/8"
+    # 30 ft by the definition of the foot
+    assert (round(pair["height_1"], 9), pair["height_2"]) == (9.144, 6.5)
+    assert (pair["storeys_1"], pair["period_2"]) == (3.0, 0.2)
+    assert (pair["barrio_1"], pair["barrio_2"], pair["alto_1"]) == ("A", "B", "30 ft")
+    assert pd.read_parquet(tmp_path / "p.buildings.parquet")["barrio"].tolist() == ["A", "B"]
+
+
+@pytest.mark.parametrize("option", ["period", "hight=alto"])
+def test_a_column_option_that_names_no_quantity(call, footprints, option):
+    code, _, err = call("pairs", footprints, "--column", option)
+    assert code == 2
+    assert "QUANTITY=COLUMN" in err
+    assert option in err
+
+
+def test_a_list_of_buildings_makes_pairs(call, tmp_path):
+    rows = ["id,lon,lat,width,length,azimuth,storeys", "a,0.3,0,8,10,90,3", "b,0.3001,0,8,10,90,4"]
+    (tmp_path / "list.csv").write_text("\n".join(rows))
+    code, out, _ = call("pairs", tmp_path / "list.csv", "-o", tmp_path / "p.csv")
+    assert code == 0
+    assert "1 pairs, 0 of them touching, 0 rejected" in out
+
+
 def test_wrong_footprints_stop_with_one_line(call, tmp_path):
     (tmp_path / "points.csv").write_text("x,y\n0,0\n")
-    for name, reason in (("points.csv", "footprints are needed"), ("absent.gpkg", "no such file")):
+    wanted = "add a column wkt (outlines in degrees), or width, length, azimuth"
+    for name, reason in (("points.csv", wanted), ("absent.gpkg", "no such file")):
         code, _, err = call("pairs", tmp_path / name)
         assert code == 2
         assert err.count("\n") == 1

@@ -119,6 +119,23 @@ def test_fetch_fills_the_cache_alone(server, configuration, call):
     assert len(server.requests) == asked
 
 
+def test_fetch_takes_a_named_earthquake(server, tmp_path, call):
+    options = ("--event-service", server.url, "--provider", server.url, "-o", tmp_path / "quake")
+    code, out, err = call("fetch", "xx1", *options)
+    assert code == 0, err
+    assert "2 stations are in" in out
+    assert (tmp_path / "quake" / "event-xx1.xml").is_file()
+
+
+def test_fetch_refuses_what_is_neither_configuration_nor_earthquake(configuration, call):
+    code, out, err = call("fetch", "somewhere")
+    assert (code, out) == (2, "")
+    assert "somewhere: its form is not that of an earthquake" in err
+    code, _, err = call("fetch", configuration, "--seedlink", "host")
+    assert code == 2
+    assert "whose section [records.fdsn] holds these options" in err
+
+
 def test_fetch_says_what_had_no_data_and_asks_again_when_told(server, configuration, call):
     server.fail("dataselect", "S001", status(204))
     server.fail("dataselect", "S002", status(204))

@@ -2,6 +2,7 @@
 
 import io
 import json
+import socket
 import tarfile
 import zipfile
 from collections.abc import Callable, Iterable
@@ -16,7 +17,26 @@ import obspy
 import pandas as pd
 import pyogrio
 import shapely
+from building_samples import (
+    Town,
+    google,
+    microsoft,
+    osm_xml,
+    overture,
+    plateau_lod0,
+    plateau_lod1,
+    r2d_assets,
+    small_town,
+)
 from format_samples import SAMPLES
+from messy_tables import (
+    NAMES,
+    ROWS,
+    readable,
+    text_of,
+    with_shared_texts,
+    workbook_of,
+)
 from obspy import Stream
 from obspy.core.event import Catalog, Event, Magnitude, Origin
 from station_files import START, THREE, inventory, record
@@ -28,9 +48,11 @@ from per_obspy.inventory.footprints.footprint_pairs import pairs_from_footprints
 from per_obspy.records.asdf import find_asdf_stations, read_asdf_station
 from per_obspy.records.event_file import read_event
 from per_obspy.records.fdsn.event_list import find_events
+from per_obspy.records.fdsn.web import web_pool
 from per_obspy.records.folder import find_stations, read_station
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
 from per_obspy.records.processed_files import write_description, write_processed
+from per_obspy.records.seedlink.seedlink_window import Conversation
 from per_obspy.records.shakemap import read_shakemap
 from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
 
@@ -56,6 +78,13 @@ KNET = "nied/tests/data/test.knet"
 
 STATIONS = b"network,station,latitude,longitude,elevation\nCI,CLC,35.0,-117.0,700\n"
 
+ITACA = (
+    b"event.ev_sourcedb.shortname,event.datetime,event.latitude,event.longitude,"
+    b"event.focaldepth,event.pref_mag,station.code,station.sourceid,station.latitude,"
+    b"station.longitude,station.altitude,station.vs30,station.ec8\n"
+    b"ITACA,2009-04-06 01:32:39,42.3,13.3,8.8,6.3,AQG,2987,42.37,13.33,721,684.8,B\n"
+)
+
 CONFIGURATION = b"""
 name = "x"
 output = "out"
@@ -76,6 +105,14 @@ pairs = 1
 source = "a survey"
 licence = "CC0-1.0"
 date = 2026-11-21
+"""
+
+FORM = b"""
+decimal = "."
+[columns]
+gap = "gap"
+[units]
+gap = "cm"
 """
 
 CURVE = b"period,damping,sd\n0.1,0.05,0.01\n1.0,0.05,0.1\n4.0,0.05,0.4\n"
@@ -135,6 +172,7 @@ def _archives() -> dict[str, Entry]:
     """Return archives of two records."""
     return {
         "zip": Entry("all.zip", _zip, _records),
+        "zip_in_zip": Entry("bundle.zip", _bundle, _records),
         "tar": Entry("all.tar", partial(_tar, "w"), _records),
         "tgz": Entry("all.tgz", partial(_tar, "w:gz"), _records),
     }
@@ -145,6 +183,8 @@ def _metadata() -> dict[str, Entry]:
     return {
         "stationxml": Entry("station.xml", _station_xml, _records_beside),
         "stations": Entry("stations.csv", lambda: STATIONS, _text_beside),
+        "itaca_metadata": Entry("x.metadata", lambda: ITACA, _text_beside),
+        "seedlink": Entry("answer.seedlink", _packets, _seedlink),
         "description": Entry("record.json", _description, _described_record),
         "quakeml": Entry("event.xml", _quakeml, _event),
         "event_list": Entry("events.xml", _quakeml, _event_list),
@@ -157,9 +197,20 @@ def _inventories() -> dict[str, Entry]:
     """Return tables of pairs and layers of buildings."""
     return {
         "pairs_csv": Entry("pairs.csv", _pairs_csv, _pairs),
+        "pairs_turkish": Entry("pairs.csv", _turkish, _pairs),
+        "pairs_utf_16": Entry("pairs.txt", _utf_16, _pairs),
+        "pairs_xlsx": Entry("pairs.xlsx", _workbook, _pairs),
+        "pairs_form": Entry("pairs.csv.toml", lambda: FORM, _pairs_beside),
         "pairs_parquet": Entry("pairs.parquet", _pairs_parquet, _pairs),
         "footprints_geojson": Entry("town.geojson", partial(_layer, "a.geojson"), _footprints),
         "footprints_gpkg": Entry("town.gpkg", partial(_layer, "a.gpkg"), _footprints),
+        "citygml_lod0": Entry("town.gml", partial(_town, plateau_lod0), _footprints),
+        "citygml_lod1": Entry("town.gml", partial(_town, plateau_lod1), _footprints),
+        "assets": Entry("town.json", partial(_town, r2d_assets), _footprints),
+        "google_csv": Entry("town.csv", partial(_town, google), _footprints),
+        "geojson_lines": Entry("town.geojsonl", partial(_town, microsoft), _footprints),
+        "osm": Entry("town.osm", partial(_town, osm_xml), _footprints),
+        "overture": Entry("town.parquet", partial(_town, overture), _footprints),
     }
 
 
@@ -197,6 +248,17 @@ def _zip() -> bytes:
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in _members().items():
             archive.writestr(name, content)
+    return packed.getvalue()
+
+
+def _bundle() -> bytes:
+    """Return a zip of a zip and a tar, as centres of strong motion pack stations."""
+    packed = io.BytesIO()
+    # Stored, so that damage reaches the archives inside as well
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("one/station.zip", _zip())
+        archive.writestr("two.tar", _tar("w"))
+        archive.writestr("README.txt", b"words")
     return packed.getvalue()
 
 
@@ -265,6 +327,29 @@ def _pairs_csv() -> bytes:
     return _pair_table().to_csv(index=False).encode()
 
 
+def _turkish() -> bytes:
+    """Return a pair table with semicolons, decimal commas and Turkish headings."""
+    return readable()["Turkish, cp1254, gap in cm"].content
+
+
+def _utf_16() -> bytes:
+    """Return a pair table in UTF-16 with tabulators."""
+    return text_of(NAMES, ROWS, "\t", ",").encode("utf-16")
+
+
+def _workbook() -> bytes:
+    """Return a pair table in a sheet, with formulas and a part of texts."""
+    sheet = [NAMES, *ROWS, ["d", "=1/8|0.125", *ROWS[0][2:]]]
+    return with_shared_texts(workbook_of({"Pairs": sheet}))
+
+
+def _pairs_beside(path: Path) -> Iterable[object]:
+    """Read a good pair table with the file as what is said about it."""
+    table = path.with_suffix("")
+    table.write_bytes(_pairs_csv())
+    return _pairs(table)
+
+
 def _pairs_parquet() -> bytes:
     """Return a pair table as Parquet."""
     content = io.BytesIO()
@@ -330,6 +415,12 @@ def _layer(name: str) -> bytes:
         return path.read_bytes()
 
 
+def _town(write: Callable[[Path, Town], Path]) -> bytes:
+    """Return four houses in the format of another source."""
+    with TemporaryDirectory() as folder:
+        return write(Path(folder), small_town()).read_bytes()
+
+
 def _records(path: Path) -> Iterable[object]:
     """Read a record, or an archive of records, as a run does."""
     found = find_stations(path)
@@ -385,6 +476,31 @@ def _event(path: Path) -> Iterable[object]:
     """Read the event of a run."""
     origin = read_event(path).preferred_origin() or read_event(path).origins[0]
     return [origin.latitude, origin.longitude]
+
+
+def _packets() -> bytes:
+    """Return what a SeedLink server says, from its greeting to its end."""
+    records = _written("MSEED")[:4096]
+    packets = [b"SL%06X" % n + records[512 * n : 512 * n + 512] for n in range(len(records) // 512)]
+    return b"SeedLink v3.1\r\nfuzz\r\nOK\r\nOK\r\nOK\r\n" + b"".join(packets) + b"END"
+
+
+def _seedlink(path: Path) -> Iterable[object]:
+    """Read the bytes of a file as the answers of a SeedLink server, and the records in them."""
+    pool = web_pool(1.0, 0, 0.01, longest=2.0, largest=2**20)
+    ours, theirs = socket.socketpair()
+    # Everything is said at once, whatever is asked, and fits into the buffer of the connection
+    with ours, theirs:
+        ours.settimeout(1.0)
+        theirs.sendall(path.read_bytes()[:100_000])
+        theirs.shutdown(socket.SHUT_WR)
+        conversation = Conversation(ours, "seedlink://fuzz", pool)
+        is_there = conversation.selected("CI.CLC", [("", "HN1")], (START, START + 10.0))
+        content = b"".join(conversation.records()) if is_there else b""
+    if not content:
+        return []
+    stream = read_bytes_with_obspy(obspy.read, content, str(path), format="MSEED")
+    return [len(trace.data) for trace in stream]
 
 
 def _event_list(path: Path) -> Iterable[object]:

@@ -44,7 +44,7 @@ def test_a_missing_extra_is_named_before_anything_is_computed(
 
 FAULTS = {
     "no table": ("", PAIRS, r"pairs\.csv: no such file"),
-    "missing column": (HEADER.replace("gap", "Gap") + "\n", PAIRS, "missing column gap"),
+    "missing column": (HEADER.replace("gap", "ward") + "\n", PAIRS, "missing column gap"),
     "no catalog": ("", '[pairs]\ncatalog = "none.toml"\nnames = ["x"]\n', r"none\.toml"),
     "no map": (HEADER, f'shakemap = "grid.xml"\n{PAIRS}', r"grid\.xml"),
 }

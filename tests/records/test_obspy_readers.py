@@ -16,8 +16,9 @@ from station_files import record
 
 from per_obspy.errors import RecordRejected
 from per_obspy.records import obspy_readers
+from per_obspy.records.contents.metadata_files import read_inventories
 from per_obspy.records.event_file import read_event
-from per_obspy.records.folder import find_stations, read_inventories
+from per_obspy.records.folder import find_stations
 from per_obspy.records.obspy_readers import FORMATS, read_bytes_with_obspy, read_with_obspy
 from per_obspy.records.summary import describe_records
 

@@ -48,6 +48,8 @@ def test_facts_are_text():
         "record_flags": "baseline_shift second_event",
         "warnings": "HNN: another event: 0.5; HNZ: late trigger: 0.2",
         "notes": "HNZ: short",
+        "coordinates_source": "",
+        "coordinates_conflict": "",
     }
 
 

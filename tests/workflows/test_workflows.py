@@ -109,9 +109,12 @@ def test_cities_in_a_simulated_earthquake_and_in_that_of_mexico(city, real_data,
     mexico, _ = _run_city(city, f"{city}_sct1985.toml", real_data, tmp_path)
     for table in (simulated, mexico):
         assert len(table) == len(pairs)
-        # walls that touch meet in any shaking; gaps of more than a metre between low houses do not
-        # close
-        assert (table[table["gap"] == 0.0]["probability"] == 1.0).all()
+        # outlines that touch are drawn with an error that is assumed: no certain contact, and no
+        # `no`; gaps of more than a metre between low houses do not close
+        touching = table[table["gap"] == 0.0]
+        assert "no" not in set(touching["state"])
+        assert (touching["probability"] < 1.0).all()
+        assert touching["derived"].str.contains("gap_std").all()
         low = np.fmax(table["height_1"], table["height_2"]) < 12.0
         assert (table[(table["gap"] > 1.0) & low]["probability"] < 1e-6).all()
     assert totals["expected_pounding"].sum() == pytest.approx(simulated["probability"].sum())

@@ -1,4 +1,4 @@
-"""Coordinates of stations from plain text: FDSN station text and tables in CSV."""
+"""Coordinates and ground of stations from plain text: FDSN station text and tables in CSV."""
 
 import csv
 import re
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from obspy import Inventory, UTCDateTime
 from obspy.core.inventory import Comment, Network, Station
 
-from per_obspy.errors import RecordRejected
+from per_obspy.errors import RecordRejected, printable
 
 #: column of a table of stations -> names that it may have, in lower case
 _COLUMNS = {
@@ -17,11 +17,16 @@ _COLUMNS = {
     "latitude": ("latitude", "lat", "latitude_deg"),
     "longitude": ("longitude", "lon", "long", "longitude_deg"),
     "elevation": ("elevation", "elev", "height", "elevation_m"),
+    "vs30": ("vs30", "vs_30", "vs30_m/s", "vs30_mps"),
+    "site_class": ("site_class", "siteclass", "ec8", "nehrp", "soil_class"),
 }
 _REQUIRED = ("station", "latitude", "longitude")
 
-#: largest absolute value, degrees or m
-_LARGEST = {"latitude": 90.0, "longitude": 180.0, "elevation": 9000.0}
+#: largest absolute value: degrees, m or m/s
+_LARGEST = {"latitude": 90.0, "longitude": 180.0, "elevation": 9000.0, "vs30": 10_000.0}
+
+#: Beginning of the comment of a station that names the table which describes it.
+SOURCE = "coordinates from "
 
 #: start of an epoch that FDSN station text leaves open
 _OPEN = UTCDateTime(1, 1, 2)
@@ -41,6 +46,12 @@ class StationRow(NamedTuple):
         Degrees.
     elevation : float or None
         m.
+    vs30 : float or None
+        Mean shear-wave velocity of the upper 30 m, m/s.
+    site_class : str
+        Any word; empty if unknown.
+    source : str
+        Name of the table.
     """
 
     network: str
@@ -48,6 +59,9 @@ class StationRow(NamedTuple):
     latitude: float
     longitude: float
     elevation: float | None
+    vs30: float | None = None
+    site_class: str = ""
+    source: str = ""
 
 
 def bare_name(name: str) -> str:
@@ -144,12 +158,34 @@ def _row(line: str, name: str, fields: list[str], places: dict[str, list[int]]) 
     names = tuple(bare_name(word) for word in words["station"] if bare_name(word))
     if not names:
         raise RecordRejected(name, f"{line}, station: empty")
-    # Of the numbers only the elevation may be missing
+    # Only the place may not be missing
     place = [_number(line, name, column, words[column][0]) for column in ("latitude", "longitude")]
-    height = words.get("elevation", [""])[0]
-    elevation = _number(line, name, "elevation", height) if height else None
-    network = words.get("network", [""])[0].upper()
-    return StationRow(network, names, place[0], place[1], elevation)
+    return StationRow(
+        words.get("network", [""])[0].upper(),
+        names,
+        place[0],
+        place[1],
+        _optional_number(line, name, "elevation", words),
+        _velocity(line, name, words),
+        words.get("site_class", [""])[0][:40],
+        printable(re.split(r"[/\\]", name)[-1]),
+    )
+
+
+def _optional_number(
+    line: str, name: str, column: str, words: dict[str, list[str]]
+) -> float | None:
+    """Return a number of a column, None where there is none."""
+    word = words.get(column, [""])[0]
+    return _number(line, name, column, word) if word else None
+
+
+def _velocity(line: str, name: str, words: dict[str, list[str]]) -> float | None:
+    """Return Vs30, m/s; tables write 0 for an unknown one, and a negative one is refused."""
+    velocity = _optional_number(line, name, "vs30", words)
+    if velocity is not None and velocity < 0:
+        raise RecordRejected(name, f"{line}, vs30: {velocity:g} is no velocity in m/s")
+    return velocity or None
 
 
 def _number(line: str, name: str, column: str, word: str) -> float:
@@ -190,8 +226,13 @@ def located_stations(rows: Iterable[StationRow], stations: Iterable[str]) -> Inv
 
 def _station(code: str, row: StationRow) -> Station:
     """Return the description of a station; ObsPy needs a number for an elevation."""
-    comments = [] if row.elevation is not None else [Comment("elevation=unknown")]
+    words = [f"{SOURCE}{row.source or 'a table of stations'}"]
+    words += [] if row.elevation is not None else ["elevation=unknown"]
+    # The ground, as the comments of StationXML have it
+    words += [f"vs30={row.vs30:g}"] if row.vs30 else []
+    words += [f"site_class={row.site_class}"] if row.site_class else []
     elevation = 0.0 if row.elevation is None else row.elevation
+    comments = [Comment(word) for word in words]
     return Station(code, row.latitude, row.longitude, elevation, comments=comments)
 
 

@@ -15,6 +15,9 @@ processing_level
     ``"raw"`` or ``"processed"``.
 coordinates
     latitude, longitude (degrees), elevation (m).
+coordinates_source, coordinates_conflict
+    Name of the table of stations, ``"header"`` or ``"StationXML"``; text with the places of other
+    sources that are more than 1 km away (``records/coordinate_sources.py``).
 sensor_location
     Place in the structure or the ground, as the header has it.
 sensor_azimuth, sensor_dip

@@ -1,36 +1,27 @@
-"""Readers of layers of building footprints: polygons in degrees, attributes, unusable features."""
+"""
+Layers of building footprints: valid polygons in degrees, attributes, unusable features.
 
-import json
-import warnings
+Outlines are kept as WKB, a tenth of the memory of polygons, and are polygons only block by block.
+"""
+
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet
-import pyogrio
 import pyproj
 import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import unreadable_reason
-from per_obspy.inventory.files.plain_columns import plain_columns
-from per_obspy.inventory.footprints.gdal_paths import literal_path
-
-#: Files that GDAL reads; GeoParquet is read by pyarrow.
-GDAL_KINDS = {
-    ".gpkg": "GeoPackage",
-    ".geojson": "GeoJSON file",
-    ".json": "GeoJSON file",
-    ".shp": "Shapefile",
-    ".fgb": "FlatGeobuf file",
-}
-JSON_SUFFIXES = (".geojson", ".json")
-PARQUET_SUFFIXES = (".parquet", ".geoparquet")
+from per_obspy.inventory.footprints.layer_files import RawLayer, read_raw_layer
 
 Geometries = NDArray[np.object_]
+
+#: Features per block, to bound memory.
+BLOCK = 20_000
 
 #: Largest degrees of longitude and latitude, in the order of bounds.
 _DEGREES = [180.0, 90.0, 180.0, 90.0]
@@ -45,26 +36,28 @@ class Layer(NamedTuple):
 
     Attributes
     ----------
-    polygons : (n_buildings,) ndarray of shapely geometries
-        Valid polygons and multipolygons, two-dimensional, longitude and latitude in degrees (WGS
-        84).
+    outlines : pa.Array
+        WKB of ``n_buildings`` valid polygons and multipolygons, two-dimensional, longitude and
+        latitude in degrees (WGS 84).
     attributes : DataFrame
-        One row per polygon; its index is the number of the feature in the file, from 1.
+        One row per outline; its index is the number of the feature in the file, from 1, or the line
+        of a list.
     rejected : tuple of Rejection
         Features whose geometry cannot be used.
     """
 
-    polygons: Geometries
+    outlines: pa.Array
     attributes: pd.DataFrame
     rejected: tuple[Rejection, ...]
 
 
-class _Raw(NamedTuple):
-    """A layer as its file has it: geometries, attributes and coordinate reference system."""
+class _Block(NamedTuple):
+    """Consecutive features: their geometries as read, the same in degrees, and the usable ones."""
 
-    geometries: Geometries
-    attributes: pd.DataFrame
-    crs: Any
+    original: Geometries
+    degrees: Geometries
+    stray: NDArray[np.bool_]
+    good: NDArray[np.bool_]
 
 
 def read_layer(path: str | Path, layer: str | None = None) -> Layer:
@@ -74,7 +67,8 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     Parameters
     ----------
     path : str or Path
-        GeoPackage, GeoJSON, Shapefile, FlatGeobuf or GeoParquet.
+        GeoPackage, GeoJSON, Shapefile, FlatGeobuf, GeoParquet, or a CSV list of buildings with
+        outlines.
     layer : str, optional
         Name of the layer, for files that have several.
 
@@ -85,155 +79,96 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
         contains no polygons.
     """
     file = Path(path)
-    raw = _read(file, layer)
-    _require_outlines(file, raw.geometries)
+    raw = read_raw_layer(file, layer)
+    _require_outlines(file, raw)
+    transformer, is_projected = to_degrees(file, raw.crs)
+    # Outlines that can be used and reasons for the others, block by block
+    outlines, rejected, good = [], list(raw.broken), np.zeros(len(raw.wkb), dtype=bool)
+    for start, geometries in _blocks(raw.wkb):
+        block = _checked_block(geometries, transformer, is_projected)
+        outlines.append(pa.array(shapely.to_wkb(block.degrees[block.good]), pa.large_binary()))
+        good[start : start + len(geometries)] = block.good
+        rejected += _rejections(file, raw, start, block)
+    attributes = raw.attributes.filter(pa.array(good)).to_pandas()
+    attributes.index = pd.Index(raw.numbers[good])
+    # In the order of the file
+    rejected.sort(key=lambda row: row.row or 0)
+    return Layer(pa.concat_arrays(outlines), attributes, tuple(rejected))
+
+
+def polygons(outlines: pa.Array) -> Geometries:
+    """Return the polygons of outlines that are WKB."""
+    wkb = outlines.to_numpy(zero_copy_only=False)
+    return np.asarray(shapely.from_wkb(wkb, on_invalid="ignore"), dtype=object)
+
+
+def _blocks(wkb: pa.ChunkedArray) -> Iterator[tuple[int, Geometries]]:
+    """Yield position and geometries of every block."""
+    for start in range(0, len(wkb), BLOCK):
+        yield start, polygons(wkb.slice(start, BLOCK))
+
+
+def _require_outlines(file: Path, raw: RawLayer) -> None:
+    """Raise CatalogError if a layer is empty or has points only."""
+    if len(raw.wkb) == 0:
+        raise CatalogError(str(file), "the layer has no features")
+    kinds: set[int] = set()
+    for _, geometries in _blocks(raw.wkb):
+        found = shapely.get_type_id(geometries)
+        kinds |= set(found[found >= 0].tolist())
+        # One outline is enough
+        if kinds - _POINTS:
+            return
+    if raw.faults and not kinds:
+        return
+    raise CatalogError(
+        str(file), "the layer holds points, not footprints: a gap is a distance between walls"
+    )
+
+
+def in_degrees(original: Geometries, transformer: pyproj.Transformer) -> Geometries:
+    """Return geometries in longitude and latitude."""
+    return np.asarray(
+        shapely.transform(
+            shapely.force_2d(original),
+            lambda xy: np.column_stack(transformer.transform(*xy.T)),
+        )
+    )
+
+
+def _checked_block(
+    original: Geometries, transformer: pyproj.Transformer, is_projected: bool
+) -> _Block:
+    """Return geometries in degrees, and where they are footprints."""
     # Longitude and latitude of every feature
-    crs = _reference_system(file, raw.crs)
-    degrees = _in_degrees(file, shapely.force_2d(raw.geometries), crs)
+    degrees = in_degrees(original, transformer)
     # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates are
     # degrees
-    stray = _on_earth(raw.geometries) & bool(crs.is_projected)
-    good = _are_footprints(degrees) & ~stray
-    # Features without a usable polygon
+    stray = _on_earth(original) & is_projected
+    return _Block(original, degrees, stray, _are_footprints(degrees) & ~stray)
+
+
+def _rejections(file: Path, raw: RawLayer, start: int, block: _Block) -> list[Rejection]:
+    """Return the rejections of the features of a block."""
+    # A list knows its faults, other files show them
     rejected = []
-    for i in np.flatnonzero(~good).tolist():
-        fault = _fault(degrees[i], raw.geometries[i], stray[i])
-        rejected.append(_rejection(file, i + 1, fault))
-    attributes = raw.attributes.set_index(pd.RangeIndex(1, len(good) + 1))
-    return Layer(degrees[good], attributes[good], tuple(rejected))
+    for i in np.flatnonzero(~block.good).tolist():
+        number = int(raw.numbers[start + i])
+        fault = raw.faults.get(start + i)
+        reason = fault or _fault(block.degrees[i], block.original[i], bool(block.stray[i]))
+        rejected.append(Rejection("building", f"feature {number}", str(file), number, (reason,)))
+    return rejected
 
 
-def _require_outlines(file: Path, geometries: Geometries) -> None:
-    """Raise CatalogError if a layer is empty or has points only."""
-    if len(geometries) == 0:
-        raise CatalogError(str(file), "the layer has no features")
-    kinds = shapely.get_type_id(geometries)
-    if set(kinds[kinds >= 0].tolist()) <= _POINTS:
-        raise CatalogError(
-            str(file), "the layer holds points, not footprints: a gap is a distance between walls"
-        )
-
-
-def _rejection(file: Path, number: int, fault: str) -> Rejection:
-    """Return the rejection of a feature by its number in the file."""
-    return Rejection("building", f"feature {number}", str(file), number, (fault,))
-
-
-def _read(file: Path, layer: str | None) -> _Raw:
-    """Read a layer by the reader of the file's suffix."""
-    suffix = file.suffix.lower()
-    if not file.exists():
-        raise CatalogError(str(file), "no such file")
-    if suffix == ".csv":
-        raise CatalogError(
-            str(file),
-            "a table has no walls, and a gap is a distance between walls: footprints are needed",
-        )
-    # GDAL knows further files, but not whether they hold footprints
-    if suffix not in (*GDAL_KINDS, *PARQUET_SUFFIXES):
-        expected = ", ".join((*GDAL_KINDS, *PARQUET_SUFFIXES))
-        raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
-    return _read_gdal(file, layer) if suffix in GDAL_KINDS else _read_geoparquet(file)
-
-
-def _read_gdal(file: Path, layer: str | None) -> _Raw:
-    """Read a layer with GDAL."""
+def to_degrees(file: Path, crs: Any) -> tuple[pyproj.Transformer, bool]:
+    """Return the transformation to longitude and latitude, and whether it is from a projection."""
+    system = _reference_system(file, crs)
     try:
-        # GDAL warns of its repairs, such as rings that are not closed, and of unreadable features
-        with (
-            warnings.catch_warnings(action="ignore", category=RuntimeWarning),
-            literal_path(file) as path,
-        ):
-            name = _layer_name(file, path, layer)
-            meta, _, geometries, fields = pyogrio.raw.read(path, layer=name, force_2d=False)
-    except (
-        pyogrio.errors.DataSourceError,
-        pyogrio.errors.DataLayerError,
-        UnicodeDecodeError,
-    ) as error:
-        problem = unreadable_reason(file, GDAL_KINDS[file.suffix.lower()], error)
+        transformer = pyproj.Transformer.from_crs(system, "OGC:CRS84", always_xy=True)
+    except pyproj.exceptions.ProjError as error:
+        problem = f"coordinate reference system {system.name!r:.60} cannot be turned into WGS 84"
         raise CatalogError(str(file), problem) from error
-    # What GDAL found, but for a reference system that it does not know
-    columns = dict(zip(meta["fields"], fields, strict=True))
-    attributes = pd.DataFrame(columns, index=range(len(geometries)))
-    is_json = file.suffix.lower() in JSON_SUFFIXES
-    crs = (_declared_system(file) if is_json else None) or meta["crs"]
-    return _Raw(shapely.from_wkb(geometries, on_invalid="ignore"), attributes, crs)
-
-
-def _declared_system(file: Path) -> str | None:
-    """Return the coordinate reference system of a GeoJSON file, for which GDAL may take WGS 84."""
-    text = file.read_bytes()
-    if b'"crs"' not in text:
-        return None
-    try:
-        declared = json.loads(text).get("crs")
-    except (ValueError, AttributeError, RecursionError) as error:
-        raise CatalogError(str(file), f"not a GeoJSON file: {error}") from error
-    if declared is None:
-        return None
-    # The name of the older standard, or its form with a code
-    try:
-        properties = declared["properties"]
-        return str(properties["name"] if "name" in properties else f"EPSG:{properties['code']}")
-    except (KeyError, TypeError):
-        return json.dumps(declared)
-
-
-def _layer_name(file: Path, path: Path, layer: str | None) -> str:
-    """Return the requested layer of a path, or the only one with geometries."""
-    kinds = {str(name): kind for name, kind in pyogrio.list_layers(path)}
-    if layer is not None:
-        if layer not in kinds:
-            raise CatalogError(str(file), f"no layer {layer!r} (layers found: {', '.join(kinds)})")
-        return layer
-    # A layer without geometries is a table
-    spatial = [name for name, kind in kinds.items() if kind is not None]
-    if not spatial:
-        found = ", ".join(kinds) or "none"
-        raise CatalogError(str(file), f"no layer has geometries (layers found: {found})")
-    if len(spatial) > 1:
-        raise CatalogError(str(file), f"several layers, name one: {', '.join(spatial)}")
-    return spatial[0]
-
-
-def _read_geoparquet(file: Path) -> _Raw:
-    """Read a GeoParquet file."""
-    try:
-        table = pa.parquet.read_table(file.absolute())
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
-    # GeoParquet is described by JSON in the metadata
-    described = (table.schema.metadata or {}).get(b"geo")
-    if described is None:
-        raise CatalogError(
-            str(file), "no GeoParquet metadata: a table of pairs is no layer of footprints"
-        )
-    name, geometries, crs = _geometry_column(file, table, described)
-    attributes, faults = plain_columns(table.drop_columns([name]).replace_schema_metadata(None))
-    for row, fault in faults.items():
-        raise CatalogError(str(file), f"feature {row + 1}: {fault}")
-    return _Raw(geometries, attributes.to_pandas(), crs)
-
-
-def _geometry_column(file: Path, table: pa.Table, described: bytes) -> tuple[str, Geometries, Any]:
-    """Return name, geometries and coordinate reference system of the primary geometry column."""
-    try:
-        geo = json.loads(described)
-        name = geo["primary_column"]
-        column = geo["columns"][name]
-        encoding = column.get("encoding")
-        # Other encodings are refused below
-        geometries = None
-        if encoding == "WKB":
-            geometries = shapely.from_wkb(table[name].to_numpy(), on_invalid="ignore")
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        problem = f"wrong GeoParquet metadata: {type(error).__name__} {error}"
-        raise CatalogError(str(file), problem) from error
-    if geometries is None:
-        raise CatalogError(str(file), f"geometries are encoded as {encoding!r}, expected WKB")
-    # A missing CRS means OGC:CRS84 by the GeoParquet specification, an explicit null means unknown
-    return name, geometries, column.get("crs", "OGC:CRS84")
+    return transformer, bool(system.is_projected)
 
 
 def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
@@ -250,18 +185,6 @@ def _reference_system(file: Path, crs: Any) -> pyproj.CRS:
         problem = f"coordinate reference system {found.name!r:.60} is of another kind"
         raise CatalogError(str(file), f"{problem}, expected a geographic or projected one")
     return found
-
-
-def _in_degrees(file: Path, geometries: Geometries, crs: pyproj.CRS) -> Geometries:
-    """Return geometries in longitude and latitude."""
-    try:
-        transformer = pyproj.Transformer.from_crs(crs, "OGC:CRS84", always_xy=True)
-    except pyproj.exceptions.ProjError as error:
-        problem = f"coordinate reference system {crs.name!r:.60} cannot be turned into WGS 84"
-        raise CatalogError(str(file), problem) from error
-    return np.asarray(
-        shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
-    )
 
 
 def _are_footprints(degrees: Geometries) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ the pair is the mean normal of its facing walls, weighted by length; without fac
 corners meet) it is the shortest connection.
 """
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,22 @@ ROW_ANGLE = 45.0
 CHUNK = 20_000
 
 
+class Outlines(NamedTuple):
+    """
+    Footprints in metres that are polygons only when they are needed.
+
+    Attributes
+    ----------
+    bounds : (n_buildings, 4) ndarray
+        West, south, east, north, m.
+    polygons : callable
+        Polygons or multipolygons of an array of positions.
+    """
+
+    bounds: FloatArray
+    polygons: Callable[[IntArray], Geometries]
+
+
 class Neighbours(NamedTuple):
     """
     Pairs of footprints, ``first < second``, one element per pair.
@@ -50,8 +67,8 @@ class Neighbours(NamedTuple):
         Length over which walls face each other, m.
     azimuth : (n_pairs,) ndarray
         From first to second, degrees clockwise from the projection's north.
-    inside : (n_pairs,) ndarray of bool
-        Whether both have a further neighbour on the other side.
+    inside_1, inside_2 : (n_pairs,) ndarray of bool
+        Whether the first and the second have a further neighbour on the other side.
     """
 
     first: IntArray
@@ -60,7 +77,21 @@ class Neighbours(NamedTuple):
     overlap: FloatArray
     facing_length: FloatArray
     azimuth: FloatArray
-    inside: NDArray[np.bool_]
+    inside_1: NDArray[np.bool_]
+    inside_2: NDArray[np.bool_]
+
+    def rows(self, rows: slice) -> "Neighbours":
+        """Return some of the pairs."""
+        return Neighbours(
+            self.first[rows],
+            self.second[rows],
+            self.gap[rows],
+            self.overlap[rows],
+            self.facing_length[rows],
+            self.azimuth[rows],
+            self.inside_1[rows],
+            self.inside_2[rows],
+        )
 
 
 class _Walls(NamedTuple):
@@ -75,38 +106,77 @@ class _Walls(NamedTuple):
     end: FloatArray
 
 
-def neighbours(polygons: Geometries, distance: float) -> Neighbours:
+def neighbours(outlines: Outlines, distance: float) -> Neighbours:
     """
-    Find the pairs of footprints within a distance.
+    Find the pairs of footprints within a distance, block by block.
 
     Parameters
     ----------
-    polygons : (n_buildings,) ndarray of shapely polygons or multipolygons
-        In metres, valid.
+    outlines : Outlines
+        Footprints in metres, valid.
     distance : float
         Largest gap, m.
     """
-    first, second = _close(polygons, distance)
-    gap = shapely.distance(polygons[first], polygons[second])
-    gap = np.where(gap < TOUCHING, 0.0, gap)
-    # Axis by facing walls where there are any, else by the shortest connection
+    positions, columns = list[IntArray](), list[FloatArray]()
+    for first, second in _near_boxes(outlines, distance):
+        found, measured = _measured(outlines, first, second, distance)
+        positions.append(found)
+        columns.append(measured)
+    # All pairs, which show where rows go on
+    first, second = np.concatenate(positions, axis=1)
+    gap, overlap, facing, azimuth = np.concatenate(columns, axis=1)
+    inside_1, inside_2 = _inside_row(first, second, azimuth)
+    return Neighbours(first, second, gap, overlap, facing, azimuth, inside_1, inside_2)
+
+
+def _near_boxes(outlines: Outlines, distance: float) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield blocks of footprints whose bounding boxes are near, every pair once and in order."""
+    # A tree over the diagonals has the boxes of the outlines, in a fifth of their memory
+    corners = outlines.bounds.reshape(-1, 2, 2)
+    tree = shapely.STRtree(shapely.linestrings(corners))
+    low, high = outlines.bounds[:, :2] - distance, outlines.bounds[:, 2:] + distance
+    for start in range(0, len(corners), CHUNK):
+        rows = slice(start, start + CHUNK)
+        reach = shapely.box(*low[rows].T, *high[rows].T)
+        query, found = tree.query(reach)
+        is_once = query + start < found
+        first, second = query[is_once] + start, found[is_once]
+        order = np.lexsort((second, first))
+        # Large buildings have many neighbours
+        for part in range(0, max(order.size, 1), CHUNK):
+            chosen = order[part : part + CHUNK]
+            yield first[chosen], second[chosen]
+
+
+def _measured(
+    outlines: Outlines, first: IntArray, second: IntArray, distance: float
+) -> tuple[IntArray, FloatArray]:
+    """
+    Return the pairs within a distance.
+
+    Their positions, (2, n_pairs), and gap, overlap, facing length and azimuth, (4, n_pairs).
+    """
+    # Polygons of the block, each once
+    numbers, place = np.unique(np.concatenate([first, second]), return_inverse=True)
+    polygons = outlines.polygons(numbers)
+    one, other = place[: first.size], place[first.size :]
+    gap = shapely.distance(polygons[one], polygons[other])
+    near = gap <= distance
+    one, other, gap = one[near], other[near], np.where(gap < TOUCHING, 0.0, gap)[near]
+    facing, azimuth = _axis(polygons, one, other, gap)
+    overlap = _overlap(polygons, one, other, gap)
+    return np.stack([first[near], second[near]]), np.stack([gap, overlap, facing, azimuth])
+
+
+def _axis(
+    polygons: Geometries, first: IntArray, second: IntArray, gap: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the length of facing walls of each pair, m, and its azimuth, degrees."""
+    # By facing walls where there are any, else by the shortest connection
     facing, normals = _facing(polygons, first, second, gap)
     connection = _connection(polygons[first], polygons[second], gap)
     axis = np.where(facing[:, None] > 0.0, normals, connection)
-    azimuth = np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
-    overlap = _overlap(polygons, first, second, gap)
-    is_inside = _inside_row(first, second, azimuth)
-    return Neighbours(first, second, gap, overlap, facing, azimuth, is_inside)
-
-
-def _close(polygons: Geometries, distance: float) -> tuple[IntArray, IntArray]:
-    """Return the positions of footprints within a distance, every pair once and in order."""
-    tree = shapely.STRtree(polygons)
-    query, found = tree.query(polygons, predicate="dwithin", distance=distance)
-    order = np.lexsort((found, query))
-    first, second = query[order], found[order]
-    is_once = first < second
-    return first[is_once], second[is_once]
+    return facing, np.rad2deg(np.arctan2(axis[:, 0], axis[:, 1])) % 360.0
 
 
 def _overlap(
@@ -149,20 +219,18 @@ def _facing(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length of facing walls of each pair, m, and the sum of normal times length."""
     walls, bounds = _walls(polygons), shapely.bounds(polygons)
-    length, axis = np.zeros(first.size), np.zeros((first.size, 2))
-    for start in range(0, first.size, CHUNK):
-        rows = slice(start, start + CHUNK)
-        reach = gap[rows] + FACING_DEPTH
-        # Combinations of walls that come near the other building
-        near_1 = _near(walls, first[rows], bounds[second[rows]], reach)
-        near_2 = _near(walls, second[rows], bounds[first[rows]], reach)
-        pair, wall_1, wall_2 = _combined(near_1, near_2, reach.size)
-        # Sums over the combinations of each pair
-        shared, normal = _facing_walls(walls, wall_1, wall_2, reach[pair])
-        length[rows] = np.bincount(pair, shared, minlength=reach.size)
-        for i in (0, 1):
-            axis[rows, i] = np.bincount(pair, shared * normal[:, i], minlength=reach.size)
-    return length, axis
+    # Combinations of walls that come near the other building
+    reach = gap + FACING_DEPTH
+    near_1 = _near(walls, first, bounds[second], reach)
+    near_2 = _near(walls, second, bounds[first], reach)
+    pair, wall_1, wall_2 = _combined(near_1, near_2, reach.size)
+    # Sums over the combinations of each pair
+    shared, normal = _facing_walls(walls, wall_1, wall_2, reach[pair])
+    length = np.bincount(pair, shared, minlength=reach.size)
+    axis = np.zeros((reach.size, 2))
+    for i in (0, 1):
+        axis[:, i] = np.bincount(pair, shared * normal[:, i], minlength=reach.size)
+    return np.asarray(length, dtype=np.float64), axis
 
 
 def _expanded(starts: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
@@ -242,8 +310,10 @@ def _ratio(part: FloatArray, whole: FloatArray, where: NDArray[np.bool_]) -> Flo
     return np.divide(part, whole, out=np.zeros_like(part), where=where)
 
 
-def _inside_row(first: IntArray, second: IntArray, azimuth: FloatArray) -> NDArray[np.bool_]:
-    """Return where both buildings of a pair have a further neighbour on the opposite side."""
+def _inside_row(
+    first: IntArray, second: IntArray, azimuth: FloatArray
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where either building of a pair has a further neighbour on the opposite side."""
     # Each pair seen from both buildings, grouped by building
     building = np.concatenate([first, second])
     direction = np.concatenate([azimuth, azimuth + 180.0])
@@ -255,4 +325,4 @@ def _inside_row(first: IntArray, second: IntArray, azimuth: FloatArray) -> NDArr
     turn = (direction[order][other] - direction[seen]) % 360.0
     is_opposite = np.abs(turn - 180.0) < ROW_ANGLE
     continues = np.bincount(seen, is_opposite, minlength=building.size) > 0
-    return continues[: first.size] & continues[first.size :]
+    return continues[: first.size], continues[first.size :]

@@ -13,6 +13,9 @@ NAMED_CHECKS = ("baseline_shift", "second_event")
 KINDS = {
     "digitised": "digitised from film: short and long periods are less certain",
     "undated": "the start time is unknown: it is not known of which earthquake the record is",
+    "contradicting_coordinates": (
+        "two sources place the station more than 1 km apart: see coordinates_conflict"
+    ),
 }
 
 
@@ -31,8 +34,8 @@ def flags_noted(stream: Stream) -> Stream:
     obspy Stream
         ``stats.per_obspy.record_flags`` of a record may hold ``baseline_shift``,
         ``second_event``, ``assumed_corners``, ``record_warning`` (another check that warns),
-        ``digitised`` and ``undated``; it is missing where there is none. The last two are in
-        ``warnings`` too. Flags of an earlier processing stay.
+        ``digitised``, ``undated`` and ``contradicting_coordinates``; it is missing where there is
+        none. The last three are in ``warnings`` too. Flags of an earlier processing stay.
     """
     out = Stream()
     for trace in stream:
@@ -63,17 +66,21 @@ def record_flags(trace: Trace) -> list[str]:
 
 
 def _kinds(trace: Trace) -> set[str]:
-    """Return the flags of film, and of a record whose clock was never set."""
+    """Return the flags of film, of a clock that was never set, and of contradicting places."""
     # Zeros that the filter put before the record are no part of it
     pads = trace.stats.get("per_obspy", {})
     start = trace.stats.starttime + (pads.get("pad_before") or 0.0)
     is_undated = (start.year, start.month, start.day) in UNSET_DAYS
-    kinds = {"digitised": bool(trace.stats.get("digitised")), "undated": is_undated}
+    kinds = {
+        "digitised": bool(trace.stats.get("digitised")),
+        "undated": is_undated,
+        "contradicting_coordinates": bool(trace.stats.get("coordinates_conflict")),
+    }
     return {name for name, is_so in kinds.items() if is_so}
 
 
 def _warn_of_kind(trace: Trace, flags: list[str]) -> None:
-    """Append the warnings of film and unset clocks to those of a trace, each once."""
+    """Append the warnings of film, unset clocks and places to those of a trace, each once."""
     earlier = str(trace.stats.per_obspy.get("warnings") or "")
     texts = [KINDS[flag] for flag in flags if flag in KINDS and KINDS[flag] not in earlier]
     if texts:

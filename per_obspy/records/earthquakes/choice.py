@@ -1,27 +1,34 @@
 """The one earthquake of a folder that is screened: its stations and files, and what is left out."""
 
-from collections.abc import Container
+import logging
+from collections.abc import Container, Iterable
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from obspy import Stream, Trace, UTCDateTime
+from obspy import Inventory, Stream, Trace, UTCDateTime
+from obspy.core import AttribDict
 from obspy.core.event import Event
 
 from per_obspy import config
-from per_obspy.errors import Rejection
-from per_obspy.records.archives import LIMITS
+from per_obspy.errors import Rejection, shortened
+from per_obspy.records.archives.archive_files import LIMITS
 from per_obspy.records.earthquakes.groups import (
+    GAP,
     HOURS,
     MARGIN,
     EventGroup,
     RecordSpan,
     chosen_group,
     event_groups,
+    follows,
     station_files,
 )
+from per_obspy.records.earthquakes.header_event import AgreedEvent, HeaderEvent, agreed_event
 from per_obspy.records.folder import SourceContents, read_station
+
+log = logging.getLogger(__name__)
 
 #: Reads a station from its files, metadata and name, as ``records.folder.read_station`` does.
 Reader = partial[tuple[Stream, tuple[Rejection, ...]]]
@@ -40,7 +47,8 @@ class OneEarthquake(NamedTuple):
         only a window is read.
     earthquakes : list of dict
         Facts of every group, for ``run.json``: ``start``, ``stations``, ``records``, ``undated``
-        (records without a date that are taken for this earthquake) and ``screened``.
+        (records without a date that are taken for this earthquake), ``screened``, and ``headers``:
+        the earthquake by the headers of its records, see ``earthquakes.header_event``.
     """
 
     contents: tuple[tuple[SourceContents, Reader], ...]
@@ -73,6 +81,9 @@ def one_earthquake(
     motion = partial(largest_motion, found, reader)
     group = chosen_group(groups, time, source, motion, records.event_gap)
     facts = [_facts(other, is_screened=other is group) for other in groups]
+    # Without an event of the configuration that of the headers counts
+    if event is None:
+        reader = reader_of_event(reader, group_event(group, records.event_gap))
     # Everything that is not of this earthquake is listed
     members = {record.key for record in group.records}
     others = [record for record in found.records if record.key not in members]
@@ -80,6 +91,30 @@ def one_earthquake(
     mixed = {record.path for record in others}
     found = found._replace(rejected=rejected)
     return OneEarthquake(_contents(found, group, mixed, reader), facts)
+
+
+def read_station_of(
+    paths: Iterable[Path],
+    inventory: Inventory | None,
+    station: str | None = None,
+    *,
+    event: HeaderEvent,
+    **options: Any,
+) -> tuple[Stream, tuple[Rejection, ...]]:
+    """
+    Read a station as ``records.folder.read_station``, with the earthquake of most headers.
+
+    Parameters
+    ----------
+    paths, inventory, station, **options
+        As for ``read_station``.
+    event : HeaderEvent
+        Takes the place of ``stats.event`` of every trace.
+    """
+    stream, rejected = read_station(paths, inventory, station, **options)
+    for trace in stream:
+        trace.stats.event = AttribDict(event.words)
+    return stream, rejected
 
 
 def _reader(limits: config.Archives) -> Reader:
@@ -175,13 +210,57 @@ def _rejection(record: RecordSpan, screened: EventGroup) -> Rejection:
     return Rejection("record", record.record, str(record.path), None, (reason,))
 
 
+def group_event(group: EventGroup, gap: float = GAP) -> AgreedEvent | None:
+    """
+    Return the earthquake by the headers of a group's records; None if no header describes one.
+
+    Parameters
+    ----------
+    group : EventGroup
+        Records of one earthquake.
+    gap : float
+        Longest time from the origin to the start of the records, s; an origin at another time is
+        no earthquake of these records.
+    """
+    found = agreed_event((record.station, record.event) for record in group.records)
+    if found is None or found.event is None or not found.event.time:
+        return found
+    if follows(group, UTCDateTime(found.event.time), gap):
+        return found
+    # An origin hours away: the headers or the clocks are wrong
+    stations = {record.station for record in group.records if record.event}
+    return AgreedEvent(None, 0, dict.fromkeys(sorted(stations), found.event) | found.others)
+
+
+def reader_of_event(reader: Reader, found: AgreedEvent | None) -> Reader:
+    """Return a reader of stations whose records have the earthquake of most headers, if any has."""
+    if found is None:
+        return reader
+    _warn_of_contradictions(found)
+    if found.event is None:
+        return reader
+    return partial(read_station_of, event=found.event, **reader.keywords)
+
+
+def _warn_of_contradictions(found: AgreedEvent) -> None:
+    """Log which stations have headers of another earthquake than most, or that none has most."""
+    others = "; ".join(f"{name}: {event}" for name, event in found.others.items())
+    if others and found.event is None:
+        log.warning("headers of records describe no common earthquake: %s", shortened(others))
+    elif others:
+        message = "%d headers describe another earthquake than the %d of most, %s: %s"
+        log.warning(message, len(found.others), found.stations, found.event, shortened(others))
+
+
 def _facts(group: EventGroup, is_screened: bool) -> dict[str, object]:
     """Return the facts of a group."""
     undated = sum(not record.is_dated for record in group.records)
+    by_headers = group_event(group)
     return {
         "start": group.label,
         "stations": group.stations,
         "records": len(group.records),
         "undated": undated,
         "screened": is_screened,
+        "headers": by_headers.facts if by_headers else None,
     }

@@ -22,6 +22,8 @@ from obspy import Trace, UTCDateTime
 
 from per_obspy.constants import UNSET_DAYS
 from per_obspy.errors import CatalogError
+from per_obspy.formats.knet import knet_event
+from per_obspy.records.earthquakes.header_event import HeaderEvent, header_event
 
 #: Longest time from the first start of a group to the last, s.
 GAP = 300.0
@@ -50,6 +52,8 @@ class RecordSpan(NamedTuple):
         Its file.
     start, end : UTCDateTime
         Of the first and the last sample.
+    event : HeaderEvent or None
+        The earthquake by the record's header.
     """
 
     record: str
@@ -57,6 +61,7 @@ class RecordSpan(NamedTuple):
     path: Path
     start: UTCDateTime
     end: UTCDateTime
+    event: HeaderEvent | None = None
 
     @property
     def key(self) -> tuple[str, str, int, int]:
@@ -122,7 +127,9 @@ def record_span(trace: Trace, path: Path) -> RecordSpan:
     pads = stats.get("per_obspy", {})
     start = stats.starttime + (pads.get("pad_before") or 0.0)
     end = stats.endtime - (pads.get("pad_after") or 0.0)
-    return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end)
+    # ObsPy's own reader keeps the header of K-NET apart
+    event = header_event(knet_event(trace) if "knet" in stats else stats.get("event"))
+    return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end, event)
 
 
 def station_files(records: Iterable[RecordSpan]) -> dict[str, tuple[Path, ...]]:
@@ -192,7 +199,7 @@ def chosen_group(
         If the records of no group contain the time, or follow it within the gap.
     """
     if time is not None:
-        fitting = [group for group in groups if _follows(group, time, gap)]
+        fitting = [group for group in groups if follows(group, time, gap)]
         if not fitting:
             starts = ", ".join(group.label for group in groups)
             problem = f"no record is of {time}, they start {starts}: choose one by records.time"
@@ -282,8 +289,8 @@ def _group(members: Sequence[RecordSpan]) -> EventGroup:
     return EventGroup(first.start if first.is_dated else None, tuple(members))
 
 
-def _follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
-    """Return whether a group's records contain a time or start within the gap after it."""
+def follows(group: EventGroup, time: UTCDateTime, gap: float) -> bool:
+    """Return whether a group's records contain a time or start within a gap, s, after it."""
     window = group.window
     if window is None:
         return True

@@ -39,6 +39,7 @@ from per_obspy.records.fdsn.request import (
 from per_obspy.records.fdsn.web import WebPool, answer, host, web_pool
 from per_obspy.records.folder import SourceContents, find_stations
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
+from per_obspy.records.seedlink.server_address import server_address
 from per_obspy.resume import (
     Status,
     StatusError,
@@ -102,7 +103,7 @@ def fetch(
     fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
-    key = digest((fetched.wanted, request.providers))
+    key = digest((fetched.wanted, request.providers, *request.seedlink))
     status_file = request.cache / f"complete-{key}.json"
     known = None if again else _known_rejections(earlier_status(status_file, key))
     if known is not None:
@@ -147,7 +148,7 @@ def _fetch_missing(
     bases, rejected = base_urls(pool, request.providers, station_parameters(wanted))
     offers, unlisted, unusable = _offers(pool, bases, wanted)
     rejected += unlisted
-    outcomes = _stations(pool, fetched, offers, request.connections, progress)
+    outcomes = _stations(pool, fetched, offers, request, progress)
     complete = not rejected and all(outcome.lasting for outcome in outcomes)
     rejected += unusable
     # Stations without a reason are in the cache
@@ -278,16 +279,19 @@ def _stations(
     pool: WebPool,
     fetched: Fetched,
     offers: dict[str, list[Offer]],
-    connections: int,
+    request: config.Fdsn,
     progress: Progress,
 ) -> list[Outcome]:
     """Fetch several stations at the same time; when interrupted, leave the rest for later."""
     # Files are whole one by one: an interruption loses only those under way
-    threads = ThreadPoolExecutor(connections)
+    threads = ThreadPoolExecutor(request.connections)
+    live = [server_address(server) for server in request.seedlink]
     outcomes = []
     try:
         futures = [
-            threads.submit(fetch_station, pool, fetched.wanted, fetched.folder, name, services)
+            threads.submit(
+                fetch_station, pool, fetched.wanted, fetched.folder, name, services, live
+            )
             for name, services in offers.items()
         ]
         for future in as_completed(futures):

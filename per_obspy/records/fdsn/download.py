@@ -1,5 +1,7 @@
 """Download of one station: records and metadata from the first of several FDSN services."""
 
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +14,8 @@ from per_obspy.records.fdsn.request import Wanted, channel_parameters, digest
 from per_obspy.records.fdsn.web import RequestTooLarge, WebPool, answer, host, whole_answer
 from per_obspy.records.folder import station_name
 from per_obspy.records.obspy_readers import read_bytes_with_obspy
+from per_obspy.records.seedlink.seedlink_window import seedlink_window
+from per_obspy.records.seedlink.server_address import ServerAddress
 from per_obspy.resume import StatusError, hash_if_readable, read_status, write_status
 
 #: Times that an answer without an announced end is compared with the next.
@@ -54,7 +58,12 @@ class Outcome(NamedTuple):
 
 
 def fetch_station(
-    pool: WebPool, wanted: Wanted, folder: Path, station: str, offers: list[Offer]
+    pool: WebPool,
+    wanted: Wanted,
+    folder: Path,
+    station: str,
+    offers: list[Offer],
+    live: Sequence[ServerAddress] = (),
 ) -> Outcome:
     """
     Download a station into a folder as ``NET.STA.mseed`` and ``NET.STA.xml``.
@@ -74,6 +83,8 @@ def fetch_station(
         ``"NET.STA"``.
     offers : list of Offer
         In order of preference.
+    live : sequence of ServerAddress
+        SeedLink servers, which are asked for records that no service has.
     """
     reasons, lasting = [], True
     # The next service is tried only where one fails
@@ -88,7 +99,19 @@ def fetch_station(
             lasting = False
         else:
             return Outcome(station, (), lasting=True)
-    return Outcome(station, tuple(reasons), lasting)
+    # Minutes after an earthquake archives may not have what servers of real-time data have
+    for server, offer in product(live, offers):
+        try:
+            _fetch_live(pool, wanted, inside(folder, f"{station}.mseed"), offer, server)
+            _fetch_metadata(pool, wanted, inside(folder, f"{station}.xml"), offer)
+        except _NoData as refusal:
+            reasons.append(str(refusal))
+        except (ServiceError, RecordRejected) as fault:
+            reasons.append(str(fault))
+            lasting = False
+        else:
+            return Outcome(station, (), lasting=True)
+    return Outcome(station, tuple(dict.fromkeys(reasons)), lasting)
 
 
 class _NoData(ServiceError):
@@ -113,6 +136,21 @@ def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> N
                 problem = f"answers with something else than channel {'.'.join(codes)}"
                 raise RecordRejected(public_url(url), problem)
             content += alone
+    _write(path, content, wanted, offer)
+
+
+def _fetch_live(
+    pool: WebPool, wanted: Wanted, path: Path, offer: Offer, server: ServerAddress
+) -> None:
+    """Download the records of a station from a SeedLink server unless they are there."""
+    if _is_whole(path, wanted):
+        return
+    window = (wanted.start, wanted.end)
+    content = seedlink_window(pool, server, path.stem, offer.channels, window)
+    if not content:
+        raise _NoData(f"{server} has no data of the window")
+    # Records of another station must not enter the cache under this name
+    _channels(content, f"seedlink://{server}", path.stem)
     _write(path, content, wanted, offer)
 
 

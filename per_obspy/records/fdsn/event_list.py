@@ -184,7 +184,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     # Anything but a whole file is fetched
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:
-        content = answer(pool, url, {"eventid": event_id, "format": "quakeml"})
+        content = answer(pool, url, {"eventid": event_id, "format": "xml"})
     except NotFound:
         content = b""
     if not content:

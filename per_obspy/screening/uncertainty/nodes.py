@@ -7,7 +7,7 @@ alike, so that a row does not depend on the other pairs.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from per_obspy.checks import FloatArray
@@ -22,6 +22,10 @@ NODES: FloatArray = ndtri(qmc.Sobol(6, scramble=False).fast_forward(128).random(
 
 #: Columns of ``NODES``: both buildings, demand, gap.
 BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
+
+#: Shares of measured gaps below the quantiles that a lognormal gap has of them, for outlines that
+#: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
+TOUCHING, APART, WIDE = (0.01, 0.9), (0.16, 0.84), 3.0
 
 #: Largest damping of a node, fraction of critical: an oscillator has less than the critical one.
 LARGEST_DAMPING = 0.99
@@ -68,15 +72,49 @@ def building_is_uncertain(pairs: Table) -> NDArray[np.bool_]:
 
 
 def gap_dispersion(pairs: Table) -> FloatArray:
-    """Return the log-standard deviation of a lognormal gap; 0 of pairs that touch."""
-    gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
-    separated = gap > 0
-    dispersion = np.zeros_like(gap)
-    dispersion[separated] = lognormal_dispersion(gap[separated], deviation[separated])
-    return dispersion
+    """
+    Return the log-standard deviation of a lognormal gap; 0 where the gap is certain.
+
+    A gap is a distance measured with a normal error, and not below 0: either the walls are one, or
+    the gap has a normal distribution about ``gap`` with ``gap_std``, truncated at 0. Both are
+    equally likely where outlines touch, as the error alone would give a stiff pair, whose demand is
+    a hundredth of it, a ``no``. For outlines apart, Bayes' rule gives the chance that the walls are
+    one. The lognormal gap has two quantiles of this distribution (``TOUCHING``, ``APART``).
+
+    A gap that the configuration assumes (``assumed_gap``) is lognormal itself, with mean ``gap``.
+    """
+    return _lognormal_gap(pairs)[1]
 
 
 def median_gap(pairs: Table) -> FloatArray:
-    """Return the median of a lognormal gap of given mean, m."""
-    median: FloatArray = values(pairs, "gap") * np.exp(-(gap_dispersion(pairs) ** 2) / 2.0)
-    return median
+    """Return the median of a lognormal gap, m, as :func:`gap_dispersion`."""
+    return _lognormal_gap(pairs)[0]
+
+
+def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:
+    """Return median, m, and log-standard deviation of lognormal gaps."""
+    gap, deviation = values(pairs, "gap"), values(pairs, "gap_std")
+    assumed = values(pairs, "assumed_gap") > 0 if "assumed_gap" in pairs else gap < 0
+    measured, lognormal = (deviation > 0) & ~assumed, (gap > 0) & assumed
+    # Certain gaps stay
+    median, dispersion = gap.copy(), np.zeros(gap.shape)
+    dispersion[lognormal] = lognormal_dispersion(gap[lognormal], deviation[lognormal])
+    median[lognormal] *= np.exp(-(dispersion[lognormal] ** 2) / 2.0)
+    fitted = _with_quantiles(gap[measured], deviation[measured])
+    median[measured], dispersion[measured] = fitted
+    return median, dispersion
+
+
+def _with_quantiles(gap: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return median, m, and log-standard deviation of lognormal gaps from measured ones."""
+    # Quantiles of the normal distribution above 0
+    apart = np.minimum(gap / (WIDE * deviation), 1.0)
+    low, high = (near + apart * (far - near) for near, far in zip(TOUCHING, APART, strict=True))
+    above = ndtr(gap / deviation)
+    lower, upper = (gap - deviation * ndtri(above * (1.0 - share)) for share in (low, high))
+    # The same lengths as quantiles of all gaps, of which some are 0
+    odds = np.exp(-((gap / deviation) ** 2) / 2.0) / (2.0 * above)
+    one_wall = odds / (1.0 + odds)
+    low, high = (ndtri(one_wall + (1.0 - one_wall) * share) for share in (low, high))
+    dispersion = np.log(upper / lower) / (high - low)
+    return upper * np.exp(-high * dispersion), dispersion

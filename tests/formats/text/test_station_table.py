@@ -21,7 +21,9 @@ TABLE = "Network,Station,LATITUDE,Longitude,Elevation\nxx,Some Town,-33.5,-71.25
 def test_code_and_name_and_separators():
     table = b"\xef\xbb\xbfCode; Name; Lat; Lon\n\nab1; Vi\xc3\xb1a; 1; +2.5\n"
     assert is_station_table(table)
-    assert read_station_table("t", table) == (StationRow("", ("AB1", "VI\xd1A"), 1.0, 2.5, None),)
+    assert read_station_table("t", table) == (
+        StationRow("", ("AB1", "VI\xd1A"), 1.0, 2.5, None, source="t"),
+    )
 
 
 @pytest.mark.parametrize(

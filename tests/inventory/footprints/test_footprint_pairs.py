@@ -14,8 +14,10 @@ from numpy.testing import assert_allclose
 from pyproj import Transformer
 
 from per_obspy import pairs_from_footprints
+from per_obspy.config import Building
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.checking import checked_pairs
+from per_obspy.inventory.completion import completed_pairs
 
 #: metres about a place in a salt flat -> degrees
 LOCAL = "+proj=tmerc +lon_0=-67.95 +lat_0=-20.35 +datum=WGS84"
@@ -138,13 +140,28 @@ def test_azimuth_is_true_north_also_at_the_edge_of_the_layer(write):
         assert row.azimuth == pytest.approx(true, abs=0.02)
 
 
-def test_drawn_gaps_are_uncertain_and_party_walls_are_not(write):
-    pairs = pairs_from_footprints(write(ROW), gap_std=0.1)
-    # would catch a deviation of touching pairs, which a lognormal gap cannot have
-    assert dict(zip(pairs["gap"].round(6), pairs["gap_std"], strict=True)) == {0.25: 0.1, 0.0: 0.0}
-    assert (pairs_from_footprints(write(ROW, "other.gpkg"))["gap_std"] == 0.0).all()
-    with pytest.raises(ValueError, match="gap_std"):
-        pairs_from_footprints(write(ROW, "third.gpkg"), gap_std=-0.1)
+def test_drawn_gaps_and_touching_outlines_are_uncertain(write):
+    path = write(ROW)
+    pairs = pairs_from_footprints(path, gap_std=0.2)
+    assert pairs["gap"].round(6).tolist() == [0.25, 0.0]
+    assert pairs["gap_std"].tolist() == [0.2, 0.2]
+    assert set(pairs["gap_std_source"]) == {"given"}
+    assert pairs_from_footprints(path, gap_std=0.0)["gap_std"].tolist() == [0.0, 0.0]
+    # out of the range of the schema
+    for wrong in (-0.1, 1.5):
+        with pytest.raises(ValueError, match="gap_std"):
+            pairs_from_footprints(path, gap_std=wrong)
+
+
+def test_a_deviation_that_nobody_gave_is_assumed_and_marked_as_derived(write):
+    path = write(ROW)
+    assumed = pairs_from_footprints(path)
+    assert assumed["gap_std"].tolist() == [0.1, 0.1]
+    assert set(assumed["gap_std_source"]) == {"assumed"}
+    derived = completed_pairs(assumed, Building())["derived"].str.split()
+    assert all("gap_std" in names for names in derived)
+    given = completed_pairs(pairs_from_footprints(path, gap_std=0.1), Building())["derived"]
+    assert not any("gap_std" in names for names in given.str.split())
 
 
 def test_floors_that_do_not_meet(write):
@@ -248,17 +265,14 @@ def test_too_few_footprints_say_why(write):
 
 
 def test_heights_that_are_none(write):
-    pairs = pairs_from_footprints(write(ROW[:3], height=["9", "nine", "-3"]))
+    houses = [*ROW[:3], shapely.box(30, 0, 40, 12)]
+    pairs = pairs_from_footprints(write(houses, height=["9", "nine", "-3", "6"]))
     assert pairs.empty
     reasons = [rejection.reasons for rejection in pairs.attrs["rejected"]]
-    missing = "none of height_{0}, storeys_{0}, period_{0} is a number, one is needed"
     assert reasons == [
-        ("height_2 = 'nine' is not a number", missing.format(2)),
-        (
-            "height_1 = 'nine' is not a number",
-            "height_2 = -3 m is outside 2 to 1000 m",
-            missing.format(1),
-        ),
+        ("height_2 = 'nine' is no length (a number, or with m, ft, in, cm, mm)",),
+        ("height_1 = 'nine' is no length (a number, or with m, ft, in, cm, mm)",),
+        ("height_1 = -3 m is outside 2 to 1000 m",),
     ]
 
 
@@ -424,5 +438,8 @@ def test_real_cities(real_data, city, expected, utm):
 
 @pytest.mark.real_data
 def test_points_of_berkeley_are_no_footprints(real_data):
-    with pytest.raises(CatalogError, match="a table has no walls"):
+    with pytest.raises(
+        CatalogError,
+        match=r"points have no walls.*an area \(PlanArea\).*add a column wkt .*or width, length",
+    ):
         pairs_from_footprints(real_data / "inventories" / "BerkeleyBuildings_full.csv")

@@ -1,4 +1,8 @@
-"""Layers of footprints: files of another kind, damaged files, layers to choose from."""
+"""
+Layers of footprints: files of another kind, damaged files, layers to choose from.
+
+The files themselves are read by per_obspy.inventory.footprints.layer_files.
+"""
 
 import json
 
@@ -11,7 +15,8 @@ import pytest
 import shapely
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints.layers import read_layer
+from per_obspy.inventory.footprints import layers
+from per_obspy.inventory.footprints.layers import polygons, read_layer
 
 #: four houses of 1e-4 degrees
 HOUSES = [shapely.box(10 + x * 1e-3, 50, 10.0001 + x * 1e-3, 50.0001) for x in range(4)]
@@ -20,12 +25,12 @@ HEIGHTS = [12.0, 9.0, 6.0, 3.0]
 
 @pytest.fixture
 def write(tmp_path):
-    def write(polygons, name="town.gpkg", crs="EPSG:4326", **options):
+    def write(shapes, name="town.gpkg", crs="EPSG:4326", **options):
         path = tmp_path / name
         pyogrio.raw.write(
             path,
-            shapely.to_wkb(np.array(polygons, dtype=object)),
-            [np.array(HEIGHTS[: len(polygons)])],
+            shapely.to_wkb(np.array(shapes, dtype=object)),
+            [np.array(HEIGHTS[: len(shapes)])],
             ["height"],
             geometry_type="Polygon",
             crs=crs,
@@ -49,7 +54,20 @@ def test_polygons_and_attributes_have_the_number_of_the_feature(write):
     assert layer.attributes.index.tolist() == [1, 3]
     assert layer.attributes["height"].tolist() == [12.0, 6.0]
     assert [(row.row, row.reasons) for row in layer.rejected] == [(2, ("no geometry",))]
-    assert shapely.equals_exact(layer.polygons, np.array([HOUSES[0], HOUSES[2]]), 1e-12).all()
+    kept = np.array([HOUSES[0], HOUSES[2]])
+    assert shapely.equals_exact(polygons(layer.outlines), kept, 1e-12).all()
+
+
+def test_blocks_do_not_change_a_layer(write, monkeypatch):
+    # would catch numbers and attributes that start anew in every block
+    path = write([None, HOUSES[0], HOUSES[1], None])
+    whole = read_layer(path)
+    monkeypatch.setattr(layers, "BLOCK", 1)
+    parts = read_layer(path)
+    assert parts.outlines.equals(whole.outlines)
+    assert parts.attributes.equals(whole.attributes)
+    assert parts.rejected == whole.rejected
+    assert [row.row for row in parts.rejected] == [1, 4]
 
 
 KINDS = {
@@ -143,7 +161,7 @@ def test_several_layers_need_a_name(write):
         CatalogError, match=r"no layer 'harbour' \(layers found: old_town, new_town\)"
     ):
         read_layer(path, "harbour")
-    assert len(read_layer(path, "new_town").polygons) == 2
+    assert len(read_layer(path, "new_town").outlines) == 2
 
 
 #: A name that no database has, one of heights, one from the centre of the Earth, one of the Moon.
@@ -182,7 +200,29 @@ def test_an_unknown_system_of_geojson_is_not_taken_for_degrees(write, declared, 
         read_layer(path)
     known = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
     path.write_text(json.dumps(content | {"crs": known}))
-    assert len(read_layer(path).polygons) == len(HOUSES)
+    assert len(read_layer(path).outlines) == len(HOUSES)
+
+
+def test_the_system_of_geojson_stands_anywhere_at_its_top(write):
+    path = write(HOUSES, "town.geojson")
+    content = json.loads(path.read_text())
+    content.pop("crs", None)
+    unknown = {"type": "name", "properties": {"name": "EPSG:999999"}}
+    # after the features, as JSON has no order
+    path.write_text(json.dumps(content | {"crs": unknown}))
+    with pytest.raises(CatalogError, match="unknown"):
+        read_layer(path)
+    # inside of another member it is none of the layer
+    path.write_text(json.dumps({"metadata": {"crs": unknown}} | content))
+    assert len(read_layer(path).outlines) == len(HOUSES)
+
+
+def test_a_column_that_stands_twice(tmp_path):
+    path = _write_geoparquet(tmp_path / "town.parquet")
+    table = pa.parquet.read_table(path)
+    pa.parquet.write_table(table.append_column("height", table["height"]), path)
+    with pytest.raises(CatalogError, match=r"Multiple matches for .*height"):
+        read_layer(path)
 
 
 @pytest.mark.parametrize("prj", ["junk", "", "GEOGCS[", 'LOCAL_CS["site"]'])

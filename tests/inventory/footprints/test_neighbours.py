@@ -7,11 +7,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from shapely import affinity
 
 from per_obspy.inventory.footprints import neighbours as module
-from per_obspy.inventory.footprints.neighbours import neighbours
+from per_obspy.inventory.footprints.neighbours import Outlines, neighbours
+
+
+def _neighbours(polygons, distance):
+    return neighbours(Outlines(shapely.bounds(polygons), polygons.__getitem__), distance)
 
 
 def _found(*polygons, distance=3.0):
-    return neighbours(np.array(polygons), distance)
+    return _neighbours(np.array(polygons), distance)
 
 
 HOUSE = shapely.box(0, 0, 10, 12)
@@ -31,9 +35,9 @@ def test_turning_the_town_turns_the_axis_only(angle):
     # would catch the mathematical angle in place of the azimuth, and walls taken along the
     # coordinate axes
     houses = np.array([HOUSE, shapely.box(10.3, 4, 20, 16)])
-    straight = neighbours(houses, 3.0)
+    straight = _neighbours(houses, 3.0)
     # shapely turns anticlockwise, azimuths count clockwise
-    turned = neighbours(
+    turned = _neighbours(
         np.array([affinity.rotate(house, angle, origin=(0, 0)) for house in houses]), 3.0
     )
     assert_allclose(turned.azimuth, (straight.azimuth - angle) % 360.0, atol=1e-9)
@@ -106,14 +110,12 @@ def test_ends_and_insides_of_a_row():
     row = [shapely.box(10 * i, 0, 10 * i + 9.8, 12) for i in range(4)]
     near = _found(*row)
     assert near.first.tolist() == [0, 1, 2]
-    assert near.inside.tolist() == [False, True, False]
+    assert near.inside_1.tolist() == [False, True, True]
+    assert near.inside_2.tolist() == [True, True, False]
     # a neighbour behind does not continue the row
-    assert (
-        _found(
-            row[0], row[1], shapely.box(0, 12, 9.8, 24), shapely.box(10, 12, 19.8, 24)
-        ).inside.sum()
-        == 0
-    )
+    behind = _found(row[0], row[1], shapely.box(0, 12, 9.8, 24), shapely.box(10, 12, 19.8, 24))
+    assert not behind.inside_1.any()
+    assert not behind.inside_2.any()
 
 
 def test_all_pairs_of_a_random_town_by_brute_force():
@@ -123,7 +125,7 @@ def test_all_pairs_of_a_random_town_by_brute_force():
         affinity.rotate(shapely.box(x, y, x + 6, y + 4), angle)
         for (x, y), angle in zip(centres, generator.uniform(0, 180, 150), strict=True)
     ])  # fmt: skip
-    near = neighbours(town, 2.0)
+    near = _neighbours(town, 2.0)
     brute = shapely.distance(town[:, None], town[None, :])
     first, second = np.nonzero(np.triu(brute <= 2.0, k=1))
     assert_array_equal(near.first, first)
@@ -131,9 +133,20 @@ def test_all_pairs_of_a_random_town_by_brute_force():
     assert_allclose(near.gap, brute[first, second], atol=module.TOUCHING)
 
 
+def test_a_wide_building_among_many_small_ones(monkeypatch):
+    # a wall of 300 m along thirty houses: would catch pairs that are lost where a block ends
+    monkeypatch.setattr(module, "CHUNK", 7)
+    houses = [shapely.box(10.0 * i, 0, 10.0 * i + 9.5, 12) for i in range(30)]
+    near = _found(shapely.box(0, 12.5, 300, 20), *houses, distance=1.0)
+    assert near.first[:30].tolist() == [0] * 30
+    assert near.second[:30].tolist() == list(range(1, 31))
+    assert_allclose(near.gap, 0.5, atol=1e-12)
+    assert len(near.gap) == 30 + 29
+
+
 def test_chunks_do_not_change_a_bit(monkeypatch):
     row = np.array([shapely.box(10.1 * i, 0, 10.1 * i + 10, 12) for i in range(30)])
-    whole = neighbours(row, 1.0)
+    whole = _neighbours(row, 1.0)
     monkeypatch.setattr(module, "CHUNK", 4)
-    for one, other in zip(whole, neighbours(row, 1.0), strict=True):
+    for one, other in zip(whole, _neighbours(row, 1.0), strict=True):
         assert_array_equal(one, other)

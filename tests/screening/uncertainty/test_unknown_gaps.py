@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 from screening_samples import make_pairs, make_station
 from shakemap_samples import make_map
 
@@ -13,6 +14,7 @@ from per_obspy.screening.by_spectrum.design_spectrum import DesignSpectrum
 from per_obspy.screening.by_spectrum.design_table import design_table
 from per_obspy.screening.by_spectrum.shakemap_table import shakemap_fallback
 from per_obspy.screening.ground_motion.assignment import assigned, stations_of
+from per_obspy.screening.uncertainty.nodes import gap_dispersion, median_gap
 from per_obspy.screening.uncertainty.unknown_gaps import NUMBERS, TEXTS, UNKNOWN_CLASS, kept_apart
 
 #: Pairs that differ in how their demand is found, and one of everything that codes ask for.
@@ -72,17 +74,21 @@ def test_state_class_and_flag_name_the_reason(station):
     assert not unknown["flags"].str.contains("touching|suffices|single_hit").any()
 
 
-def test_an_assumed_gap_is_that_of_a_pair_with_this_distribution(station):
-    # A lognormal gap of median 0.05 m: mean and standard deviation as textbooks have them
+def test_an_assumed_gap_has_the_lognormal_distribution_of_the_configuration(station):
+    # would catch an assumed gap that is taken for a measured one, whose error is normal
     median, spread = 0.05, 0.5
-    mean = median * np.exp(spread**2 / 2)
-    deviation = mean * np.sqrt(np.exp(spread**2) - 1)
-    assumed = risk(station, np.nan, building=Building(gap=median, gap_log_std=spread))
-    pairs = make_pairs([{**kind, "gap": mean, "gap_std": deviation} for kind in KINDS])
-    given = per_obspy.risk_table(station, pairs).set_index("pair_id").sort_index()
-    for name in ("probability", "expected_impact_velocity", "impact_velocity_84", "demand"):
-        # round-off of the deviation, which is computed in two ways
-        np.testing.assert_allclose(assumed[name], given[name], rtol=1e-9)
+    building = Building(gap=median, gap_log_std=spread)
+    pairs = make_pairs([{**kind, "gap": np.nan} for kind in KINDS])
+    complete = kept_apart(completed_pairs(pairs, building))
+    # round-off of mean and deviation, through which it passes
+    np.testing.assert_allclose(median_gap(complete), median, rtol=1e-12)
+    np.testing.assert_allclose(gap_dispersion(complete), spread, rtol=1e-12)
+    # where nothing else is in doubt, a certain demand exceeds the gap with the textbook's chance
+    assumed = risk(station, np.nan, building=building.model_copy(update={"damping_log_std": 0.0}))
+    first = assumed.iloc[0]
+    chance = norm.cdf(np.log(first["demand"] / median) / spread)
+    # the station is not at the site: hardly more doubt; a normal error would make it less by 0.006
+    assert first["probability"] == pytest.approx(chance, abs=1e-3)
     assert assumed["derived"].str.split().map(lambda names: "gap" in names).all()
     assert set(assumed["risk_class"]) == {UNKNOWN_CLASS}
     assert "unknown" not in set(assumed["state"])

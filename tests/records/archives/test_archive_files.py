@@ -5,34 +5,18 @@ import tarfile
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
-from obspy import Stream, Trace
+from archive_samples import AT2, mseed
 
 from per_obspy.errors import CatalogError, RecordRejected
-from per_obspy.records.archives import archive_files, open_file
+from per_obspy.records.archives.archive_files import archive_files, open_file
 from per_obspy.records.folder import find_stations, read_station
-
-AT2 = b"""PEER NGA STRONG MOTION DATABASE RECORD
-Some Event, 7/21/1952, Some School, 21
-ACCELERATION TIME SERIES IN UNITS OF G
-NPTS=      3, DT=   .0100 SEC,
-  .1E+00 .2E+00 -.3E+00
-"""
-
-
-def mseed(station: str) -> bytes:
-    file = io.BytesIO()
-    header = {"network": "CI", "station": station, "channel": "HNN", "delta": 0.01}
-    Stream([Trace(np.arange(300, dtype=np.int32), header)]).write(file, format="MSEED")
-    return file.getvalue()
-
 
 CONTENT = {
     "deep/one.mseed": mseed("ONE"),
     "two.mseed": mseed("TWO"),
     "three.AT2": AT2,
-    "readme.txt": b"words",
+    "notes.txt": b"words",
 }
 
 
@@ -63,7 +47,7 @@ def test_an_archive_is_a_folder(tmp_path: Path, name: str):
     contents = find_stations(tmp_path)
     assert contents.stations["CI.ONE"] == (archive / "deep" / "one.mseed",)
     assert list(contents.stations) == [".SOMESCHOOL", "CI.ONE", "CI.TWO"]
-    assert [rejection.name for rejection in contents.rejected] == ["readme.txt"]
+    assert [rejection.name for rejection in contents.rejected] == ["notes.txt"]
     assert open_file(archive / "three.AT2").read() == AT2
     assert sorted(path.name for path in tmp_path.iterdir()) == [name]  # no file is unpacked on disk
 

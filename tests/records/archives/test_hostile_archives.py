@@ -1,4 +1,9 @@
-"""Archives made to exhaust memory or time, or to lead elsewhere: per_obspy.records.archives."""
+"""
+Archives made to exhaust memory or time, or to lead elsewhere.
+
+They are read by per_obspy.records.archives.packed, per_obspy.records.archives.walked,
+per_obspy.records.archives.zip_archive and per_obspy.records.archives.tar_archive.
+"""
 
 import gzip
 import io
@@ -11,12 +16,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from test_archives import AT2, mseed
+from archive_samples import AT2, mseed
 
 from per_obspy.config import Archives, Records
 from per_obspy.errors import RecordRejected
-from per_obspy.records import archives
-from per_obspy.records.archives import archive_files, open_file
+from per_obspy.records.archives.archive_files import archive_files, open_file
+from per_obspy.records.archives.tar_archive import PackedTar
+from per_obspy.records.archives.zip_archive import PackedZip
 from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import find_sources
 
@@ -117,12 +123,73 @@ def test_links_and_devices_are_rows_and_not_followed(tmp_path: Path):
 
 
 @pytest.mark.parametrize("kind", PACK)
-def test_archives_inside_archives_are_rows(tmp_path: Path, kind: str):
+def test_archives_deeper_than_the_limit_are_rows(tmp_path: Path, kind: str):
     inner = zipped(tmp_path / "inner.zip", [("a.AT2", AT2)]).read_bytes()
     archive = PACK[kind](tmp_path / kind, [("deep/inner.zip", inner)])
-    files, (row,) = archive_files(archive)
+    files, (row,) = archive_files(archive, Archives(most_levels=1))
     assert files == []
-    assert "an archive inside an archive: unpack the outer one first" in row.reasons[0]
+    assert "deeper than records.archives.most_levels = 1: unpack the outer one" in row.reasons[0]
+
+
+@pytest.mark.parametrize("kind", PACK)
+@pytest.mark.parametrize("inside", PACK)
+def test_an_archive_inside_an_archive_is_a_folder(tmp_path: Path, kind: str, inside: str):
+    inner = PACK[inside](tmp_path / inside, [("deep/a.AT2", AT2)])
+    name = f"one/{inner.name}"
+    archive = PACK[kind](tmp_path / f"outer-{kind}", [(name, inner.read_bytes()), ("b.AT2", AT2)])
+    inner.unlink()
+    files, rejected = archive_files(archive)
+    assert (files, rejected) == ([archive / "b.AT2", archive / name / "deep/a.AT2"], [])
+    # Back and forth: the archive inside is opened again
+    assert [open_file(path).read() for path in (*files, *files)] == [AT2] * 4
+    assert [path.name for path in tmp_path.iterdir()] == [archive.name]
+
+
+def test_files_of_two_archives_inside_are_not_confused(tmp_path: Path):
+    inner = {
+        name: zipped(tmp_path / name, [("a.txt", name.encode())]).read_bytes()
+        for name in ("x.zip", "y.zip")
+    }
+    archive = zipped(tmp_path / "a.zip", list(inner.items()))
+    x, y = archive_files(archive)[0]
+    assert [open_file(path).read() for path in (x, y, x)] == [b"x.zip", b"y.zip", b"x.zip"]
+
+
+def test_a_damaged_archive_inside_is_one_row(tmp_path: Path):
+    inner = zipped(tmp_path / "i.zip", [("a.AT2", AT2)]).read_bytes()
+    members = [("cut.zip", inner[:50]), ("whole.zip", inner), ("cut.tar", b"no archive")]
+    archive = zipped(tmp_path / "a.zip", members)
+    files, rejected = archive_files(archive)
+    assert files == [archive / "whole.zip/a.AT2"]
+    assert sorted(row.name for row in rejected) == ["cut.tar", "cut.zip"]
+    assert all("the archive is damaged" in row.reasons[0] for row in rejected)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("largest_total", 8000), ("most_members", 10), ("largest_ratio", 1)]
+)
+def test_archives_inside_share_the_limits_of_the_outermost(tmp_path: Path, key: str, value: int):
+    # Each archive inside is within every limit, all together are not
+    content = bytes(30 * 2**20) if key == "largest_ratio" else bytes(900)
+    inner = zipped(tmp_path / "i.zip", [(f"{i}.bin", content) for i in range(3)]).read_bytes()
+    archive = zipped(tmp_path / "a.zip", [(f"{i}.zip", inner) for i in range(4)])
+    limits = Archives(**{key: value})
+    with pytest.raises(RecordRejected, match=f"{value}"):
+        archive_files(archive, limits)
+    alone = zipped(tmp_path / "alone.zip", [("0.zip", inner)])
+    if key != "largest_ratio":
+        assert len(archive_files(alone, limits)[0]) == 3
+
+
+def test_an_archive_that_holds_itself_ends_at_the_deepest_level(tmp_path: Path):
+    content = AT2
+    for _ in range(6):
+        content = zipped(tmp_path / "i.zip", [("i.zip", content)]).read_bytes()
+    (tmp_path / "i.zip").unlink()
+    (tmp_path / "a.zip").write_bytes(content)
+    files, (row,) = archive_files(tmp_path / "a.zip")
+    assert files == []
+    assert "most_levels = 3" in row.reasons[0]
 
 
 def test_encrypted_and_unknown_packing_are_rows(tmp_path: Path):
@@ -194,7 +261,7 @@ def test_a_bomb_is_one_row_and_takes_no_memory(tmp_path: Path, write):
     assert "records.archives.largest_ratio = 200 times its own size" in row.reasons[0]
 
 
-@pytest.mark.parametrize(("key", "value"), [("largest_total", 3000), ("most_members", 2)])
+@pytest.mark.parametrize(("key", "value"), [("largest_total", 8000), ("most_members", 2)])
 @pytest.mark.parametrize("kind", [*PACK, "a.tar.gz"])
 def test_limits_of_the_configuration_count(tmp_path: Path, kind: str, key: str, value: int):
     pack = PACK.get(kind) or (lambda path, members: tar(path, members, "w:gz"))
@@ -320,11 +387,11 @@ def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name, write, 
     archive = write(tmp_path / name, many)
     # every opening of the archive and every member that is described
     opened, described = [], []
-    for kind in (archives._Zip, archives._Tar):
+    for kind in (PackedZip, PackedTar):
         walk = kind.described
 
-        def counted(self, walk=walk):
-            opened.append(self.path)
+        def counted(self, walk=walk, kind=kind):
+            opened.append(kind)
             for member in walk(self):
                 described.append(member)
                 yield member
@@ -335,7 +402,7 @@ def test_many_members_are_walked_once(tmp_path: Path, monkeypatch, name, write, 
     # members of all parts, the last first
     for path in files[::-100]:
         assert open_file(path).read() == b"words"
-    assert opened == [archive]
+    assert len(opened) == 1
     assert len(described) == many
 
 

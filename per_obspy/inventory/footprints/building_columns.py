@@ -1,0 +1,177 @@
+"""
+Columns of buildings: those of the schema, from names that the user gives, and all others kept.
+
+A column of the layer whose name the schema or the results need for something else is kept as
+``layer_`` and its name.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from per_obspy.errors import CatalogError, did_you_mean, printable
+from per_obspy.inventory.checking import is_number
+from per_obspy.inventory.footprints.lengths import read_numbers
+from per_obspy.inventory.importers.recognition import imported
+from per_obspy.inventory.schema import COLUMNS
+
+#: Quantities of a building that a layer may give, by their names in the schema.
+GIVEN = (
+    *("building_id", "height", "storeys", "storey_height", "system", "period", "damping"),
+    *("mass", "occupants", "importance", "participation", "yield_displacement"),
+    *("yield_coefficient", "hardening", "period_log_std", "damping_log_std"),
+    "height_log_std",
+)
+
+#: Quantities whose text may have a unit, and counts.
+LENGTHS, COUNTS = ("height", "storey_height"), ("storeys",)
+
+#: Quantities that the outlines give.
+FROM_OUTLINES = ("longitude", "latitude", "area", "geometry")
+
+#: Results of one building in the risk table; a test compares them with the table's columns.
+RESULTS = (
+    *("amplification", "amplification_exact", "contact_mass", "displacement_exact", "ductility"),
+    *("ln_per_ratio", "ln_per_std", "per", "sd"),
+)
+
+#: Prefix of columns whose names are needed otherwise.
+PREFIX = "layer_"
+
+#: Longest name of a carried column, characters: that of a pair table has two more.
+LONGEST_NAME = 190
+
+
+class BuildingColumns(NamedTuple):
+    """
+    Columns of buildings by the schema, and cells that could not be read.
+
+    Attributes
+    ----------
+    table : DataFrame
+        One row per building: columns of the schema without ``_1`` or ``_2``, then all others.
+    faults : dict of str to dict
+        Column -> number of the building -> its unreadable text.
+    """
+
+    table: pd.DataFrame
+    faults: dict[str, dict[int, str]]
+
+
+def building_columns(
+    attributes: pd.DataFrame, names: Mapping[str, str], source: str
+) -> BuildingColumns:
+    """
+    Return the attributes of a layer by the schema, with all other columns.
+
+    Parameters
+    ----------
+    attributes : DataFrame
+        Columns of the layer; the index is the number of the feature.
+    names : mapping of str to str
+        Name in the schema, without ``_1`` or ``_2`` -> the layer's column, for columns that are
+        not recognised or not the right ones.
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    CatalogError
+        If a named column is missing, or no column tells a height, storeys or a period.
+    ValueError
+        If a name is none of ``GIVEN``.
+    """
+    given = _given(attributes, names, source)
+    known = imported(attributes, source, given)
+    faults = {}
+    for name in (*LENGTHS, *COUNTS):
+        if name in known:
+            known[name], unread = _read(known[name], name in LENGTHS)
+            faults[name] = unread
+    return BuildingColumns(known.join(_others(attributes, known)), faults)
+
+
+def _given(attributes: pd.DataFrame, names: Mapping[str, str], source: str) -> dict[str, pd.Series]:
+    """Return the columns that the user names, under the names of the schema."""
+    given = {}
+    for name, column in names.items():
+        if name not in GIVEN:
+            raise ValueError(f"{name} is no column of a building{did_you_mean(name, GIVEN)}")
+        if column not in attributes:
+            known = [str(found) for found in attributes.columns]
+            listed = ", ".join(known)
+            raise CatalogError(
+                source,
+                f"no column {column!r} for {name} (columns found: {listed:.200})"
+                f"{did_you_mean(column, known)}",
+            )
+        given[name] = attributes[column]
+    # Texts as texts, with a number where a building has no identifier
+    if "building_id" in given:
+        given["building_id"] = _identifiers(given["building_id"])
+    if "system" in given:
+        given["system"] = given["system"].fillna("").astype(str)
+    return given
+
+
+def _identifiers(cells: pd.Series) -> pd.Series:
+    """Return identifiers as text, the number of the feature where a building has none."""
+    # Whole numbers that were stored as floats lose their decimal point
+    if pd.api.types.is_float_dtype(cells) and (cells.dropna() % 1 == 0).all():
+        cells = cells.astype("Int64")
+    text = cells.astype(str).str.strip()
+    numbers = pd.Series([f"feature {number}" for number in cells.index], index=cells.index)
+    return text.mask(np.asarray(cells.isna()) | (text == ""), numbers)
+
+
+def _read(cells: pd.Series, is_length: bool) -> tuple[pd.Series, dict[int, str]]:
+    """Return cells as numbers, and the text of those that are none by the building's number."""
+    if is_number(cells):
+        return cells, {}
+    numbers, wrong = read_numbers(cells, is_length)
+    return numbers, {int(number): str(cells[number]) for number in cells.index[wrong]}
+
+
+def _others(attributes: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:
+    """Return the columns of a layer that are not in a table of known ones, under free names."""
+    # Names are compared without case, as layers and spreadsheets do
+    taken = {str(name).lower() for name in known}
+    columns = {}
+    for name in attributes.columns:
+        if name in known and _is_same(attributes[name], known[name]):
+            continue
+        free = _free_name(str(name), taken)
+        taken.add(free.lower())
+        columns[free] = attributes[name]
+    return pd.DataFrame(columns, index=attributes.index)
+
+
+def _is_same(original: pd.Series, known: pd.Series) -> bool:
+    """Return whether a column of the schema has what the column of its name in the layer has."""
+    if is_number(original) and is_number(known):
+        return bool(np.array_equal(original, known, equal_nan=True))
+    # Text that was read as a number is kept beside it
+    if is_number(original) or is_number(known):
+        return False
+    return bool((_texts(original) == _texts(known)).all())
+
+
+def _texts(cells: pd.Series) -> pd.Series:
+    """Return cells as text, empty where there is none."""
+    return cells.astype(str).mask(cells.isna(), "")
+
+
+def _free_name(name: str, taken: Iterable[str]) -> str:
+    """Return a name that is not needed otherwise and not taken, whatever the case of letters."""
+    plain = printable(name).strip()[:LONGEST_NAME] or "unnamed"
+    needed = {column.removesuffix("_1") for column in COLUMNS if column.endswith("_1")}
+    reserved = {*needed, *FROM_OUTLINES, *RESULTS, *GIVEN}
+    if plain.lower() in reserved or plain.lower() in taken:
+        plain = f"{PREFIX}{plain}"
+    # A number where even that is taken
+    free, number = plain, 2
+    while free.lower() in taken:
+        free, number = f"{plain}_{number}", number + 1
+    return free

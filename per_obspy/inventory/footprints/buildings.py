@@ -1,0 +1,207 @@
+"""
+Buildings of a layer: their outlines, columns, places and areas, and the file beside the pairs.
+
+Pairs refer to it by ``building_id_1`` and ``building_id_2``.
+"""
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet
+import pyproj
+import shapely
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.errors import CatalogError, Rejection
+from per_obspy.files import written_whole
+from per_obspy.inventory.footprints.layers import BLOCK, Geometries, polygons
+from per_obspy.inventory.footprints.neighbours import IntArray, Outlines
+
+#: A local projection is true to scale within this range of longitudes, degrees.
+WIDEST_LAYER = 6.0
+
+#: Version of GeoParquet that is written: https://geoparquet.org/releases/v1.1.0/.
+GEOPARQUET = "1.1.0"
+
+#: Column of the outlines.
+GEOMETRY = "geometry"
+
+
+class Buildings(NamedTuple):
+    """
+    Buildings with usable outlines.
+
+    Attributes
+    ----------
+    outlines : pa.Array
+        WKB in degrees (WGS 84).
+    table : DataFrame
+        One row per outline: ``building_id``, ``longitude``, ``latitude`` (degrees), ``area`` (m2),
+        columns of the schema, all others.
+    """
+
+    outlines: pa.Array
+    table: pd.DataFrame
+
+
+class Projected(NamedTuple):
+    """
+    Outlines in a transverse Mercator projection about the middle of their layer.
+
+    Attributes
+    ----------
+    outlines : Outlines
+        In metres.
+    place : (n, 2) ndarray
+        Longitude and latitude of the centroids, degrees.
+    area : (n,) ndarray
+        m2.
+    central_meridian : float
+        Degrees.
+    """
+
+    outlines: Outlines
+    place: FloatArray
+    area: FloatArray
+    central_meridian: float
+
+
+def without_repetitions(
+    outlines: pa.Array, table: pd.DataFrame, source: str
+) -> tuple[Buildings, tuple[Rejection, ...]]:
+    """
+    Return buildings without those that repeat an earlier outline or identifier.
+
+    Parameters
+    ----------
+    outlines : pa.Array
+        WKB in degrees.
+    table : DataFrame
+        With ``building_id``; the index is the number of the feature.
+    source : str
+        The file, for messages.
+    """
+    identifiers = table["building_id"]
+    same_shape, same_name = _repeated(outlines), identifiers.duplicated().to_numpy()
+    # Each repetition with its reasons
+    rejected = []
+    for i in np.flatnonzero(same_shape | same_name).tolist():
+        name, number = identifiers.iloc[i], int(table.index[i])
+        reasons = []
+        if same_shape[i]:
+            reasons.append("the polygon repeats an earlier one")
+        if same_name[i]:
+            reasons.append(f"building_id = {name!r} stands in an earlier feature already")
+        rejected.append(Rejection("building", name, source, number, tuple(reasons)))
+    good = ~(same_shape | same_name)
+    kept = outlines.filter(pa.array(good)) if rejected else outlines
+    return Buildings(kept, table[good] if rejected else table), tuple(rejected)
+
+
+def _repeated(outlines: pa.Array) -> NDArray[np.bool_]:
+    """Return where an outline repeats an earlier one, whatever the order of its points."""
+    hashes = [np.empty(0, dtype=np.uint64)]
+    for start in range(0, len(outlines), BLOCK):
+        normal = shapely.to_wkb(shapely.normalize(polygons(outlines.slice(start, BLOCK))))
+        hashes.append(pd.util.hash_array(normal, categorize=False))
+    hashed = pd.Series(np.concatenate(hashes))
+    # A hash may be shared by chance: the outlines themselves decide
+    shared = np.flatnonzero(hashed.duplicated(keep=False))
+    shapes = shapely.to_wkb(shapely.normalize(polygons(outlines.take(pa.array(shared)))))
+    repeated = np.zeros(len(outlines), dtype=bool)
+    repeated[shared] = pd.Series(shapes, dtype=object).duplicated()
+    return repeated
+
+
+def projected(outlines: pa.Array, source: str) -> Projected:
+    """
+    Return outlines in metres, with their places in degrees and areas.
+
+    Parameters
+    ----------
+    outlines : pa.Array
+        WKB in degrees.
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    CatalogError
+        If they span more than 6 degrees of longitude.
+    """
+    # Places in degrees, and the region for which the projection is to be
+    blocks = [outlines.slice(start, BLOCK) for start in range(0, len(outlines), BLOCK)]
+    place, boxes = [], []
+    for block in blocks:
+        degrees = polygons(block)
+        place.append(shapely.get_coordinates(shapely.centroid(degrees)))
+        boxes.append(shapely.total_bounds(degrees))
+    transformer, central_meridian = _projection(np.array(boxes), source)
+    # Boxes and areas in metres
+    bounds, area = [], []
+    for block in blocks:
+        metres = _in_metres(block, transformer)
+        bounds.append(shapely.bounds(metres))
+        area.append(shapely.area(metres))
+
+    def chosen(numbers: IntArray) -> Geometries:
+        return _in_metres(outlines.take(pa.array(numbers)), transformer)
+
+    near = Outlines(np.concatenate(bounds), chosen)
+    return Projected(near, np.concatenate(place), np.concatenate(area), central_meridian)
+
+
+def _projection(boxes: FloatArray, source: str) -> tuple[pyproj.Transformer, float]:
+    """Return a transverse Mercator projection about the middle of boxes, and its meridian."""
+    # Around all boxes
+    west, south = boxes[:, :2].min(axis=0)
+    east, north = boxes[:, 2:].max(axis=0)
+    if east - west > WIDEST_LAYER:
+        raise CatalogError(
+            source,
+            f"footprints from {west:g} to {east:g} degrees east: split the layer, "
+            f"a local projection covers {WIDEST_LAYER:g} degrees",
+        )
+    longitude, latitude = float(west + east) / 2.0, float(south + north) / 2.0
+    local = pyproj.CRS.from_dict(
+        {"proj": "tmerc", "lon_0": longitude, "lat_0": latitude, "datum": "WGS84"}
+    )
+    return pyproj.Transformer.from_crs("OGC:CRS84", local, always_xy=True), longitude
+
+
+def _in_metres(outlines: pa.Array, transformer: pyproj.Transformer) -> Geometries:
+    """Return outlines in a projection."""
+    metres = shapely.transform(
+        polygons(outlines), lambda xy: np.column_stack(transformer.transform(*xy.T))
+    )
+    return np.asarray(metres)
+
+
+def write_buildings(buildings: Buildings, path: Path) -> None:
+    """
+    Write buildings as GeoParquet, whole or not at all.
+
+    Parameters
+    ----------
+    buildings : Buildings
+        With ``longitude`` and ``latitude``.
+    path : Path
+        ``.parquet``. Outlines are the column ``geometry``, longitude and latitude in degrees.
+    """
+    table = pa.Table.from_pandas(buildings.table, preserve_index=False)
+    outlines = buildings.outlines.cast(pa.binary())
+    table = table.append_column(GEOMETRY, outlines).replace_schema_metadata(_described())
+    with written_whole(path) as part:
+        pa.parquet.write_table(table, part, row_group_size=5 * BLOCK)
+
+
+def _described() -> dict[str, str]:
+    """Return the metadata of GeoParquet; without a reference system it means degrees, WGS 84."""
+    column = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"]}
+    geo = {"version": GEOPARQUET, "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}
+    return {"geo": json.dumps(geo)}

@@ -1,0 +1,1 @@
+"""Archives as folders: zip and tar, also inside each other."""

@@ -1,0 +1,1 @@
+"""Contents of a folder of records: its files, their metadata, one series of each channel."""

@@ -1,0 +1,127 @@
+"""Files that describe stations: StationXML, FDSN station text, tables; and other kinds of files."""
+
+import re
+from functools import reduce
+from operator import add
+from pathlib import Path
+
+import obspy
+from obspy import Inventory
+
+from per_obspy.errors import CatalogError, RecordRejected, Rejection
+from per_obspy.formats.text.itaca_metadata import is_itaca_metadata
+from per_obspy.formats.text.station_table import (
+    StationRow,
+    is_station_table,
+    marked_open_starts,
+    read_station_table,
+    with_open_starts,
+)
+from per_obspy.records.archives.archive_files import read_file
+from per_obspy.records.contents.file_list import files_below
+from per_obspy.records.obspy_readers import read_bytes_with_obspy, read_content
+
+#: words at the beginning of StationXML, FDSN station text, QuakeML and descriptions of processed
+#: records -> kind of file
+_MARKS = {
+    b"<FDSNStationXML": "inventory",
+    b"#Network": "station text",
+    b"quakeml": "event",
+    b'"shard": ': "description",
+}
+
+#: Beginnings of logical records of SEED: a number, and the type of a volume header or of data.
+_VOLUME, _DATA = re.compile(rb"\d{6}V[ *]"), re.compile(rb"\d{6}[DRQM] ")
+
+#: Smallest logical record of SEED that networks write, bytes.
+_LOGICAL_RECORD = 256
+
+#: Kinds of files that describe stations.
+METADATA = ("inventory", "station text", "station table", "ITACA metadata")
+
+
+def kind_of(path: Path, content: bytes) -> str:
+    """Return the kind of a file: a kind of metadata, event, description, or else record."""
+    start = content[:1000]
+    if path.suffix.lower() == ".csv" and is_station_table(start):
+        return "station table"
+    if is_itaca_metadata(start):
+        return "ITACA metadata"
+    if _VOLUME.match(start) and not _has_data(content):
+        return "inventory"
+    return next((kind for mark, kind in _MARKS.items() if mark in start), "record")
+
+
+def _has_data(content: bytes) -> bool:
+    """Return whether a volume of SEED holds records of data beside its headers."""
+    starts = range(0, len(content), _LOGICAL_RECORD)
+    return any(_DATA.match(content, start) for start in starts)
+
+
+def named_metadata(path: Path | None) -> tuple[list[Inventory], list[StationRow]]:
+    """Return the descriptions of stations, or the rows of a table of them, that a user named."""
+    if path is None:
+        return [], []
+    # A table that the user named must be right
+    try:
+        if path.is_file() and kind_of(path, content := read_file(path)) == "station table":
+            return [], [*read_station_table(str(path), content)]
+    except RecordRejected as rejection:
+        raise CatalogError(str(path), "; ".join(rejection.reasons)) from rejection
+    return read_inventories(path), []
+
+
+def _read_inventory(path: Path) -> Inventory:
+    """Read StationXML or FDSN station text."""
+    content = read_file(path)
+    if kind_of(path, content) == "station text":
+        return read_station_text(path, content)
+    return read_content(obspy.read_inventory, content, path)
+
+
+def read_station_text(path: Path, content: bytes) -> Inventory:
+    """Read FDSN station text, whose empty start means an open one."""
+    marked = marked_open_starts(content)
+    try:
+        inventory = read_bytes_with_obspy(
+            obspy.read_inventory, marked, str(path), format="STATIONTXT"
+        )
+    except RecordRejected as rejection:
+        reason = f"is no FDSN station text: {rejection.reasons[0]}"
+        raise RecordRejected(str(path), reason) from rejection
+    return with_open_starts(inventory)
+
+
+def merged_inventory(inventories: list[Inventory]) -> Inventory | None:
+    """Return one inventory of all; None of none."""
+    return reduce(add, inventories) if inventories else None
+
+
+def read_inventories(stationxml: Path) -> list[Inventory]:
+    """
+    Read a StationXML file, or all of a folder.
+
+    Raises
+    ------
+    CatalogError
+        If there is none, or one cannot be read.
+    """
+    paths = [stationxml]
+    # What cannot be read is tried again below, for its reason
+    if stationxml.is_dir():
+        files, unread = files_below(stationxml)
+        paths = [path for path in files if path.suffix == ".xml"]
+        paths += [Path(rejection.source) for rejection in unread if _is_needed(rejection)]
+    if not paths:
+        raise CatalogError(str(stationxml), "the folder holds no StationXML (*.xml)")
+    try:
+        return [_read_inventory(path) for path in paths]
+    except RecordRejected as rejection:
+        raise CatalogError(
+            rejection.record, f"is no StationXML: {'; '.join(rejection.reasons)}"
+        ) from rejection
+
+
+def _is_needed(rejection: Rejection) -> bool:
+    """Return whether something that cannot be read may hold StationXML."""
+    return rejection.source.endswith(".xml") or "cannot be listed" in rejection.reasons[0]

@@ -1,0 +1,149 @@
+"""A window of one station from a SeedLink server on loopback."""
+
+import time
+from collections.abc import Iterator
+from io import BytesIO
+
+import numpy as np
+import pytest
+from obspy import Stream, Trace, UTCDateTime, read
+from obspy.clients.seedlink.basic_client import Client
+from seedlink_server import SeedlinkServer, seedlink
+
+from per_obspy.errors import ServiceError
+from per_obspy.records.fdsn.web import web_pool
+from per_obspy.records.seedlink.seedlink_window import seedlink_window
+from per_obspy.records.seedlink.server_address import server_address
+
+START = UTCDateTime(2020, 1, 2, 3, 4, 5)
+CODES = (("", "HNN"), ("", "HNE"), ("00", "HNZ"))
+
+
+def stream() -> Stream:
+    random = np.random.default_rng(1)
+    traces = Stream()
+    for station in ("CLC", "CCC"):
+        for location, channel in (*CODES, ("", "LOG")):
+            header = {"network": "CI", "station": station, "location": location}
+            header |= {"channel": channel, "starttime": START, "delta": 0.01}
+            samples = random.integers(-2000, 2000, 6000).astype(np.int32)
+            traces += Trace(samples, header)
+    return traces
+
+
+@pytest.fixture
+def server() -> Iterator[SeedlinkServer]:
+    with seedlink(stream()) as running:
+        yield running
+
+
+def asked(
+    server: SeedlinkServer,
+    station: str = "CI.CLC",
+    window: tuple[float, float] = (0.0, 59.0),
+    **limits: float,
+) -> bytes:
+    given = {"timeout": 5.0, "retries": 0, "wait": 0.01} | limits
+    pool = web_pool(**given)  # type: ignore[arg-type]
+    times = (START + window[0], START + window[1])
+    return seedlink_window(pool, server_address(server.address), station, CODES, times)
+
+
+def test_the_records_of_one_station_arrive_whole(server: SeedlinkServer):
+    found = read(BytesIO(asked(server))).merge()
+    wanted = stream().select(station="CLC", channel="HN?")
+    assert sorted(trace.id for trace in found) == sorted(trace.id for trace in wanted)
+    for trace in wanted:
+        (same,) = found.select(id=trace.id)
+        np.testing.assert_array_equal(same.data, trace.data)
+    assert "SELECT --HNN.D" in server.said
+    assert "SELECT 00HNZ.D" in server.said
+
+
+def test_only_records_of_the_window_arrive(server: SeedlinkServer):
+    part = read(BytesIO(asked(server, window=(20.0, 25.0)))).merge()
+    assert len(part) == len(CODES)
+    # records of 512 bytes hold a few seconds each
+    assert all(START + 10 < trace.stats.starttime <= START + 20 for trace in part)
+    assert all(START + 25 <= trace.stats.endtime < START + 35 for trace in part)
+
+
+def test_the_client_of_obspy_gets_the_same(server: SeedlinkServer):
+    # The server speaks the protocol, if another client understands it
+    host, port = server.address.split(":")
+    client = Client(host, int(port), timeout=5)
+    theirs = client.get_waveforms("CI", "CLC", "", "HNN", START, START + 59)
+    ours = read(BytesIO(asked(server))).merge().select(channel="HNN")
+    np.testing.assert_array_equal(theirs.merge()[0].data, ours[0].slice(endtime=START + 59).data)
+
+
+def test_an_unknown_station_has_no_records(server: SeedlinkServer):
+    assert asked(server, "CI.NONE") == b""
+
+
+def test_a_window_without_records_is_empty(server: SeedlinkServer):
+    assert asked(server, window=(3600.0, 3700.0)) == b""
+
+
+def test_a_server_that_is_not_there():
+    with seedlink(Stream()) as server:
+        address = server.address
+    pool = web_pool(timeout=1.0, retries=0, wait=0.01)
+    with pytest.raises(ServiceError, match="no answer"):
+        seedlink_window(pool, server_address(address), "CI.CLC", CODES, (START, START + 1))
+
+
+@pytest.mark.parametrize(
+    ("sent", "reason"),
+    [
+        (b"<html>you are lost</html>", "answers with something else, '<html>yo'"),
+        (b"SL000001" + b"cut", "hangs up inside a packet"),
+        (b"SLxxxxxx" + bytes(512), "answers with something else"),
+    ],
+)
+def test_anything_else_is_refused(server: SeedlinkServer, sent: bytes, reason: str):
+    server.instead = lambda handler: handler.wfile.write(sent)
+    with pytest.raises(ServiceError, match=reason):
+        asked(server)
+
+
+def test_information_is_passed_over(server: SeedlinkServer):
+    server.instead = lambda handler: handler.wfile.write(b"SLINFO *" + bytes(512) + b"END")
+    assert asked(server) == b""
+
+
+@pytest.mark.parametrize("greeting", [b"SSH-2.0\r\n\r\n", b"x" * 4000, b""])
+def test_another_kind_of_server_is_refused(server: SeedlinkServer, greeting: bytes):
+    server.greeting = greeting
+    with pytest.raises(ServiceError, match=r"no SeedLink server|answers no line|no answer"):
+        asked(server, timeout=0.3)
+
+
+def test_an_endless_answer_ends_at_the_limit(server: SeedlinkServer):
+    def endless(handler):
+        while True:
+            handler.wfile.write(b"SL000001" + bytes(512))
+
+    server.instead = endless
+    with pytest.raises(ServiceError, match="sends more than 100000 bytes"):
+        asked(server, largest=100_000)
+
+
+def test_a_server_that_drips_ends_at_the_time_limit(server: SeedlinkServer):
+    def dripping(handler):
+        for _ in range(100):
+            handler.wfile.write(b"S")
+            time.sleep(0.05)
+
+    server.instead = dripping
+    began = time.monotonic()
+    with pytest.raises(ServiceError, match=r"within 0\.5 s|something else"):
+        asked(server, longest=0.5)
+    # the limit, and a few waits for the next byte
+    assert time.monotonic() - began < 2.0
+
+
+def test_a_silent_server_ends_at_the_time_out(server: SeedlinkServer):
+    server.instead = lambda _: time.sleep(1.0)
+    with pytest.raises(ServiceError, match="no answer"):
+        asked(server, timeout=0.2)
