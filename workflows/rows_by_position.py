@@ -1,8 +1,8 @@
 """
 Compare buildings in their rows with the same buildings in each of their pairs alone.
 
-Run: ``python workflows/rows_by_position.py NAME=FOLDER ...`` with output folders of runs; prints the
-tables of docs/rows.md and draws docs/figures/rows_by_position.png.
+Run: ``python workflows/rows_by_position.py NAME=FOLDER ...`` with output folders of runs; prints
+the tables of docs/rows.md and draws docs/figures/rows_by_position.png.
 """
 
 import argparse
@@ -97,7 +97,9 @@ def main() -> None:
     """Compare the runs that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("runs", nargs="+", help="title=folder of a run")
-    parser.add_argument("--figure", type=Path, default=CHECKOUT / "docs/figures/rows_by_position.png")
+    parser.add_argument(
+        "--figure", type=Path, default=CHECKOUT / "docs/figures/rows_by_position.png"
+    )
     given = parser.parse_args()
     # Tables are printed run by run, the figure has all of them
     tables = {}

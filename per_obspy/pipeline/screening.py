@@ -15,8 +15,8 @@ from per_obspy.inventory.gap_units import gap_suspicions
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.pairs import pair_files
+from per_obspy.pipeline.rows.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE

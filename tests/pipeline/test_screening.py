@@ -87,7 +87,7 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
 def test_results_do_not_depend_on_workers(copied, monkeypatch):
     before = results(copied)
     shutil.rmtree(copied / "out" / "rows")
-    for name in (CHUNK, "per_obspy.pipeline.building_rows.CHUNK"):
+    for name in (CHUNK, "per_obspy.pipeline.rows.building_rows.CHUNK"):
         monkeypatch.setattr(name, 20)
     screen(copied / "run.toml")
     assert results(copied) == before

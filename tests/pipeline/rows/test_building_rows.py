@@ -16,7 +16,7 @@ import pytest
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 
-from .small_run import InProcess, write_configuration
+from ..small_run import InProcess, write_configuration
 
 TABLES = ("rows.parquet", "buildings.parquet", "buildings.csv", "totals.csv", "rejected.csv")
 
@@ -110,7 +110,7 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     before = content(copied)
     shutil.rmtree(copied / "out" / "rows")
     for name in ("building_rows.TOGETHER", "building_rows.CHUNK"):
-        monkeypatch.setattr(f"per_obspy.pipeline.{name}", size)
+        monkeypatch.setattr(f"per_obspy.pipeline.rows.{name}", size)
     monkeypatch.setattr("per_obspy.tables.buildings.SIDES", size)
     assert screened(copied)["row_chunks"] > 3
     assert content(copied) == before
