@@ -8,6 +8,7 @@ or one section. Paths in a configuration are relative to the folder of its file.
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
+from per_obspy.config.rows import Rows
 from per_obspy.config.run import Design, Pairs, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
@@ -30,6 +31,7 @@ __all__ = [
     "Processing",
     "Records",
     "RelativePath",
+    "Rows",
     "Run",
     "Scenario",
     "Screening",

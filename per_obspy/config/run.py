@@ -11,6 +11,7 @@ from pydantic import (
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
+from per_obspy.config.rows import Rows
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.config.simulation import SimulatedPairs
@@ -62,6 +63,7 @@ class Run(Section):
     building: Building = Building()
     screening: Screening = Screening()
     totals: Totals = Totals()
+    rows: Rows = Rows()
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
     )

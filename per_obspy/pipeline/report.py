@@ -27,6 +27,7 @@ from per_obspy.tables.totals import (
     piece_totals,
     region_totals,
     totals_columns,
+    with_buildings,
     write_totals,
 )
 
@@ -171,11 +172,13 @@ def _summary(
         if sum(pieces.rows) != table.pairs:
             raise CatalogError(str(risk), "cannot be read to its end: run again")
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
+    totals = region_totals(pieces.totals, settings.totals)
+    counted = with_buildings(totals.table, folder / "buildings.parquet")
     return RiskSummary(
         worst,
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        region_totals(pieces.totals, settings.totals),
+        totals._replace(table=counted),
     )
 
 

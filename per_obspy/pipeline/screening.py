@@ -14,15 +14,16 @@ from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.tables.risk import write_risk
+from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
-KINDS = ("file", "record", "station", "service", "pair")
+KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
 
 class Screened(NamedTuple):
@@ -84,19 +85,36 @@ def screened(
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
-    has_motion = bool(stations or maps)
+    has_motion = stations or maps
     parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
-    outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
-    kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
+    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
-    tables = [part.path for part in parts if part.path]
-    if tables:
-        progress("ranking", 0, 1)
-        risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
-        outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
-        progress("ranking", 1, 1)
-    failed = any(part.failed for part in parts)
-    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed)
+    if tables := [part.path for part in parts if part.path]:
+        facts = _facts(settings, stations)
+        files, states, served = _ranked(tables, folder, facts, settings.csv_rows, progress)
+        # Rows of buildings are read from it
+        rows = building_rows(settings, folder, ground, facts, executor, progress)
+        outputs += [*files, *rows.outputs]
+    left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
+    kinds = write_rejected(left_out, outputs[0])
+    counts, failed = _counts(states, kinds, parts, rows), rows.failed or _any_failed(parts)
+    return Screened(outputs, counts, served, unplaced, failed)
+
+
+def _ranked(
+    tables: Sequence[Path], folder: Path, facts: dict[str, str], csv_rows: int, progress: Progress
+) -> RiskFiles:
+    """Write the risk table of all parts."""
+    progress("ranking", 0, 1)
+    risk = write_risk(tables, folder, facts, csv_rows)
+    progress("ranking", 1, 1)
+    return risk
+
+
+def _any_failed(parts: Sequence[Part]) -> bool:
+    """Return whether the work of a chunk of pairs failed unexpectedly."""
+    return any(part.failed for part in parts)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
@@ -105,12 +123,15 @@ def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]
     return {"name": settings.name, "simulated": str(is_simulated).lower()}
 
 
-def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
-    """Return the numbers of pairs, of rejections of each kind and of chunks."""
+def _counts(
+    states: Counter[str], kinds: Counter[str], parts: Sequence[Part], rows: BuildingRowsDone
+) -> dict[str, int]:
+    """Return the numbers of pairs, of rejections of each kind, of chunks, and those of rows."""
     counts = {"pairs": states.total()}
     counts |= {state: states[state] for state in EVERY_STATE}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
-    return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    return counts | rows.counts
 
 
 def _maps(settings: Run) -> tuple[Path, ...]:

@@ -83,6 +83,13 @@ def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) ->
     return dataset(paths, schema=schema, format="parquet", filesystem=LocalFileSystem())
 
 
+def batches(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.RecordBatch]:
+    """Yield the rows of a query, so many at a time."""
+    reader = database.execute(query).to_arrow_reader(size)
+    assert reader is not None  # a query has rows, if only none
+    yield from reader
+
+
 def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
     """
     Write a part.

@@ -1,0 +1,58 @@
+"""Rows of buildings as a table, one row per interface, from the parts that the jobs leave."""
+
+import json
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from per_obspy.files import written_whole
+from per_obspy.screening.building_rows.columns import FLAGS, ROWS
+from per_obspy.tables.described import schema_of, table_of, write_meanings
+from per_obspy.tables.parts import text_columns
+
+#: Rows of a group of a part.
+TOGETHER = 10_000
+
+
+def write_rows_part(interfaces: Mapping[str, Any], path: Path) -> None:
+    """Write some interfaces with the columns ``ROWS``."""
+    table = table_of(interfaces, ROWS)
+    with written_whole(path) as part:
+        pq.write_table(
+            table, part, row_group_size=TOGETHER, use_dictionary=text_columns(table.schema)
+        )
+
+
+def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) -> list[Path]:
+    """
+    Write ``rows.parquet`` and ``rows.columns.csv``.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        From :func:`write_rows_part`, in their order.
+    folder : Path
+        Where to.
+    facts : mapping of str to str
+        Facts of the whole table that the Parquet file states.
+    """
+    files = [folder / "rows.parquet", folder / "rows.columns.csv"]
+    statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
+    schema = schema_of(ROWS, statement)
+    dictionaries = text_columns(schema)
+    with (
+        written_whole(files[0]) as whole,
+        pq.ParquetWriter(whole, schema, use_dictionary=dictionaries) as writer,
+    ):
+        # Row group by row group
+        for part in parts:
+            with pq.ParquetFile(part.absolute()) as file:
+                for group in range(file.num_row_groups):
+                    rows: pa.Table = file.read_row_group(group, use_threads=False)
+                    writer.write_table(rows.replace_schema_metadata(statement))
+    write_meanings(ROWS, FLAGS, files[1])
+    return files
