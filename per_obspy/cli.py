@@ -18,6 +18,7 @@ import typer
 import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.pairs import catalog, pairs
+from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch, info
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
@@ -44,7 +45,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, process, spectra, screen, report, events, fetch, info):
+for command in (run, simulate, process, spectra, screen, report, plan, events, fetch, info):
     app.command()(command)
 
 
