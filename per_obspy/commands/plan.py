@@ -10,7 +10,7 @@ from per_obspy.commands.endings import AsJson, output_option
 from per_obspy.commands.printing import print_table
 
 if TYPE_CHECKING:
-    from per_obspy.pipeline.inspection import Plan
+    from per_obspy.pipeline.rows.inspection import Plan
 
 #: Columns of the visits that are printed, with their titles.
 SHOWN = {
@@ -63,7 +63,7 @@ def plan(
 
     Example: per-obspy plan output/san_jose --teams 4 --start=-84.08,9.93
     """
-    from per_obspy.pipeline.inspection import plan_inspection
+    from per_obspy.pipeline.rows.inspection import plan_inspection
     from per_obspy.report.plan.visits import Teams
 
     # One start for all teams, or one of each

@@ -110,6 +110,7 @@ def write_layer(
     facts : mapping of str to str
         Facts that hold for all rows, as the description of the layer.
     """
+    # All shapes are of one type
     kind = shapes[0].geom_type if len(shapes) else "Point"
     description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     pyogrio.raw.write_arrow(

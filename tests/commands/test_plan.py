@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from per_obspy.screening.building_rows.columns import BUILDINGS
+from per_obspy.screening.building_rows.row_columns import BUILDINGS
 
 
 @pytest.fixture

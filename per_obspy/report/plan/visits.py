@@ -17,7 +17,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
 
 if TYPE_CHECKING:
-    from pyvrp import ProblemData
+    from pyvrp import Client, ProblemData
 
 #: Iterations of PyVRP for a block, and the seed of its random numbers: the same visits every time.
 ITERATIONS, SEED = 300, 1
@@ -120,7 +120,7 @@ def _routes(block: pd.DataFrame, state: _State, teams: Teams) -> list[NDArray[np
 
 def _problem(block: pd.DataFrame, state: _State, teams: Teams) -> "ProblemData":
     """Return a block as a problem of routes: one vehicle per team, one client per building."""
-    from pyvrp import Client, Depot, Location, ProblemData, VehicleType
+    from pyvrp import Depot, Location, ProblemData, VehicleType
 
     # Places: the teams, the end of all routes, the buildings
     end = len(teams.starts)
@@ -128,20 +128,25 @@ def _problem(block: pd.DataFrame, state: _State, teams: Teams) -> "ProblemData":
     latitude = np.concatenate([state.latitude, [0.0], block["latitude"]])
     ways = _ways(longitude, latitude, end, teams.detour)
     places = [Location(*place) for place in zip(longitude, latitude, strict=True)]
-    # Buildings may be left out, at the cost of their prize
-    inspection = round(teams.inspection)
-    clients = [
-        Client(end + 1 + row, [1], service_duration=inspection, prize=prize, required=False)
-        for row, prize in enumerate(_prizes(block, int(ways.max())))
-    ]
+    depots = [Depot(place) for place in range(end + 1)]
     # Every team starts where it is, with the time that it has left
     vehicles = [
         VehicleType(1, [teams.block], team, end, shift_duration=int(left))
         for team, left in enumerate(state.left.tolist())
     ]
-    depots = [Depot(place) for place in range(end + 1)]
+    clients = _clients(block, end + 1, int(ways.max()), round(teams.inspection))
     matrices: list[Any] = [[ways], [np.rint(ways / teams.speed).astype(np.int64)]]
     return ProblemData(places, clients, depots, vehicles, *matrices)
+
+
+def _clients(block: pd.DataFrame, first: int, longest: int, inspection: int) -> "list[Client]":
+    """Return the buildings, which may be left out at the cost of their prize."""
+    from pyvrp import Client
+
+    return [
+        Client(first + row, [1], service_duration=inspection, prize=prize, required=False)
+        for row, prize in enumerate(_prizes(block, longest))
+    ]
 
 
 def _prizes(block: pd.DataFrame, longest: int) -> list[int]:

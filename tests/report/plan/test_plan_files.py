@@ -4,8 +4,8 @@ import gpxpy
 import pandas as pd
 import pytest
 
-from per_obspy.report.plan.files import gpx_routes, visit_table, write_plan
-from per_obspy.screening.building_rows.columns import BUILDINGS
+from per_obspy.report.plan.plan_files import gpx_routes, visit_table, write_plan
+from per_obspy.screening.building_rows.row_columns import BUILDINGS
 
 NAMES = ["<script>alert(1)</script>", '=HYPERLINK("x")', "a\x00\u202eb"]
 

@@ -10,10 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.errors import CatalogError, NothingUsable, require_extra
-from per_obspy.report.plan.files import visit_table, write_plan
+from per_obspy.report.plan.plan_files import visit_table, write_plan
 from per_obspy.report.plan.visits import Teams, largest_number, planned_visits
 from per_obspy.resume import StatusError, read_status
-from per_obspy.screening.building_rows.columns import BUILDINGS
+from per_obspy.screening.building_rows.row_columns import BUILDINGS
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
 
 #: Columns of the buildings that the plan carries.
@@ -144,7 +144,7 @@ def _check_starts(teams: Teams, buildings: pd.DataFrame) -> None:
 
 def _write_layer(table: pd.DataFrame, path: Path, facts: Mapping[str, str]) -> Path:
     """Write the visits as points and the routes as lines, for QGIS."""
-    from per_obspy.report.plan.layers import write_plan_layers
+    from per_obspy.report.plan.plan_layers import write_plan_layers
 
     write_plan_layers(table, path, facts)
     return path

@@ -19,7 +19,7 @@ def write_plan_layers(table: pd.DataFrame, path: Path, facts: Mapping[str, str])
     Parameters
     ----------
     table : DataFrame
-        From :func:`per_obspy.report.plan.files.visit_table`.
+        From :func:`per_obspy.report.plan.plan_files.visit_table`.
     path : Path
         ``.gpkg``.
     facts : mapping of str to str
