@@ -103,7 +103,10 @@ def _facts(results: Path) -> dict[str, str]:
     if record.get("state") == "unfinished":
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     if not (results / "buildings.parquet").is_file():
-        raise CatalogError(str(results), "has no buildings.parquet: run with rows of buildings")
+        raise CatalogError(
+            str(results),
+            "has no buildings.parquet: the pair table needs building_id_1 and building_id_2",
+        )
     simulated = str(bool(record.get("simulated"))).lower()
     return {"name": str(record.get("name", "")), "simulated": simulated}
 
