@@ -14,7 +14,7 @@ from per_obspy.errors import CatalogError, PerError
 from per_obspy.files import remove_file
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.page import worst_pairs, write_run_page
+from per_obspy.pipeline.results.page import worst_pairs, write_run_page
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
@@ -29,6 +29,7 @@ from per_obspy.tables.totals import (
     piece_totals,
     region_totals,
     totals_columns,
+    with_buildings,
     write_totals,
 )
 
@@ -182,11 +183,13 @@ def _summary(
         if sum(pieces.rows) != table.pairs:
             raise CatalogError(str(risk), "cannot be read to its end: run again")
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
+    totals = region_totals(pieces.totals, settings.totals)
+    counted = with_buildings(totals.table, folder / "buildings.parquet")
     return RiskSummary(
         worst,
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        region_totals(pieces.totals, settings.totals),
+        totals._replace(table=counted),
         (pieces.tally, listed),
     )
 

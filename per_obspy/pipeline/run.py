@@ -216,8 +216,9 @@ def _begun(folder: Path, settings: Run, stage: str) -> int | None:
     begun = {"name": settings.name, "state": UNFINISHED, "stage": stage, "earlier_rows": rows}
     write_status(folder / RECORD, "", {}, begun, indent=1)
     # A table of an earlier run would be taken for one of this run
-    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        remove_file(folder / name)
+    for name in ("risk", "rows", "buildings"):
+        for end in (".parquet", ".csv", ".columns.csv"):
+            remove_file(folder / f"{name}{end}")
     return rows
 
 

@@ -51,7 +51,7 @@ def write_pairs_layer(
     with written_whole(path) as whole, literal_path(whole) as part:
         for number, table in enumerate(tables):
             points = shapely.points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
-            _write(part, PAIRS, points, table, number > 0, facts)
+            write_layer(part, PAIRS, points, table, number > 0, facts)
         _write_style(part, PAIRS, class_style(classes))
 
 
@@ -81,10 +81,10 @@ def write_totals_layer(
     else:
         shapes = np.array([shapely.Polygon(corners) for corners in outlines], dtype=object)
     with written_whole(path) as whole, literal_path(whole) as part:
-        _write(part, TOTALS, shapes, totals, False, facts)
+        write_layer(part, TOTALS, shapes, totals, False, facts)
 
 
-def _write(
+def write_layer(
     path: Path,
     layer: str,
     shapes: NDArray[np.object_],
@@ -92,15 +92,32 @@ def _write(
     append: bool,
     facts: Mapping[str, str],
 ) -> None:
-    """Write or append a layer: a table with its shapes, and facts as its description."""
-    # Shapes of a layer are all of one type
-    polygons = (shapely.get_type_id(shapes) == shapely.GeometryType.POLYGON).any()
+    """
+    Write or append a layer of a GeoPackage.
+
+    Parameters
+    ----------
+    path : Path
+        File that :func:`.literal_path` gave.
+    layer : str
+        Name of the layer.
+    shapes : (n_rows,) ndarray of object
+        Geometries, all of one type.
+    table : DataFrame
+        Attributes of each shape.
+    append : bool
+        Whether the file exists: the layer is added to it, or rows to the layer.
+    facts : mapping of str to str
+        Facts that hold for all rows, as the description of the layer.
+    """
+    # All shapes are of one type
+    kind = shapes[0].geom_type if len(shapes) else "Point"
     description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     pyogrio.raw.write_arrow(
         _with_shapes(table, shapes),
         path,
         geometry_name=GEOMETRY,
-        geometry_type="Polygon" if polygons else "Point",
+        geometry_type=kind,
         crs=CRS,
         layer=layer,
         append=append,

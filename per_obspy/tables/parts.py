@@ -37,6 +37,11 @@ _PART = "order_part"
 _ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 
+def some_columns(table: Dataset, names: Sequence[str]) -> Dataset:
+    """Return some columns of Parquet files for a database, to which others may have equal names."""
+    return table.replace_schema(pa.schema([table.schema.field(name) for name in names]))
+
+
 @contextmanager
 def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     """
@@ -81,6 +86,11 @@ def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) ->
         schema = pa.schema([schema.field(name) for name in columns])
     paths = [str(file.absolute()) for file in files]
     return dataset(paths, schema=schema, format="parquet", filesystem=LocalFileSystem())
+
+
+def batches(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.RecordBatch]:
+    """Yield the rows of a query, so many at a time."""
+    yield from database.sql(query).to_arrow_reader(size)
 
 
 def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:

@@ -32,7 +32,7 @@ from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES
 from per_obspy.tables.risk import RankedTable
-from per_obspy.tables.totals import area_names
+from per_obspy.tables.totals import areas_of
 
 #: Pairs whose history is drawn, the worst ones.
 HISTORIES = 50
@@ -48,7 +48,7 @@ def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
     """Return the worst pairs of a risk table with the columns of the page and their areas."""
     area = [settings.totals.area] if settings.totals.area else []
     worst = table.first(PAGE_PAIRS, [*PAGE_COLUMNS, *area])
-    return worst.assign(area=area_names(worst, settings.totals))
+    return worst.assign(area=areas_of(worst, settings.totals, settings.totals.area or ""))
 
 
 def write_run_page(

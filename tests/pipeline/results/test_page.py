@@ -1,4 +1,4 @@
-"""The page of a run: per_obspy.pipeline.page and per_obspy.report.page.drawn_histories."""
+"""The page of a run: per_obspy.pipeline.results.page and per_obspy.report.page.drawn_histories."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import pytest
 
 from per_obspy.pipeline.run import report, run
 
-from .small_run import InProcess, write_configuration
+from ..small_run import InProcess, write_configuration
 
 
 def content_of(path):
