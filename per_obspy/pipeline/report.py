@@ -149,11 +149,23 @@ def reported(
                 _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
         if spectra is not None:
             _draw_figures(settings, summary, spectra, stations, folder, report)
-        with report.tried(folder / "report.html"):
-            found = (*summary.page, summary.totals.table)
-            write_run_page(settings, folder, stations, found, simulated)
+        _write_page(settings, summary, stations, folder, report)
     progress("report", 1, 1)
     return report
+
+
+def _write_page(
+    settings: Run,
+    summary: RiskSummary,
+    stations: Sequence[FinishedStation],
+    folder: Path,
+    report: Report,
+) -> None:
+    """Write the page that holds everything for people."""
+    found = (*summary.page, summary.totals.table)
+    with report.tried(folder / "report.html"):
+        simulated = simulated_motion(settings, stations)
+        write_run_page(settings, folder, stations, found, simulated)
 
 
 def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Dataset:
@@ -167,9 +179,7 @@ def _summary(
     settings: Run, risk: Path, folder: Path, facts: dict[str, str], report: Report
 ) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
-    needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
-    needed += COUNTED
-    columns = None if settings.geopackage else list(dict.fromkeys(needed))
+    columns = None if settings.geopackage else _needed_columns(settings)
     # The layer takes the pieces one by one, and so they are noted on the way
     pieces = _Pieces([], [], [], [], [], PairTally(list(settings.screening.classes)))
     with ranked_table(risk, columns) as table:
@@ -192,6 +202,12 @@ def _summary(
         totals._replace(table=counted),
         (pieces.tally, listed),
     )
+
+
+def _needed_columns(settings: Run) -> list[str]:
+    """Return the columns of the risk table that the report takes of every pair."""
+    needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
+    return list(dict.fromkeys([*needed, *COUNTED]))
 
 
 def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.DataFrame]:

@@ -73,10 +73,9 @@ class RankedTable(NamedTuple):
         """Return the first rows with those of the columns that the table has."""
         known = set(self.file.schema_arrow.names)
         names = [name for name in dict.fromkeys(columns) if name in known]
-        found = self.file.schema_arrow.empty_table().select(names).to_pandas()
-        for batch in self.file.iter_batches(count, columns=names):
-            found = batch.to_pandas()
-            break
+        empty = self.file.schema_arrow.empty_table().select(names)
+        batch = next(self.file.iter_batches(count, columns=names), empty)
+        found: pd.DataFrame = batch.to_pandas()
         return found
 
     def row(self, index: int) -> pd.Series:

@@ -17,6 +17,7 @@ from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.stations import file_stem
+from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.coast import lines_around
 from per_obspy.report.page.content import (
     BUILDING_KINDS,
@@ -28,9 +29,9 @@ from per_obspy.report.page.content import (
 from per_obspy.report.page.document import write_page
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.first_screen import Event
-from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES
+from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
 
@@ -75,6 +76,7 @@ def write_run_page(
         Whether the motion is simulated.
     """
     tally, worst, areas = found
+    # Tables that the stages before have written
     table = _station_table(folder / "stations.csv", stations)
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
@@ -82,7 +84,7 @@ def write_run_page(
         language=settings.report.language,
         simulated=simulated,
         classes=tuple(settings.screening.classes),
-        event=_event(stations, table),
+        event=_event(stations, table, _known_event(folder / "run.json")),
         tally=tally,
         worst=worst,
         stations=table,
@@ -103,17 +105,64 @@ def _column(table: pd.DataFrame, name: str) -> FloatArray:
     return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
 
 
-def _event(stations: Sequence[FinishedStation], table: pd.DataFrame) -> Event:
-    """Return the facts of the earthquake that the spectra of the stations hold."""
+def _event(
+    stations: Sequence[FinishedStation], table: pd.DataFrame, known: Mapping[str, Any]
+) -> Event:
+    """Return the facts of the earthquake that its file and the spectra of the stations hold."""
     facts = [station.spectra.attrs for station in stations if station.spectra is not None]
     starts = [str(found["time_coverage_start"]) for found in facts if _is_dated(found)]
     start = min(starts)[:19].replace("T", " ") if starts else ""
-    names = ("hypocentre_longitude", "hypocentre_latitude", "hypocentre_depth")
-    places = (tuple(float(found.get(name, math.nan)) for name in names) for found in facts)
-    known = [place for place in places if np.isfinite(place[:2]).all()]
-    place = (known[0][0], known[0][1], known[0][2]) if known else None
+    # Stations that are rejected have no spectra
     used = int((table["state"] == "used").sum()) if "state" in table else len(facts)
-    return Event(start, place, used, len(table) - used)
+    return Event(
+        start=start,
+        time=str(known.get("time") or "")[:19].replace("T", " "),
+        magnitude=_number(known.get("magnitude")),
+        place=_place(facts, known),
+        used=used,
+        missing=len(table) - used,
+    )
+
+
+def _place(
+    facts: Sequence[Mapping[str, Any]], known: Mapping[str, Any]
+) -> tuple[float, float, float] | None:
+    """Return longitude, latitude and depth of the hypocentre, None if it is unknown."""
+    places = [_coordinates(found, "hypocentre_") for found in facts]
+    for place in (*places, _coordinates(known, "")):
+        # The depth may be unknown
+        if np.isfinite(place[:2]).all():
+            return place
+    return None
+
+
+def _coordinates(facts: Mapping[str, Any], prefix: str) -> tuple[float, float, float]:
+    """Return longitude, latitude and depth of names with a prefix, NaN where one is missing."""
+    longitude, latitude, depth = (
+        _number(facts.get(f"{prefix}{axis}")) for axis in ("longitude", "latitude", "depth")
+    )
+    return longitude, latitude, depth
+
+
+def _number(value: Any) -> float:
+    """Return a number of a status file, NaN where there is none."""
+    is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return float(value) if is_number else math.nan
+
+
+def _known_event(record: Path) -> Mapping[str, Any]:
+    """Return time and magnitude of the screened earthquake as ``run.json`` knows them."""
+    try:
+        groups = read_status(record).get("earthquakes")
+    except StatusError:
+        return {}
+    # Only one of several earthquakes is screened
+    screened = [
+        group.get("event")
+        for group in (groups if isinstance(groups, list) else [])
+        if isinstance(group, Mapping) and group.get("screened")
+    ]
+    return screened[0] if screened and isinstance(screened[0], Mapping) else {}
 
 
 def _is_dated(facts: Mapping[str, Any]) -> bool:
@@ -125,8 +174,9 @@ def _station_table(path: Path, stations: Sequence[FinishedStation]) -> pd.DataFr
     """Return the table of the stations with PER and SD of each at one period, cm."""
     if not path.is_file():
         return pd.DataFrame()
-    texts = {name: str for name in ("station", "state", "warnings", "rejected")}
+    texts = dict.fromkeys(("station", "state", "warnings", "rejected"), str)
     table = pd.read_csv(path, dtype=texts, keep_default_na=True)
+    # Largest of the horizontals
     for name in ("per", "sd"):
         values = {
             station.station: _at_one_period(station.spectra, name)
@@ -147,6 +197,7 @@ def _at_one_period(spectra: Any, name: str) -> float:
 
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
     """Return the first rows of the table of rejections, and how many it has."""
+    # Line by line: rejections of a large inventory are many
     rows, count = list[list[str]](), 0
     if path.is_file():
         with path.open(encoding="utf-8", newline="") as file:
@@ -203,6 +254,7 @@ def _histories(
 
 def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return how the results were made."""
+    # Everything else is in the files beside the page
     texts = LANGUAGES[settings.report.language]
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [

@@ -35,12 +35,14 @@ def read_outlines(path: Path, names: Collection[str]) -> list[tuple[str, list[fl
     """
     if not path.is_file() or find_spec("shapely") is None:
         return []
+    # The first names are of the worst pairs
     wanted = set(list(names)[:MOST_OUTLINES])
     outlines = list[tuple[str, list[float]]]()
     with pq.ParquetFile(path) as file:
         if not {"building_id", "geometry"} <= set(file.schema_arrow.names):
             return []
         for batch in file.iter_batches(10_000, columns=["building_id", "geometry"]):
+            # Names of buildings may be stored as numbers
             texts = pc.cast(batch["building_id"], "string").to_pylist()
             chosen = [(name, row) for row, name in enumerate(texts) if name in wanted]
             shapes = batch["geometry"]

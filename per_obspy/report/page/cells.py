@@ -33,11 +33,13 @@ class CellCounts:
 
     def add(self, pairs: pd.DataFrame) -> None:
         """Count pairs by place and class; those without a place are left out."""
+        # Columns and rows of the grid
         placed = pairs[np.isfinite(pairs["longitude"]) & np.isfinite(pairs["latitude"])]
         column = np.floor(placed["longitude"].to_numpy() / self.size).astype(np.int64)
         row = np.floor(placed["latitude"].to_numpy() / self.size).astype(np.int64)
         codes = pd.Index(self.kinds).get_indexer(placed["risk_class"])
         kind = np.where(codes < 0, len(self.kinds) - 1, codes)
+        # Pairs of one cell and class together
         keys, counts = np.unique(np.stack([column, row, kind]), axis=1, return_counts=True)
         for key, count in zip(keys.T.tolist(), counts.tolist(), strict=True):
             self._counts[key[0], key[1], key[2]] += count
@@ -53,12 +55,13 @@ class CellCounts:
         self._counts = joined
 
     def table(self) -> pd.DataFrame:
-        """Return one row per cell: ``longitude, latitude`` of its middle, and a column per class."""
+        """Return one row per cell: ``longitude, latitude`` of its middle, a column per class."""
         if not self._counts:
             return pd.DataFrame(columns=["longitude", "latitude", *self.kinds], dtype=float)
         counts = pd.Series(dict(self._counts)).unstack(fill_value=0)
         counts = counts.reindex(columns=range(len(self.kinds)), fill_value=0)
         counts.columns = pd.Index(self.kinds)
+        # Cells are numbered from their south-western corner
         middle = (np.array(counts.index.to_list()) + 0.5) * self.size
         places = pd.DataFrame(middle, columns=["longitude", "latitude"])
         return pd.concat([places, counts.reset_index(drop=True)], axis=1)

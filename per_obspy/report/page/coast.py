@@ -57,14 +57,11 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
     known = np.isfinite(longitude) & np.isfinite(latitude)
     if not known.any():
         return found
-    places = np.stack([longitude[known], latitude[known]], axis=1)
-    low, high = places.min(axis=0), places.max(axis=0)
-    margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
+    # Corners near the places, of which few enough are kept
     world = _world()
-    near = ((world.corners >= low - margin) & (world.corners <= high + margin)).all(axis=1)
-    # Steps into the box and out of it belong to the lines
-    near = near | np.roll(near, 1) | np.roll(near, -1)
+    near = _near(world.corners, np.stack([longitude[known], latitude[known]], axis=1))
     stride = 1 + int(near.sum()) // MOST_CORNERS
+    # Line by line, with its index of the first corner
     starts = np.concatenate([[0], world.ends[:-1]])
     for start, end, border in zip(starts, world.ends, world.is_border, strict=True):
         if near[start:end].any():
@@ -73,8 +70,19 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
     return found
 
 
+def _near(corners: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
+    """Return which corners are near places, or the next to one that is."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
+    near = ((corners >= low - margin) & (corners <= high + margin)).all(axis=1)
+    # Steps into the box and out of it belong to the lines
+    joined: NDArray[np.bool_] = near | np.roll(near, 1) | np.roll(near, -1)
+    return joined
+
+
 def _pieces(corners: FloatArray, near: NDArray[np.bool_], stride: int) -> list[list[float]]:
     """Return the parts of a line whose corners are near, every so many corners and the last."""
+    # First corners that are near, and first ones that are not, by turns
     edges = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
     pieces = []
     for first, after in edges.reshape(-1, 2):

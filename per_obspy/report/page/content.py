@@ -8,7 +8,7 @@ import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.report.page.first_screen import Event, first_screen
-from per_obspy.report.page.packing import PackedTable, pack_table
+from per_obspy.report.page.packing import LONGEST_TEXT, PackedTable, pack_table
 from per_obspy.report.page.tally import PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.style import BUILDING_COLOURS, class_colours
@@ -116,16 +116,10 @@ class PageData(NamedTuple):
 
 def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, and its tables, whose descriptions the content holds."""
-    screen = first_screen(
-        data.event,
-        data.tally,
-        data.worst,
-        data.areas,
-        data.buildings,
-        (data.language, data.simulated),
-    )
-    texts = LANGUAGES[data.language]
-    tables = _tables(data)
+    # Sentences first, then whatever the script draws
+    facts = data.language, data.simulated
+    screen = first_screen(data.event, data.tally, data.worst, data.areas, data.buildings, facts)
+    texts, tables = LANGUAGES[data.language], _tables(data)
     content = {
         "language": data.language,
         "texts": {key: text for key, text in texts.items() if not key.startswith("flag_")},
@@ -136,17 +130,25 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
         "states": _states(data.tally, texts),
         "classes": _classes(data, texts),
         "pair_count": data.tally.pairs,
-        "building_colours": BUILDING_COLOURS,
-        "cell_size": data.tally.cells.size,
-        "epicentre": list(data.event.place[:2]) if data.event.place else None,
-        **data.lines,
-        "outlines": [[shortened(name, LONGEST_CELL), ring] for name, ring in data.outlines],
-        "histories": {str(rank): history for rank, history in data.histories.items()},
-        "history_count": len(data.histories),
+        **_drawn(data),
         **_further_tables(data, texts),
         "tables": [table.description for table in tables],
     }
     return content, tables
+
+
+def _drawn(data: PageData) -> dict[str, Any]:
+    """Return everything of the map and of the figures that is in no table."""
+    return {
+        "building_colours": BUILDING_COLOURS,
+        "cell_size": data.tally.cells.size,
+        "epicentre": list(data.event.place[:2]) if data.event.place else None,
+        **data.lines,
+        # Names as they are packed, by which the script finds the pairs of an outline
+        "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in data.outlines],
+        "histories": {str(rank): history for rank, history in data.histories.items()},
+        "history_count": len(data.histories),
+    }
 
 
 def _tables(data: PageData) -> list[PackedTable]:
@@ -187,27 +189,31 @@ def _classes(data: PageData, texts: Mapping[str, str]) -> list[dict[str, Any]]:
 
 def _further_tables(data: PageData, texts: Mapping[str, str]) -> dict[str, Any]:
     """Return stations, areas, rejections and provenance."""
-    stations = data.stations.copy()
-    places = _station_places(stations)
-    if "state" in stations:
-        named = {name: texts[f"station_{name}"] for name in ("used", "rejected")}
-        stations["state"] = stations["state"].map(named).fillna("")
-    if {"warnings", "rejected"} <= set(stations):
-        both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
-        stations["warnings"] = both.str.strip()
-    areas = data.areas
+    areas, note = data.areas, texts["rejected_none"]
     if "expected_pounding" in areas:
         areas = areas.sort_values("expected_pounding", ascending=False)
-    note = texts["rejected_none"]
     if data.rejections:
         shown = min(data.rejections, MOST_ROWS)
         note = texts["rejected_some"].format(shown=shown, all=data.rejections)
+    # Stations are on the map too
+    stations = _rows(_described(data.stations, texts), STATION_COLUMNS, texts)
     return {
-        "stations": {**_rows(stations, STATION_COLUMNS, texts), "places": places},
+        "stations": {**stations, "places": _station_places(data.stations)},
         "areas": _rows(areas, AREA_COLUMNS, texts),
         "rejected": {**_rows(data.rejected, REJECTED_COLUMNS, texts), "note": note},
         "provenance": [[name, shortened(value, LONGEST_CELL)] for name, value in data.provenance],
     }
+
+
+def _described(stations: pd.DataFrame, texts: Mapping[str, str]) -> pd.DataFrame:
+    """Return stations with their states in words, and reasons of rejection with the warnings."""
+    if not {"state", "warnings", "rejected"} <= set(stations):
+        return stations
+    # Reasons and warnings are one column
+    named = {name: texts[f"station_{name}"] for name in ("used", "rejected")}
+    both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
+    state = stations["state"].map(named).fillna("")
+    return stations.assign(state=state, warnings=both.str.strip())
 
 
 def _station_places(stations: pd.DataFrame) -> list[list[Any]]:

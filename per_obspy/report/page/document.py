@@ -44,6 +44,7 @@ def page_document(data: PageData) -> str:
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
         "base-uri 'none'; form-action 'none'"
     )
+    # Every part goes into its place once; none is searched for places
     parts = {
         "language": data.language,
         "policy": policy,

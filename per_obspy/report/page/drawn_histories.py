@@ -68,6 +68,7 @@ def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None
 
 def _structure(pair: pd.Series, number: int) -> Structure:
     """Return a building of the pair as an oscillator at contact level."""
+    # Yielding is known of the oscillator, the history is at contact level
     share = float(pair[f"participation_{number}"])
     limit = float(pair[f"yield_displacement_{number}"])
     return Structure(
@@ -91,22 +92,26 @@ def _along(station: xr.Dataset, azimuth: float) -> FloatArray:
 def _thinned(history: PoundingHistory) -> dict[str, Any]:
     """Return the part of a history with strong motion as few numbers."""
     strength = np.cumsum((history.displacement**2).sum(axis=0))
-    if strength[-1] == 0:
-        first, last = 0, history.time.size - 1
-    else:
-        first, last = np.searchsorted(strength, np.array([0.002, 0.995]) * strength[-1])
-    edges = np.unique(np.linspace(first, last, INTERVALS + 1).astype(int))
-    impacts = history.impacts[history.impacts["counted"].to_numpy(dtype=bool)]
-    speed = impacts["velocity_before_1"] - impacts["velocity_before_2"]
-    fastest = speed.sort_values(ascending=False).index[:MOST_IMPACTS]
+    # All of it where nothing moves
+    shares = np.array([0.002, 0.995]) if strength[-1] > 0 else np.array([0.0, 1.0])
+    first, last = np.searchsorted(strength, shares * strength[-1])
+    edges = np.unique(np.linspace(first, max(last, first + 1), INTERVALS + 1).astype(int))
     return {
         "time": [round(float(time), 3) for time in history.time[edges]],
         "one": _envelope(history.displacement[0], edges),
         "two": _envelope(history.displacement[1], edges),
-        "impacts": [
-            [round(float(impacts["time"][i]), 3), round(float(speed[i]), 3)] for i in fastest
-        ],
+        "impacts": _fastest(history.impacts),
     }
+
+
+def _fastest(impacts: pd.DataFrame) -> list[list[float]]:
+    """Return time, s, and approach velocity, m/s, of the fastest impacts that count."""
+    counted = impacts[impacts["counted"].to_numpy(dtype=bool)]
+    speed = counted["velocity_before_1"] - counted["velocity_before_2"]
+    fastest = pd.DataFrame({"time": counted["time"], "speed": speed}).nlargest(
+        MOST_IMPACTS, "speed"
+    )
+    return fastest.round(3).to_numpy().tolist()
 
 
 def _envelope(displacement: FloatArray, edges: Any) -> list[float]:

@@ -35,6 +35,10 @@ class Event(NamedTuple):
     ----------
     start : str
         First sample of the first record, UTC; empty if unknown.
+    time : str
+        Origin time, UTC, of the event file; empty if unknown.
+    magnitude : float
+        Of the event file; NaN if unknown.
     place : tuple of float or None
         Longitude and latitude of the hypocentre, degrees, and its depth, m.
     used, missing : int
@@ -42,6 +46,8 @@ class Event(NamedTuple):
     """
 
     start: str
+    time: str
+    magnitude: float
     place: tuple[float, float, float] | None
     used: int
     missing: int
@@ -93,7 +99,7 @@ def first_screen(
     facts : (Language, bool)
         Language, and whether the motion is simulated.
     """
-    language, simulated = facts
+    language = facts[0]
     return FirstScreen(
         _event_line(event, language),
         _numbers(tally, worst, buildings, language),
@@ -104,8 +110,14 @@ def first_screen(
 
 def _event_line(event: Event, language: Language) -> str:
     """Return time, place and stations in one line."""
+    # Facts that are unknown are left out
     texts, parts = LANGUAGES[language], list[str]()
-    if event.start:
+    if math.isfinite(event.magnitude):
+        parts.append(texts["event_magnitude"].format(value=written(event.magnitude, 1, language)))
+    if event.time:
+        parts.append(f"{event.time} UTC")
+    # Else the time of the records is the next best
+    elif event.start:
         parts.append(texts["event_time"].format(time=event.start))
     if event.place is not None:
         longitude, latitude, depth = event.place
@@ -124,27 +136,31 @@ def _numbers(
     tally: PairTally, worst: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
 ) -> list[tuple[str, str]]:
     """Return the five numbers: pairs, pounding, expected or buildings, worst class, velocity."""
+    # Five numbers that a decision needs, the last one in a unit
     texts = LANGUAGES[language]
-
-    def count(value: float) -> str:
-        return written(value, 0, language)
-
     sure = tally.states["yes"] + tally.states["likely"]
-    numbers = [(count(tally.pairs), texts["number_pairs"]), (count(sure), texts["number_pounding"])]
+    numbers = [(float(tally.pairs), texts["number_pairs"]), (sure, texts["number_pounding"])]
     if buildings is not None and "neighbours_that_can_hit" in buildings:
-        hit = int((buildings["neighbours_that_can_hit"] > 0).sum())
-        numbers.append((count(hit), texts["number_buildings"]))
+        hit = float((buildings["neighbours_that_can_hit"] > 0).sum())
+        numbers.append((hit, texts["number_buildings"]))
     else:
-        numbers.append((count(tally.expected), texts["number_expected"]))
+        numbers.append((tally.expected, texts["number_expected"]))
     # The class of the worst pair is the worst that occurs
     if "risk_class" in worst and len(worst):
         name = str(worst["risk_class"].iloc[0])
-        numbers.append((count(tally.classes[name]), texts["number_severe"].format(name=name)))
-    fastest = worst["expected_impact_velocity"].max() if len(worst) else math.nan
-    if math.isfinite(fastest):
-        value = f"{written(100.0 * fastest, 0, language)} cm/s"
-        numbers.append((value, texts["number_velocity"]))
-    return numbers
+        meaning = texts["number_severe"].format(name=shortened(name, LONGEST_NAME))
+        numbers.append((tally.classes[name], meaning))
+    counts = [(written(value, 0, language), meaning) for value, meaning in numbers]
+    return [*counts, *_fastest(worst, language)]
+
+
+def _fastest(worst: pd.DataFrame, language: Language) -> list[tuple[str, str]]:
+    """Return the fastest expected impact, if there is one."""
+    fastest = float(worst["expected_impact_velocity"].max()) if len(worst) else math.nan
+    if not math.isfinite(fastest):
+        return []
+    value = f"{written(100.0 * fastest, 0, language)} cm/s"
+    return [(value, LANGUAGES[language]["number_velocity"])]
 
 
 def _first(
@@ -156,19 +172,11 @@ def _first(
 ) -> list[str]:
     """Return sentences on what to do first."""
     language, simulated = facts
-    texts, said = LANGUAGES[language], list[str]()
-    if simulated:
-        said.append(texts["todo_exercise"])
+    texts = LANGUAGES[language]
+    said = [texts["todo_exercise"]] if simulated else []
     hit = worst[worst["state"].isin(("yes", "likely"))] if "state" in worst else worst
-    if len(hit) == 0:
-        said.append(texts["todo_none"])
-    elif buildings is not None and len(buildings):
-        said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
-    else:
-        said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
-    if len(areas) > 1 and "expected_pounding" in areas and len(hit):
-        most = areas.sort_values("expected_pounding", ascending=False)[:3]
-        said.append(texts["todo_areas"].format(names=_placed_names(most, language)))
+    said += _inspected(hit, areas, buildings, language) if len(hit) else [texts["todo_none"]]
+    # Gaps to be measured, and pairs that come later
     for state in ("unknown", "possible"):
         if tally.states[state]:
             value = written(tally.states[state], 0, language)
@@ -176,32 +184,53 @@ def _first(
     return said
 
 
+def _inspected(
+    hit: pd.DataFrame, areas: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
+) -> list[str]:
+    """Return what to inspect first: buildings or pairs, and areas."""
+    texts, said = LANGUAGES[language], list[str]()
+    if buildings is not None and len(buildings):
+        said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
+    else:
+        said.append(texts["todo_worst"].format(names=_names(hit["pair_id"])))
+    # One area is no choice
+    if len(areas) > 1 and "expected_pounding" in areas:
+        most = areas.sort_values("expected_pounding", ascending=False)[:3]
+        said.append(texts["todo_areas"].format(names=_placed_names(most, language)))
+    return said
+
+
 def _sure(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str]:
     """Return sentences on what is uncertain."""
-    texts, said = LANGUAGES[language], list[str]()
-    limits = ("expected_pounding_std_independent", "expected_pounding_std_common")
-    if len(areas) and set(limits) <= set(areas):
-        # Areas are independent of each other, or else of one cause
-        low = float((areas[limits[0]].fillna(0.0) ** 2).sum() ** 0.5)
-        high = float(areas[limits[1]].fillna(0.0).sum())
-        spread = {"low": written(low, 0, language), "high": written(high, 0, language)}
-        mean = written(tally.expected, 0, language)
-        said.append(texts["sure_expected"].format(mean=mean, **spread))
+    texts, said = LANGUAGES[language], _spread(tally, areas, language)
     whole = written(tally.pairs, 0, language)
     for flag, key in DOUBTS.items():
         if tally.flags[flag]:
             value = written(tally.flags[flag], 0, language)
             said.append(texts[key].format(count=value, all=whole))
+    # The nearer the records, the surer the motion
     distance = tally.median_distance()
     if math.isfinite(distance):
         value = written(distance / 1000.0, 1, language)
         said.append(texts["sure_distance"].format(value=value))
-    said.append(texts["sure_nature"])
-    return said
+    return [*said, texts["sure_nature"]]
+
+
+def _spread(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str]:
+    """Return the expected number of pounding pairs with the limits of its deviation."""
+    names = ("expected_pounding_std_independent", "expected_pounding_std_common")
+    if areas.empty or not set(names) <= set(areas):
+        return []
+    # Areas are independent of each other, or else of one cause
+    low = float((areas[names[0]].fillna(0.0) ** 2).sum() ** 0.5)
+    high = float(areas[names[1]].fillna(0.0).sum())
+    values = {"mean": tally.expected, "low": low, "high": high}
+    texts = {name: written(value, 0, language) for name, value in values.items()}
+    return [LANGUAGES[language]["sure_expected"].format(**texts)]
 
 
 def _placed_names(areas: pd.DataFrame, language: Language) -> str:
-    """Return the names of areas with latitude and longitude of their middle, one after the other."""
+    """Return the names of areas with latitude and longitude of their middle."""
     named = []
     for _, area in areas.iterrows():
         place = (written(area[name], 3, language) for name in ("latitude", "longitude"))

@@ -53,6 +53,7 @@ def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
     kinds : mapping of str to str
         Column -> ``number``, ``place`` (degrees), ``choice`` (few different texts) or ``text``.
     """
+    # Data follow each other in the order of the descriptions
     columns, pieces = list[dict[str, Any]](), list[bytes]()
     for name, kind in kinds.items():
         if name not in table:

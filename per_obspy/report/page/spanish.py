@@ -12,6 +12,7 @@ SPANISH: dict[str, str] = {
     "number_severe": "en la peor clase: {name}",
     "number_velocity": "impacto esperado más rápido",
     "number_buildings": "edificios que un vecino puede golpear",
+    "event_magnitude": "Magnitud {value}",
     "event_time": "Los registros empiezan {time} UTC",
     "event_place": "epicentro {latitude}°, {longitude}°",
     "event_depth": "profundidad {value} km",

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from per_obspy.report.page.cells import CellCounts
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
@@ -39,11 +38,12 @@ class PairTally:
         self.classes: Counter[str] = Counter()
         self.flags: Counter[str] = Counter()
         self.cells = CellCounts([*classes, UNKNOWN_CLASS])
-        self._distances: list[NDArray[np.float32]] = []
+        self._distances: list[pd.Series] = []
 
     def add(self, piece: pd.DataFrame) -> None:
         """Count a piece of the risk table, of which the worst pairs come first."""
         before, self.pairs = self.pairs, self.pairs + len(piece)
+        # Counts add up, whatever the pieces
         self.states.update(_counts(piece, "state"))
         self.classes.update(_counts(piece, "risk_class"))
         for names, count in _counts(piece, "flags").items():
@@ -51,16 +51,14 @@ class PairTally:
         if "probability" in piece:
             self.expected += float(np.nansum(piece["probability"]))
         if "distance" in piece:
-            self._distances.append(piece["distance"].to_numpy(dtype=np.float32))
+            self._distances.append(piece["distance"].dropna())
         others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
         if len(others) and {"longitude", "latitude", "risk_class"} <= set(piece):
             self.cells.add(others)
 
     def median_distance(self) -> float:
         """Return the median distance between pair and station, m; NaN if no pair has one."""
-        known = [values[np.isfinite(values)] for values in self._distances]
-        joined = np.concatenate(known) if known else np.empty(0)
-        return float(np.median(joined)) if joined.size else float("nan")
+        return float(pd.concat(self._distances).median()) if self._distances else float("nan")
 
 
 def _counts(piece: pd.DataFrame, column: str) -> dict[str, int]:

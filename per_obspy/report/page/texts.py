@@ -21,6 +21,7 @@ ENGLISH: dict[str, str] = {
     "number_severe": "in the worst class: {name}",
     "number_velocity": "fastest expected impact",
     "number_buildings": "buildings that a neighbour can hit",
+    "event_magnitude": "Magnitude {value}",
     "event_time": "Records start {time} UTC",
     "event_place": "epicentre {latitude}°, {longitude}°",
     "event_depth": "depth {value} km",
@@ -30,7 +31,7 @@ ENGLISH: dict[str, str] = {
     "todo_buildings": "Inspect these buildings first: {names}.",
     "todo_areas": "Begin in the areas with most expected pounding: {names}.",
     "todo_unknown": "Measure {count} gaps that are unknown: there is no verdict without them.",
-    "todo_possible": "Then look at the {count} pairs for which pounding is possible but not likely.",
+    "todo_possible": "Then look at the {count} pairs that possibly, not likely, hit each other.",
     "todo_none": "No pair is likely to have hit its neighbour; check the possible ones.",
     "sure_expected": (
         "{mean} pairs are expected to pound; the standard deviation lies between {low} "

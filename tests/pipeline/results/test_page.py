@@ -87,7 +87,7 @@ def test_report_writes_the_page_in_the_language_of_the_configuration(folder):
     assert content_of(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
 
 
-def test_rejections_are_counted_and_their_beginning_shown(folder, content):
+def test_rejections_are_counted_and_their_beginning_shown(content):
     assert content["rejected"]["rows"] == []
     assert content["rejected"]["note"] == "Nothing was rejected."
 

@@ -28,8 +28,15 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
         "rgb(176, 0, 0)"
     )
     event = page.page.inner_text("#event")
-    for fact in ("2026-01-02 03:04:05 UTC", "43.00°", "13.00°", "1 stations used, 1 not usable"):
+    for fact in (
+        "Magnitude 6.4",
+        "2026-01-02 03:04:05 UTC",
+        "43.00°",
+        "13.00°",
+        "1 stations used, 1 not usable",
+    ):
         assert fact in event
+    assert "1 stations used, 1 not usable" in event
     numbers = page.texts("#numbers dd")
     # 12 pairs, 6 of them sure or likely, 3 severe; 6 expected: probabilities fall evenly to 0
     assert numbers[:4] == ["12", "6", "6", "3"]
