@@ -158,7 +158,7 @@ def _known_event(record: Path) -> Mapping[str, Any]:
         return {}
     # Only one of several earthquakes is screened
     screened = [
-        group.get("event")
+        group.get("event") or group.get("headers")
         for group in (groups if isinstance(groups, list) else [])
         if isinstance(group, Mapping) and group.get("screened")
     ]

@@ -119,18 +119,20 @@ class Details {
     const found = this.page.content.histories[String(Math.round(this.value("rank", i)))];
     if (!found) return this.value("station", i) ? [element("p", { class: "small" }, t("no_history", { value: this.page.content.history_count }))] : [];
     const caption = t("history", { value: found.impacts.length });
-    const picture = drawing("svg", { class: "picture", viewBox: "0 0 900 240", role: "img", "aria-label": caption });
+    // As wide as the page, so that letters keep their size
+    const width = Math.max(300, Math.min(1150, document.documentElement.clientWidth - 60));
+    const picture = drawing("svg", { class: "picture", viewBox: `0 0 ${width} 240`, role: "img", "aria-label": caption });
     const start = found.time[0];
     const length = found.time[found.time.length - 1] - start || 1;
     const gap = 1000 * this.value("gap", i);
     const two = found.two.map((value) => value + gap);
     const all = [...found.one, ...two];
     const [low, high] = [Math.min(...all), Math.max(...all)];
-    const x = (time) => 44 + (846 * (time - start)) / length;
+    const x = (time) => 44 + ((width - 54) * (time - start)) / length;
     const y = (value) => 12 + (196 * (high - value)) / (high - low || 1);
     const colours = this.page.content.building_colours;
     for (const tick of ticks(low / 10, high / 10)) {
-      picture.append(drawing("line", { x1: 44, x2: 890, y1: y(10 * tick), y2: y(10 * tick), stroke: "#ccc" }));
+      picture.append(drawing("line", { x1: 44, x2: width - 10, y1: y(10 * tick), y2: y(10 * tick), stroke: "#ccc" }));
       picture.append(drawing("text", { x: 40, y: y(10 * tick) + 4, "text-anchor": "end", "font-size": 11 }, this.page.number(tick, tickDigits(low / 10, high / 10))));
     }
     for (const tick of ticks(start, start + length)) {
