@@ -83,6 +83,11 @@ def parquet_rows(files: Sequence[Path], columns: Sequence[str] | None = None) ->
     return dataset(paths, schema=schema, format="parquet", filesystem=LocalFileSystem())
 
 
+def batches(database: duckdb.DuckDBPyConnection, query: str, size: int) -> Iterator[pa.RecordBatch]:
+    """Yield the rows of a query, so many at a time."""
+    yield from database.sql(query).to_arrow_reader(size)
+
+
 def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
     """
     Write a part.
