@@ -17,8 +17,10 @@ import typer
 
 import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
+from per_obspy.commands.info import info
+from per_obspy.commands.init import init
 from per_obspy.commands.pairs import catalog, pairs
-from per_obspy.commands.records import events, fetch, info
+from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
@@ -44,7 +46,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, simulate, process, spectra, screen, report, events, fetch, info):
+for command in (run, init, simulate, process, spectra, screen, report, events, fetch, info):
     app.command()(command)
 
 

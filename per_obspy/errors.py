@@ -51,7 +51,9 @@ def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
     >>> len(shortened("9" * 1_000_000)), shortened("line 3, dt: empty"), shortened("X" * 99, 5)
     (1000, 'line 3, dt: empty', 'XXXX…')
     """
-    start = printable(text[:length])
+    # Blanks of other widths as well
+    known = printable(text[:length])
+    start = "".join(letter if letter.isprintable() else " " for letter in known)
     return start if len(text) <= length else f"{start[:-1]}…"
 
 

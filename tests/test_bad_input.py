@@ -93,18 +93,18 @@ WHOLE = {
         "pairs check pairs.parquet",
         "not a Parquet table: it is a PDF document",
     ),
-    "Latin-1": (
-        {"pairs.csv": _table({"note": "café"}).encode("latin-1")},
+    "damaged UTF-8": (
+        {"pairs.csv": _table({"note": "café"}).encode() + b"\xe9 \n"},
         "pairs check pairs.csv",
-        "line 2 is not UTF-8",
+        "line 3 is not UTF-8",
     ),
-    "semicolons": (
-        {"pairs.csv": _table().replace(",", ";")},
+    "a number of two readings": (
+        {"pairs.csv": _table().replace(",", ";").replace("0.05", "1,234")},
         "pairs check pairs.csv",
-        "pairs.csv: columns are separated by",
+        "pairs.csv: line 2: gap = '1,234' is 1.234 or 1234, and no other number decides",
     ),
     "missing column": (
-        {"pairs.csv": _table().replace("gap", "Gap")},
+        {"pairs.csv": _table().replace("gap", "ward")},
         "run run.toml",
         "missing column gap (columns found: ",
     ),

@@ -63,6 +63,10 @@ def print_and_end(
         show(result)
     for fault in result.record.get("faults", []):
         print(f"per-obspy: {fault}", file=sys.stderr)
+    # How the pair tables are read, and what is odd of them
+    notes = result.record.get("pair_tables", {})
+    for sentence in (*notes.get("recognised", ()), *notes.get("suspicions", ())):
+        print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
     # Losses are for people and for jobs that nobody watches
     lost = result.record.get("losses", [])
     for sentence in lost:

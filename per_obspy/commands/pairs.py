@@ -149,42 +149,75 @@ def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_js
 
 @pairs.command("check")
 def check_pairs(
-    file: Annotated[Path, typer.Argument(help="Pair table, .csv or .parquet.")],
+    file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx.")],
+    write: Annotated[
+        bool,
+        typer.Option(
+            "--write", help="Write names and units of its columns to FILE.toml beside it."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
-    Check a pair table and say what it gives.
+    Check a pair table and say what it gives; in a terminal, ask for headings and units.
 
-    Example: per-obspy pairs check pairs.csv
+    Example: per-obspy pairs check pairs.xlsx --write
     """
-    from per_obspy.inventory.files.reading import read_pairs
-    from per_obspy.inventory.table_checks import (
-        derived_counts,
-        inventory_profile,
-        suspicions,
-        unused_columns,
-    )
+    from per_obspy.commands.pair_questions import asked_columns, asked_units, is_terminal
+    from per_obspy.inventory.files.reading import checked_file, read_pairs
+    from per_obspy.inventory.recognition.side_file import form_as_toml, form_of, write_form
 
-    # Read the table and describe it
-    table = read_pairs(file)
-    rejected = table.attrs["rejected"]
-    profile = inventory_profile(table)
-    touching = int((table["gap"] == 0.0).sum())
-    derived, unused, odd = derived_counts(table), unused_columns(table), suspicions(table)
+    # Names and units that are not plain, which a person confirms
+    asks = is_terminal() and not as_json
+    form = asked_columns(file, form_of(file)) if asks else form_of(file)
+    table = read_pairs(file, form)
+    proposed = table.attrs["proposed_units"]
+    if asks and proposed:
+        form = form.model_copy(update={"units": {**form.units, **asked_units(proposed)}})
+        table = read_pairs(file, form)
+    _show_check(file, table, as_json)
 
-    # Print the description, for machines or people
-    if as_json:
-        columns = json.loads(profile.to_json(orient="records"))
-        faults = [rejection._asdict() for rejection in rejected]
-        known = {"pairs": len(table), "touching": touching, "rejected": faults, "columns": columns}
-        print(json.dumps({**known, "derived": derived, "unused": unused, "suspicions": odd}))
-    else:
-        counted = f"{len(table)} usable pairs, {touching} of them touching"
-        print(f"{file}: {counted}, {len(rejected)} rejected rows")
-        _print_rejected(rejected)
-        if not table.empty:
-            _print_profile(profile, derived, unused, odd)
+    # What is written, or may be
+    found = checked_file(file, form).meanings.as_form(form)
+    if write:
+        print(f"written: {write_form(file, found)}", file=sys.stderr)
+    elif proposed and not as_json:
+        print("\nUnits for a configuration, or for --write in a terminal:\n")
+        print(form_as_toml(form.model_copy(update={"units": proposed}), "pairs"))
     stop_if_nothing(len(table), f"no usable row in {file}")
+
+
+def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
+    """Print what a pair table gives, for machines or people."""
+    from per_obspy.inventory.files.reading import recognised_line
+    from per_obspy.inventory.table_checks import suspicions
+
+    # Counts, and what is said about the table as a whole
+    counts = {"pairs": len(table), "touching": int((table["gap"] == 0.0).sum())}
+    rejected, odd = table.attrs["rejected"], suspicions(table)
+    found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}
+    if as_json:
+        known = {"rejected": [row._asdict() for row in rejected], **_described(table)}
+        print(json.dumps({**counts, **known, "suspicions": odd, **found}))
+        return
+    # People first learn how the table is read
+    if found["recognised"]:
+        print(recognised_line(file, found["recognised"]))
+    counted = f"{counts['pairs']} usable pairs, {counts['touching']} of them touching"
+    print(f"{file}: {counted}, {len(rejected)} rejected rows")
+    _print_rejected(rejected)
+    if not table.empty:
+        _print_profile(table)
+    for suspicion in odd:
+        print("Suspicious:", suspicion)
+
+
+def _described(table: "pd.DataFrame") -> "dict[str, Any]":
+    """Return the columns of a pair table, those that are derived and those that are unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    columns = json.loads(inventory_profile(table).to_json(orient="records"))
+    return {"columns": columns, "derived": derived_counts(table), "unused": unused_columns(table)}
 
 
 def _print_rejected(rejected: "Sequence[Rejection]") -> None:
@@ -200,10 +233,15 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
         print(f"  and {len(rejected) - SHOWN} more; rows by fault: {counts}")
 
 
-def _print_profile(
-    profile: "pd.DataFrame", derived: dict[str, int], unused: list[str], suspicions: list[str]
-) -> None:
-    """Print the columns of a pair table, and the warnings about the table as a whole."""
+def _print_profile(table: "pd.DataFrame") -> None:
+    """Print the columns of a pair table, what is derived and what is unknown."""
+    from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
+
+    profile, derived, unused = (
+        inventory_profile(table),
+        derived_counts(table),
+        unused_columns(table),
+    )
     # The most frequent of many numbers is meaningless
     frequent = profile["most_frequent"].where(profile["median"].isna(), "")
     described = profile.assign(most_frequent=frequent)
@@ -214,14 +252,12 @@ def _print_profile(
         described[name] = described[name].astype(object).mask(degrees, digits)
     titles = [str(name).replace("_", " ") for name in profile.columns]
     print_table("What it gives", titles, described.itertuples(index=False))
-    # Derived values, unknown columns, suspicions
+    # Derived values, unknown columns
     if derived:
         counts = ", ".join(f"{name} ({rows})" for name, rows in derived.items())
         print("Derived or assumed instead (rows):", counts)
     if unused:
         print("Unknown columns, carried along unchanged:", printable("; ".join(unused)))
-    for suspicion in suspicions:
-        print("Suspicious:", suspicion)
 
 
 @catalog.command("add")

@@ -1,4 +1,4 @@
-"""``per-obspy events``, ``fetch`` and ``info``: list earthquakes, fetch and inspect records."""
+"""``per-obspy events`` and ``fetch``: list earthquakes and fetch their records."""
 
 import json
 import sys
@@ -11,27 +11,10 @@ from per_obspy.commands.endings import AsJson, stop_if_nothing
 from per_obspy.commands.printing import print_table, shown_progress
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from per_obspy.errors import Rejection
     from per_obspy.records.fdsn.event_list import EventRow
-    from per_obspy.records.summary import RecordInfo
-
-#: What the table of records shows of each; JSON has everything.
-SHOWN = (
-    "record",
-    "format",
-    "level",
-    "start",
-    "dt",
-    "duration",
-    "azimuth",
-    "peak",
-    "unit",
-    "event",
-    "file",
-)
-
 
 #: What the table of earthquakes shows of each.
 EVENT_TITLES = ("event", "time (UTC)", "latitude", "longitude", "depth (m)", "magnitude", "place")
@@ -147,49 +130,6 @@ def _require_no_options(source: str, settings: "Mapping[str, object]", folder: P
         raise CatalogError(source, problem)
 
 
-def info(
-    path: Annotated[Path, typer.Argument(help="Folder, archive, waveform file or ASDF workspace.")],
-    stationxml: Annotated[
-        Path | None, typer.Option(help="StationXML file or folder, if not beside.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """
-    Say what records there are, and why the others cannot be used.
-
-    Example: per-obspy info shared/records
-    """
-    from per_obspy.records.summary import describe_records
-
-    records, rejected = describe_records(path, stationxml)
-    # Print every record and every reason, for machines or people
-    if as_json:
-        usable = [record._asdict() for record in records]
-        unusable = [rejection._asdict() for rejection in rejected]
-        print(json.dumps({"records": usable, "rejected": unusable}))
-    else:
-        print_table(f"{len(records)} records", SHOWN, [_record_cells(record) for record in records])
-        for line in _event_lines(records):
-            print(line)
-        _print_rejected(rejected)
-    stop_if_nothing(len(records))
-
-
-def _event_lines(records: "Sequence[RecordInfo]") -> list[str]:
-    """Return one line per earthquake with its records and stations, and one on simulated motion."""
-    groups: dict[str, list[RecordInfo]] = {}
-    for record in records:
-        for label in record.event.split(", "):
-            groups.setdefault(label, []).append(record)
-    # One line per earthquake, by number
-    lines = []
-    for label, members in sorted(groups.items(), key=lambda item: int(item[0].split(":")[0])):
-        stations = len({tuple(record.record.split(".")[:2]) for record in members})
-        lines.append(f"earthquake {label}: {stations} stations, {len(members)} records")
-    simulated = sum(record.simulated for record in records)
-    return [*lines, *([f"{simulated} records are SIMULATED."] if simulated else [])]
-
-
 def _event_cells(row: "EventRow") -> list[object]:
     """Return the cells of an earthquake, empty where a value is unknown."""
     depth = "" if row.depth is None else f"{row.depth:.0f}"
@@ -197,12 +137,6 @@ def _event_cells(row: "EventRow") -> list[object]:
     # Time to the second, position to 100 m
     position = (f"{row.latitude:.3f}", f"{row.longitude:.3f}")
     return [row.event_id, row.time[:19], *position, depth, magnitude, row.place]
-
-
-def _record_cells(record: "RecordInfo") -> list[object]:
-    """Return the cells of a record, times to the second, empty where a value is unknown."""
-    known = record._asdict() | {"start": record.start[:19]}
-    return ["" if known[name] is None else known[name] for name in SHOWN]
 
 
 def _print_rejected(rejected: "tuple[Rejection, ...]") -> None:

@@ -1,12 +1,20 @@
 """``per-obspy run`` and its parts: ``simulate``, ``process``, ``spectra`` and ``report``."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from per_obspy.commands.endings import AsJson, Strict, output_option, print_and_end, stop_if_nothing
+from per_obspy.commands.endings import (
+    AsJson,
+    Strict,
+    named_path,
+    output_option,
+    print_and_end,
+    stop_if_nothing,
+)
 from per_obspy.commands.printing import print_table, shown_progress, state_texts
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
@@ -50,21 +58,55 @@ NAMED_STATIONS = 3
 PLOT_DAMPING = 0.05
 
 
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the configuration, as screening.exact=false; repeat for several.",
+    ),
+]
+
+
 def run(
-    configuration: Annotated[Path, typer.Argument(help="TOML file of the run.")],
+    first: Annotated[
+        str,
+        typer.Argument(
+            metavar="CONFIGURATION | RECORDS",
+            help="TOML file or a folder with one; or records: folder, archive, file or event id.",
+        ),
+    ],
+    second: Annotated[
+        str | None,
+        typer.Argument(metavar="PAIRS", help="Pair table or footprints, or a folder with one."),
+    ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    changes: Changes = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """
     Do a whole run: records to spectra to risk table to figures.
 
-    Example: per-obspy run workflows/demo.toml
+    One argument is a configuration, or a folder that holds one.
+
+    Two are records and pairs, in either order: content decides.
+
+    Results: -o, else the configured folder, else results/RECORDS-PAIRS.
+
+    Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
+    from per_obspy.pipeline.inputs.arguments import requested_run
     from per_obspy.pipeline.run import run as whole_run
 
+    # An empty name would be the folder of the shell
+    for name in (first, first if second is None else second):
+        named_path(name)
+    asked = requested_run(first, second, output, changes or ())
+    if asked.line:
+        print(printable(asked.line), file=sys.stderr)
     with shown_progress() as progress:
-        result = whole_run(configuration, output, progress=progress)
+        result = whole_run(asked.configuration, output, progress=progress)
     print_and_end(result, as_json, print_result, strict)
 
 
@@ -216,7 +258,7 @@ def print_result(result: "Result") -> None:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
         _print_worst(folder / "risk.parquet", 10)
-    for name in sorted({*record["outputs"], "run.json"}):
+    for name in sorted({*record["outputs"], "run.json", "configuration.toml"}):
         print(f"  {folder / name}")
 
 
@@ -227,6 +269,9 @@ def _print_counts(record: dict[str, Any]) -> None:
         print(_simulated_line(counts))
     for line in _earthquake_lines(record.get("earthquakes", ())):
         print(line)
+    if drawn := record.get("drawn"):
+        left_out = f"{drawn['rejected']} buildings or pairs rejected: pairs.rejected.csv"
+        print(f"{drawn['pairs']} pairs of footprints, {left_out}")
     # Stations, pairs by state, and all rejections together
     states = ", ".join(state_texts(counts))
     rejected = sum(count for name, count in counts.items() if name.startswith("rejected_"))

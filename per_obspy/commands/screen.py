@@ -1,6 +1,7 @@
 """``per-obspy screen``: screen pairs by a run, a design spectrum or an ensemble of scenarios."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,7 +91,7 @@ def _screen_again(configuration: Path, output: Path | None, strict: bool, as_jso
 def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
     """Screen pairs by a design or user spectrum instead of a record, and print the result."""
     from per_obspy.config import Design, load
-    from per_obspy.inventory.files.reading import read_pairs
+    from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
     from per_obspy.screening.by_spectrum.design_table import design_table
     from per_obspy.tables.design import write_design
@@ -101,6 +102,9 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)
     files = write_design(table, output or settings.output)
+
+    if recognised := pairs.attrs["recognised"]:
+        print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
 
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)

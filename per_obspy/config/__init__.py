@@ -6,9 +6,10 @@ or one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
+from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
-from per_obspy.config.run import Design, Pairs, Run, screening_kind
+from per_obspy.config.run import Design, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
@@ -39,6 +40,7 @@ __all__ = [
     "Simulation",
     "Spectra",
     "States",
+    "TableForm",
     "Totals",
     "Window",
     "checked",

@@ -32,44 +32,76 @@ class Check(Section):
 class Checks(Section):
     """Thresholds of the record checks (``processing/quality``, ``processing/filter/corners``)."""
 
-    # Hz, at least
-    sampling_rate: Check = Check(threshold=20.0, level="reject")
-    # s, at least
-    duration: Check = Check(threshold=5.0, level="reject")
-    # Different values a sample takes, at least
-    levels: Check = Check(threshold=16, level="reject")
-    # Equal samples at an extreme, fewer than
-    clipped_run: Check = Check(threshold=5, level="reject")
-    # Peak over full scale of a 24-bit counter, at most
-    counter_use: Check = Check(threshold=0.8, level="warn")
-    # s without change during the shaking, less than
-    dropout: Check = Check(threshold=0.5, level="reject")
-    # Jump of one sample over others within 0.5 s, at most
-    spike: Check = Check(threshold=6.0, level="reject")
-    # A second, at least
-    zero_crossings: Check = Check(threshold=0.1, level="reject")
-    # Relative, between header and samples, at most
-    header_peak: Check = Check(threshold=0.01, level="warn")
-    # Peak over the largest peak of two sisters, at most
-    outlier: Check = Check(threshold=5.0, level="reject")
-    # Motion of the first second over the peak, at most
-    late_trigger: Check = Check(threshold=0.1, level="warn")
-    # Motion of the last second over the peak, at most
-    cut_off: Check = Check(threshold=0.1, level="warn")
-    # Later peak after quiet over the peak, at most
-    second_event: Check = Check(threshold=0.3, level="warn")
-    # Somewhere at least
-    signal_to_noise: Check = Check(threshold=2.0, level="reject")
-    # Signal to noise over ``required_band``, at least
-    clear_band: Check = Check(threshold=2.0, level="warn")
-    # Low-pass over high-pass corner, at least
-    bandwidth: Check = Check(threshold=4.0, level="reject")
-    # Over its peak, at most
-    final_velocity: Check = Check(threshold=0.1, level="reject")
-    # Over its peak, at most
-    final_displacement: Check = Check(threshold=0.2, level="reject")
-    # Velocity before the filter that stays, over the peak
-    baseline_shift: Check = Check(threshold=0.5, level="warn")
+    sampling_rate: Check = Field(Check(threshold=20.0, level="reject"), description="Hz, at least")
+    duration: Check = Field(Check(threshold=5.0, level="reject"), description="s, at least")
+    levels: Check = Field(
+        Check(threshold=16, level="reject"),
+        description="different values a sample takes, at least",
+    )
+    clipped_run: Check = Field(
+        Check(threshold=5, level="reject"),
+        description="equal samples at an extreme, fewer than",
+    )
+    counter_use: Check = Field(
+        Check(threshold=0.8, level="warn"),
+        description="peak over full scale of a 24-bit counter, at most",
+    )
+    dropout: Check = Field(
+        Check(threshold=0.5, level="reject"),
+        description="s without change during the shaking, less than",
+    )
+    spike: Check = Field(
+        Check(threshold=6.0, level="reject"),
+        description="jump of one sample over others within 0.5 s, at most",
+    )
+    zero_crossings: Check = Field(
+        Check(threshold=0.1, level="reject"),
+        description="zero crossings per second, at least",
+    )
+    header_peak: Check = Field(
+        Check(threshold=0.01, level="warn"),
+        description="peak, relative difference between header and samples, at most",
+    )
+    outlier: Check = Field(
+        Check(threshold=5.0, level="reject"),
+        description="peak over the largest peak of two sisters, at most",
+    )
+    late_trigger: Check = Field(
+        Check(threshold=0.1, level="warn"),
+        description="motion of the first second over the peak, at most",
+    )
+    cut_off: Check = Field(
+        Check(threshold=0.1, level="warn"),
+        description="motion of the last second over the peak, at most",
+    )
+    second_event: Check = Field(
+        Check(threshold=0.3, level="warn"),
+        description="later peak after quiet over the peak, at most",
+    )
+    signal_to_noise: Check = Field(
+        Check(threshold=2.0, level="reject"),
+        description="signal to noise at the best frequency, at least",
+    )
+    clear_band: Check = Field(
+        Check(threshold=2.0, level="warn"),
+        description="signal to noise over required_band, at least",
+    )
+    bandwidth: Check = Field(
+        Check(threshold=4.0, level="reject"),
+        description="low-pass over high-pass corner, at least",
+    )
+    final_velocity: Check = Field(
+        Check(threshold=0.1, level="reject"),
+        description="final velocity over its peak, at most",
+    )
+    final_displacement: Check = Field(
+        Check(threshold=0.2, level="reject"),
+        description="final displacement over its peak, at most",
+    )
+    baseline_shift: Check = Field(
+        Check(threshold=0.5, level="warn"),
+        description="velocity before the filter that stays, over the peak",
+    )
 
 
 class Processing(Section):
@@ -139,7 +171,7 @@ class Processing(Section):
     permanent_offset: bool = Field(
         False, description="near a fault: keep it, no high-pass, adaptive baseline"
     )
-    checks: Checks = Checks()
+    checks: Checks = Field(Checks(), description="thresholds of the record checks")
 
     @field_validator("required_band", "highpass_range")
     @classmethod

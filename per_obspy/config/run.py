@@ -9,39 +9,13 @@ from pydantic import (
 )
 
 from per_obspy.config.ensemble import Ensemble
+from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
-from per_obspy.config.simulation import SimulatedPairs
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.errors import CatalogError
-
-
-class Pairs(Section):
-    """Source of the building pairs: a table, stored inventories, or simulated pairs."""
-
-    file: RelativePath | None = Field(None, description="pair table, CSV or Parquet")
-    catalog: RelativePath | None = Field(
-        None, description="index of stored inventories, catalog.toml"
-    )
-    names: tuple[str, ...] = Field(
-        (), description="of stored inventories; none: all that the stations' region touches"
-    )
-    simulated: SimulatedPairs | None = Field(
-        None, description="simulated inventory around the stations"
-    )
-    largest_rejected_share: float = Field(
-        0.5, ge=0, le=1, description="share of rejected rows above which a run warns; see --strict"
-    )
-
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
-        if sum(source is not None for source in (self.file, self.catalog, self.simulated)) != 1:
-            raise ValueError("give one of file, catalog and simulated")
-        if self.names and self.catalog is None:
-            raise ValueError("names are of stored inventories: give their catalog")
-        return self
 
 
 class Run(Section):

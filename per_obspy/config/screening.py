@@ -22,6 +22,9 @@ class Building(Section):
         0.3, ge=0, description="log-standard deviation of an assumed damping"
     )
     storey_height: float = Field(3.0, ge=2, le=12, description="m")
+    storey_height_log_std: float = Field(
+        0.13, ge=0, le=1, description="log-standard deviation of a height derived from storeys"
+    )
     mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
     area: float = Field(
         200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters"
@@ -178,8 +181,12 @@ class Screening(Section):
     shakemap_log_std: float = Field(
         0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed"
     )
-    interpolation: Interpolation = Interpolation()
-    codes: Codes = Codes()
+    interpolation: Interpolation = Field(
+        Interpolation(), description="how the motion between stations is estimated"
+    )
+    codes: Codes = Field(
+        Codes(), description="inputs of code rules; a rule is empty where its input is missing"
+    )
 
     @field_validator("classes")
     @classmethod

@@ -2,7 +2,7 @@
 
 import os
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -97,7 +97,7 @@ def read_toml(path: Path) -> dict[str, object]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
-    except ValueError as error:  # also numbers of too many digits
+    except (ValueError, RecursionError) as error:  # also too many digits, or lists in lists
         kind = looks_like(path)
         raise CatalogError(
             str(path), f"cannot be read as TOML: {f'is {kind}' if kind else error}"
@@ -166,7 +166,7 @@ def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
     inside = (
         name
         for name, field in fields.items()
-        for inner in _sections(field.annotation)
+        for inner in sections_of(field.annotation)
         if key in inner.model_fields
     )
     return next((f", it belongs to [{name}]" for name in inside), "")
@@ -180,16 +180,52 @@ def _fields_at(
     for key in keys:
         if isinstance(key, int):
             continue
-        inner = next(_sections(section.model_fields[name].annotation), None) if name else section
+        inner = next(sections_of(section.model_fields[name].annotation), None) if name else section
         if inner is None:  # a table whose keys are free
             break
         section, name = inner, key
     return section.model_fields, name
 
 
-def _sections(annotation: Any) -> Iterator[type[Section]]:
+def sections_of(annotation: Any) -> Iterator[type[Section]]:
     """Yield the sections named in the type of a field, whether single, optional or repeated."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield annotation
     for inner in get_args(annotation):
-        yield from _sections(inner)
+        yield from sections_of(inner)
+
+
+def with_paths(
+    content: Mapping[str, Any], section: type[Section], change: Callable[[str], str]
+) -> dict[str, Any]:
+    """
+    Return the content of a configuration with every path changed.
+
+    Parameters
+    ----------
+    content : mapping
+        Key to value, as TOML gives it; values of a wrong type stay as they are.
+    section : type of Section
+        Model of the content.
+    change : callable
+        Path to path, as text.
+    """
+    result = dict(content)
+    for name in content.keys() & section.model_fields.keys():
+        value, annotation = content[name], section.model_fields[name].annotation
+        model = next(sections_of(annotation), None)
+        # A table, several tables, or a path
+        if model is not None and isinstance(value, Mapping):
+            result[name] = with_paths(value, model, change)
+        elif model is not None and isinstance(value, list):
+            is_table = [isinstance(one, Mapping) for one in value]
+            if all(is_table):
+                result[name] = [with_paths(one, model, change) for one in value]
+        elif _is_path(annotation) and isinstance(value, str) and value.strip():
+            result[name] = change(value)
+    return result
+
+
+def _is_path(annotation: Any) -> bool:
+    """Return whether a key holds a path."""
+    return annotation is Path or any(map(_is_path, get_args(annotation)[:1]))

@@ -49,8 +49,8 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     Returns
     -------
     pairs : DataFrame
-        All columns of the input and, for each building, ``storeys, height, system, period,
-        period_log_std, damping, damping_log_std, mass, participation, contact_mass,
+        All columns of the input and, for each building, ``storeys, height, height_log_std, system,
+        period, period_log_std, damping, damping_log_std, mass, participation, contact_mass,
         yield_displacement, hardening``; for the pair ``longitude, latitude, azimuth,
         contact_height, floor_offset, floors_misaligned, gap_std, restitution`` and ``derived``: the
         names of the derived columns, separated by blanks, empty if none. Units as in the schema.
@@ -70,6 +70,9 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     * An empty gap is a lognormal one of the median and deviation in ``building``, if it has one;
       else it stays NaN.
     * Log-standard deviations of given periods and dampings are 0 unless the table gives them.
+    * A height from storeys has the deviation of the storey height, and with it that of the storeys
+      where the table gives ``height_log_std``. A derived period has the height's deviation too.
+    * A height with a deviation is an estimate and counts as derived.
     """
     columns: Columns = {}
     derived: Derived = {}
@@ -77,6 +80,7 @@ def completed_pairs(pairs: pd.DataFrame, building: config.Building) -> pd.DataFr
     # Each building's oscillator
     for i in (1, 2):
         _add_size(columns, derived, pairs, i, building)
+        _add_height_deviation(columns, derived, pairs, i, building)
         _add_period(columns, derived, pairs, i, system[i].to_numpy(dtype=str), building)
         _add_strength(columns, derived, pairs, i)
     # Quantities that need both buildings
@@ -126,6 +130,20 @@ def _add_size(
     _add_column(columns, derived, f"storeys_{i}", storeys, counted)
 
 
+def _add_height_deviation(
+    columns: Columns, derived: Derived, pairs: pd.DataFrame, i: int, building: config.Building
+) -> None:
+    """Add the logarithmic standard deviation of the height of building i, 0 where it is exact."""
+    name = f"height_{i}"
+    given = _given_or(numbers_in(pairs, f"height_log_std_{i}"), 0.0)
+    # That of storeys and of the height of a storey
+    is_counted = derived[name]
+    columns[f"height_log_std_{i}"] = np.where(
+        is_counted, np.hypot(given, building.storey_height_log_std), given
+    )
+    derived[name] = (is_counted | (given > 0.0)) & ~np.isnan(columns[name])
+
+
 def _add_period(
     columns: Columns,
     derived: Derived,
@@ -140,7 +158,8 @@ def _add_period(
     unknown = np.isnan(height)
     formula = _FORMULAS[building.period_formula](np.where(unknown, 1.0, height), system)
     _add_column(columns, derived, f"period_{i}", period, np.where(unknown, np.nan, formula))
-    spread = np.where(np.isnan(period), period_log_std(system), 0.0)
+    scatter = period_log_std(system, columns[f"height_log_std_{i}"])
+    spread = np.where(np.isnan(period), scatter, 0.0)
     columns[f"period_log_std_{i}"] = _given_or(numbers_in(pairs, f"period_log_std_{i}"), spread)
     # Damping as a fraction of critical
     damping = numbers_in(pairs, f"damping_{i}")
@@ -168,6 +187,9 @@ def _add_contact(
     # Contact at the top of the lower building whose height is known
     lower = np.fmin(columns["height_1"], columns["height_2"])
     _add_column(columns, derived, "contact_height", numbers_in(pairs, "contact_height"), lower)
+    # Also where the table has taken it from an estimated height
+    deviation = np.fmax(columns["height_log_std_1"], columns["height_log_std_2"])
+    derived["contact_height"] |= (deviation > 0.0) & (columns["contact_height"] == lower)
     for i in (1, 2):
         _add_participation(columns, derived, pairs, i)
     _add_floor_offset(columns, derived, pairs)

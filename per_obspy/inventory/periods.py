@@ -148,6 +148,32 @@ def ec8_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     return period
 
 
-def period_log_std(system: ArrayLike) -> FloatArray:
-    """Return the logarithmic standard deviation of a derived period: 0.3, or 0.4 for ``other``."""
-    return _by_system(_checked_systems(system), LOG_STD)
+def period_log_std(system: ArrayLike, height_log_std: ArrayLike = 0.0) -> FloatArray:
+    """
+    Return the logarithmic standard deviation of a derived period.
+
+    Parameters
+    ----------
+    system : array_like of str
+        One of ``SYSTEMS``: 0.3, or 0.4 for walls and ``other``, where the height is exact.
+    height_log_std : array_like, optional
+        Logarithmic standard deviation of the height, which the period has by the exponent of
+        ASCE 7; that of Eurocode 8 is not larger.
+
+    Returns
+    -------
+    deviation : ndarray
+        Root of the sum of both squares.
+
+    Examples
+    --------
+    >>> period_log_std("concrete_mrf", [0.0, 0.4]).round(3)
+    array([0.3  , 0.469])
+    """
+    names = _checked_systems(system)
+    exponents = {name: exponent for name, (_, _, exponent) in ASCE7.items()}
+    deviation = checks.not_negative("height_log_std", height_log_std)
+    scatter: FloatArray = np.hypot(
+        _by_system(names, LOG_STD), _by_system(names, exponents) * deviation
+    )
+    return scatter

@@ -119,6 +119,9 @@ _BUILDING = (
            choices=POSITIONS),
     Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
            hint="metres above ground expected"),
+    Column("height_log_std", "float64", "1",
+           "logarithmic standard deviation of an estimated height, or of the storeys from which it "
+           "follows; above 0 it marks the height as derived", low=0.0, high=2.0),
     Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
     Column("system", "str", "", "structural system", choices=SYSTEMS),
     Column("period", "float64", "s", "first natural period in the direction of the axis",

@@ -8,14 +8,13 @@ from collections import Counter
 from collections.abc import Iterable
 
 import pandas as pd
+import pyarrow as pa
 
 from per_obspy.config import Building
 from per_obspy.errors import Rejection, did_you_mean
 from per_obspy.inventory.completion import completed_pairs
+from per_obspy.inventory.gap_units import GAP, gap_counts, gap_suspicions
 from per_obspy.inventory.schema import COLUMNS
-
-#: Neighbours are sought within about this gap, m: a wider median suggests another unit.
-WIDE_GAP = 3.0
 
 
 def inventory_profile(pairs: pd.DataFrame) -> pd.DataFrame:
@@ -81,9 +80,5 @@ def faults_by_column(rejected: Iterable[Rejection]) -> dict[str, int]:
 
 def suspicions(pairs: pd.DataFrame) -> list[str]:
     """Return warnings about values that are possible row by row but odd for the whole table."""
-    median = pairs["gap"][pairs["gap"] > 0.0].median()
-    if median > WIDE_GAP:
-        return [
-            f"the median of the gaps above 0 is {median:g} m: given in millimetres or centimetres?"
-        ]
-    return []
+    gaps = pairs.attrs.get("gaps") or gap_counts(pa.chunked_array([pairs[GAP].to_numpy()]))
+    return gap_suspicions(gaps)

@@ -124,7 +124,7 @@ def _check_runs(settings: Ensemble, configuration: Path, folder: Path) -> None:
         owners[place] = name
         # A fault of the last run would otherwise be found after all others are done
         require_extras(run_settings)
-        check_inputs(run_settings)
+        check_inputs(run_settings, run_settings.output)
 
 
 def _prefixed(name: str, progress: Progress) -> Progress:

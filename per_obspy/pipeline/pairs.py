@@ -18,6 +18,7 @@ from per_obspy.inventory.catalogue import (
 from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs.ground_files import StationFile
+from per_obspy.pipeline.inputs.drawn_pairs import pair_table
 from per_obspy.screening.ground_motion.assignment import nearest_station
 
 
@@ -41,8 +42,8 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
         simulate.
     """
     pairs = settings.pairs
-    if pairs and pairs.file:
-        return [pairs.file]
+    if table := pair_table(settings, folder):
+        return [table]
     # Everything else is found around the stations
     if not stations:
         raise CatalogError(

@@ -6,18 +6,14 @@ The state in ``run.json`` is ``unfinished`` from the beginning to the end, when 
 only then the other results are complete, and a run of the same inputs does nothing.
 """
 
-import json
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from per_obspy.config import Run, load
+from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import content_hash, file_hash, is_part, remove_file
-from per_obspy.inventory.catalogue import stored_inventories
+from per_obspy.files import file_hash, is_part, remove_file
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -27,8 +23,10 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.losses import losses, number_of_rows
-from per_obspy.pipeline.preflight import check_inputs, require_extras
+from per_obspy.pipeline.preflight import check_inputs
+from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.pipeline.report import reported
 from per_obspy.pipeline.screening import Screened, screened
 from per_obspy.pipeline.stations import (
@@ -41,8 +39,7 @@ from per_obspy.pipeline.stations import (
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent, timed
-from per_obspy.records.fdsn.cache import Fetched
-from per_obspy.records.sources import fetched_records, hash_if_readable, input_files
+from per_obspy.records.sources import fetched_records
 from per_obspy.resume import (
     StatusError,
     changed_outputs,
@@ -61,7 +58,7 @@ UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
 
 
 def run(
-    configuration: str | Path,
+    configuration: str | Path | Run,
     output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
@@ -71,8 +68,8 @@ def run(
 
     Parameters
     ----------
-    configuration : str or Path
-        TOML file, see :class:`per_obspy.config.Run`.
+    configuration : str, Path or Run
+        TOML file, or the settings themselves, see :class:`per_obspy.config.Run`.
     output : str or Path, optional
         Folder of the results, instead of the configured one.
     executor : Executor, optional
@@ -97,32 +94,33 @@ def run(
     Unfinished
         If the machine failed at some stations or chunks of pairs, after all others of this stage.
     """
-    configuration = Path(configuration).resolve()
-    settings = _settings(configuration)
-    folder = Path(output or settings.output).resolve()
+    asked = RunSettings(configuration, output)
+    settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
+        asked.write()
         fetched = fetched_records(settings.records, progress)
         # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():
-            head = _head(settings, configuration, fetched, {})
+            head = asked.head(fetched, {})
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
         # Otherwise they are hashed while their headers are read
-        check_inputs(settings)
+        drawn = write_drawn_pairs(settings, folder, progress)
+        check_inputs(settings, folder)
         earlier_rows = _begun(folder, settings, STATIONS)
         seconds, started = dict[str, float](), now()
         with timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
-            head = head or _head(settings, configuration, fetched, found.hashes)
+            head = head or asked.head(fetched, found.hashes)
         record = _all_stages(settings, folder, found, executor, progress)
-        record |= {"seconds": seconds | record["seconds"], "started": started}
+        record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def screen(
-    configuration: Path,
+    configuration: Path | Run,
     output: Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
@@ -133,27 +131,29 @@ def screen(
     Only chunks of the inventory that have changed are computed. Parameters and errors are those of
     :func:`run`; it is an error as well if there are no stations.
     """
-    configuration = configuration.resolve()
-    settings = _settings(configuration)
-    folder = (output or settings.output).resolve()
+    asked = RunSettings(configuration, output)
+    settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         _require_stations(folder)
         stations = stations_of_earlier_run(folder)
-        check_inputs(settings)
+        drawn = write_drawn_pairs(settings, folder, progress)
+        check_inputs(settings, folder)
         earthquakes = _earlier_earthquakes(folder)
         earlier_rows = _begun(folder, settings, SCREENING)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
-        head = _head(settings, configuration, None, {})
+        head = asked.head(None, {})
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
         with compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
-        record |= {"started": started, "earthquakes": earthquakes}
+        record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
-def report(configuration: Path, output: Path | None = None, progress: Progress = silent) -> Result:
+def report(
+    configuration: Path | Run, output: Path | None = None, progress: Progress = silent
+) -> Result:
     """
     Write totals, figures and layers again from the risk table of a finished run.
 
@@ -162,8 +162,8 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
     CatalogError
         If there is no finished run, or what it left has changed.
     """
-    settings = _settings(configuration.resolve())
-    folder = (output or settings.output).resolve()
+    asked = RunSettings(configuration, output)
+    settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         record = _finished(folder / RECORD)
         stations = _usable(stations_of_earlier_run(folder))
@@ -173,49 +173,6 @@ def report(configuration: Path, output: Path | None = None, progress: Progress =
         key = "" if made.faults else record["key"]
         found = {"outputs": outputs, "faults": made.faults, "key": key}
         return recorded(folder / RECORD, {**record, **found})
-
-
-def _settings(configuration: Path) -> Run:
-    """Return the settings of a run whose optional libraries are there."""
-    settings = load(configuration, Run)
-    require_extras(settings)
-    return settings
-
-
-def _head(
-    settings: Run, configuration: Path, fetched: Fetched | None, hashes: Mapping[Path, str]
-) -> dict[str, Any]:
-    """Return key, configuration and inputs of a run; files with a known hash are not read."""
-    files = _input_files(settings, fetched)
-    inputs = {
-        os.path.relpath(path, configuration.parent): hashes.get(path) or hash_if_readable(path)
-        for path in files
-    }
-    text = settings.model_dump_json(context={"folder": configuration.parent})
-    values = json.loads(text)
-    # The number of processes changes no result
-    content = {"configuration": {**values, "workers": 0}, "inputs": inputs}
-    key = content_hash({"version": version("per_obspy"), **content})
-    return {"key": key, "configuration": values, "inputs": inputs}
-
-
-def _input_files(settings: Run, fetched: Fetched | None) -> list[Path]:
-    """Return every input file of a run: records and their metadata, scenario and inventory."""
-    given = [settings.simulation, *_inventory_files(settings)]
-    files = [path for path in given if path and path.is_file()]
-    return [*input_files(settings.records, fetched), *files]
-
-
-def _inventory_files(settings: Run) -> list[Path]:
-    """Return every file from which pairs may be taken, and the index that names them."""
-    pairs = settings.pairs
-    if pairs is None or pairs.simulated is not None:
-        return []
-    if pairs.catalog is None:
-        return [pairs.file] if pairs.file else []
-    stored = stored_inventories(pairs.catalog)
-    chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]
-    return [pairs.catalog, *chosen]
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
@@ -317,6 +274,7 @@ def _later_stages(
         "faults": made.faults,
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
+        "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
         "outputs": file_hashes(folder, outputs),
         "versions": software_versions(),
         "seconds": seconds,
@@ -359,7 +317,8 @@ def _intermediate_hashes(
     """Return the hashes of the files of the first stage, which other commands or users read."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
-    files += [folder / name for name in ("simulated.json", "pairs.csv")]
+    made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)
+    files += [folder / name for name in made]
     # What was hashed on the way is not opened again
     hashes = dict(known)
     hashes |= {station.shard: station.hash for station in stations if station.shard}

@@ -11,6 +11,7 @@ from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.files.reading import PairInventory
+from per_obspy.inventory.gap_units import gap_suspicions
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
@@ -23,6 +24,22 @@ from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
 KINDS = ("file", "record", "station", "service", "pair")
+
+
+class PairNotes(NamedTuple):
+    """
+    Sentences about the pair tables of a run.
+
+    Attributes
+    ----------
+    recognised : tuple of str
+        How each table that is not plain is read.
+    suspicions : tuple of str
+        What is possible row by row but odd of all gaps.
+    """
+
+    recognised: tuple[str, ...] = ()
+    suspicions: tuple[str, ...] = ()
 
 
 class Screened(NamedTuple):
@@ -41,6 +58,8 @@ class Screened(NamedTuple):
         Stations that serve no pair because their place is unknown.
     failed : bool
         Whether the work of a chunk failed unexpectedly.
+    pair_tables : PairNotes
+        How the pair tables are read, and what is odd of their gaps.
     """
 
     outputs: list[Path]
@@ -48,6 +67,7 @@ class Screened(NamedTuple):
     served: Counter[str]
     unplaced: tuple[Rejection, ...]
     failed: bool
+    pair_tables: PairNotes
 
 
 def screened(
@@ -84,19 +104,19 @@ def screened(
     maps = _maps(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
-    has_motion = bool(stations or maps)
-    parts = _parts(settings, folder, ground, executor, progress) if has_motion else []
+    parts, notes = list[Part](), PairNotes()
+    if stations or maps:
+        parts, notes = _parts(settings, folder, ground, executor, progress)
     outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
     kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
     # The parts of the chunks become one table, worst pair first
-    tables = [part.path for part in parts if part.path]
-    if tables:
+    if tables := [part.path for part in parts if part.path]:
         progress("ranking", 0, 1)
         risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
         outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
         progress("ranking", 1, 1)
     failed = any(part.failed for part in parts)
-    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed)
+    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed, notes)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
@@ -122,9 +142,10 @@ def _maps(settings: Run) -> tuple[Path, ...]:
 
 def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
-) -> list[Part]:
+) -> tuple[list[Part], PairNotes]:
     """Do the chunks and return their parts in the order of the inventory; remove other parts."""
-    inventory = PairInventory(pair_files(settings, folder, ground.stations))
+    form = settings.pairs.form if settings.pairs else None
+    inventory = PairInventory(pair_files(settings, folder, ground.stations), form)
     area = settings.totals.area
     if area and area not in inventory.names:
         raise CatalogError("totals", f"area: the pair table has no column {area!r}")
@@ -137,7 +158,9 @@ def _parts(
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
     _remove_others(_chunk_folder(folder), parts)
-    return sorted(parts, key=lambda part: part.number)
+    # What is said about the tables, after all their rows were read
+    notes = PairNotes(tuple(inventory.recognised()), tuple(gap_suspicions(inventory.gaps)))
+    return sorted(parts, key=lambda part: part.number), notes
 
 
 def _remove_others(folder: Path, parts: Sequence[Part]) -> None:

@@ -1,4 +1,4 @@
-"""``per-obspy events``, ``fetch``, ``info`` and a run with records of a service on loopback."""
+"""``per-obspy events``, ``fetch`` and a run with records of a service on loopback."""
 
 import json
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from fdsn_server import FdsnServer, serving, status
 
 from per_obspy.config import Scenario
 from per_obspy.pipeline.run import run
-from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
+from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 CONFIGURATION = """
 name = "fetched"
@@ -107,6 +107,25 @@ def test_a_service_that_is_down_exits_with_75(server, configuration, call):
         assert "HTTP 503" in err.splitlines()[-1]
 
 
+def test_the_identifier_of_an_earthquake_is_enough_for_records(server, tmp_path, call):
+    # would catch an identifier taken for a path, or a cache that is filled again
+    changes = [f"records.fdsn.providers=['{server.url}']", "records.fdsn.wait=0.01"]
+    changes += [f"records.fdsn.event_provider='{server.url}'", "pairs.simulated.count=10"]
+    changes += ["screening.largest_distance=1e5", "screening.exact=false", "spectra.count=5"]
+    options = [word for change in changes for word in ("--set", change)]
+    code, out, err = call("run", "USGS:xx1", *options, "-o", tmp_path / "out", "--json")
+    assert code == 0, err
+    assert json.loads(out)["counts"]["stations"] == 2
+    assert "records: USGS:xx1 (identifier of an earthquake)" in err
+    assert (tmp_path / "out" / "fetched").is_dir()
+    # its configuration runs without the network
+    asked = len(server.requests)
+    server.shutdown()
+    code, out, _ = call("run", tmp_path / "out", "--json")
+    assert (code, json.loads(out)["did_nothing"]) == (0, True)
+    assert len(server.requests) == asked
+
+
 def test_fetch_fills_the_cache_alone(server, configuration, call):
     code, out, err = call("fetch", configuration)
     assert code == 0
@@ -193,117 +212,8 @@ def test_events(server, call):
     assert call("events", "absent")[0] == 2
 
 
-def test_info(simulation, tmp_path, call):
-    write_simulation(simulation, tmp_path)
-    (tmp_path / "notes.txt").write_text("bring an umbrella")
-    code, out, err = call("info", tmp_path)
-    assert code == 0
-    assert "6 records" in out
-    assert "XX.S002..HNE" in out
-    assert "rejected file notes.txt: ObsPy cannot read it" in err
-    code, out, _ = call("info", tmp_path, "--json")
-    told = json.loads(out)
-    assert [one["name"] for one in told["rejected"]] == ["notes.txt"]
-    for one in told["records"]:
-        (trace,) = simulation.stream.select(id=one["record"])
-        assert (one["dt"], one["format"], one["level"], one["unit"]) == (
-            0.02,
-            "MSEED",
-            "raw",
-            "m/s2",
-        )
-        assert one["duration"] == pytest.approx(trace.stats.endtime - trace.stats.starttime)
-        # 200 000 counts a m/s2, as the simulated StationXML says
-        assert one["peak"] == pytest.approx(abs(trace.data - trace.data.mean()).max() / 2e5)
-        assert one["file"] == f"{one['record'][:7]}.mseed"
-
-
-def test_info_shows_earthquakes_and_simulated_records(simulation, tmp_path, call):
-    write_simulation(simulation, tmp_path / "main")
-    later = Scenario(stations=1, dt=0.02, magnitude=5.5, origin_time="2001-02-03T04:05:06")
-    write_simulation(simulate(later), tmp_path / "later")
-    # as JSON every record has its mark, as text every earthquake has a line
-    records = json.loads(call("info", tmp_path, "--json")[1])["records"]
-    assert {record["event"][:2] for record in records} == {"1:", "2:"}
-    assert all(record["simulated"] for record in records)
-    out = call("info", tmp_path)[1]
-    assert "earthquake 1: " in out
-    assert "earthquake 2: 2001-02-03T04:04: 1 stations, 3 records" in out
-    assert "9 records are SIMULATED." in out
-
-
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        ({}, "the folder is empty"),
-        (
-            {"a.txt": "Dear colleague", "b.md": "# Notes"},
-            "none of its 2 files is a record; a.txt: ",
-        ),
-        ({"s.xml": "<FDSNStationXML"}, "none of its 1 files is a record; s.xml: "),
-    ],
-)
-def test_info_of_nothing(tmp_path, call, content, problem):
-    (tmp_path / "records").mkdir()
-    for name, text in content.items():
-        (tmp_path / "records" / name).write_text(text)
-    run_file = tmp_path / "run.toml"
-    head = 'name = "x"\noutput = "out"\n[records]\nfolder = "records"\n'
-    run_file.write_text(f"{head}[pairs.simulated]\ncount = 2\n")
-    # The folder is named in one line, whatever reads it
-    for command in (
-        ("info", tmp_path / "records"),
-        ("run", run_file),
-        ("process", tmp_path / "records", "-o", tmp_path / "clean"),
-        ("spectra", tmp_path / "records", "-o", tmp_path / "spectra.nc"),
-    ):
-        code, _, err = call(*command)
-        assert code == 3
-        assert f"records: {problem}" in err.splitlines()[-1]
-    assert call("info", tmp_path / "absent")[0] == 2
-
-
-def test_info_of_records_that_cannot_be_used(simulation, tmp_path, call):
-    write_simulation(simulation, tmp_path)
-    (tmp_path / "stations.xml").unlink()
-    code, out, err = call("info", tmp_path)
-    assert code == 3
-    assert "0 records" in out
-    assert "XX.S001..HNN: there is no StationXML" in err
-
-
-@pytest.mark.parametrize("command", ["info", "process"])
-def test_a_record_without_samples_is_rejected(simulation, tmp_path, call, command):
-    write_simulation(simulation, tmp_path / "in")
-    for waveforms in (tmp_path / "in").glob("*.mseed"):
-        waveforms.unlink()
-    head = "TIMESERIES XX_S001__HNN_D, 0 samples, 100 sps, 2000-01-01T00:00:00.000000, "
-    head += "SLIST, INTEGER, Counts"
-    (tmp_path / "in" / "S001.txt").write_text(f"{head}\n")
-    output = ("-o", tmp_path / "out") if command == "process" else ()
-    code, out, _ = call(command, tmp_path / "in", *output, "--json")
-    assert code == 3
-    (rejected,) = json.loads(out)["rejected"]
-    assert "no samples" in rejected["reasons"][0]
-
-
-@pytest.mark.real_data
-def test_info_of_a_workspace(real_data, call):
-    code, out, _ = call(
-        "info", real_data / "records" / "asdf" / "nc72282711_workspace.h5", "--json"
-    )
-    assert code == 0
-    told = json.loads(out)["records"]
-    assert sorted(one["level"] for one in told) == ["processed"] * 3 + ["raw"] * 3
-    raw, processed = (
-        [one["peak"] for one in told if one["level"] == level] for level in ("raw", "processed")
-    )
-    # the mean instead of a baseline, and no filter: 1 % for pulses of 5 Hz
-    assert raw == pytest.approx(processed, rel=0.01)
-
-
 def test_help_has_an_example(call):
-    for command in ("events", "fetch", "info"):
+    for command in ("events", "fetch"):
         code, out, _ = call(command, "--help")
         assert code == 0
         assert "Example: per-obspy" in out

@@ -1,6 +1,83 @@
-"""Lines that ``per-obspy run`` prints of its earthquakes and of simulated motion."""
+"""Arguments of ``per-obspy run``, and what it prints of earthquakes and simulated motion."""
+
+import json
+
+import pytest
 
 from per_obspy.commands.run import _earthquake_lines, _simulated_line
+from per_obspy.config import Scenario
+from per_obspy.records.simulation.earthquake import simulate, write_simulation
+
+PAIRS = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
+SMALL = ("spectra.count=5", "screening.exact=false", "screening.largest_distance=1e5", "workers=1")
+OPTIONS = [word for change in SMALL for word in ("--set", change)]
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("records")
+    write_simulation(simulate(Scenario(stations=2, dt=0.02, magnitude=6.5)), folder)
+    return folder
+
+
+def test_records_and_pairs_are_a_run(records, tmp_path, monkeypatch, call):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "town.csv").write_text(f"{PAIRS}a,0.3,0.0,10,0.3001,0.0,12,0.05\n")
+    code, out, err = call("run", records, "town.csv", *OPTIONS)
+    assert code == 0, err
+    folder = tmp_path / "results" / f"{records.name}-town"
+    line = f"records: {records} (folder); pairs: town.csv (pair table); results: {folder}"
+    assert err.splitlines()[0] == line.replace(f"{tmp_path}/", "")
+    assert "2 stations, 1 pairs" in out
+    assert f"{folder / 'configuration.toml'}" in out
+    # a second run does nothing, also in the other order; another value is another run
+    code, out, _ = call("run", "town.csv", records, *OPTIONS, "--json")
+    assert (code, json.loads(out)["did_nothing"]) == (0, True)
+    code, out, _ = call("run", folder, "--set", "screening.target_amplification=1.5", "--json")
+    assert (code, json.loads(out)["did_nothing"]) == (0, False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["RECORDS"], "records without pairs: name a pair table or footprints too"),
+        (["RECORDS", "absent.csv"], "absent.csv: no such folder or file"),
+        (["RECORDS", "town.csv", "--set", "highpas=1"], "did you mean processing.highpass?"),
+        (["RECORDS", "town.csv", "--set", "spectra.count=1"], "spectra.count: "),
+        (["absent"], "absent: no such folder or file"),
+        (["absent.toml"], "absent.toml: cannot be read: No such file or directory"),
+    ],
+)
+def test_wrong_arguments_are_one_line(records, tmp_path, monkeypatch, call, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "town.csv").write_text(PAIRS)
+    given = [records if one == "RECORDS" else one for one in arguments]
+    code, out, err = call("run", *given)
+    assert (code, out) == (2, "")
+    (line,) = err.splitlines()
+    assert message in line
+    assert [path.name for path in tmp_path.iterdir()] == ["town.csv"]
+
+
+@pytest.mark.parametrize(
+    "command", [["run", ""], ["run", "RECORDS", ""], ["info", ""], ["init", ""]]
+)
+def test_an_empty_argument_is_not_the_folder_of_the_shell(
+    records, tmp_path, monkeypatch, call, command
+):
+    # would catch a run of whatever lies here, from a variable that was never set
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.toml").write_text('name = "x"\noutput = "out"\nsimulation = "s.toml"\n')
+    code, _, err = call(*(records if one == "RECORDS" else one for one in command))
+    assert code == 2
+    assert "the path is empty" in " ".join(err.replace("│", " ").split())
+    assert [path.name for path in tmp_path.iterdir()] == ["run.toml"]
+
+
+def test_help_says_how_arguments_are_told_apart(call):
+    code, out, _ = call("run", "--help")
+    assert code == 0
+    assert "Two are records and pairs, in either order: content decides." in out
 
 
 def test_the_screened_earthquake_is_printed():

@@ -154,7 +154,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ('simulation = "s.toml"\n' + GOOD, r"give either simulation or records"),
         (
             'name = "x"\noutput = "o"\nsimulation = "s"\n[pairs]\n',
-            r"pairs: .*give one of file, catalog and simulated",
+            r"pairs: .*give one of file, footprints, catalog and simulated",
         ),
         (GOOD.split("[pairs]")[0], r"give pairs"),
         (

@@ -17,7 +17,26 @@ import obspy
 import pandas as pd
 import pyogrio
 import shapely
+from building_samples import (
+    Town,
+    google,
+    microsoft,
+    osm_xml,
+    overture,
+    plateau_lod0,
+    plateau_lod1,
+    r2d_assets,
+    small_town,
+)
 from format_samples import SAMPLES
+from messy_tables import (
+    NAMES,
+    ROWS,
+    readable,
+    text_of,
+    with_shared_texts,
+    workbook_of,
+)
 from obspy import Stream
 from obspy.core.event import Catalog, Event, Magnitude, Origin
 from station_files import START, THREE, inventory, record
@@ -86,6 +105,14 @@ pairs = 1
 source = "a survey"
 licence = "CC0-1.0"
 date = 2026-11-21
+"""
+
+FORM = b"""
+decimal = "."
+[columns]
+gap = "gap"
+[units]
+gap = "cm"
 """
 
 CURVE = b"period,damping,sd\n0.1,0.05,0.01\n1.0,0.05,0.1\n4.0,0.05,0.4\n"
@@ -170,9 +197,20 @@ def _inventories() -> dict[str, Entry]:
     """Return tables of pairs and layers of buildings."""
     return {
         "pairs_csv": Entry("pairs.csv", _pairs_csv, _pairs),
+        "pairs_turkish": Entry("pairs.csv", _turkish, _pairs),
+        "pairs_utf_16": Entry("pairs.txt", _utf_16, _pairs),
+        "pairs_xlsx": Entry("pairs.xlsx", _workbook, _pairs),
+        "pairs_form": Entry("pairs.csv.toml", lambda: FORM, _pairs_beside),
         "pairs_parquet": Entry("pairs.parquet", _pairs_parquet, _pairs),
         "footprints_geojson": Entry("town.geojson", partial(_layer, "a.geojson"), _footprints),
         "footprints_gpkg": Entry("town.gpkg", partial(_layer, "a.gpkg"), _footprints),
+        "citygml_lod0": Entry("town.gml", partial(_town, plateau_lod0), _footprints),
+        "citygml_lod1": Entry("town.gml", partial(_town, plateau_lod1), _footprints),
+        "assets": Entry("town.json", partial(_town, r2d_assets), _footprints),
+        "google_csv": Entry("town.csv", partial(_town, google), _footprints),
+        "geojson_lines": Entry("town.geojsonl", partial(_town, microsoft), _footprints),
+        "osm": Entry("town.osm", partial(_town, osm_xml), _footprints),
+        "overture": Entry("town.parquet", partial(_town, overture), _footprints),
     }
 
 
@@ -289,6 +327,29 @@ def _pairs_csv() -> bytes:
     return _pair_table().to_csv(index=False).encode()
 
 
+def _turkish() -> bytes:
+    """Return a pair table with semicolons, decimal commas and Turkish headings."""
+    return readable()["Turkish, cp1254, gap in cm"].content
+
+
+def _utf_16() -> bytes:
+    """Return a pair table in UTF-16 with tabulators."""
+    return text_of(NAMES, ROWS, "\t", ",").encode("utf-16")
+
+
+def _workbook() -> bytes:
+    """Return a pair table in a sheet, with formulas and a part of texts."""
+    sheet = [NAMES, *ROWS, ["d", "=1/8|0.125", *ROWS[0][2:]]]
+    return with_shared_texts(workbook_of({"Pairs": sheet}))
+
+
+def _pairs_beside(path: Path) -> Iterable[object]:
+    """Read a good pair table with the file as what is said about it."""
+    table = path.with_suffix("")
+    table.write_bytes(_pairs_csv())
+    return _pairs(table)
+
+
 def _pairs_parquet() -> bytes:
     """Return a pair table as Parquet."""
     content = io.BytesIO()
@@ -352,6 +413,12 @@ def _layer(name: str) -> bytes:
             crs="EPSG:4326",
         )
         return path.read_bytes()
+
+
+def _town(write: Callable[[Path, Town], Path]) -> bytes:
+    """Return four houses in the format of another source."""
+    with TemporaryDirectory() as folder:
+        return write(Path(folder), small_town()).read_bytes()
 
 
 def _records(path: Path) -> Iterable[object]:

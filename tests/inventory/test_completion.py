@@ -214,3 +214,42 @@ def test_the_input_stays():
     before = table.copy(deep=True)
     completed_pairs(table, Building())
     pd.testing.assert_frame_equal(table, before)
+
+
+def test_a_height_from_storeys_has_the_deviation_of_the_storey_height():
+    # ASCE 7: T = C h**0.75 for `other`, h**0.9 for concrete frames
+    row = _completed(height_1=12.0, storeys_2=3.0, system_1="concrete_mrf", system_2="concrete_mrf")
+    assert (row["height_log_std_1"], row["height_log_std_2"]) == (0.0, 0.13)
+    assert row["period_log_std_1"] == pytest.approx(0.3)
+    assert row["period_log_std_2"] == pytest.approx(np.hypot(0.3, 0.9 * 0.13))
+
+
+def test_an_estimated_height_counts_as_derived_and_widens_the_period():
+    row = _completed(**SIZES, height_log_std_1=0.5)
+    assert "height_1" in row["derived"].split()
+    assert "height_2" not in row["derived"].split()
+    # and so does a contact height that the table has from it
+    assert "contact_height" in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5, contact_height=9.0)
+    assert "contact_height" in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5, contact_height=8.0)
+    assert "contact_height" not in row["derived"].split()
+    row = _completed(**SIZES, height_log_std_1=0.5)
+    assert row["period_log_std_1"] == pytest.approx(np.hypot(0.4, 0.75 * 0.5))
+    # a period that is given does not depend on the height
+    assert _completed(**SIZES, height_log_std_1=0.5, period_1=0.3)["period_log_std_1"] == 0.0
+
+
+def test_estimated_storeys_add_their_deviation_to_that_of_the_storey_height():
+    row = _completed(height_1=12.0, storeys_2=3.0, height_log_std_2=0.3)
+    assert row["height_log_std_2"] == pytest.approx(np.hypot(0.3, 0.13))
+
+
+def test_the_storey_heights_of_hazus_have_the_default_deviation():
+    # HAZUS 5.1 Earthquake Model Technical Manual, table 5-1: typical storeys and heights in feet
+    typical = {
+        (1, 14): 1, (2, 24): 5, (5, 60): 4, (13, 156): 4, (1, 15): 3, (2, 20): 6, (5, 50): 6,
+        (12, 120): 5, (3, 35): 1, (1, 10): 1,
+    }  # fmt: skip
+    storey = np.concatenate([np.full(count, h / n) for (n, h), count in typical.items()])
+    assert np.std(np.log(storey)) == pytest.approx(Building().storey_height_log_std, abs=0.005)

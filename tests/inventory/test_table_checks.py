@@ -64,7 +64,12 @@ def test_gaps_in_another_unit_are_suspected_as_a_whole():
     assert suspicions(_pairs(gap=[0.0, 0.3])) == []
     assert suspicions(_pairs(gap=[0.0, 0.0])) == []
     (warning,) = suspicions(_pairs(gap=[0.0, 8.0]))
-    assert "8 m" in warning
+    assert warning.startswith("1 of 1 gaps above 0 are wider than 3 m")
+    # whole centimetres of a survey, of which each could be metres
+    whole = [1.0, 2.0, 2.0, 3.0, 1.0, 0.0]
+    (warning,) = suspicions(_pairs(pair_id=list("abcdef"), gap=whole))
+    assert warning.startswith("all 5 gaps above 0 are whole metres")
+    assert suspicions(_pairs(pair_id=list("abcde"), gap=[1.0, 2.0, 2.0, 3.0, 1.5])) == []
 
 
 def test_faults_are_counted_by_column():

@@ -13,6 +13,7 @@ from .small_run import InProcess, plain_figure, write_smallest_configuration
 #: Files of the run, seen from its output folder; their names are the same in every run.
 FILES = (
     "run.json",
+    "configuration.toml",
     "risk.csv",
     "risk.parquet",
     "risk.columns.csv",

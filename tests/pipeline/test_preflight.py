@@ -44,7 +44,7 @@ def test_a_missing_extra_is_named_before_anything_is_computed(
 
 FAULTS = {
     "no table": ("", PAIRS, r"pairs\.csv: no such file"),
-    "missing column": (HEADER.replace("gap", "Gap") + "\n", PAIRS, "missing column gap"),
+    "missing column": (HEADER.replace("gap", "ward") + "\n", PAIRS, "missing column gap"),
     "no catalog": ("", '[pairs]\ncatalog = "none.toml"\nnames = ["x"]\n', r"none\.toml"),
     "no map": (HEADER, f'shakemap = "grid.xml"\n{PAIRS}', r"grid\.xml"),
 }
@@ -58,13 +58,13 @@ def test_wrong_inputs_are_found_before_records(tmp_path, fault):
         (tmp_path / "pairs.csv").write_text(table)
     (tmp_path / "run.toml").write_text(RECORDS + text)
     with pytest.raises(CatalogError, match=reason):
-        check_inputs(load(tmp_path / "run.toml", Run))
+        check_inputs(load(tmp_path / "run.toml", Run), tmp_path / "out")
 
 
 def test_a_whole_table_passes(tmp_path):
     (tmp_path / "pairs.csv").write_text(f"{HEADER}a,0,0,10,0,0,12,0.1\n")
     (tmp_path / "run.toml").write_text(RECORDS + PAIRS)
-    check_inputs(load(tmp_path / "run.toml", Run))
+    check_inputs(load(tmp_path / "run.toml", Run), tmp_path / "out")
     with pytest.raises(CatalogError, match="absent: no such folder or file"):
         run(tmp_path / "run.toml")
     shutil.rmtree(tmp_path / "out")
@@ -87,9 +87,9 @@ def test_an_area_that_the_pairs_lack_is_found_before_records(tmp_path, source):
     }[source]
     (tmp_path / "run.toml").write_text(RECORDS + pairs + AREA)
     with pytest.raises(CatalogError, match="totals: area: the pair table has no column 'district'"):
-        check_inputs(load(tmp_path / "run.toml", Run))
+        check_inputs(load(tmp_path / "run.toml", Run), tmp_path / "out")
     (tmp_path / "run.toml").write_text(RECORDS + pairs + AREA.replace("district", "gap"))
-    check_inputs(load(tmp_path / "run.toml", Run))
+    check_inputs(load(tmp_path / "run.toml", Run), tmp_path / "out")
 
 
 def test_an_ensemble_checks_all_its_runs_before_the_first(tmp_path):

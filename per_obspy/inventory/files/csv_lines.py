@@ -7,9 +7,9 @@ after it for one cell: such a row is left out by itself, and the next line is a 
 
 import csv
 import re
-from codecs import BOM_UTF8
 from collections import deque
 from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
-from per_obspy.inventory.files.csv_text import BLOCK
+from per_obspy.inventory.recognition.csv_text import UTF_8, text_blocks
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
 #: Most lines of one row; a quotation over more of them is one that is not closed.
@@ -33,18 +33,41 @@ LONGEST_NAME = 80
 OPEN = "a quotation mark is not closed"
 AFTER = "text follows a closing quotation mark"
 
-# Text inside of quotation marks, in which two of them stand for one; cells; what may follow them
+# Text inside of quotation marks, in which two of them stand for one
 _INSIDE = rb'(?:[^"]|"")*+'
-_CELL = rb'(?:"%b"|[^",][^,]*+|)' % _INSIDE
-_CELLS = rb"(?:,%b)*+" % _CELL
 
-#: A line whose quotations are all closed, and one whose last cell is not.
-_WHOLE = re.compile(rb"%b%b" % (_CELL, _CELLS))
-_OPENING = re.compile(rb'(?:%b,)*+"%b' % (_CELL, _INSIDE))
 
-#: A further line of a quotation, which closes it; or which does not, or opens the next one.
-_CLOSING = re.compile(rb'%b"%b' % (_INSIDE, _CELLS))
-_BETWEEN = re.compile(rb'%b(?:"%b,"%b)?+' % (_INSIDE, _CELLS, _INSIDE))
+class _Patterns(NamedTuple):
+    """
+    Lines by their quotations.
+
+    Attributes
+    ----------
+    whole, opening : Pattern
+        A line whose quotations are all closed, and one whose last cell is not.
+    closing, between : Pattern
+        A further line of a quotation, which closes it; or which does not, or opens the next one.
+    """
+
+    whole: re.Pattern[bytes]
+    opening: re.Pattern[bytes]
+    closing: re.Pattern[bytes]
+    between: re.Pattern[bytes]
+
+
+@cache
+def _patterns(separator: str) -> _Patterns:
+    """Return the patterns of lines whose cells are separated by a sign."""
+    sign = re.escape(separator).encode()
+    # Cells, and what may follow them
+    cell = rb'(?:"%b"|[^"%b][^%b]*+|)' % (_INSIDE, sign, sign)
+    cells = rb"(?:%b%b)*+" % (sign, cell)
+    return _Patterns(
+        whole=re.compile(rb"%b%b" % (cell, cells)),
+        opening=re.compile(rb'(?:%b%b)*+"%b' % (cell, sign, _INSIDE)),
+        closing=re.compile(rb'%b"%b' % (_INSIDE, cells)),
+        between=re.compile(rb'%b(?:"%b%b"%b)?+' % (_INSIDE, cells, sign, _INSIDE)),
+    )
 
 
 class RowLines(NamedTuple):
@@ -66,23 +89,44 @@ class RowLines(NamedTuple):
     broken: tuple[Rejection, ...]
 
 
-def header_names(file: Path) -> list[str]:
+class Layout(NamedTuple):
     """
-    Return the names in the first line of a file.
+    Where the rows of a text file are.
+
+    Attributes
+    ----------
+    lines : int
+        Number of lines of the file.
+    header : int
+        Line of the header.
+    separator, encoding : str
+        Of the text.
+    """
+
+    lines: int
+    header: int = 1
+    separator: str = ","
+    encoding: str = UTF_8
+
+
+def header_names(file: Path, layout: Layout) -> list[str]:
+    """
+    Return the names in the header of a file.
 
     Raises
     ------
     CatalogError
         If a quotation mark of the line is not closed.
     """
-    first = next(_blocks(file)).partition(b"\n")[0]
-    if not _WHOLE.fullmatch(first):
-        problem = OPEN if _OPENING.fullmatch(first) else AFTER
-        raise CatalogError(str(file), f"line 1: {problem}")
-    return _cells(first)
+    first = next(_after_lines(file, layout, layout.header - 1)).partition(b"\n")[0]
+    patterns = _patterns(layout.separator)
+    if not patterns.whole.fullmatch(first):
+        problem = OPEN if patterns.opening.fullmatch(first) else AFTER
+        raise CatalogError(str(file), f"line {layout.header}: {problem}")
+    return _cells(first, layout.separator)
 
 
-def row_lines(file: Path, names: Sequence[str], lines: int) -> Iterator[RowLines]:
+def row_lines(file: Path, names: Sequence[str], layout: Layout) -> Iterator[RowLines]:
     """
     Yield the rows after the header, some thousands at a time.
 
@@ -91,24 +135,24 @@ def row_lines(file: Path, names: Sequence[str], lines: int) -> Iterator[RowLines
     file : Path
         Checked by :func:`~.csv_text.check_text`.
     names : sequence of str
-        Columns of the header.
-    lines : int
-        Number of lines of the file.
+        Columns of the header, by the schema where it knows them.
+    layout : Layout
+        Of the file.
 
     Raises
     ------
     CatalogError
         If the lines that were read are not those that the file had.
     """
-    scanner, blocks = _Scanner(file, names), _blocks(file)
-    # The header is line 1
-    yield scanner.rows(next(blocks).partition(b"\n")[2])
-    for block in blocks:
+    scanner = _Scanner(file, names, layout)
+    for block in _after_lines(file, layout, layout.header):
         yield scanner.rows(block)
     yield scanner.rows(b"", is_last=True)
-    if scanner.number != lines + 1:
+    if scanner.number != layout.lines + 1:
         read = scanner.number - 1
-        problem = f"{lines} lines, of which {read} were read: was the file changed meanwhile?"
+        problem = (
+            f"{layout.lines} lines, of which {read} were read: was the file changed meanwhile?"
+        )
         raise CatalogError(str(file), problem)
 
 
@@ -122,9 +166,10 @@ class _Scanner:
         Number of the next line of the file.
     """
 
-    def __init__(self, file: Path, names: Sequence[str]) -> None:
-        self.number = 2
+    def __init__(self, file: Path, names: Sequence[str], layout: Layout) -> None:
+        self.number = layout.header + 1
         self._file, self._names = file, names
+        self._separator, self._patterns = layout.separator, _patterns(layout.separator)
         # Lines of a row that goes on in the next block
         self._waiting: deque[bytes] = deque()
 
@@ -153,21 +198,21 @@ class _Scanner:
         if not self._waiting:
             return None
         first = self._waiting[0]
-        if b'"' not in first or _WHOLE.fullmatch(first):
+        if b'"' not in first or self._patterns.whole.fullmatch(first):
             return 1, ""
-        if not _OPENING.fullmatch(first):
+        if not self._patterns.opening.fullmatch(first):
             return 1, AFTER
         # Go on to the line that closes the quotation
         for count, line in enumerate(islice(self._waiting, 1, LONGEST_ROW), start=2):
-            if _CLOSING.fullmatch(line):
+            if self._patterns.closing.fullmatch(line):
                 return self._closed(list(islice(self._waiting, count)))
-            if self._is_row(line) or not _BETWEEN.fullmatch(line):
+            if self._is_row(line) or not self._patterns.between.fullmatch(line):
                 return 1, OPEN
         return (1, OPEN) if is_last or len(self._waiting) >= LONGEST_ROW else None
 
     def _closed(self, lines: list[bytes]) -> tuple[int, str]:
         """Return how many of the lines of a closed quotation are the next row, and its fault."""
-        cells = _cells(b"\n".join(lines))
+        cells = _cells(b"\n".join(lines), self._separator)
         named = dict(zip(self._names, cells, strict=False))
         # Only carried columns have text of several lines
         wrong = [name for name, cell in named.items() if "\n" in cell and name in COLUMNS]
@@ -179,10 +224,11 @@ class _Scanner:
 
     def _is_row(self, line: bytes) -> bool:
         """Return whether a line inside a quotation is a row by itself, by what its gap is."""
-        if line.count(b",") < len(self._names) - 1:
+        if line.count(self._separator.encode()) < len(self._names) - 1:
             return False
-        cells = dict(zip(self._names, _cells(line), strict=False))
-        gap = cells.get("gap", "no row")
+        cells = dict(zip(self._names, _cells(line, self._separator), strict=False))
+        # A number, with either decimal mark, or an empty cell
+        gap = cells.get("gap", "no row").replace(",", ".")
         try:
             return gap.strip().lower() in EMPTY or float(gap) == float(gap)
         except ValueError:
@@ -190,34 +236,49 @@ class _Scanner:
 
     def _rejection(self, line: bytes, fault: str) -> Rejection:
         """Return the rejection of the next line."""
-        name = line.partition(b",")[0].strip(b'" ')[:LONGEST_NAME].decode("utf-8", "replace")
+        name = (
+            line.partition(self._separator.encode())[0]
+            .strip(b'" ')[:LONGEST_NAME]
+            .decode("utf-8", "replace")
+        )
         return Rejection("pair", name, str(self._file), self.number, (fault,))
 
 
-def _cells(row: bytes) -> list[str]:
+def _cells(row: bytes, separator: str) -> list[str]:
     """Return the cells of a row; none if one of them is longer than any cell should be."""
     try:
-        return next(csv.reader([row.decode("utf-8", "replace")]), [])
+        return next(csv.reader([row.decode("utf-8", "replace")], delimiter=separator), [])
     except csv.Error:
         return []
 
 
-def _blocks(file: Path) -> Iterator[bytes]:
-    """Yield whole lines, which all end with a line feed, without a mark of the byte order."""
+def _after_lines(file: Path, layout: Layout, count: int) -> Iterator[bytes]:
+    """Yield whole lines after the first ones, at least one block of them."""
+    blocks = _blocks(file, layout.encoding)
+    for block in blocks:
+        # Lines of the block that are left out
+        left_out = min(count, block.count(b"\n"))
+        count -= left_out
+        rest = block.split(b"\n", left_out)[-1] if left_out else block
+        if not count:
+            yield rest
+            break
+    yield from blocks
+
+
+def _blocks(file: Path, encoding: str) -> Iterator[bytes]:
+    """Yield whole lines in UTF-8, which all end with a line feed."""
     rest = b""
-    with file.open("rb") as stream:
-        if stream.read(len(BOM_UTF8)) != BOM_UTF8:
-            stream.seek(0)
-        while block := stream.read(BLOCK):
-            rest += block
-            # A carriage return at the end may belong to a line feed that follows
-            end = 1 + max(rest.rfind(b"\n"), rest.rfind(b"\r", 0, -1))
-            if end:
-                yield _with_line_feeds(rest[:end])
-                rest = rest[end:]
-            elif len(rest) > LONGEST_LINE:
-                problem = f"a line is longer than {LONGEST_LINE >> 20} MB"
-                raise CatalogError(str(file), problem)
+    for block in text_blocks(file, encoding):
+        rest += block
+        # A carriage return at the end may belong to a line feed that follows
+        end = 1 + max(rest.rfind(b"\n"), rest.rfind(b"\r", 0, -1))
+        if end:
+            yield _with_line_feeds(rest[:end])
+            rest = rest[end:]
+        elif len(rest) > LONGEST_LINE:
+            problem = f"a line is longer than {LONGEST_LINE >> 20} MB"
+            raise CatalogError(str(file), problem)
     if rest:
         yield _with_line_feeds(rest if rest.endswith(b"\r") else rest + b"\n")
 

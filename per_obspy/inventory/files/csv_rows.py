@@ -5,6 +5,7 @@ Each row has its line in the file, and lines that are no rows become rejections:
 file is in one of them, or blank.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -15,17 +16,31 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
+from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.inventory.files.csv_lines import (
     LONGEST_NAME,
+    Layout,
     RowLines,
     header_names,
     row_lines,
 )
-from per_obspy.inventory.files.csv_text import check_separator, check_text
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows
 from per_obspy.inventory.files.text_cells import given_text, given_texts
+from per_obspy.inventory.recognition.decimal_marks import (
+    evidence_of,
+    has_quoted_commas,
+    marks_of,
+    two_readings,
+    with_points,
+)
+from per_obspy.inventory.recognition.encodings import TURKISH, two_pages
+from per_obspy.inventory.recognition.table_form import text_form
+from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
+
+#: Nothing is said about the form of a table.
+PLAIN = TableForm()
 
 
 class CsvFile:
@@ -33,16 +48,98 @@ class CsvFile:
     Pairs in a CSV file.
 
     Every cell is read as text, so that a message can contain a bad value as it is in the file.
+
+    Parameters
+    ----------
+    file : Path
+        Text of any form that :func:`~.table_form.text_form` recognises.
+    given : TableForm
+        What the user says about its form.
     """
 
-    def __init__(self, file: Path) -> None:
-        self.file = file
-        self._lines = check_text(file)
-        names = header_names(file)
-        check_separator(file, names)
-        self._columns = [given_text(name.strip()) for name in names]
+    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
+        self.file, self._given = file, given
+        form = text_form(file, given)
+        self._form = form
+        self._layout = Layout(form.lines, form.header, form.separator, form.encoding)
+        self.headings = header_names(file, self._layout)
+        self.meanings = form.meanings
+        self._columns = [given_text(name.strip()) for name in form.meanings.names]
         # Spreadsheets leave columns without a name
         self.names: Sequence[str] = [name for name in self._columns if name]
+
+    @property
+    def recognised(self) -> str:
+        """What is not plain about the file, empty if nothing is; reads the whole file."""
+        return "; ".join(text for text in (self._form.sentence(), self.recognised_numbers) if text)
+
+    @property
+    def recognised_numbers(self) -> str:
+        """Which columns have decimal commas, or commas between thousands."""
+        # Columns by their decimal mark
+        commas = [name for name, mark in self._marks.items() if mark == ","]
+        thousands = [name for name, mark in self._marks.items() if mark == "."]
+        texts = [f"decimal commas in {', '.join(commas)}"] if commas else []
+        texts += [f"commas between thousands in {', '.join(thousands)}"] if thousands else []
+        return "; ".join(texts)
+
+    def check_cells(self) -> None:
+        """Raise CatalogError if a cell can be read in two ways, or rows exceed the header."""
+        _ = self._marks
+        if self._layout.separator != ",":
+            return
+        # Decimal commas between commas make more cells, in every row
+        first = next(self._blocks([IDENTIFIER]))
+        counts = [
+            re.match(r"(\d+) columns, the header has", row.reasons[0]) for row in first.broken
+        ]
+        wide = [found and int(found[1]) > len(self._columns) for found in counts]
+        if len(first.lines) == 0 and wide and all(wide):
+            reason = f"no row has as many columns as the header ({first.broken[0].reasons[0]})"
+            mend = "separate columns by semicolons, or put cells with commas in quotation marks"
+            raise CatalogError(str(self.file), f"{reason}, as decimal commas make: {mend}")
+
+    @cached_property
+    def _marks(self) -> dict[str, str]:
+        """
+        Return the decimal mark of each column of numbers that has commas.
+
+        Raises
+        ------
+        CatalogError
+            If a number may be read in two ways, or a text of a known column may be.
+        """
+        self._check_letters()
+        # Between commas only quoted numbers can have one
+        if self._layout.separator == "," and not has_quoted_commas(self.file, self._form.encoding):
+            return {}
+        blocks = self._blocks(self._known(is_text=False))
+        evidence = evidence_of((rows.table, rows.lines.tolist()) for rows in blocks)
+        if self._given.decimal:
+            commas = [name for name, found in evidence.items() if found.has_commas]
+            return dict.fromkeys(commas, self._given.decimal)
+        # What no number decides, the user has to
+        marks, doubtful = marks_of(evidence)
+        if doubtful:
+            raise CatalogError(str(self.file), two_readings(*next(iter(doubtful.items()))))
+        return marks
+
+    def _known(self, is_text: bool) -> list[str]:
+        """Return the columns of the schema that hold text, or numbers."""
+        known = [name for name in self.names if name in COLUMNS]
+        return [name for name in known if (COLUMNS[name].dtype == "str") == is_text]
+
+    def _check_letters(self) -> None:
+        """Raise CatalogError if the text of a known column depends on the code page."""
+        names = self._known(is_text=True)
+        for rows in self._blocks(names) if self._form.is_doubtful else ():
+            for name, cells in zip(names, rows.table.columns, strict=True):
+                # The first cell with a letter that is another one in Turkey
+                is_other = pc.match_substring_regex(cells, f"[{TURKISH}]")
+                place = pc.index(is_other, True).as_py()
+                if place >= 0:
+                    problem = two_pages(name, cells[place].as_py())
+                    raise CatalogError(str(self.file), f"line {rows.lines[place]}: {problem}")
 
     @cached_property
     def _number_types(self) -> dict[str, pa.DataType | None]:
@@ -64,7 +161,7 @@ class CsvFile:
             yield given_texts(block.table.column(0)).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows; lines without any content are left out."""
+        """Yield blocks of so many rows in plain units; lines without any content are left out."""
         for rows in _regrouped(self._blocks(self.names), size):
             full = _has_content(rows.table)
             cells = {name: self._converted(name, rows.table[name]) for name in self.names}
@@ -78,7 +175,16 @@ class CsvFile:
             return given_texts(cells) if kind is None else _as_numbers(cells, kind)
         if COLUMNS[name].dtype == "str":
             return given_texts(cells)
-        return _as_numbers(cells, pa.float64()) or cells
+        return self._plain_numbers(name, cells)
+
+    def _plain_numbers(self, name: str, cells: pa.ChunkedArray) -> pa.ChunkedArray:
+        """Return numbers of a known column in the unit of the schema, else text."""
+        mark, unit = self._marks.get(name), self.meanings.units.get(name)
+        points = with_points(cells, mark) if mark else cells
+        numbers = _as_numbers(points, pa.float64())
+        if unit is None:
+            return points if numbers is None else numbers
+        return converted_texts(points, unit) if numbers is None else converted(numbers, unit)
 
     def _blocks(self, names: Sequence[str]) -> Iterator[RawRows]:
         """Yield these columns as text, some thousands of rows at a time, and the broken lines."""
@@ -88,8 +194,8 @@ class CsvFile:
         options = pa.csv.ConvertOptions(
             column_types=dict.fromkeys(chosen, pa.string()), include_columns=chosen
         )
-        for rows in row_lines(self.file, self._columns, self._lines):
-            table, skipped = _parsed(rows.text, columns, options)
+        for rows in row_lines(self.file, self._columns, self._layout):
+            table, skipped = _parsed(rows.text, columns, options, self._layout.separator)
             lines = np.delete(rows.numbers, list(skipped))
             # Every line that was given is a row or a broken one
             if len(table) != lines.size:
@@ -102,12 +208,13 @@ class CsvFile:
         """Return the broken lines and those with too few or too many cells, in their order."""
         broken = [*rows.broken]
         for position, invalid in skipped.items():
-            broken.append(_rejection(self.file, int(rows.numbers[position]), invalid))
+            line = int(rows.numbers[position])
+            broken.append(_rejection(self.file, line, invalid, self._layout.separator))
         return sorted(broken, key=lambda line: line.row or 0)
 
 
 def _parsed(
-    text: bytes, columns: list[str], options: pa.csv.ConvertOptions
+    text: bytes, columns: list[str], options: pa.csv.ConvertOptions, separator: str
 ) -> tuple[pa.Table, dict[int, pa.csv.InvalidRow]]:
     """Return rows as a table of text, and the invalid ones by their position."""
     skipped: dict[int, pa.csv.InvalidRow] = {}
@@ -121,15 +228,17 @@ def _parsed(
         return pa.table(empty, names=options.include_columns), skipped
     # With threads, the reader does not number the rows; a block is read in one piece
     reading = pa.csv.ReadOptions(use_threads=False, column_names=columns, block_size=len(text) + 1)
-    parsing = pa.csv.ParseOptions(ignore_empty_lines=False, invalid_row_handler=skip)
+    parsing = pa.csv.ParseOptions(
+        delimiter=separator, ignore_empty_lines=False, invalid_row_handler=skip
+    )
     table = pa.csv.read_csv(pa.BufferReader(text), reading, parsing, options)
     return table, skipped
 
 
-def _rejection(file: Path, line: int, row: pa.csv.InvalidRow) -> Rejection:
+def _rejection(file: Path, line: int, row: pa.csv.InvalidRow, separator: str) -> Rejection:
     """Return the rejection of a line with too few or too many cells."""
     reason = f"{row.actual_columns} columns, the header has {row.expected_columns}"
-    name = row.text.split(",")[0][:LONGEST_NAME]
+    name = row.text.split(separator)[0][:LONGEST_NAME]
     return Rejection("pair", name, str(file), line, (reason,))
 
 

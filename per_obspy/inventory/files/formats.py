@@ -1,4 +1,4 @@
-"""Files of pairs by suffix: Parquet files, and CSV files from :mod:`.csv_rows`."""
+"""Files of pairs by suffix: Parquet, CSV (:mod:`.csv_rows`) and workbooks."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,50 +9,88 @@ import pyarrow as pa
 import pyarrow.parquet
 from numpy.typing import NDArray
 
+from per_obspy.config import TableForm
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import unreadable_reason
 from per_obspy.inventory.checking import OBSERVED
-from per_obspy.inventory.files.csv_rows import CsvFile
+from per_obspy.inventory.files.csv_rows import PLAIN, CsvFile
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows
+from per_obspy.inventory.files.workbook_rows import WorkbookFile
+from per_obspy.inventory.recognition.column_meanings import meanings_of
+from per_obspy.inventory.recognition.side_file import form_of
+from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 
 #: Prefix that pandas gives to a column of row numbers.
 INDEX = "__index_level_"
 
 
 class ParquetFile:
-    """Pairs in a Parquet file."""
+    """
+    Pairs in a Parquet file.
 
-    def __init__(self, file: Path) -> None:
+    Parameters
+    ----------
+    file : Path
+        The file.
+    given : TableForm
+        Names and units of the user.
+    """
+
+    def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
         self.file = file
         # Relative names such as http:/x are addresses to the reader
         self._path = file.absolute()
         with self._readable():
-            names = pa.parquet.read_schema(self._path).names
-        self.names: Sequence[str] = [name for name in names if not name.startswith(INDEX)]
+            stored = pa.parquet.read_schema(self._path).names
+        self.headings = [name for name in stored if not name.startswith(INDEX)]
+        self.meanings = meanings_of(self.headings, given, str(file))
+        self.names: Sequence[str] = self.meanings.names
+
+    @property
+    def recognised(self) -> str:
+        """Names and units that are not those of the schema, empty if all are."""
+        return self.meanings.sentence()
+
+    def check_cells(self) -> None:
+        """Do nothing: numbers of a Parquet file can be read in one way only."""
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
+        column = self.headings[self.names.index(IDENTIFIER)]
         with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
-            for batch in stored.iter_batches(columns=[IDENTIFIER]):
+            for batch in stored.iter_batches(columns=[column]):
                 if pa.types.is_nested(batch.schema.field(0).type):
                     batch.column(0).cast(pa.string())  # lists and the like are no names
                 names, _ = plain_columns(pa.Table.from_batches([batch]))
                 yield names.column(0).cast(pa.string()).combine_chunks()
 
     def rows(self, size: int) -> Iterator[RawRows]:
-        """Yield blocks of so many rows."""
+        """Yield blocks of so many rows in the units of the schema."""
         line = 2
         with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
-            for batch in stored.iter_batches(batch_size=size, columns=self.names):
+            for batch in stored.iter_batches(batch_size=size, columns=self.headings):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)
+                # Names and units of the schema
                 table, faults = plain_columns(pa.Table.from_batches([batch]))
+                table = self._in_units(table.select(self.headings).rename_columns(self.names))
                 broken = [self._rejection(table, lines, *fault) for fault in faults.items()]
                 good = np.isin(np.arange(batch.num_rows), list(faults), invert=True)
                 rows = _with_numbers(table).filter(pa.array(good))
                 yield RawRows(str(self.file), rows, lines[good], tuple(broken))
                 line += batch.num_rows
+
+    def _in_units(self, table: pa.Table) -> pa.Table:
+        """Return a table in the units of the schema; what is no number stays as it is."""
+        for name, unit in self.meanings.units.items():
+            # Truth values and dates stay, and are rejected as such
+            place, column = table.column_names.index(name), table[name]
+            if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+                table = table.set_column(place, name, converted(column, unit))
+            elif pa.types.is_string(column.type):
+                table = table.set_column(place, name, converted_texts(column, unit))
+        return table
 
     def _rejection(
         self, table: pa.Table, lines: NDArray[np.int64], row: int, fault: str
@@ -84,28 +122,51 @@ def _with_numbers(table: pa.Table) -> pa.Table:
 
 
 #: Suffixes of layers of footprints, which are not pairs yet.
-FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb")
+FOOTPRINTS = (".gpkg", ".geojson", ".shp", ".fgb", ".gml", ".osm", ".pbf", ".geojsonl")
 
-_KINDS: dict[str, type[CsvFile] | type[ParquetFile]] = {".csv": CsvFile, ".parquet": ParquetFile}
+#: Suffixes of other workbooks, which a spreadsheet program saves as .xlsx.
+WORKBOOKS = (".xls", ".xlsb", ".ods", ".numbers")
+
+_KINDS: dict[str, type[CsvFile] | type[ParquetFile] | type[WorkbookFile]] = {
+    ".csv": CsvFile,
+    ".parquet": ParquetFile,
+    ".xlsx": WorkbookFile,
+    ".xlsm": WorkbookFile,
+    ".tsv": CsvFile,
+    ".txt": CsvFile,
+}
 
 
-def pair_file(path: Path) -> PairFile:
+def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
     """
     Open a file of pairs.
+
+    Parameters
+    ----------
+    path : Path
+        The file; another one beside it may say how it is written (:mod:`~.side_file`).
+    given : TableForm, optional
+        How it is written, from a configuration.
 
     Raises
     ------
     CatalogError
         If it does not exist, is of an unknown kind, or cannot be read.
+    MissingExtra
+        If it is a workbook and the library for workbooks is not installed.
     """
     # Layers of footprints are a common mistake
-    if path.suffix.lower() not in _KINDS:
-        is_layer = path.suffix.lower() in FOOTPRINTS
-        advice = "; per-obspy pairs makes such a table of footprints" if is_layer else ""
-        expected = " or ".join(_KINDS)
+    suffix = path.suffix.lower()
+    if suffix not in _KINDS:
+        advice = (
+            "; per-obspy pairs makes such a table of footprints" if suffix in FOOTPRINTS else ""
+        )
+        advice = "; save the workbook as .xlsx" if suffix in WORKBOOKS else advice
+        expected = f"{', '.join(list(_KINDS)[:-1])} or {list(_KINDS)[-1]}"
         raise CatalogError(
             str(path), f"unknown suffix {path.suffix!r}, expected {expected}{advice}"
         )
     if not path.is_file():
         raise CatalogError(str(path), "no such file")
-    return _KINDS[path.suffix.lower()](path)
+    file: PairFile = _KINDS[suffix](path, form_of(path, given))
+    return file

@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from per_obspy.errors import Rejection
+from per_obspy.inventory.recognition.column_meanings import Meanings
 
 #: Column with the name of the pair.
 IDENTIFIER = "pair_id"
@@ -45,7 +46,24 @@ class RawRows(NamedTuple):
 class PairFile(Protocol):
     """A file of pairs: its columns, the identifiers of its pairs, its rows."""
 
-    names: Sequence[str]
+    @property
+    def names(self) -> Sequence[str]:
+        """Columns, by the schema where it knows them."""
+
+    @property
+    def headings(self) -> Sequence[str]:
+        """The header as it is in the file."""
+
+    @property
+    def meanings(self) -> Meanings:
+        """What the headings mean."""
+
+    @property
+    def recognised(self) -> str:
+        """What is not plain about the file, empty if nothing is."""
+
+    def check_cells(self) -> None:
+        """Raise CatalogError if a number or letter of a known column can be read in two ways."""
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""

@@ -1,4 +1,4 @@
-"""Readers of pair tables, CSV or Parquet, whole or in chunks, with reasons for rejected rows."""
+"""Readers of pair tables, whole or in chunks, with reasons for rejected rows."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,10 +10,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from per_obspy.errors import CatalogError, Rejection
+from per_obspy.config import TableForm
+from per_obspy.errors import CatalogError, Rejection, printable
 from per_obspy.inventory.checking import Rejections, check_columns, checked_pairs
 from per_obspy.inventory.files.formats import pair_file
-from per_obspy.inventory.files.raw_rows import IDENTIFIER, RawRows, name_hashes
+from per_obspy.inventory.files.raw_rows import IDENTIFIER, PairFile, RawRows, name_hashes
+from per_obspy.inventory.gap_units import GAP, GapCounts, gap_counts, gap_suspicions
+from per_obspy.inventory.recognition.proposals import proposed_units
+from per_obspy.inventory.schema import COLUMNS
 
 #: More rows than any table has.
 ALL = 1 << 40
@@ -35,30 +39,36 @@ class PairChunk(NamedTuple):
     repeated: NDArray[np.bool_]
 
 
-def read_pairs(path: str | Path | pd.DataFrame) -> pd.DataFrame:
+def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -> pd.DataFrame:
     """
     Read and check a table of building pairs.
 
     Parameters
     ----------
     path : str, Path or DataFrame
-        ``.csv`` (UTF-8, comma separated, one header line) or ``.parquet``, or a table in memory,
-        whose rows count as following a header in line 1. Columns, units and
-        allowed ranges are in ``per_obspy.inventory.schema.COLUMNS``; further columns are carried
-        through.
+        ``.csv``, ``.tsv`` or ``.txt``, ``.parquet``, or ``.xlsx``; or a table in memory, whose rows
+        count as following a header in line 1. Columns, units and allowed ranges are in
+        ``per_obspy.inventory.schema.COLUMNS``; further columns are carried through. Text that is
+        not plain (UTF-8, commas, the names of the schema) is recognised where it is unambiguous.
+    form : TableForm, optional
+        How the file is written, where that is not recognised: encoding, separator, decimal mark,
+        sheet, names and units of columns.
 
     Returns
     -------
     pairs : DataFrame
         Accepted rows in file order: numbers as float64 in SI (NaN where empty), text as str (""
         where empty). ``pairs.attrs["rejected"]`` is a tuple of
-        :class:`~per_obspy.errors.Rejection`, one for each other row, with every reason.
+        :class:`~per_obspy.errors.Rejection`, one for each other row, with every reason;
+        ``pairs.attrs["recognised"]`` says what is not plain about the file, empty if nothing is.
 
     Raises
     ------
     CatalogError
-        If the file cannot be read, is of an unknown kind, is not UTF-8, is empty or lacks a
-        required column.
+        If the file cannot be read, is of an unknown kind, can be read in two ways, is empty or
+        lacks a required column.
+    MissingExtra
+        If it is a workbook and the library for workbooks is not installed.
     TypeError
         If the argument is neither a path nor a table.
     """
@@ -67,16 +77,49 @@ def read_pairs(path: str | Path | pd.DataFrame) -> pd.DataFrame:
         return _checked_table(path)
     if not isinstance(path, str | Path):
         raise TypeError(f"path must be a path or a DataFrame, got {type(path).__name__}")
-    file = pair_file(Path(path))
-    check_columns(file.names, str(path))
+    file = checked_file(Path(path), form)
+    rows = _all_rows(file, str(path))
+    pairs = _checked(rows, None)
+    # How the file is read, and in which units it may be
+    gaps = gap_counts(rows.table[GAP])
+    known = rows.table.select([name for name in file.names if name in COLUMNS]).to_pandas()
+    units = proposed_units(known, bool(gap_suspicions(gaps)))
+    pairs.attrs |= {"recognised": file.recognised, "gaps": gaps, "proposed_units": units}
+    return pairs
+
+
+def _all_rows(file: PairFile, path: str) -> RawRows:
+    """Return the rows of a file in one piece."""
     blocks = list(file.rows(ALL))
     if not any(len(block.table) or block.broken for block in blocks):
-        raise CatalogError(str(path), "the table has no rows")
-    # Join the blocks; empty ones may have other types
-    tables = [block.table for block in blocks if len(block.table)] or [blocks[0].table]
-    lines = np.concatenate([block.lines for block in blocks])
+        raise CatalogError(path, "the table has no rows")
     broken = tuple(line for block in blocks for line in block.broken)
-    return _checked(RawRows(str(path), pa.concat_tables(tables), lines, broken), None)
+    # Join the blocks; empty ones may have other types
+    tables = [block.table for block in blocks if len(block.table)]
+    lines = np.concatenate([block.lines for block in blocks])
+    table = pa.concat_tables(tables or [blocks[0].table])
+    return RawRows(blocks[0].source, table, lines, broken)
+
+
+def checked_file(path: Path, form: TableForm | None = None) -> PairFile:
+    """
+    Open a file of pairs that has the columns it needs.
+
+    Raises
+    ------
+    CatalogError
+        If it cannot be read, or in two ways; or if it lacks a column, with the headings that may be
+        meant.
+    """
+    file = pair_file(path, form)
+    try:
+        check_columns(file.names, str(path))
+    except CatalogError as error:
+        if "missing" not in error.problem:
+            raise
+        raise CatalogError(error.source, error.problem + file.meanings.asked()) from error
+    file.check_cells()
+    return file
 
 
 def _checked_table(table: pd.DataFrame) -> pd.DataFrame:
@@ -94,8 +137,10 @@ class PairInventory:
     Parameters
     ----------
     paths : sequence of Path
-        CSV or Parquet. Besides a chunk, memory holds 8 bytes per row to find repeated
+        As :func:`read_pairs`. Besides a chunk, memory holds 8 bytes per row to find repeated
         identifiers.
+    form : TableForm, optional
+        How the files are written.
 
     Attributes
     ----------
@@ -103,6 +148,8 @@ class PairInventory:
         Number of rows.
     names : set of str
         Columns that all files have.
+    gaps : GapCounts
+        Of the chunks that were read.
 
     Raises
     ------
@@ -110,10 +157,9 @@ class PairInventory:
         As :func:`read_pairs`.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._files = {path: pair_file(path) for path in paths}
-        for path, file in self._files.items():
-            check_columns(file.names, str(path))
+    def __init__(self, paths: Sequence[Path], form: TableForm | None = None) -> None:
+        self._files = {path: checked_file(path, form) for path in paths}
+        self.gaps = GapCounts()
         self.names = set.intersection(*(set(file.names) for file in self._files.values()))
         # Hashes that occur twice: candidates for repeated identifiers
         hashes = self._identifier_hashes()
@@ -135,9 +181,21 @@ class PairInventory:
     def chunks(self, size: int) -> Iterator[PairChunk]:
         """Yield chunks of so many rows; no chunk has rows of two files."""
         seen: set[str] = set()
+        self.gaps = GapCounts()
         for file in self._files.values():
             for rows in file.rows(size):
+                self.gaps = self.gaps.joined(gap_counts(rows.table[GAP]))
                 yield PairChunk(rows, _repeated(rows.table[IDENTIFIER], self._repeated, seen))
+
+    def recognised(self) -> list[str]:
+        """Return a sentence for each file that is not plain: how it is read."""
+        sentences = {path: file.recognised for path, file in self._files.items()}
+        return [recognised_line(path, text) for path, text in sentences.items() if text]
+
+
+def recognised_line(path: Path, recognised: str) -> str:
+    """Return the line that says how a table is read, with the name of its file."""
+    return printable(f"{path.name}: read as {recognised}")
 
 
 def _repeated(

@@ -13,8 +13,8 @@ import pandas as pd
 
 from per_obspy.errors import CatalogError, did_you_mean, printable
 from per_obspy.inventory.checking import is_number
-from per_obspy.inventory.footprints.importers import imported
 from per_obspy.inventory.footprints.lengths import read_numbers
+from per_obspy.inventory.importers.recognition import imported
 from per_obspy.inventory.schema import COLUMNS
 
 #: Quantities of a building that a layer may give, by their names in the schema.
@@ -22,6 +22,7 @@ GIVEN = (
     *("building_id", "height", "storeys", "storey_height", "system", "period", "damping"),
     *("mass", "occupants", "importance", "participation", "yield_displacement"),
     *("yield_coefficient", "hardening", "period_log_std", "damping_log_std"),
+    "height_log_std",
 )
 
 #: Quantities whose text may have a unit, and counts.
@@ -83,10 +84,7 @@ def building_columns(
         If a name is none of ``GIVEN``.
     """
     given = _given(attributes, names, source)
-    # Columns under the schema's names are recognised whatever the source
-    known = imported(attributes.assign(**given), source)
-    for name, column in given.items():
-        known[name] = column
+    known = imported(attributes, source, given)
     faults = {}
     for name in (*LENGTHS, *COUNTS):
         if name in known:

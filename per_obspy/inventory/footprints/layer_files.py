@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet
 import pyogrio
+import shapely
 from numpy.typing import NDArray
 
 from per_obspy.errors import CatalogError, Rejection
@@ -17,6 +19,9 @@ from per_obspy.files import unreadable_reason
 from per_obspy.inventory.files.plain_columns import plain_columns
 from per_obspy.inventory.footprints.building_lists import read_list
 from per_obspy.inventory.footprints.gdal_paths import literal_path
+from per_obspy.inventory.importers.building_files import SUFFIXES, read_buildings
+from per_obspy.inventory.importers.importer import RawLayer as ImportedLayer
+from per_obspy.inventory.importers.nested_columns import without_nesting
 
 #: Files that GDAL reads; GeoParquet is read by pyarrow, lists of buildings by the reader of tables.
 GDAL_KINDS = {
@@ -82,10 +87,12 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     if not file.exists():
         raise CatalogError(str(file), "no such file")
     # GDAL knows further files, but not whether they hold footprints
-    known = (*GDAL_KINDS, *PARQUET_SUFFIXES, *LIST_SUFFIXES)
+    known = (*GDAL_KINDS, *PARQUET_SUFFIXES, *LIST_SUFFIXES, *SUFFIXES)
     if suffix not in known:
         expected = ", ".join(known)
         raise CatalogError(str(file), f"unknown suffix {file.suffix!r}, expected one of {expected}")
+    if (buildings := read_buildings(file)) is not None:
+        return raw_features(buildings)
     if suffix in LIST_SUFFIXES:
         found = read_list(file)
         # Positions of a list are degrees
@@ -119,6 +126,21 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
     geometry = table.column_names[-1]
     fields = [str(name) for name in meta["fields"]]
     return _raw_layer(file, table[geometry], table.select(fields), crs)
+
+
+def raw_features(buildings: ImportedLayer) -> RawLayer:
+    """Return the buildings of an importer's reader as a layer."""
+    shapes = buildings.geometries.copy()
+    shapes[list(buildings.faults)] = None
+    wkb = pa.chunked_array([pa.array(shapely.to_wkb(shapes), pa.large_binary())])
+    # Cells of JSON may be numbers and texts in one column
+    columns = {}
+    for name in buildings.attributes:
+        cells = buildings.attributes[name]
+        is_mixed = pd.api.types.infer_dtype(cells, skipna=True).startswith("mixed")
+        columns[str(name)] = pa.array(cells.astype(str).where(cells.notna()) if is_mixed else cells)
+    numbers = np.arange(1, len(wkb) + 1)
+    return RawLayer(wkb, pa.table(columns), buildings.crs, numbers, buildings.faults)
 
 
 def _raw_layer(file: Path, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
@@ -189,7 +211,7 @@ def _layer_name(file: Path, path: Path, layer: str | None) -> str:
 def _read_geoparquet(file: Path) -> RawLayer:
     """Read a GeoParquet file."""
     try:
-        table = pa.parquet.read_table(file.absolute())
+        table = without_nesting(pa.parquet.read_table(file.absolute()))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise CatalogError(str(file), unreadable_reason(file, "Parquet table", error)) from error
     # GeoParquet is described by JSON in the metadata

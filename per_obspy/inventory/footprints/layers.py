@@ -81,7 +81,7 @@ def read_layer(path: str | Path, layer: str | None = None) -> Layer:
     file = Path(path)
     raw = read_raw_layer(file, layer)
     _require_outlines(file, raw)
-    transformer, is_projected = _to_degrees(file, raw.crs)
+    transformer, is_projected = to_degrees(file, raw.crs)
     # Outlines that can be used and reasons for the others, block by block
     outlines, rejected, good = [], list(raw.broken), np.zeros(len(raw.wkb), dtype=bool)
     for start, geometries in _blocks(raw.wkb):
@@ -126,17 +126,22 @@ def _require_outlines(file: Path, raw: RawLayer) -> None:
     )
 
 
-def _checked_block(
-    original: Geometries, transformer: pyproj.Transformer, is_projected: bool
-) -> _Block:
-    """Return geometries in degrees, and where they are footprints."""
-    # Longitude and latitude of every feature
-    degrees = np.asarray(
+def in_degrees(original: Geometries, transformer: pyproj.Transformer) -> Geometries:
+    """Return geometries in longitude and latitude."""
+    return np.asarray(
         shapely.transform(
             shapely.force_2d(original),
             lambda xy: np.column_stack(transformer.transform(*xy.T)),
         )
     )
+
+
+def _checked_block(
+    original: Geometries, transformer: pyproj.Transformer, is_projected: bool
+) -> _Block:
+    """Return geometries in degrees, and where they are footprints."""
+    # Longitude and latitude of every feature
+    degrees = in_degrees(original, transformer)
     # A town lies within 180 m and 90 m of the origin of its projection only if its coordinates are
     # degrees
     stray = _on_earth(original) & is_projected
@@ -155,7 +160,7 @@ def _rejections(file: Path, raw: RawLayer, start: int, block: _Block) -> list[Re
     return rejected
 
 
-def _to_degrees(file: Path, crs: Any) -> tuple[pyproj.Transformer, bool]:
+def to_degrees(file: Path, crs: Any) -> tuple[pyproj.Transformer, bool]:
     """Return the transformation to longitude and latitude, and whether it is from a projection."""
     system = _reference_system(file, crs)
     try:

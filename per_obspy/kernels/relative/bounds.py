@@ -20,38 +20,82 @@ from per_obspy.kernels.spectra.tile_search import TILE
 
 
 @kernel
-def strongest_inputs(ground, dt):
+def tile_inputs(ground, dt):
     """
-    Return the strongest motion of both components in any tile, (3, 2).
+    Return the strongest motion of both components in every tile, (n_tiles, 3, 2).
 
-    Rows: largest acceleration, largest rate of change, and integral over a tile of the size.
+    Rows: largest acceleration, largest rate of change, and integral over the tile of the size.
     """
-    inputs = np.zeros((3, 2))
-    for component in range(2):
-        for first in range(0, ground.shape[1] - 1, TILE):
+    inputs = np.zeros(((ground.shape[1] - 1) // TILE, 3, 2))
+    for tile in range(inputs.shape[0]):
+        for component in range(2):
             integral = 0.0
             # Integral of the size by the trapezoidal rule, an upper bound
-            for i in range(first, first + TILE):
+            for i in range(tile * TILE, (tile + 1) * TILE):
                 start, end = ground[component, i], ground[component, i + 1]
                 integral += 0.5 * (abs(start) + abs(end))
                 # Largest acceleration and rate of change
-                inputs[0, component] = max(inputs[0, component], abs(start), abs(end))
-                inputs[1, component] = max(inputs[1, component], abs(end - start) / dt)
-            inputs[2, component] = max(inputs[2, component], integral * dt)
+                peak = max(inputs[tile, 0, component], abs(start), abs(end))
+                inputs[tile, 0, component] = peak
+                rate = max(inputs[tile, 1, component], abs(end - start) / dt)
+                inputs[tile, 1, component] = rate
+            inputs[tile, 2, component] = integral * dt
     return inputs
 
 
 @kernel
-def between_sample_margins(pair, dt, table, lane, inputs):
-    """Return bounds of how far the relative displacement exceeds its samples, and their cubics."""
+def strongest_inputs(inputs):
+    """Return the strongest motion of both components in any tile, (3, 2)."""
+    strongest = np.zeros((3, 2))
+    for tile in range(inputs.shape[0]):
+        for row in range(3):
+            for component in range(2):
+                size = inputs[tile, row, component]
+                strongest[row, component] = max(strongest[row, component], size)
+    return strongest
+
+
+@kernel
+def largest_radii(pair, table, lane, inputs):
+    """Return the largest radii of both structures, and of D, before any tile so far."""
+    peak = abs(pair[6]) * inputs[0, 0] + abs(pair[7]) * inputs[0, 1]
+    radius_1 = _radius(0, table, lane, peak)
+    radius_2 = _radius(1, table, lane, peak)
+    return radius_1, radius_2, math.sqrt(table[STATE_PEAKS + 2, lane])
+
+
+@kernel
+def present_radii(pair, motion):
+    """Return the radii of both structures, and of D, in a state ``u, z`` of 1, then of 2."""
+    u1, z1, u2, z2 = motion
+    distance = pair[2] * u1 - pair[5] * u2
+    slope = pair[2] * z1 - pair[5] * z2 * pair[3] / pair[0]
+    return math.hypot(u1, z1), math.hypot(u2, z2), math.hypot(distance, slope)
+
+
+@kernel
+def tile_margins(pair, dt, radii, inputs):
+    """Return :func:`between_sample_margins` over a tile, from its strongest motion (3, 2)."""
     # Strongest motion along the pair's azimuth
     north, east = abs(pair[6]), abs(pair[7])
     peak = north * inputs[0, 0] + east * inputs[0, 1]
     rate = north * inputs[1, 0] + east * inputs[1, 1]
     integral = north * inputs[2, 0] + east * inputs[2, 1]
-    # Derivatives of either structure from its largest radius within a tile
-    radius_1 = _radius(0, table, lane, peak) + integral / pair[0]
-    radius_2 = _radius(1, table, lane, peak) + integral / pair[3]
+    return between_sample_margins(pair, dt, TILE * dt, radii, (peak, rate, integral))
+
+
+@kernel
+def between_sample_margins(pair, dt, duration, radii, ground):
+    """
+    Return bounds of how far the relative displacement exceeds its samples, and their cubics.
+
+    They hold for a time (s) from a state of the radii of both structures and of D, under a ground
+    motion of largest acceleration, rate of change, and integral of the size.
+    """
+    peak, rate, integral = ground
+    # Derivatives of either structure from its largest radius within the time
+    radius_1 = radii[0] + integral / pair[0]
+    radius_2 = radii[1] + integral / pair[3]
     second_1, _, fourth_1 = _derivatives(pair[0], pair[1], radius_1, peak, rate, 0.0)
     second_2, third_2, fourth_2 = _derivatives(pair[3], pair[4], radius_2, peak, rate, 0.0)
 
@@ -61,7 +105,7 @@ def between_sample_margins(pair, dt, table, lane, inputs):
     force_rate = unlike * rate + viscosity * second_2 + stiffness * pair[3] * radius_2
     force_bend = viscosity * third_2 + stiffness * second_2
     # Derivatives of D from its own radius
-    radius = math.sqrt(table[STATE_PEAKS + 2, lane]) + force * TILE * dt / pair[0]
+    radius = radii[2] + force * duration / pair[0]
     second, _, fourth = _derivatives(pair[0], pair[1], radius, force, force_rate, force_bend)
     # The smaller bound counts
     second = min(second, pair[2] * second_1 + pair[5] * second_2)
@@ -105,17 +149,13 @@ def may_grow(pair, motion, largest):
     ``motion``: the states ``u, z`` of structure 1, then of 2.
     """
     # Sum of the radii, which never grow
-    u1, z1, u2, z2 = motion
-    radius_1, radius_2 = math.hypot(u1, z1), math.hypot(u2, z2)
+    radius_1, radius_2, radius = present_radii(pair, motion)
     least = min(largest[0], largest[1])
     if pair[2] * radius_1 + pair[5] * radius_2 <= least:
         return False
-    # Radius of the relative motion D, and the force on it
+    # Force on the relative motion D
     _, viscosity, stiffness = differences(pair)
     force = (viscosity * pair[3] + stiffness) * radius_2
-    distance = pair[2] * u1 - pair[5] * u2
-    slope = pair[2] * z1 - pair[5] * z2 * pair[3] / pair[0]
-    radius = math.hypot(distance, slope)
     # The radius of a free vibration falls like exp(-xi omega t), but for this factor: its integral
     # over all time
     decay = pair[4] * pair[3] * math.sqrt((1.0 - pair[4]) / (1.0 + pair[4]))

@@ -1,10 +1,11 @@
 """
-Largest relative displacement of many pairs under one record.
+Largest relative displacement and velocity of many pairs under one record.
 
-It is exact for piecewise-linear ground acceleration. Every pair is driven along its own azimuth. A
-pass over the samples stores the states before each tile of steps and the largest values in it; only
-tiles that could hold a larger value between samples are searched again, pair by pair. Structures
-that are equal in everything never separate and are left out.
+Displacements are exact for piecewise-linear ground acceleration. Every pair is driven along its own
+azimuth. A pass over the samples stores the states before each tile of steps and the largest values
+in it; only tiles that could hold a larger displacement between samples are searched again, pair by
+pair. Parts of the record that cannot hold the largest values are left out. Structures that are
+equal in everything never separate and are left out.
 """
 
 import math
@@ -12,9 +13,24 @@ import math
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.relative.bounds import between_sample_margins, may_grow, strongest_inputs
+from per_obspy.kernels.relative.bounds import (
+    largest_radii,
+    may_grow,
+    present_radii,
+    strongest_inputs,
+    tile_inputs,
+    tile_margins,
+)
+from per_obspy.kernels.relative.pair_windows import (
+    GROUP,
+    bound_motion,
+    expected_motion,
+    find_pair_windows,
+    grouped_inputs,
+)
 from per_obspy.kernels.relative.relative_peaks import search_pair_tile
 from per_obspy.kernels.relative.relative_samples import (
+    APPROACH,
     GREATEST,
     LEAST,
     PAIR_CHECKPOINT_ROWS,
@@ -23,19 +39,23 @@ from per_obspy.kernels.relative.relative_samples import (
     STATE,
     pack_pair,
     run_pair_tiles,
-    start_pairs_at_rest,
     state_of,
 )
 from per_obspy.kernels.spectra.tile_search import TILE, TILES
 
 #: Free vibration is followed for at most this many of the longer period.
 FREE_PERIODS = 20.0
+#: Part of the bounds of its motion that a pair is expected to reach; the bounds are wide. One that
+#: does not reach it is run again, through the part of the record that may exceed what it reached.
+EXPECTED = 0.004
+#: Part of what it has reached, so that rounding does not matter.
+REACHED = 1.0 - 1e-9
 
 
 @kernel
 def relative_maxima(north, east, dt, pairs, largest):
     """
-    Fill the largest relative displacements of pairs in both directions, free vibration included.
+    Fill the largest relative displacements and velocities of pairs, free vibration included.
 
     Parameters
     ----------
@@ -46,34 +66,92 @@ def relative_maxima(north, east, dt, pairs, largest):
     pairs : (8, n) ndarray
         Rows: circular frequency (rad/s), damping (fraction of critical) and participation
         (dimensionless) of structure 1, then of 2; cosine and sine of the azimuth from 1 to 2.
-    largest : (2, n) ndarray
-        Receives the maxima of ``q1 u1 - q2 u2`` and of ``q2 u2 - q1 u1``, m.
+    largest : (3, n) ndarray
+        Receives the maxima of ``q1 u1 - q2 u2`` and of ``q2 u2 - q1 u1``, m, and that of ``q1 v1 -
+        q2 v2`` at the samples, m/s.
     """
     ground = _whole_tiles(north, east)
-    inputs = strongest_inputs(ground, dt)
+    inputs = tile_inputs(ground, dt)
+    groups = grouped_inputs(inputs)
     # Memory of one block of pairs
-    table = np.empty((PAIR_ROWS, PAIR_LANES))
-    tiles = min((ground.shape[1] - 1) // TILE, TILES)
-    checkpoints = np.empty((tiles, PAIR_CHECKPOINT_ROWS, PAIR_LANES))
+    tiles = inputs.shape[0]
+    checkpoints = np.empty((min(tiles, TILES), PAIR_CHECKPOINT_ROWS, PAIR_LANES))
+    bounds = np.empty((4, groups.shape[0], PAIR_LANES))
     block = np.empty((PAIR_LANES, 8))
-    best = np.empty((PAIR_LANES, 2))
-    moving = np.empty(PAIR_LANES, np.bool_)
+    best = np.empty((PAIR_LANES, 3))
+    floors = np.empty((2, PAIR_LANES))
     largest[:] = 0.0
-    unequal = _unequal_pairs(pairs)
-    for first in range(0, unequal.size, PAIR_LANES):
-        # Fill the block, the last one with copies of its last pair
-        chosen = unequal[first : first + PAIR_LANES]
-        for lane in range(PAIR_LANES):
-            block[lane] = pairs[:, chosen[min(lane, chosen.size - 1)]]
-            pack_pair(block[lane], dt, table, lane)
-            moving[lane] = lane < chosen.size
-        # Record, then free vibration
-        best[:] = 0.0
-        start_pairs_at_rest(ground[0, 0], ground[1, 0], table)
-        _shake(ground, dt, block, table, checkpoints, inputs, moving, best)
-        _ring_down(dt, block, table, checkpoints, inputs, moving, best)
-        for lane in range(chosen.size):
-            largest[:, chosen[lane]] = best[lane]
+    pending = _unequal_pairs(pairs)
+    # The second round begins with what the first has reached
+    for again in range(2):
+        short, count = np.empty(pending.size, np.int64), 0
+        for first in range(0, pending.size, PAIR_LANES):
+            # Fill the block, the last one with copies of its last pair
+            chosen = pending[first : first + PAIR_LANES]
+            for lane in range(PAIR_LANES):
+                block[lane] = pairs[:, chosen[min(lane, chosen.size - 1)]]
+            bound_motion(groups, GROUP * TILE * dt, block, bounds)
+            expected_motion(block, bounds, EXPECTED, floors)
+            if again:
+                _reached(largest, chosen, floors)
+            _run_block(ground, dt, block, chosen.size, inputs, bounds, floors, checkpoints, best)
+            for lane in range(chosen.size):
+                largest[:, chosen[lane]] = best[lane]
+                if not again and _is_short(best[lane], floors[:, lane]):
+                    short[count] = chosen[lane]
+                    count += 1
+        pending = short[:count]
+
+
+@kernel
+def _reached(largest, chosen, floors):
+    """Lower the floors of a block to what its pairs are known to reach."""
+    for lane in range(PAIR_LANES):
+        # Displacements in both directions count
+        index = chosen[min(lane, chosen.size - 1)]
+        distance = REACHED * min(largest[0, index], largest[1, index])
+        floors[0, lane] = min(floors[0, lane], distance)
+        floors[1, lane] = min(floors[1, lane], REACHED * largest[2, index])
+
+
+@kernel
+def _is_short(best, floors):
+    """Return whether a pair does not reach what was expected of it in either direction."""
+    return min(best[0], best[1]) < floors[0] or best[2] < floors[1]
+
+
+@kernel
+def _run_block(ground, dt, block, count, inputs, bounds, floors, checkpoints, best):
+    """Fill the largest values of a block, (lanes, 3), from the part of the record that counts."""
+    table = np.zeros((PAIR_ROWS, PAIR_LANES))
+    windows = np.empty((2, PAIR_LANES), np.int64)
+    moving = np.empty(PAIR_LANES, np.bool_)
+    for lane in range(PAIR_LANES):
+        pack_pair(block[lane], dt, table, lane)
+    find_pair_windows(GROUP * TILE * dt, block, bounds, floors, windows)
+    # From groups to tiles; of copies nothing counts
+    windows[0] *= GROUP
+    windows[1] = np.minimum((windows[1] + 1) * GROUP, inputs.shape[0]) - 1
+    windows[1, count:] = -1
+    best[:] = 0.0
+    tiles = inputs.shape[0]
+    _shake(ground, dt, block, table, checkpoints, inputs, windows, best)
+    # Free vibration of those that count up to the end
+    for lane in range(PAIR_LANES):
+        moving[lane] = windows[1, lane] == tiles - 1
+    _ring_down(dt, tiles, block, table, checkpoints, moving, best)
+
+
+@kernel
+def _shake(ground, dt, block, table, checkpoints, inputs, windows, best):
+    """Raise the largest values to those during the parts of the record that count."""
+    end = windows[1].max() + 1
+    for first in range(windows[0].min(), end, TILES):
+        # A stretch: first the samples, then the peaks between them
+        last = min(first + TILES, end)
+        samples = ground[:, first * TILE : last * TILE + 1]
+        run_pair_tiles(samples[0], samples[1], first, windows, table, checkpoints)
+        _raise(samples, dt, block, table, checkpoints, inputs[first:last], first, windows, best)
 
 
 @kernel
@@ -99,22 +177,20 @@ def _unequal_pairs(pairs):
 
 
 @kernel
-def _shake(ground, dt, block, table, checkpoints, inputs, moving, best):
-    """Raise the largest values to those during the record."""
-    for begin in range(0, ground.shape[1] - 1, TILES * TILE):
-        stretch = ground[:, begin : begin + TILES * TILE + 1]
-        run_pair_tiles(stretch[0], stretch[1], table, checkpoints)
-        _raise(stretch, dt, block, table, checkpoints, inputs, moving, best)
-
-
-@kernel
-def _ring_down(dt, block, table, checkpoints, inputs, moving, best):
+def _ring_down(dt, tile, block, table, checkpoints, moving, best):
     """Raise the largest values to those of the free vibration, tile by tile while one may grow."""
     rest = np.zeros((2, TILE + 1))
+    quiet = np.zeros((1, 3, 2))
+    windows = np.empty((2, PAIR_LANES), np.int64)
     steps = 0
     while _drop_settled(steps, dt, block, table, moving, best):
-        run_pair_tiles(rest[0], rest[1], table, checkpoints)
-        _raise(rest, dt, block, table, checkpoints, inputs, moving, best)
+        # None starts here, and those that move count
+        windows[0] = -1
+        for lane in range(PAIR_LANES):
+            windows[1, lane] = tile if moving[lane] else -1
+        run_pair_tiles(rest[0], rest[1], tile, windows, table, checkpoints)
+        _raise(rest, dt, block, table, checkpoints, quiet, tile, windows, best)
+        tile += 1
         steps += TILE
 
 
@@ -136,36 +212,69 @@ def _drop_settled(steps, dt, block, table, moving, best):
 
 
 @kernel
-def _raise(ground, dt, block, table, checkpoints, inputs, moving, best):
+def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
     """Raise the largest values to the samples of the tiles, then to the peaks between them."""
-    tiles = (ground.shape[1] - 1) // TILE
-    margins = np.zeros((2, PAIR_LANES))
-    before = np.empty(4)
-    # Samples of all tiles
-    for tile in range(tiles):
-        for lane in range(PAIR_LANES):
-            if moving[lane]:
-                best[lane, 0] = max(best[lane, 0], checkpoints[tile, GREATEST, lane])
-                best[lane, 1] = max(best[lane, 1], -checkpoints[tile, LEAST, lane])
-    # Bounds of how far samples and cubics are exceeded
+    _raise_to_samples(block, checkpoints, inputs.shape[0], first, windows, best)
+    # Limits of the samples of tiles that need no search, from bounds over all tiles
+    limits = np.empty((2, PAIR_LANES))
+    strongest = strongest_inputs(inputs)
     for lane in range(PAIR_LANES):
-        sample_margin, cubic_margin = between_sample_margins(block[lane], dt, table, lane, inputs)
-        margins[0, lane] = sample_margin
-        margins[1, lane] = cubic_margin
+        radii = largest_radii(block[lane], table, lane, strongest)
+        margin, _ = tile_margins(block[lane], dt, radii, strongest)
+        limits[0, lane], limits[1, lane] = best[lane, 0] - margin, best[lane, 1] - margin
     # Tiles whose samples come close enough to the largest values
-    for tile in range(tiles):
-        north = ground[0, tile * TILE :]
-        east = ground[1, tile * TILE :]
+    for tile in range(inputs.shape[0]):
+        near = 0
         for lane in range(PAIR_LANES):
-            high = checkpoints[tile, GREATEST, lane] + margins[0, lane]
-            low = checkpoints[tile, LEAST, lane] - margins[0, lane]
-            if moving[lane] and (high > best[lane, 0] or -low > best[lane, 1]):
-                acceleration = block[lane, 6] * north[0] + block[lane, 7] * east[0]
-                # States of both structures before the tile
-                for body in range(2):
-                    along = checkpoints[tile, 2 * body, lane]
-                    across = checkpoints[tile, 2 * body + 1, lane]
-                    u, z = state_of(body, table, lane, along, across, acceleration)
-                    before[2 * body] = u
-                    before[2 * body + 1] = z
-                search_pair_tile(block[lane], dt, north, east, before, margins[1, lane], best[lane])
+            high = checkpoints[tile, GREATEST, lane] > limits[0, lane]
+            near += high or -checkpoints[tile, LEAST, lane] > limits[1, lane]
+        if near:
+            # Pair by pair
+            part = ground[:, tile * TILE : (tile + 1) * TILE + 1]
+            now = checkpoints[tile], inputs[tile], first + tile
+            _search_lanes(part, dt, block, table, now, windows, limits, best)
+
+
+@kernel
+def _raise_to_samples(block, checkpoints, tiles, first, windows, best):
+    """Raise the largest values to the samples of the tiles that count."""
+    sampled = np.zeros((3, PAIR_LANES))
+    for tile in range(tiles):
+        for lane in range(PAIR_LANES):
+            # Largest motion of a pair at rest is not below 0
+            counts = windows[0, lane] <= first + tile <= windows[1, lane]
+            part = 1.0 if counts else 0.0
+            sampled[0, lane] = max(sampled[0, lane], part * checkpoints[tile, GREATEST, lane])
+            sampled[1, lane] = max(sampled[1, lane], -part * checkpoints[tile, LEAST, lane])
+            sampled[2, lane] = max(sampled[2, lane], part * checkpoints[tile, APPROACH, lane])
+    # Velocities are over the frequency of structure 1
+    for lane in range(PAIR_LANES):
+        best[lane, 0] = max(best[lane, 0], sampled[0, lane])
+        best[lane, 1] = max(best[lane, 1], sampled[1, lane])
+        best[lane, 2] = max(best[lane, 2], block[lane, 0] * sampled[2, lane])
+
+
+@kernel
+def _search_lanes(ground, dt, block, table, now, windows, limits, best):
+    """Search a tile (checkpoint, inputs, number) of all pairs whose samples are above limits."""
+    checkpoint, inputs, tile = now  # the tile
+    for lane in range(PAIR_LANES):
+        near = checkpoint[GREATEST, lane] > limits[0, lane]
+        near |= -checkpoint[LEAST, lane] > limits[1, lane]
+        if near and windows[0, lane] <= tile <= windows[1, lane]:
+            _search(ground, dt, block[lane], table, lane, checkpoint, inputs, best)
+
+
+@kernel
+def _search(ground, dt, pair, table, lane, checkpoint, inputs, best):
+    """Raise the largest values of a pair to its peaks in a tile, if they may exceed them."""
+    # States of both structures before the tile
+    acceleration = pair[6] * ground[0, 0] + pair[7] * ground[1, 0]
+    u1, z1 = state_of(0, table, lane, checkpoint[0, lane], checkpoint[1, lane], acceleration)
+    u2, z2 = state_of(1, table, lane, checkpoint[2, lane], checkpoint[3, lane], acceleration)
+    before = (u1, z1, u2, z2)
+    # The bound of this tile alone
+    margin, cubic_margin = tile_margins(pair, dt, present_radii(pair, before), inputs)
+    high = checkpoint[GREATEST, lane] + margin > best[lane, 0]
+    if high or margin - checkpoint[LEAST, lane] > best[lane, 1]:
+        search_pair_tile(pair, dt, ground[0], ground[1], before, cubic_margin, best[lane])

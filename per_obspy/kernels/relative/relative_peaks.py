@@ -4,6 +4,7 @@ import math
 
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.oscillator.exact_step import state_after, step_coefficients
+from per_obspy.kernels.relative.bounds import between_sample_margins, present_radii
 from per_obspy.kernels.spectra.tile_search import TILE
 
 #: Phase of a step in which a peak is sought by one cubic.
@@ -48,11 +49,22 @@ def search_pair_tile(pair, dt, north, east, state, margin, largest):
         # Inner Bernstein coefficients of the cubic bound it together with the samples
         leaving = distance_0 + slope_0 / 3.0
         arriving = distance - slope / 3.0
-        high = max(leaving, arriving) + margin
-        low = min(leaving, arriving) - margin
-        if high > largest[0] or -low > largest[1]:
-            ends = (distance_0, slope_0, distance, slope)
-            _search_step(pair, dt, before, start, end, ends, margin, largest)
+        high, low = max(leaving, arriving), min(leaving, arriving)
+        if high + margin > largest[0] or margin - low > largest[1]:
+            # The bound of this step alone, mostly far smaller
+            own = min(margin, _step_margin(pair, dt, before, start, end))
+            if high + own > largest[0] or own - low > largest[1]:
+                ends = (distance_0, slope_0, distance, slope)
+                _search_step(pair, dt, before, start, end, ends, own, largest)
+
+
+@kernel
+def _step_margin(pair, dt, state, start, end):
+    """Return how far the relative displacement exceeds the cubic of a step at most."""
+    integral = 0.5 * (abs(start) + abs(end)) * dt
+    ground = (max(abs(start), abs(end)), abs(end - start) / dt, integral)
+    _, margin = between_sample_margins(pair, dt, dt, present_radii(pair, state), ground)
+    return margin
 
 
 @kernel
@@ -68,6 +80,7 @@ def _search_step(pair, dt, state, start, end, ends, margin, largest):
     """Raise the largest values to the peaks in one step, cut so that cubics resolve them."""
     parts = math.ceil(max(pair[0], pair[3]) * dt / LONGEST_PHASE)
     width = dt / parts
+    margin /= parts**4  # grows with the fourth power of the width
     rate = (end - start) / dt
     distance_0, slope_0 = ends[0], ends[1] / parts
     for part in range(parts):

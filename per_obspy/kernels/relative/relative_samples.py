@@ -1,13 +1,14 @@
 r"""
-Relative displacement of a block of pairs at the samples: 17 multiply-adds and comparisons per step.
+Relative motion of a block of pairs at the samples: 23 multiply-adds and comparisons per step.
 
 Time runs outside, pairs inside, four steps at a time. The relative displacement ``q1 u1 - q2 u2``
-is a linear form of the shifted states of both structures and the acceleration.
+and the relative velocity are linear forms of the shifted states of both structures and the
+acceleration. A pair starts at rest before the tile from which its motion counts.
 """
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import inlined, kernel
 from per_obspy.kernels.oscillator.exact_step import shifted_rest, shifted_step, unshifted
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
 
@@ -16,17 +17,17 @@ PAIR_LANES = 32
 
 #: Rows of a block's table, one column per pair: two step matrices; the direction; the forms of the
 #: relative displacement, and of the relative velocity over the frequency of structure 1; both
-#: states and the acceleration; the largest and smallest relative displacement of a tile; the
-#: squares of the largest states, and of relative displacement and velocity, before tiles; the frame
-#: of each structure. One table, because the compiler would have to prove of several arrays that
-#: they do not overlap.
-DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, STATE_PEAKS, FRAME = 8, 10, 15, 20, 25, 27, 30
-PAIR_ROWS = 40
+#: states and the acceleration; the largest and smallest relative displacement and the largest
+#: relative velocity of a tile; the squares of the largest states, and of relative displacement and
+#: velocity, before tiles; the frame of each structure. One table, because the compiler would have
+#: to prove of several arrays that they do not overlap.
+DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, STATE_PEAKS, FRAME = 8, 10, 15, 20, 25, 28, 31
+PAIR_ROWS = 41
 #: Rows that a step uses.
 LOCAL = FRAME
 #: Rows of a tile's checkpoint: the states before the tile (0 to 3), the largest and the smallest
-#: relative displacement.
-GREATEST, LEAST, PAIR_CHECKPOINT_ROWS = 4, 5, 6
+#: relative displacement, and the largest relative velocity over the frequency of structure 1.
+GREATEST, LEAST, APPROACH, PAIR_CHECKPOINT_ROWS = 4, 5, 6, 7
 
 
 @kernel
@@ -74,16 +75,17 @@ def frame_of(body, table, lane):
 
 
 @kernel
-def start_pairs_at_rest(north, east, table):
-    """Fill the shifted states of structures at rest under the first accelerations."""
-    table[STATE_PEAKS : STATE_PEAKS + 3] = 0.0
+def start_pairs_at_rest(north, east, tile, windows, table, local):
+    """Fill the shifted states of the structures that are at rest before a tile."""
     for lane in range(PAIR_LANES):
+        if tile != windows[0, lane]:
+            continue
         # Acceleration along the pair's azimuth
         acceleration = table[DIRECTION, lane] * north + table[DIRECTION + 1, lane] * east
         for body in range(2):
             along, across = shifted_rest(frame_of(body, table, lane), acceleration)
-            table[STATE + 2 * body, lane] = along
-            table[STATE + 2 * body + 1, lane] = across
+            local[STATE + 2 * body, lane] = along
+            local[STATE + 2 * body + 1, lane] = across
 
 
 @kernel
@@ -93,26 +95,31 @@ def state_of(body, table, lane, along, across, acceleration):
 
 
 @kernel
-def run_pair_tiles(north, east, table, checkpoints):
+def run_pair_tiles(north, east, first_tile, windows, table, checkpoints):
     """
-    Advance a block; store, per tile, the states before it and the extreme relative displacements.
+    Advance a block; store, per tile, the states before it and the extreme relative motion.
 
-    ``north`` and ``east``: a whole number of tiles and one sample; ``checkpoints`` (tile, row,
-    lane).
+    ``north`` and ``east``: a whole number of tiles and one sample, the first of them of the number
+    ``first_tile``; ``windows`` (2, lanes): the tile before which each pair is at rest, and the last
+    one that counts; ``checkpoints`` (tile, row, lane).
     """
     local = np.empty((LOCAL, PAIR_LANES))  # of a size that the compiler knows: it makes vectors
     local[:] = table[:LOCAL]
     for first in range(0, north.size - 1, TILE):
-        _open_tile(north[first], east[first], local, checkpoints[first // TILE])
+        # Pairs that start here, and the states before the tile
+        tile = first_tile + first // TILE
+        start_pairs_at_rest(north[first], east[first], tile, windows, table, local)
+        _open_tile(north[first], east[first], tile, windows, local, checkpoints[first // TILE])
         _run_tile(north, east, first, local)
         for lane in range(PAIR_LANES):
             checkpoints[first // TILE, GREATEST, lane] = local[EXTREMES, lane]
             checkpoints[first // TILE, LEAST, lane] = local[EXTREMES + 1, lane]
+            checkpoints[first // TILE, APPROACH, lane] = local[EXTREMES + 2, lane]
     table[:LOCAL] = local
 
 
 @kernel
-def _open_tile(north, east, t, checkpoint):
+def _open_tile(north, east, tile, windows, t, checkpoint):
     """Store the states before a tile, and start its largest and smallest values with theirs."""
     for lane in range(PAIR_LANES):
         # Shifted states of structures 1 (u, z) and 2 (w, y); denormal numbers become zero
@@ -128,10 +135,12 @@ def _open_tile(north, east, t, checkpoint):
         )
         # Start of the tile: states, acceleration, largest and smallest relative displacement
         t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p
-        t[25, lane], t[26, lane] = distance, distance
-        # Squares of the largest states before tiles, for the bounds
-        t[27, lane], t[28, lane] = max(t[27, lane], u * u + z * z), max(t[28, lane], w * w + y * y)
-        t[29, lane] = max(t[29, lane], distance * distance + slope * slope)
+        t[25, lane], t[26, lane], t[27, lane] = distance, distance, slope
+        # Squares of the largest states before tiles that count, for the bounds
+        counts = 1.0 if windows[0, lane] <= tile <= windows[1, lane] else 0.0
+        t[28, lane] = max(t[28, lane], counts * (u * u + z * z))
+        t[29, lane] = max(t[29, lane], counts * (w * w + y * y))
+        t[30, lane] = max(t[30, lane], counts * (distance * distance + slope * slope))
         # Checkpoint
         checkpoint[0, lane], checkpoint[1, lane] = u, z
         checkpoint[2, lane], checkpoint[3, lane] = w, y
@@ -142,7 +151,7 @@ def _flushed(value):
     return value if abs(value) > SMALLEST_STATE else 0.0
 
 
-@kernel
+@inlined
 def _run_tile(north, east, first, t):
     """Advance a block over a tile, four steps at a time."""
     for i in range(first + 1, first + TILE + 1, 4):
@@ -155,13 +164,13 @@ def _run_tile(north, east, first, t):
             p2 = t[8, lane] * north_2 + t[9, lane] * east_2
             p3 = t[8, lane] * north_3 + t[9, lane] * east_3
             p4 = t[8, lane] * north_4 + t[9, lane] * east_4
-            # Four steps of both structures, with their relative displacement d
-            u, z, w, y, d1 = _moved(
+            # Four steps of both structures, with their relative displacement d and velocity v
+            u, z, w, y, d1, v1 = _moved(
                 t, lane, t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane], p1
             )
-            u, z, w, y, d2 = _moved(t, lane, u, z, w, y, p1, p2)
-            u, z, w, y, d3 = _moved(t, lane, u, z, w, y, p2, p3)
-            u, z, w, y, d4 = _moved(t, lane, u, z, w, y, p3, p4)
+            u, z, w, y, d2, v2 = _moved(t, lane, u, z, w, y, p1, p2)
+            u, z, w, y, d3, v3 = _moved(t, lane, u, z, w, y, p2, p3)
+            u, z, w, y, d4, v4 = _moved(t, lane, u, z, w, y, p3, p4)
             t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p4
             # Largest relative displacement
             early = max(d1, d2)
@@ -171,16 +180,23 @@ def _run_tile(north, east, first, t):
             early = min(d1, d2)
             late = min(d3, d4)
             t[26, lane] = min(t[26, lane], early, late)
+            # Largest relative velocity
+            early = max(v1, v2)
+            late = max(v3, v4)
+            t[27, lane] = max(t[27, lane], early, late)
 
 
-@kernel
+@inlined
 def _moved(t, lane, u, z, w, y, start, end):
-    """Return the states after one step and their relative displacement."""
+    """Return the states after one step and their relative displacement and velocity."""
     # Shifted steps of structures 1 (u, z) and 2 (w, y)
     u, z = t[0, lane] * u + (t[1, lane] * z + start), t[2, lane] * u + t[3, lane] * z
     w, y = t[4, lane] * w + (t[5, lane] * y + start), t[6, lane] * w + t[7, lane] * y
-    # Their form q1 u1 - q2 u2
+    # Their forms q1 u1 - q2 u2 and q1 v1 - q2 v2
     distance = (t[10, lane] * u + t[11, lane] * z) + (
         t[12, lane] * w + (t[13, lane] * y + t[14, lane] * end)
     )
-    return u, z, w, y, distance
+    slope = (t[15, lane] * u + t[16, lane] * z) + (
+        t[17, lane] * w + (t[18, lane] * y + t[19, lane] * end)
+    )
+    return u, z, w, y, distance, slope

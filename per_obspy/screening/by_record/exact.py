@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
 from per_obspy.pounding.history.pair_histories import PoundingMaxima, pounding_histories
-from per_obspy.pounding.history.relative import directional_relative_displacement
+from per_obspy.pounding.history.relative import (
+    Approach,
+    approach,
+    directional_relative_displacement,
+)
 from per_obspy.pounding.history.relative_yielding import (
     YieldingRelativeDisplacement,
     yielding_relative_displacement,
@@ -152,9 +156,10 @@ def exact_demand(station: StationMotion, table: Table, azimuth: FloatArray) -> F
     return _without_contact(station, table, azimuth).towards
 
 
-def exact_impact_velocity(station: StationMotion, table: Table, azimuth: FloatArray) -> FloatArray:
-    """Return the largest impact velocity of the pounding histories of pairs, m/s."""
-    return _pounding_maxima(station, table, azimuth).impact_velocity
+def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) -> Approach:
+    """Return the largest relative motion of linear buildings without contact, 1 towards 2."""
+    motion = station.north, station.east, station.dt
+    return approach(*motion, *_oscillators(table, azimuth))
 
 
 def no_outcome(count: int) -> Columns:

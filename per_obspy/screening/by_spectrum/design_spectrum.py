@@ -1,7 +1,7 @@
 """Design or user spectrum: displacement by period and damping, given instead of a record."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, reason_of
-from per_obspy.inventory.files.csv_text import check_separator, check_text
+from per_obspy.inventory.recognition.csv_text import check_separator, check_text
 
 #: Largest value that a spectrum may have and its unit: larger ones are in other units (ms, per
 #: cent, mm, cm/s2).
@@ -22,6 +22,9 @@ LARGEST = {
 }
 
 QUANTITIES = ("sd", "psa")
+
+#: Characters that no line of a spectrum has.
+LONGEST_LINE = 10_000
 
 
 class DesignSpectrum(NamedTuple):
@@ -77,11 +80,20 @@ def _read(source: str) -> pd.DataFrame:
         check_text(Path(source))
         # An open file, as pandas fetches names that are addresses and unpacks others
         with Path(source).open(encoding="utf-8") as file:
+            _check_lines(file, source)
             table = pd.read_csv(file, comment="#", skipinitialspace=True)
     except (OSError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise CatalogError(source, f"cannot be read as CSV: {reason_of(error)}") from error
     check_separator(Path(source), list(map(str, table.columns)))
     return table
+
+
+def _check_lines(file: TextIO, source: str) -> None:
+    """Raise ``CatalogError`` for a line that is none of numbers: it may take all memory."""
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise CatalogError(source, f"has a line of {LONGEST_LINE} characters or more")
+    file.seek(0)
 
 
 def _quantity(table: pd.DataFrame, source: str) -> str:

@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
+from per_obspy.kernels.pairs.node_motion import MOTION_ROWS, estimate_motion
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.screening.by_record.stored_spectra import (
     LogSpectra,
     log_period_and_damping,
     stored_log,
 )
-from per_obspy.screening.uncertainty.nodes import NODES, damping_at_nodes, period_at_nodes
+from per_obspy.screening.uncertainty.nodes import BUILDINGS, LARGEST_DAMPING, NODES
 from per_obspy.screening.uncertainty.population import COLUMNS, Uncertain, population
 from per_obspy.screening.uncertainty.severity import RelativeMotion
-from per_obspy.screening.values import Columns, Table, chosen
+from per_obspy.screening.values import Columns, Table, chosen, values
 
 #: Median and log-standard deviation of the gap from SD and eq. (16) over the exact one: 91 pairs of
 #: periods from 0.3 to 4 s at 5 % damping under 14 broad-band records.
@@ -30,9 +31,6 @@ SD_MEDIAN, SD_DISPERSION = 0.97, 0.14
 
 #: Pairs times nodes that are computed together: every array stays below 256 kB.
 SAMPLES = 32_768
-
-#: Gap / sum of the radii that the rounding of a correlation of 1 leaves in eq. (15).
-ROUND_OFF = 1e-7
 
 
 class UncertainRadius(NamedTuple):
@@ -90,12 +88,7 @@ class UncertainMotion(NamedTuple):
         )
 
 
-def estimated_population(
-    motion: UncertainMotion,
-    spectra: LogSpectra,
-    pairs: Table,
-    velocity_factor: FloatArray | None = None,
-) -> Columns:
+def estimated_population(motion: UncertainMotion, spectra: LogSpectra, pairs: Table) -> Columns:
     """
     Compute the population of pairs under an uncertain motion.
 
@@ -107,15 +100,12 @@ def estimated_population(
         By which the radii of resampled oscillators change; at the edge beyond the grid.
     pairs : Table
         Completed pairs with their log-standard deviations.
-    velocity_factor : (n_pairs,) ndarray, optional
-        By which impact velocities are known to differ; 1 if not given.
 
     Returns
     -------
     dict of (n_pairs,) ndarray
         ``population.COLUMNS``.
     """
-    factor = np.ones(motion.row.size) if velocity_factor is None else velocity_factor
     count = motion.row.size
     result: Columns = {name: np.empty(count) for name in COLUMNS}
     size = SAMPLES // len(NODES)
@@ -124,7 +114,7 @@ def estimated_population(
         rows = np.arange(first, min(first + size, count))
         block, table = motion.rows(rows), chosen(pairs, rows)
         relative = estimated_motion(block, spectra, table, NODES)
-        uncertain = Uncertain(relative, block.log_std, factor[rows])
+        uncertain = Uncertain(relative, block.log_std, np.ones(rows.size))
         for name, column in population(uncertain, table, NODES).items():
             result[name][rows] = column
     return result
@@ -143,42 +133,32 @@ def estimated_motion(
     nodes : (n_nodes, 6) ndarray
         As ``nodes.NODES``.
     """
-    period_1, damping_1, radius_1 = _at_nodes(motion.first, motion.row, spectra, pairs, 1, nodes)
-    period_2, damping_2, radius_2 = _at_nodes(motion.second, motion.row, spectra, pairs, 2, nodes)
+    first = _oscillators(motion.first, motion.row, spectra, pairs, 1)
+    second = _oscillators(motion.second, motion.row, spectra, pairs, 2)
     # eq. (16), shifted as that which governs at the medians
-    by_noise = ddc_correlation(period_1, damping_1, period_2, damping_2)
-    first, second = motion.first, motion.second
-    at_medians = ddc_correlation(first.period, first.damping, second.period, second.damping)
-    differs = (motion.correlation - at_medians)[:, None]
-    correlation = np.clip(by_noise + differs, -1.0, 1.0)
-    # critical gap, and the relative velocity as the gap of the velocities
-    speed_1 = 2.0 * np.pi / period_1 * radius_1
-    speed_2 = 2.0 * np.pi / period_2 * radius_2
-    demand = _difference(radius_1, radius_2, correlation)
-    velocity = _difference(speed_1, speed_2, correlation)
-    return RelativeMotion(demand, velocity, speed_1, speed_2, by_noise)
+    shift = motion.correlation - ddc_correlation(
+        *(motion.first.period, motion.first.damping),
+        *(motion.second.period, motion.second.damping),
+    )
+    relative = np.empty((MOTION_ROWS, motion.row.size, len(nodes)))
+    deviates = np.ascontiguousarray(nodes[:, BUILDINGS].T)
+    estimate_motion(
+        *spectra, motion.row, np.stack([*first, *second]), np.atleast_1d(shift), deviates, relative
+    )
+    return RelativeMotion(*relative)
 
 
-def _at_nodes(
-    building: UncertainRadius,
-    row: NDArray[np.intp],
-    spectra: LogSpectra,
-    pairs: Table,
-    i: int,
-    nodes: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return period (s), damping and radius at the site (m) of building i at the nodes."""
-    period = period_at_nodes(building.period, pairs, i, nodes)
-    damping = damping_at_nodes(building.damping, pairs, i, nodes)
+def _oscillators(
+    building: UncertainRadius, row: NDArray[np.intp], spectra: LogSpectra, pairs: Table, i: int
+) -> tuple[FloatArray, ...]:
+    """Return the oscillators of building i in the rows of the kernel."""
     # the radius changes as the stored spectrum does from the medians to the node
-    stored = stored_log(spectra, row[:, None], *log_period_and_damping(period, damping))
-    median = stored_log(spectra, row, *log_period_and_damping(building.period, building.damping))
-    known = building.radius * np.exp(building.ln_ratio - median)
-    return period, damping, known[:, None] * np.exp(stored)
-
-
-def _difference(first: FloatArray, second: FloatArray, correlation: FloatArray) -> FloatArray:
-    """Return eq. (15), 0 where two equal motions leave the round-off of their difference."""
-    square = (first - second) ** 2 + 2.0 * (1.0 - correlation) * first * second
-    difference: FloatArray = np.sqrt(square)
-    return np.where(difference > ROUND_OFF * (first + second), difference, 0.0)
+    at_medians = log_period_and_damping(building.period, building.damping)
+    where_stored_is_one = building.radius * np.exp(
+        building.ln_ratio - stored_log(spectra, row, *at_medians)
+    )
+    return (
+        *(building.period, values(pairs, f"period_log_std_{i}")),
+        *(building.damping, values(pairs, f"damping_log_std_{i}")),
+        *(np.maximum(building.damping, LARGEST_DAMPING), where_stored_is_one),
+    )

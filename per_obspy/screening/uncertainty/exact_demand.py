@@ -1,12 +1,12 @@
 """
 Population of pairs at one station; where the record supports a pair, by its exact demand.
 
-The record drives the buildings of every node, and their exact relative displacement is the demand
-of the node, whether periods were given or derived; it is carried to the site (``site_demand.py``).
-So equal buildings of uncertain period or damping are not certain to move as one. Elsewhere, and
-where the estimate leaves no doubt whether a pair of derived periods touches, estimates take the
-place of the record: at short periods, where displacements follow the ground, an exact demand takes
-up to a hundred times as long as at 1 s.
+The record drives the buildings of every node. Their exact relative displacement is the demand of
+the node, and their relative velocity that of ``severity.py``, whether periods were given or
+derived; both are carried to the site (``site_demand.py``). So equal buildings of uncertain period
+or damping are not certain to move as one, and stiff buildings, which follow slow ground, do not hit
+as if they vibrated freely. Elsewhere, and where the estimate leaves no doubt that a pair of derived
+periods does not touch, estimates take the place of the record.
 
 Against 4096 nodes, for 320 pairs in 18 real records (periods 0.3 to 3 s, one in three pairs of
 equal periods, log-standard deviations 0.2 or 0.3 of periods, dampings or both), the probability is
@@ -30,8 +30,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Screening
 from per_obspy.screening.by_record.exact import (
     can_yield,
+    exact_approach,
     exact_demand,
-    exact_impact_velocity,
     record_supports,
 )
 from per_obspy.screening.by_record.station_motion import StationMotion
@@ -60,7 +60,6 @@ from per_obspy.screening.uncertainty.site_demand import (
     SiteDemand,
     ln_field_demand,
     median_at_site,
-    pair_at_site,
     site_demand,
 )
 from per_obspy.screening.values import Columns, Table, both, chosen, values
@@ -68,20 +67,16 @@ from per_obspy.screening.values import Columns, Table, both, chosen, values
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
 YIELDING_NODES = 32
 
-#: Exact histories of a touching pair of derived periods, over a gap of this share of the demand:
-#: the chatter of touching buildings takes longer and hits no harder. Stiff buildings follow slow
-#: ground, so that the frequency of their relative motion is not their own.
-HISTORIES, SMALL_GAP = 4, 0.03
-
-#: Nodes of touching pairs: their mean impact velocity is within 4 % of that of 128 nodes in the
-#: median, and within 15 % at nine pairs in ten (180 pairs of derived periods in 3 real records).
-TOUCHING_NODES = 16
+#: Nodes of pairs that surely touch: their mean impact velocity is within 4 % of that of 128 nodes
+#: in the median, and within 15 % at nine pairs in ten (180 pairs of derived periods in 3 real
+#: records).
+SURE_NODES = 16
 
 #: Nodes after which a pair is certain if its probability is this near to 0 or 1.
-FIRST_NODES, CERTAIN = 32, 5e-4
+FIRST_NODES, CERTAIN = 32, 1e-3
 
-#: Distance of the probability by the estimate from 0 and 1 up to which pairs of derived periods are
-#: not driven by the record.
+#: Probability by the estimate up to which pairs of derived periods are not driven by the record;
+#: those as near to 1 surely touch.
 NEGLIGIBLE = 1e-4
 
 #: Demand / sum of the radii below which two oscillators move as one.
@@ -139,67 +134,44 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     """
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
-    # estimates, which show too of which pairs of derived periods the contact is in doubt
+    # estimates, which show too which pairs of derived periods may touch
     estimated = np.flatnonzero(~exact)
     if estimated.size:
         part = chosen(table, estimated)
         motion = record_motion(station, part, screening)
-        factor = _factor_of_touching(station, motion, part)
-        _fill(result, estimated, estimated_population(motion, station.per, part, factor))
+        _fill(result, estimated, estimated_population(motion, station.per, part))
     # exact demands in blocks, which bound the memory; a pair does not depend on its block
-    by_record = exact | _in_doubt(station, table, result["probability"])
-    for mask, nodes in _kinds(table):
-        for rows in _blocks(by_record & mask):
+    chance = np.where(exact, 0.5, result["probability"])
+    by_record = exact | _may_touch(station, table, chance)
+    uncertain = building_is_uncertain(table)
+    for rows in _blocks(by_record & ~uncertain):
+        pairs = _block(station, chosen(table, rows), screening)
+        _fill(result, rows, _of_certain_buildings(pairs))
+    for mask, first, count in _kinds(table, chance):
+        for rows in _blocks(by_record & uncertain & mask):
             pairs = _block(station, chosen(table, rows), screening)
-            found = _of_certain_buildings if nodes is None else _sampled
-            _fill(result, rows, found(pairs, NODES if nodes is None else nodes))
+            _fill(result, rows, _sampled(pairs, first, count))
     return result
 
 
-def _factor_of_touching(
-    station: StationMotion, motion: UncertainMotion, table: Table
-) -> FloatArray:
-    """Return exact over estimated impact velocity at few nodes, of touching pairs; 1 of others."""
-    supported = record_supports(station, table) & np.isfinite(values(table, "demand_exact"))
-    touching = supported & (values(table, "gap") == 0.0) & ~can_yield(table)
-    factor = np.ones(motion.row.size)
-    # exact histories take the time
-    for rows in _blocks(touching):
-        factor[rows] = _ratio_of_histories(station, motion.rows(rows), chosen(table, rows))
-    return factor
+def _may_touch(station: StationMotion, table: Table, chance: FloatArray) -> NDArray[np.bool_]:
+    """Return where the record supports a pair that touches by a chance that is not negligible."""
+    known = np.isfinite(values(table, "demand_exact")) & record_supports(station, table)
+    return np.asarray(known & (chance >= NEGLIGIBLE))
 
 
-def _ratio_of_histories(
-    station: StationMotion, motion: UncertainMotion, table: Columns
-) -> FloatArray:
-    """Return the sum of exact over that of estimated impact velocities at a small gap."""
-    nodes = NODES[:HISTORIES]
-    estimate = estimated_motion(motion, station.per, table, nodes)
-    gap = SMALL_GAP * estimate.demand
-    expected = impact_velocity(estimate, np.ones_like(gap), gap).sum(axis=1)
-    # the gap at the site, seen from the record
-    ln_ratio, _ = pair_at_site(table)
-    sample = _sampled_buildings(table, nodes)
-    sample["gap"] = (gap * np.exp(-ln_ratio)[:, None]).ravel()
-    azimuth = np.repeat(values(table, "azimuth_used"), HISTORIES)
-    found = exact_impact_velocity(station, sample, azimuth).reshape(-1, HISTORIES)
-    exact = found.sum(axis=1) * np.exp(ln_ratio)
-    # 1 where neither is known
-    known = (expected > 0.0) & (exact > 0.0)
-    ratio: FloatArray = np.divide(exact, expected, out=np.ones_like(exact), where=known)
-    return ratio
-
-
-def _kinds(table: Table) -> list[tuple[NDArray[np.bool_], FloatArray | None]]:
-    """Return masks of pairs, each with its nodes of both buildings; None of certain buildings."""
-    uncertain, yields = building_is_uncertain(table), can_yield(table)
-    touching = values(table, "gap") == 0.0
-    # fewer nodes of yielding pairs, and of touching ones, which surely touch
+def _kinds(table: Table, chance: FloatArray) -> list[tuple[NDArray[np.bool_], int, int]]:
+    """Return masks of pairs, each with the numbers of its first nodes and of all of them."""
+    yields, touching = can_yield(table), values(table, "gap") == 0.0
+    sure = ~touching & (chance > 1.0 - NEGLIGIBLE)
+    others = ~touching & ~sure
+    # fewer nodes of yielding pairs, and of those that surely touch
     return [
-        (~uncertain, None),
-        (uncertain & touching, NODES[:TOUCHING_NODES]),
-        (uncertain & ~touching & yields, NODES[:YIELDING_NODES]),
-        (uncertain & ~touching & ~yields, NODES),
+        (touching, SURE_NODES, SURE_NODES),
+        (sure & yields, SURE_NODES, YIELDING_NODES),
+        (sure & ~yields, SURE_NODES, len(NODES)),
+        (others & yields, YIELDING_NODES, YIELDING_NODES),
+        (others & ~yields, FIRST_NODES, len(NODES)),
     ]
 
 
@@ -215,15 +187,6 @@ def _fill(result: Columns, rows: NDArray[np.intp], part: Columns) -> None:
         result[name][rows] = column
 
 
-def _in_doubt(station: StationMotion, table: Table, estimated: FloatArray) -> NDArray[np.bool_]:
-    """Return where the record supports a pair of whose contact an estimate leaves a doubt."""
-    known = ~is_exact(table) & np.isfinite(values(table, "demand_exact"))
-    # rows of exact demands have no estimate yet
-    chance = np.where(known, estimated, 0.0)
-    doubtful = (chance >= NEGLIGIBLE) & (chance <= 1.0 - NEGLIGIBLE)
-    return known & doubtful & record_supports(station, table)
-
-
 def _block(station: StationMotion, pairs: Table, screening: Screening) -> _Block:
     """Return pairs with the exact demand as the one that decides."""
     rule = np.full(len(pairs["gap"]), "exact", dtype=object)
@@ -232,12 +195,12 @@ def _block(station: StationMotion, pairs: Table, screening: Screening) -> _Block
     return _Block(station, table, motion, site_demand(station, table, screening), screening)
 
 
-def _of_certain_buildings(block: _Block, nodes: FloatArray) -> Columns:
+def _of_certain_buildings(block: _Block) -> Columns:
     """Return the population of pairs of which at most motion and gap are uncertain."""
     # the only demand, at the site
     table, site = block.table, block.site
     moving, factor = _at_the_medians(block)
-    result = population(Uncertain(moving, site.log_std, factor), table, nodes)
+    result = population(Uncertain(moving, site.log_std, factor), table, NODES)
     # nothing uncertain: the exact history itself
     at_record = (site.log_std == 0.0) & (site.ln_ratio == 0.0) & (site.weight == 1.0)
     certain = at_record & (gap_dispersion(table) == 0.0)
@@ -251,23 +214,24 @@ def _of_certain_buildings(block: _Block, nodes: FloatArray) -> Columns:
     return result | {name: np.where(certain, history[name], result[name]) for name in history}
 
 
-def _sampled(block: _Block, nodes: FloatArray) -> Columns:
+def _sampled(block: _Block, first: int, count: int) -> Columns:
     """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
     # first nodes
-    demands = _demands(block, nodes[:FIRST_NODES])
-    chance = chance_of_contact(demands, block.site.log_std, block.table)
-    doubtful = (chance > CERTAIN) & (chance < 1.0 - CERTAIN)
+    few = _node_motion(block, NODES[:first])
+    chance = chance_of_contact(few.demand, block.site.log_std, block.table)
+    doubtful = (chance > CERTAIN) & (chance < 1.0 - CERTAIN) & (first < count)
+    # the others where they may change the probability
     result: Columns = {name: np.empty(chance.size) for name in COLUMNS}
-    for mask, taken in ((~doubtful, nodes[:FIRST_NODES]), (doubtful, nodes)):
+    for number, mask in ((first, ~doubtful), (count, doubtful)):
         rows = np.flatnonzero(mask)
         if not rows.size:
             continue
-        # the first nodes are known already
-        pairs, known = block.rows(rows), demands[rows]
-        every = np.concatenate([known, _demands(pairs, taken[FIRST_NODES:])], axis=1)
-        moving = _scaled(pairs, taken, every)
-        uncertain = Uncertain(moving, pairs.site.log_std, _factor_of_yielding(pairs))
-        _fill(result, rows, population(uncertain, pairs.table, taken))
+        pairs, motion = block.rows(rows), RelativeMotion(*(column[rows] for column in few))
+        if number > first:
+            others = _node_motion(pairs, NODES[first:number])
+            motion = RelativeMotion(*map(np.hstack, zip(motion, others, strict=True)))
+        uncertain = Uncertain(motion, pairs.site.log_std, _factor_of_yielding(pairs))
+        _fill(result, rows, population(uncertain, pairs.table, NODES[:number]))
     return result
 
 
@@ -288,23 +252,54 @@ def node_demands(
     screening : Screening
         For the demand at the site.
     """
-    return _demands(_block(station, table, screening), nodes)
+    return _node_motion(_block(station, table, screening), nodes).demand
 
 
-def _demands(block: _Block, nodes: FloatArray) -> FloatArray:
-    """Return median demands at the site at nodes of both buildings, (n_pairs, n_nodes), m."""
-    if not len(nodes):
-        return np.empty((len(block.table["gap"]), 0))
+def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
+    """Return the motion at the site at nodes of both buildings, demands being medians."""
     sample = _sampled_buildings(block.table, nodes)
-    demand = exact_demand(block.station, sample, values(sample, "azimuth_used"))
-    demand = demand.reshape(-1, len(nodes))
+    demand, velocity = _in_record(block, sample, len(nodes))
     # equal motions leave the round-off of their difference
     moves_apart = demand > ROUND_OFF * values(block.table, "absolute_gap")[:, None]
     demand = np.where(moves_apart, demand, 0.0)
     # what the motion between the stations lets expect of the same buildings
     ln_field = ln_field_demand(block.station, sample, block.screening).reshape(demand.shape)
+    return _at_site(block, nodes, demand, velocity, ln_field)
+
+
+def _in_record(block: _Block, sample: Columns, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return demand and relative velocity in the record, of a number of nodes per pair."""
+    yields = can_yield(sample)
+    demand, velocity = _linear_approach(block.station, sample)
+    weak = chosen(sample, yields)
+    demand[yields] = exact_demand(block.station, weak, values(weak, "azimuth_used"))
+    return demand.reshape(-1, count), velocity.reshape(-1, count)
+
+
+def _linear_approach(station: StationMotion, table: Table) -> tuple[FloatArray, FloatArray]:
+    """Return demand and relative velocity in the record; NaN where a building can yield."""
+    demand, velocity = np.full((2, len(table["gap"])), np.nan)
+    linear = ~can_yield(table)
+    pairs = chosen(table, linear)
+    demand[linear], velocity[linear] = exact_approach(station, pairs, values(pairs, "azimuth_used"))
+    return demand, velocity
+
+
+def _at_site(
+    block: _Block, nodes: FloatArray, demand: FloatArray, velocity: FloatArray, ln_field: FloatArray
+) -> RelativeMotion:
+    """Return the motion at the site from demand and velocity in the record, (n_pairs, n_nodes)."""
+    estimate = estimated_motion(block.motion, block.station.per, block.table, nodes)
     weight, ln_ratio = block.site.weight[:, None], block.site.ln_ratio[:, None]
-    return median_at_site(demand, weight, ln_ratio, ln_field)
+    at_site = median_at_site(demand, weight, ln_ratio, ln_field)
+    # frequency of the relative motion: that of the record, of a building that yields that of the
+    # estimate, or one between both buildings' where that has none
+    period_1, period_2 = both(block.table, "period")
+    frequency = np.repeat(2.0 * np.pi / np.sqrt(period_1 * period_2)[:, None], len(nodes), axis=1)
+    np.divide(estimate.velocity, estimate.demand, out=frequency, where=estimate.demand > 0.0)
+    known = np.isfinite(velocity) & (demand > 0.0)
+    np.divide(velocity, demand, out=frequency, where=known)
+    return estimate._replace(demand=at_site, velocity=frequency * at_site)
 
 
 def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
@@ -321,22 +316,13 @@ def _sampled_buildings(table: Table, nodes: FloatArray) -> Columns:
     return sample
 
 
-def _scaled(block: _Block, nodes: FloatArray, demand: FloatArray) -> RelativeMotion:
-    """Return the motion at nodes with exact demands: velocities follow by their frequency."""
-    estimate = estimated_motion(block.motion, block.station.per, block.table, nodes)
-    period_1, period_2 = both(block.table, "period")
-    between = np.broadcast_to((2.0 * np.pi / np.sqrt(period_1 * period_2))[:, None], demand.shape)
-    # circular frequency of the relative motion; between both where an estimate has none
-    moves = estimate.demand > 0.0
-    frequency = np.divide(estimate.velocity, estimate.demand, out=between.copy(), where=moves)
-    return estimate._replace(demand=demand, velocity=frequency * demand)
-
-
 def _at_the_medians(block: _Block) -> tuple[RelativeMotion, FloatArray]:
     """Return the motion at the medians, (n_pairs, 1), and the factor of impact velocities there."""
     site, exact = block.site, values(block.table, "demand_exact")
-    demand = median_at_site(exact, site.weight, site.ln_ratio, site.ln_field)
-    moving = _scaled(block, np.zeros((1, NODES.shape[1])), demand[:, None])
+    _, velocity = _linear_approach(block.station, block.table)
+    columns = exact[:, None], velocity[:, None], site.ln_field[:, None]
+    moving = _at_site(block, np.zeros((1, NODES.shape[1])), *columns)
+    demand = moving.demand[:, 0]
     # back to the record, whose history is known
     at_record = np.divide(exact, demand, out=np.ones_like(exact), where=demand > 0.0)
     gap = values(block.table, "gap")[:, None]

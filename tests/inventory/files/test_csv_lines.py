@@ -6,8 +6,9 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.files import csv_lines
-from per_obspy.inventory.files.csv_lines import AFTER, OPEN, header_names, row_lines
-from per_obspy.inventory.files.csv_text import check_text
+from per_obspy.inventory.files.csv_lines import AFTER, OPEN, Layout, header_names, row_lines
+from per_obspy.inventory.recognition import csv_text
+from per_obspy.inventory.recognition.csv_text import check_text
 
 NAMES = ["pair_id", "gap", "note"]
 
@@ -19,7 +20,7 @@ def read(tmp_path):
     def read(text):
         path = tmp_path / "pairs.csv"
         path.write_bytes(("pair_id,gap,note\n" + text).encode())
-        blocks = list(row_lines(path, NAMES, check_text(path)))
+        blocks = list(row_lines(path, NAMES, Layout(check_text(path))))
         rows = b"".join(block.text for block in blocks).decode().splitlines()
         numbers = [int(line) for block in blocks for line in block.numbers]
         broken = [(line.row, *line.reasons) for block in blocks for line in block.broken]
@@ -78,16 +79,16 @@ def test_a_header_with_wrong_quotations(tmp_path, header, problem):
     path = tmp_path / "pairs.csv"
     path.write_text(header + "\n")
     with pytest.raises(CatalogError, match=f"line 1: {problem}"):
-        header_names(path)
+        header_names(path, Layout(1))
     path.write_text('"a, b",c\r1,2')
-    assert header_names(path) == ["a, b", "c"]
+    assert header_names(path, Layout(1)) == ["a, b", "c"]
 
 
 def test_no_line_of_random_text_is_lost(read, monkeypatch):
     # every row has a mark that is no quotation: its line must come back, whatever stands around it
     drawn = random.Random(1)
     for block in (5, 50, 1 << 20):
-        monkeypatch.setattr(csv_lines, "BLOCK", block)
+        monkeypatch.setattr(csv_text, "BLOCK", block)
         for _ in range(100):
             pieces = ["".join(drawn.choices('ab",\n\r', k=12)) for _ in range(6)]
             text = "".join(f"{piece}\ngood{i},1,x\n" for i, piece in enumerate(pieces))

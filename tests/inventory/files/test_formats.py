@@ -21,9 +21,10 @@ WRONG_FILES = [
     (
         b"x",
         "town.gpkg",
-        "expected .csv or .parquet; per-obspy pairs makes such a table of footprints",
+        r"expected \.csv, .* or \.txt; per-obspy pairs makes such a table of footprints",
     ),
-    (b"x", "pairs.xlsx", "unknown suffix '.xlsx', expected .csv or .parquet"),
+    (b"x", "pairs.xlsx", "not a readable workbook .* not a zip file"),
+    (b"x", "pairs.ods", "unknown suffix '.ods', .* save the workbook as .xlsx"),
 ]
 
 

@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 
 from per_obspy.kernels.oscillator.exact_step import state_after, step_coefficients
-from per_obspy.kernels.relative.bounds import between_sample_margins, may_grow, strongest_inputs
+from per_obspy.kernels.relative.bounds import (
+    largest_radii,
+    may_grow,
+    strongest_inputs,
+    tile_inputs,
+    tile_margins,
+)
 from per_obspy.kernels.relative.relative_samples import (
     PAIR_CHECKPOINT_ROWS,
     PAIR_LANES,
     PAIR_ROWS,
     pack_pair,
     run_pair_tiles,
-    start_pairs_at_rest,
 )
 from per_obspy.kernels.spectra.tile_search import TILE
 
@@ -23,14 +28,16 @@ GROUND = np.random.default_rng(8).standard_normal((2, TILE + 1))
 
 def margins(pair, ground=GROUND):
     """Return the bounds for a pair that fills all lanes of a block."""
-    table = np.empty((PAIR_ROWS, PAIR_LANES))
+    table = np.zeros((PAIR_ROWS, PAIR_LANES))
     checkpoints = np.empty((1, PAIR_CHECKPOINT_ROWS, PAIR_LANES))
     pair = np.asarray(pair)
     for lane in range(PAIR_LANES):
         pack_pair(pair, DT, table, lane)
-    start_pairs_at_rest(ground[0, 0], ground[1, 0], table)
-    run_pair_tiles(ground[0], ground[1], table, checkpoints)
-    return np.array(between_sample_margins(pair, DT, table, 0, strongest_inputs(ground, DT)))
+    windows = np.zeros((2, PAIR_LANES), dtype=np.int64)
+    run_pair_tiles(ground[0], ground[1], 0, windows, table, checkpoints)
+    strongest = strongest_inputs(tile_inputs(ground, DT))
+    radii = largest_radii(pair, table, 0, strongest)
+    return np.array(tile_margins(pair, DT, radii, strongest))
 
 
 def motion(pair, parts):

@@ -11,7 +11,7 @@ def test_a_constant_push_overshoots_to_twice_the_static_displacement():
     north = np.full(9, push)
     north[-1] = 0.0
     pair = np.array([[omega], [0.0], [1.0], [9.0], [0.5], [1e-15], [1.0], [0.0]])
-    largest = np.empty((2, 1))
+    largest = np.empty((3, 1))
     relative_maxima(north[:7], np.zeros(7), dt, pair, largest)
     assert abs(largest[0, 0] / (2 * 1.5 / omega**2) - 1) < 1e-9
 
@@ -23,7 +23,7 @@ def test_east_is_felt_by_the_sine_of_the_azimuth():
     pairs = np.empty((8, 2))
     pairs[:6] = structures[:, None]
     pairs[6:] = np.eye(2)
-    largest = np.empty((2, 2))
+    largest = np.empty((3, 2))
     relative_maxima(np.zeros(4), east, 0.1, pairs, largest)
     assert largest[0, 0] == largest[1, 0] == 0.0
     assert largest[0, 1] > 0.0
@@ -37,7 +37,7 @@ def test_equal_structures_never_separate_and_unequal_ones_are_not_taken_for_them
     pairs = np.tile(twins[:, None], 5)
     for index, row in ((1, 3), (2, 4), (4, 5)):
         pairs[row, index] *= 1.01
-    largest = np.full((2, 5), np.nan)
+    largest = np.full((3, 5), np.nan)
     relative_maxima(north, np.zeros(4), 0.1, pairs, largest)
-    assert (largest > 0.0).tolist() == [[False, True, True, False, True]] * 2
+    assert (largest > 0.0).tolist() == [[False, True, True, False, True]] * 3
     assert np.all(largest[:, [0, 3]] == 0.0)

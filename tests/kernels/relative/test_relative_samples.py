@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from per_obspy.kernels.relative.relative_samples import (
+    APPROACH,
     DISTANCE,
     EXTREMES,
     GREATEST,
@@ -13,7 +14,6 @@ from per_obspy.kernels.relative.relative_samples import (
     PAIR_ROWS,
     pack_pair,
     run_pair_tiles,
-    start_pairs_at_rest,
     state_of,
 )
 from per_obspy.kernels.spectra.tile_search import TILE
@@ -28,12 +28,12 @@ def test_shifted_states_are_the_states(period, plain_states):
     ground = np.random.default_rng(2).standard_normal((2, 2 * TILE + 1))
     damping = 0.05 if period > DT else 0.0
     pair = np.array([2 * np.pi / period, damping, 1.2, 5.0, 0.02, 0.9, 0.8, 0.6])
-    table = np.empty((PAIR_ROWS, PAIR_LANES))
+    table = np.zeros((PAIR_ROWS, PAIR_LANES))
     checkpoints = np.empty((2, PAIR_CHECKPOINT_ROWS, PAIR_LANES))
     for lane in range(PAIR_LANES):
         pack_pair(pair, DT, table, lane)
-    start_pairs_at_rest(ground[0, 0], ground[1, 0], table)
-    run_pair_tiles(ground[0], ground[1], table, checkpoints)
+    windows = np.array([[0], [1]]) * np.ones((2, PAIR_LANES), dtype=np.int64)
+    run_pair_tiles(ground[0], ground[1], 0, windows, table, checkpoints)
 
     along = pair[6] * ground[0] + pair[7] * ground[1]
     # plain states, from units of a / omega² to m
@@ -44,6 +44,10 @@ def test_shifted_states_are_the_states(period, plain_states):
     greatest, least = checkpoints[:, GREATEST, LANE], checkpoints[:, LEAST, LANE]
     np.testing.assert_allclose(greatest, [tile.max() for tile in tiles], atol=tolerance)
     np.testing.assert_allclose(least, [tile.min() for tile in tiles], atol=tolerance)
+    slope = pair[2] * states[0][:, 1] - pair[5] * states[1][:, 1] * pair[3] / pair[0]
+    tiles = slope[: TILE + 1], slope[TILE:]
+    fastest = checkpoints[:, APPROACH, LANE]
+    np.testing.assert_allclose(fastest, [tile.max() for tile in tiles], atol=tolerance)
     for body in range(2):
         shifted = checkpoints[1, 2 * body : 2 * body + 2, LANE]
         found = state_of(body, table, LANE, *shifted, along[TILE])

@@ -8,6 +8,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.pounding.history.relative import (
+    approach,
     critical_gap_surface,
     directional_relative_displacement,
     relative_displacement,
@@ -54,6 +55,21 @@ def test_against_scipy_on_a_fine_grid(period_1, period_2, share_1, share_2):
     assert apart.max() * (1 - 1e-9) <= found.one_before_two <= apart.max() * (1 + missed)
     assert -apart.min() * (1 - 1e-9) <= found.two_before_one <= -apart.min() * (1 + missed)
     assert found.largest == max(found.one_before_two, found.two_before_one)
+
+
+@pytest.mark.parametrize(("period_1", "period_2"), [(0.5, 0.8), (0.15, 1.5), (2.0, 2.1)])
+def test_approach_against_scipy(period_1, period_2):
+    # mutation: the other direction, a participation left out, displacement over the frequency
+    ground = noise()
+    found = approach(ground, 0.0 * ground, DT, period_1, 0.05, period_2, 0.02, 0.0, 1.2, 0.9)
+    parts = 200
+    apart = 1.2 * displacement(ground, DT, period_1, 0.05, parts, 500)
+    apart = apart - 0.9 * displacement(ground, DT, period_2, 0.02, parts, 500)
+    both = relative_displacement(ground, DT, period_1, 0.05, period_2, 0.02, 1.2, 0.9)
+    assert found.displacement == both.one_before_two
+    # velocity by differences of the fine grid: at the samples, half a part away
+    velocity = np.gradient(apart, DT / parts)[::parts]
+    assert found.velocity == pytest.approx(velocity.max(), rel=2e-3)
 
 
 @given(periods, dampings, periods, dampings)

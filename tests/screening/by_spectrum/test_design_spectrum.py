@@ -125,3 +125,10 @@ def test_faults_are_named(write, fault):
 def test_an_absent_file_is_named(tmp_path):
     with pytest.raises(CatalogError, match=r"absent\.csv: cannot be read as CSV"):
         read_design_spectrum(tmp_path / "absent.csv")
+
+
+def test_a_line_that_would_take_all_memory_is_refused(tmp_path):
+    # a header of many columns takes a kilobyte of memory for each
+    (tmp_path / "wide.csv").write_text("period,damping,sd" + "," * 20_000 + "\n1,0.05,0.1\n")
+    with pytest.raises(CatalogError, match=r"wide\.csv: has a line of 10000 characters or more"):
+        read_design_spectrum(tmp_path / "wide.csv")

@@ -82,6 +82,28 @@ def test_nearly_equal_buildings_are_as_uncertain_as_they_are(sct):
     assert spread > 0.15
 
 
+@pytest.mark.real_data
+@pytest.mark.parametrize("share", [0.0, 0.4])
+@pytest.mark.parametrize("periods", [(0.15, 0.2), (0.2, 0.4), (0.8, 1.3)])
+def test_impact_velocities_at_sct_are_those_of_histories(sct, periods, share):
+    # stiff buildings follow the ground of 2 s: by their own frequencies they would hit up to three
+    # times as hard (2.5 times at 0.2 and 0.4 s, 1.4 at 0.8 and 1.3 s)
+    pair = {**EQUAL, **DOUBT, **AT_STATION, "azimuth": 90.0, "mass_1": 1e6, "mass_2": 1e6}
+    pair |= {"period_1": periods[0], "period_2": periods[1]}
+    gap = share * _table(sct, [pair])["demand"].iloc[0]
+    row = _table(sct, [{**pair, "gap": gap}]).iloc[0]
+    motion, random, count = station_motion(sct), np.random.default_rng(4), 800
+    drawn = np.array(periods)[:, None] * np.exp(0.2 * random.normal(size=(2, count)))
+    hit = per_obspy.pounding_histories(
+        np.stack([motion.north, motion.east]), motion.dt, drawn[0], 0.05, 1e6, drawn[1], 0.05, 1e6,
+        gap=np.full(count, gap), restitution=row["restitution"], azimuth=np.full(count, 90.0),
+    )  # fmt: skip
+    # 447 pairs on 15 real records: half within 6 %, nine in ten within 17 %; this record, almost
+    # harmonic, is one of the worse
+    expected = hit.impact_velocity.mean()
+    assert_allclose(row["expected_impact_velocity"], expected, rtol=0.3)
+
+
 def test_touching_pairs_of_assumed_damping_are_not_in_step(station):
     # equal given periods; the dampings are assumed, each with its own deviation
     pair = {**EQUAL, **AT_STATION, "damping_1": np.nan, "damping_2": np.nan, "gap": 0.0}

@@ -86,7 +86,9 @@ def test_buildings_1_and_2_are_alike(station):
     first, second = _table(station, [pair, turned])[[*COLUMNS]].to_numpy()
     # 128 nodes are not symmetric to the last digit: their own error
     assert_allclose(first[0], second[0], atol=0.02)
-    assert_allclose(first[1:], second[1:], rtol=0.05)
+    assert_allclose(first[[1, 3]], second[[1, 3]], rtol=0.05)
+    # a quantile of 128 nodes whose velocities spread by a third errs by 4 %; both err
+    assert_allclose(first[2], second[2], rtol=0.12)
 
 
 def test_equal_touching_buildings_rank_by_what_their_doubt_gives(station):

@@ -1,11 +1,15 @@
-"""Foreign column names: what is recognised, what stays unknown."""
+"""
+Foreign column names: what is recognised, what stays unknown.
+
+Covers per_obspy.inventory.importers.importer.
+"""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.footprints.importers import IMPORTERS, imported
+from per_obspy.inventory.importers.recognition import IMPORTERS, imported
 from per_obspy.inventory.schema import COLUMNS, SYSTEMS
 
 SURVEY = {

@@ -3,8 +3,8 @@
 import pytest
 
 from per_obspy.errors import CatalogError
-from per_obspy.inventory.files import csv_text
-from per_obspy.inventory.files.csv_text import check_separator, check_text
+from per_obspy.inventory.recognition import csv_text
+from per_obspy.inventory.recognition.csv_text import check_separator, check_text
 
 
 @pytest.fixture

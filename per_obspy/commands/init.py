@@ -1,0 +1,38 @@
+"""``per-obspy init``: write a first configuration with what a folder holds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from per_obspy.commands.endings import named_path, output_option
+from per_obspy.errors import printable
+
+
+def init(
+    records: Annotated[
+        str | None,
+        typer.Argument(help="Folder, archive, file or event id; not given: looked for here."),
+    ] = None,
+    pairs: Annotated[
+        str | None, typer.Argument(help="Pair table or footprints; not given: looked for here.")
+    ] = None,
+    output: Annotated[Path, output_option("TOML file.")] = Path("run.toml"),
+    force: Annotated[
+        bool, typer.Option("--force", help="Write the file again if it exists.")
+    ] = False,
+) -> None:
+    """
+    Write a configuration with what was found, and every key with its help as comments.
+
+    Example: per-obspy init records pairs.csv -o run.toml
+    """
+    from per_obspy.pipeline.inputs.discovery import write_first_configuration
+
+    # An empty name would be the folder of the shell
+    for name in (records, pairs):
+        if name is not None:
+            named_path(name)
+    lines = write_first_configuration(output, records, pairs, force)
+    for line in (*lines, f"{output} is written; next: per-obspy run {output}"):
+        print(printable(line))

@@ -1,0 +1,1 @@
+"""Recognise how a table is written: encoding, separator, decimal mark, headings, units."""

@@ -1,0 +1,118 @@
+"""Units of columns: factors to the units of the schema, checked against the column's dimension."""
+
+import math
+from typing import NamedTuple
+
+from per_obspy.errors import did_you_mean
+from per_obspy.inventory.schema import COLUMNS
+
+#: Standard acceleration of gravity, m/s² (3rd CGPM, 1901): a weight in kN is the mass it belongs
+#: to.
+GRAVITY = 9.80665
+
+
+class Unit(NamedTuple):
+    """
+    A unit as numerator and denominator of its factor, so that 7 cm are exactly 0.07 m.
+
+    Attributes
+    ----------
+    name : str
+        As it is written.
+    numerator, denominator : float
+        ``value * numerator / denominator`` is in the unit of the schema.
+    """
+
+    name: str
+    numerator: float
+    denominator: float
+
+
+#: Unit of the schema -> units -> factor as a fraction. Foot, inch and pound are those of the
+#: international agreement of 1959: 0.3048 m, 25.4 mm, 0.45359237 kg.
+_UNITS: dict[str, dict[str, tuple[float, float]]] = {
+    "m": {
+        "m": (1, 1), "mm": (1, 1000), "cm": (1, 100), "dm": (1, 10), "km": (1000, 1),
+        "ft": (3048, 10_000), "in": (254, 10_000), "yd": (9144, 10_000),
+    },
+    "m2": {"m2": (1, 1), "cm2": (1, 10_000), "ft2": (9_290_304, 100_000_000), "ha": (10_000, 1)},
+    "kg": {
+        "kg": (1, 1), "g": (1, 1000), "t": (1000, 1), "lb": (45_359_237, 100_000_000),
+        "kN": (1000, GRAVITY), "MN": (1_000_000, GRAVITY), "kip": (453_592_370, 1_000_000),
+    },
+    "s": {"s": (1, 1), "ms": (1, 1000)},
+    "degrees": {"deg": (1, 1), "rad": (180, math.pi)},
+    "m/s": {"m/s": (1, 1), "km/s": (1000, 1), "cm/s": (1, 100), "ft/s": (3048, 10_000)},
+    "1": {"1": (1, 1), "%": (1, 100)},
+}  # fmt: skip
+
+#: Other ways to write a unit, in lower case; words of several languages.
+_SPELLINGS = {
+    "m": ("metre", "metres", "meter", "meters", "metro", "metros", "metri", "mètre", "mètres",
+          "mt", "mts", "メートル"),
+    "mm": ("millimetre", "millimetres", "millimeter", "millimeters", "milimetre", "milímetros",
+           "millimetri", "millimètres", "ミリ"),
+    "cm": ("centimetre", "centimetres", "centimeter", "centimeters", "santimetre", "centímetros",
+           "centimetri", "centimètres", "センチ"),
+    "ft": ("foot", "feet", "'"),
+    "in": ("inch", "inches", '"'),
+    "m2": ("m²", "sqm", "sq m", "metrekare", "mq", "㎡"),
+    "ft2": ("ft²", "sqft", "sq ft"),
+    "t": ("tonne", "tonnes", "tonelada", "toneladas", "tonnellate"),
+    "kN": ("kn",),
+    "MN": ("mn",),
+    "lb": ("lbs",),
+    "kip": ("kips",),
+    "s": ("sec", "seconds", "seg", "sn", "秒"),
+    "deg": ("degree", "degrees", "°", "º", "grados", "gradi", "graus", "degrés", "derece", "度"),
+    "rad": ("radians",),
+    "%": ("percent", "per cent", "pct"),
+}  # fmt: skip
+
+_BY_SPELLING = {spelling: name for name, words in _SPELLINGS.items() for spelling in words}
+
+
+def unit_of(text: str, column: str) -> Unit | None:
+    """
+    Return a unit in which a column may be given; None if the text is none for that column.
+
+    Parameters
+    ----------
+    text : str
+        As it is written, in any case.
+    column : str
+        Name of the schema.
+
+    Examples
+    --------
+    >>> unit_of("CM", "gap"), unit_of("cm", "mass_1"), unit_of("m", "system_1")
+    (Unit(name='cm', numerator=1, denominator=100), None, None)
+    """
+    known = _UNITS.get(COLUMNS[column].unit, {})
+    word = text.strip().lower()
+    name = next((name for name in known if name.lower() == word), _BY_SPELLING.get(word, ""))
+    return Unit(name, *known[name]) if name in known else None
+
+
+def unit_problem(text: str, column: str) -> str:
+    """Return why a text is no unit of a column, with those that are."""
+    if column not in COLUMNS:
+        return f"a pair table has no column {column!r}{did_you_mean(column, COLUMNS)}"
+    known = _UNITS.get(COLUMNS[column].unit)
+    if known is None:
+        return f"{column} is text and has no unit"
+    return f"{text!r:.40} is no unit of {column}, expected one of {', '.join(known)}"
+
+
+def is_unit(text: str) -> bool:
+    """
+    Return whether a text is a unit of any column; a 1 is rather the number of a building.
+
+    Examples
+    --------
+    >>> is_unit("mm"), is_unit("storeys")
+    (True, False)
+    """
+    word = text.strip().lower()
+    names = {name.lower() for known in _UNITS.values() for name in known} - {"1"}
+    return word in _BY_SPELLING or word in names

@@ -1,0 +1,155 @@
+"""Facts of pair tables, footprints and risk tables."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from per_obspy.errors import require_extra
+from per_obspy.inventory.files.reading import PairInventory, checked_chunk
+from per_obspy.inventory.schema import COLUMNS
+from per_obspy.inventory.table_checks import derived_counts, suspicions, unused_columns
+from per_obspy.inventory.table_columns import numbers_in
+from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
+from per_obspy.pipeline.inputs.recognition import Kind
+from per_obspy.screening.ranking import EVERY_STATE, STATES
+from per_obspy.tables.parts import parquet_rows
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+#: Rows of a table that are looked at.
+MOST_ROWS = 100_000
+
+#: Rejections that are listed.
+FIRST = 2
+
+#: Quantities of a building whose range is said.
+_RANGES = ("height", "storeys", "period")
+
+
+def pair_table_facts(path: Path) -> Facts:
+    """Return the facts of a pair table, by its first rows if it is large."""
+    inventory = PairInventory([path])
+    table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
+    rejected = [one._asdict() for one in table.attrs["rejected"]]
+    # Sizes, what is derived instead, what is unknown and odd
+    derived = derived_counts(table) if len(table) else {}
+    unused = unused_columns(table)
+    lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(table, derived, unused)]
+    lines += _rejected_lines(rejected, "line", "row")
+    # The same for machines
+    counted = {"rows": inventory.count, "usable": len(table)}
+    values = {**counted, "derived": derived, "unknown": unused, "rejected": rejected}
+    title = f"{_rows(inventory.count)}, {len(table)} usable, {len(rejected)} rejected"
+    return Facts(Kind.PAIRS, title, lines, {"": _centres(table)}, values, not table.empty)
+
+
+def _gap_lines(gaps: pd.Series) -> list[tuple[str, str]]:
+    """Return the range of the gaps, and how many pairs touch or have an unknown one."""
+    touching, unknown = int(gaps.eq(0.0).sum()), int(gaps.isna().sum())
+    return [("gap", f"{span(gaps, 'm')}; {touching} pairs touch, {unknown} unknown")]
+
+
+def _rows(count: int) -> str:
+    """Return the number of rows, and of how many where only the first are looked at."""
+    return f"the first {MOST_ROWS} of {count} rows" if count > MOST_ROWS else f"{count} rows"
+
+
+def _rejected_lines(
+    rejected: Sequence[dict[str, Any]], word: str, key: str
+) -> list[tuple[str, str]]:
+    """Return the first rejections with their reasons."""
+    first = [(f"{word} {one[key]}".strip(), "; ".join(one["reasons"])) for one in rejected[:FIRST]]
+    return [("rejected", f"{name}: {reasons}") for name, reasons in first]
+
+
+def _range_lines(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return the ranges of the quantities of the buildings that are given."""
+    lines = []
+    # Both buildings together
+    for name in _RANGES:
+        numbers = np.concatenate([numbers_in(table, f"{name}_{i}") for i in (1, 2)])
+        unit = COLUMNS[f"{name}_1"].unit.replace("1", "")
+        if not np.isnan(numbers).all():
+            lines.append((name, span(numbers.tolist(), unit)))
+    return lines
+
+
+def _odd_lines(
+    table: pd.DataFrame, derived: Mapping[str, int], unused: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return what is derived, unknown or suspicious of a pair table."""
+    lines = []
+    if derived:
+        lines.append(("derived", some([f"{name} ({rows})" for name, rows in derived.items()], 8)))
+    if unused:
+        lines.append(("unknown", f"{some(unused)}: carried along unchanged"))
+    return lines + [("suspicious", sentence) for sentence in suspicions(table)]
+
+
+def footprint_facts(path: Path) -> Facts:
+    """Return the facts of a layer of footprints."""
+    require_extra("gis", "pyogrio", "pyproj", "shapely")
+    from per_obspy.inventory.footprints.layers import read_layer
+
+    # Everything in the file, as a search of pairs reads it
+    layer = read_layer(path)
+    # How many buildings have a value under each of the names
+    given = {str(name): int(values.notna().sum()) for name, values in layer.attributes.items()}
+    counted = [f"{name} ({count})" for name, count in given.items() if count]
+    lines = [("columns", some(counted, 12))]
+    rejected = [one._asdict() for one in layer.rejected]
+    lines += _rejected_lines(rejected, "", "name")
+    east, north = _outline_centres(layer.outlines)
+    values = {"outlines": len(east), "columns": given, "rejected": rejected}
+    title = f"{len(east)} outlines, {len(rejected)} rejected"
+    return Facts(Kind.FOOTPRINTS, title, lines, {"": (east, north)}, values, usable=len(east) > 0)
+
+
+def _outline_centres(outlines: "pa.Array") -> Places:
+    """Return the centres of outlines, block by block: as geometries they are large."""
+    import shapely
+
+    # As lists, which a map and JSON take
+    east, north = list[float](), list[float]()
+    for start in range(0, len(outlines), MOST_ROWS):
+        block = outlines[start : start + MOST_ROWS].to_numpy(zero_copy_only=False)
+        centres = shapely.get_coordinates(shapely.centroid(shapely.from_wkb(block)))
+        east += centres[:, 0].tolist()
+        north += centres[:, 1].tolist()
+    return east, north
+
+
+def risk_table_facts(path: Path) -> Facts:
+    """Return the facts of a risk table, CSV or Parquet, by its first rows if it is large."""
+    # Only what is shown is read
+    names = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
+    if path.suffix.lower() == ".csv":
+        table = pd.read_csv(path, nrows=MOST_ROWS, usecols=lambda name: name in names)
+    else:
+        table = parquet_rows([path], names).head(MOST_ROWS).to_pandas()
+    # States, and the first rows, which are the worst
+    states = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
+    worst = some([str(name) for name in table["pair_id"]], 5)
+    lines = [("pounding", _state_text(states)), ("worst pairs", worst)]
+    title = f"{len(table)} pairs{' and more' if len(table) == MOST_ROWS else ''}"
+    values = {"pairs": len(table), **states}
+    return Facts(Kind.RISK, title, lines, {"": _centres(table)}, values, usable=len(table) > 0)
+
+
+def _state_text(counts: Mapping[str, int]) -> str:
+    """Return the numbers of pairs by state, of an unknown one only where there are such pairs."""
+    shown = [one for one in counts.items() if one[1] or one[0] in STATES]
+    return ", ".join(f"{count} {state}" for state, count in shown)
+
+
+def _centres(table: pd.DataFrame) -> Places:
+    """Return the middle of every pair."""
+    places = []
+    for name in ("longitude", "latitude"):
+        first, second = numbers_in(table, f"{name}_1"), numbers_in(table, f"{name}_2")
+        places.append(np.where(abs(first - second) > 180.0, first, (first + second) / 2.0).tolist())
+    return places[0], places[1]

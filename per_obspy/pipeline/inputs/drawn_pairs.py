@@ -1,0 +1,107 @@
+"""Pairs of a run from drawn outlines: found once, written into the output folder, and kept."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from per_obspy.config import Run
+from per_obspy.config.pairs import Footprints
+from per_obspy.errors import require_extra
+from per_obspy.files import content_hash, file_hash, remove_file
+from per_obspy.inventory.files.writing import write_pairs
+from per_obspy.progress import Progress
+from per_obspy.resume import earlier_status, write_status
+from per_obspy.tables.table_files import write_rejected
+
+#: Table of the pairs, its rejections, and the status file by which they are kept.
+PAIRS, REJECTED, STATUS = "pairs.parquet", "pairs.rejected.csv", "pairs.json"
+
+#: Buildings with usable outlines, to which the pairs refer.
+BUILDINGS = "pairs.buildings.parquet"
+
+#: Names of the counts of a search.
+COUNTED = ("pairs", "rejected")
+
+#: Files of a Shapefile beside the one that is named.
+_PARTS = (".dbf", ".shx", ".prj", ".cpg")
+
+
+def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[str, int]:
+    """
+    Find the pairs of the configured footprints, unless the same ones are in the folder already.
+
+    Parameters
+    ----------
+    settings : Run
+        What to do; without footprints nothing is done.
+    folder : Path
+        Of the results; ``pairs.parquet`` and ``pairs.rejected.csv`` are written there.
+    progress : callable
+        Called when the search begins and ends.
+
+    Returns
+    -------
+    counts : dict
+        Numbers of pairs and of rejected buildings and pairs; empty without footprints.
+
+    Raises
+    ------
+    CatalogError
+        If the layer cannot be read or holds no pair.
+    MissingExtra
+        If the libraries of footprints are not installed.
+    """
+    footprints = settings.pairs.footprints if settings.pairs else None
+    if footprints is None:
+        return {}
+    require_extra("gis", "pyogrio", "pyproj", "shapely")
+    # The same layer and options give the same pairs
+    key = _key(footprints)
+    if earlier := earlier_status(folder / STATUS, key):
+        return {name: earlier[name] for name in COUNTED}
+    from per_obspy.inventory.footprints.buildings import write_buildings
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+
+    progress("finding pairs", 0, 1)
+    remove_file(folder / STATUS)
+    table, buildings = find_footprint_pairs(footprints.file, **_options(footprints))
+    rejected = table.attrs["rejected"]
+    write_pairs(table, folder / PAIRS)
+    write_buildings(buildings, folder / BUILDINGS)
+    write_rejected(rejected, folder / REJECTED)
+    # Written last: a killed search is done again
+    counts = dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
+    hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED, BUILDINGS)}
+    write_status(folder / STATUS, key, hashes, counts)
+    progress("finding pairs", 1, 1)
+    return counts
+
+
+def pair_table(settings: Run, folder: Path) -> Path | None:
+    """Return the table of a run that has one: the configured file, or that of the footprints."""
+    pairs = settings.pairs
+    if pairs and pairs.footprints:
+        return folder / PAIRS
+    return pairs.file if pairs else None
+
+
+def layer_files(layer: Path) -> list[Path]:
+    """Return the files of a layer: of a Shapefile also those beside it."""
+    parts = [layer.with_suffix(suffix) for suffix in _PARTS] if layer.suffix == ".shp" else []
+    return [layer, *(part for part in parts if part.is_file())]
+
+
+def _options(footprints: Footprints) -> dict[str, Any]:
+    """Return the options of the search that are given; others have the defaults of the search."""
+    return footprints.model_dump(exclude={"file"}, exclude_none=True)
+
+
+def _key(footprints: Footprints) -> str:
+    """Return the hash of the program, the options and the content of the layer."""
+    files = [path for path in layer_files(footprints.file) if path.is_file()]
+    content = {
+        "version": version("per_obspy"),
+        "options": _options(footprints),
+        "files": {path.suffix: file_hash(path) for path in files},
+    }
+    return content_hash(content)

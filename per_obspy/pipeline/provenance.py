@@ -1,0 +1,138 @@
+"""What identifies a run: its configuration, its input files, and their common key."""
+
+import json
+import os
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from per_obspy.config import Run, load
+from per_obspy.config.commented import commented, effective_content
+from per_obspy.errors import CatalogError
+from per_obspy.files import content_hash, written_whole
+from per_obspy.inventory.catalogue import stored_inventories
+from per_obspy.inventory.recognition.side_file import side_file
+from per_obspy.pipeline.inputs.drawn_pairs import layer_files
+from per_obspy.pipeline.preflight import require_extras
+from per_obspy.records.fdsn.cache import Fetched
+from per_obspy.records.sources import hash_if_readable, input_files
+
+#: Effective configuration of a run in its output folder.
+CONFIGURATION = "configuration.toml"
+
+#: First line of this file, by which it is known.
+WRITTEN = "Effective configuration, written by per-obspy run."
+
+#: Further lines at its top.
+HEADING = (
+    WRITTEN,
+    "It runs again with the same result: per-obspy run configuration.toml. Keys that start with #",
+    "have their defaults. The next run of this folder writes the file again: edit a copy.",
+)
+
+
+class RunSettings:
+    """
+    Settings of a run, its output folder, and the folder from which its paths are seen.
+
+    Parameters
+    ----------
+    configuration : str, Path or Run
+        TOML file, or settings that no file holds; their paths are seen from the output folder.
+    output : str or Path, optional
+        Folder of the results, instead of the configured one.
+
+    Raises
+    ------
+    CatalogError
+        If the configuration is wrong.
+    MissingExtra
+        If an optional library that it needs is not installed.
+    """
+
+    def __init__(self, configuration: str | Path | Run, output: str | Path | None) -> None:
+        if isinstance(configuration, Run):
+            self.file, self.settings = None, configuration
+        else:
+            self.file = Path(configuration).resolve()
+            self.settings = load(self.file, Run)
+        require_extras(self.settings)
+        self.folder = Path(output or self.settings.output).resolve()
+        self.base = self.file.parent if self.file else self.folder
+
+    def head(self, fetched: Fetched | None, hashes: Mapping[Path, str]) -> dict[str, Any]:
+        """
+        Return key, configuration and inputs of a run; files with a known hash are not read.
+
+        The key is the same for every file that holds the same settings.
+        """
+        found = {
+            path: hashes.get(path) or hash_if_readable(path)
+            for path in _input_files(self.settings, fetched)
+        }
+        # The number of processes changes no result
+        placed = self.settings.model_copy(update={"output": self.folder, "workers": 0})
+        content = {
+            "version": version("per_obspy"),
+            "configuration": _values(placed, self.folder),
+            "inputs": {os.path.relpath(path, self.folder): one for path, one in found.items()},
+        }
+        return {
+            "key": content_hash(content),
+            "configuration": _values(self.settings, self.base),
+            "inputs": {os.path.relpath(path, self.base): one for path, one in found.items()},
+        }
+
+    def write(self) -> None:
+        """
+        Write the effective configuration into the output folder, unless it is the one that runs.
+
+        Raises
+        ------
+        CatalogError
+            If a file of its name is there that no run has written.
+        """
+        path = self.folder / CONFIGURATION
+        if path == self.file:
+            return
+        placed = self.settings.model_copy(update={"output": self.folder})
+        text = commented(Run, effective_content(placed, self.folder), HEADING)
+        # A file of that name that somebody else wrote is kept
+        before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
+        if before and not before.startswith(f"# {WRITTEN}"):
+            raise CatalogError(
+                str(path), "is not written by a run and would be lost: name another folder with -o"
+            )
+        if before != text:
+            with written_whole(path) as part:
+                part.write_text(text, encoding="utf-8")
+
+
+def _values(settings: Run, folder: Path) -> dict[str, Any]:
+    """Return all settings as plain values, with paths seen from a folder."""
+    values: dict[str, Any] = json.loads(settings.model_dump_json(context={"folder": folder}))
+    return values
+
+
+def _input_files(settings: Run, fetched: Fetched | None) -> list[Path]:
+    """Return every input file of a run: records and their metadata, scenario and inventory."""
+    given = [settings.simulation, *_inventory_files(settings)]
+    files = [path for path in given if path and path.is_file()]
+    return [*input_files(settings.records, fetched), *files]
+
+
+def _inventory_files(settings: Run) -> list[Path]:
+    """Return every file from which pairs may be taken, and the index that names them."""
+    pairs = settings.pairs
+    if pairs is None or pairs.simulated is not None:
+        return []
+    if pairs.footprints is not None:
+        return layer_files(pairs.footprints.file)
+    if pairs.catalog is None:
+        # A file beside the table may say how it is read
+        return [pairs.file, side_file(pairs.file)] if pairs.file else []
+    # Stored inventories, all of which the region may touch
+    stored = stored_inventories(pairs.catalog)
+    chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]
+    return [pairs.catalog, *chosen, *map(side_file, chosen)]
