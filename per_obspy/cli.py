@@ -23,6 +23,7 @@ from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
+from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.machine import machine_fault
@@ -46,7 +47,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, init, simulate, process, spectra, screen, report, events, fetch, info):
+for command in (run, init, simulate, process, spectra, screen, report, show, events, fetch, info):
     app.command()(command)
 
 

@@ -60,11 +60,6 @@ class MapSources(NamedTuple):
     outlines: Path | None
 
 
-def layer_files(folder: Path, stem: str) -> tuple[Path, Path, Path]:
-    """Return the files of the layers: GeoPackage, project of QGIS, GeoParquet."""
-    return folder / f"{stem}.gpkg", folder / f"{stem}.qgz", folder / f"{stem}.geoparquet"
-
-
 def write_layers(
     tables: Iterable[pd.DataFrame], sources: MapSources, files: tuple[Path, Path, Path]
 ) -> None:
@@ -79,7 +74,7 @@ def write_layers(
     sources : MapSources
         What there is beside the pairs.
     files : tuple of Path
-        From :func:`layer_files`.
+        GeoPackage, project of QGIS, GeoParquet.
     """
     package, project, whole = files
     with ExitStack() as stack:

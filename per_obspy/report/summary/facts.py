@@ -61,7 +61,7 @@ class SummaryFacts(NamedTuple):
     stations : DataFrame
         Rows of ``stations.csv``; empty where there are none.
     area : str
-        Area with the largest expected number of pounding pairs; empty if unknown.
+        Name and place of the area with most expected pounding; empty if there are no areas.
     made : str
         When and with which version the results were made.
     """
@@ -97,8 +97,7 @@ def event_sentences(facts: Mapping[str, Any]) -> list[str]:
         sentences.append(f"Magnitude {size:.1f}.")
     east, north = number(facts, "longitude"), number(facts, "latitude")
     if math.isfinite(east) and math.isfinite(north):
-        place = f"{abs(north):.3f} degrees {'north' if north >= 0 else 'south'}"
-        place += f", {abs(east):.3f} degrees {'east' if east >= 0 else 'west'}"
+        place = place_text(north, east, 3)
         depth = number(facts, "depth") / 1000.0
         deep = f", depth {depth:.0f} km" if math.isfinite(depth) else ""
         sentences.append(f"Epicentre {place}{deep}.")
@@ -147,7 +146,7 @@ def first_steps(facts: SummaryFacts) -> list[str]:
     counts = facts.counts
     steps = ["Inspect the pairs below in their order, at the joint between them."]
     if facts.area:
-        steps.append(f"Most pounding is expected in area {name_text(facts.area)}: go there first.")
+        steps.append(f"Most pounding is expected in area {facts.area}: go there first.")
     if unknown := counts.states.get("unknown", 0):
         steps.append(f"Measure the gap of {unknown} pairs whose gap is unknown.")
     if facts.region.simulated:
@@ -174,17 +173,34 @@ def pair_sentence(pair: Mapping[str, Any]) -> str:
     parts.append(f"impact {speed_text(number(pair, 'expected_impact_velocity'))}")
     if math.isfinite(chance := number(pair, "probability")):
         parts.append(f"contact in {chance_text(chance)}")
-    places = number(pair, "latitude"), number(pair, "longitude")
-    if all(map(math.isfinite, places)):
-        parts.append(f"at {places[0]:.5f}, {places[1]:.5f}")
+    parts += _at(pair)
     return f"{', '.join(parts)}."
+
+
+def _at(row: Mapping[str, Any]) -> list[str]:
+    """Return the place of a pair or building, as a list that is empty where it is unknown."""
+    north, east = number(row, "latitude"), number(row, "longitude")
+    is_known = math.isfinite(north) and math.isfinite(east)
+    return [f"at {place_text(north, east, 5)}"] if is_known else []
+
+
+def place_text(north: float, east: float, decimals: int) -> str:
+    """
+    Return a place (degrees) without signs, which are lost on the radio.
+
+    Examples
+    --------
+    >>> place_text(-0.07316, 0.3, 5)
+    '0.07316 south, 0.30000 east'
+    """
+    east = (east + 180.0) % 360.0 - 180.0
+    sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
+    return f"{abs(north):.{decimals}f} {sides[0]}, {abs(east):.{decimals}f} {sides[1]}"
 
 
 def building_sentence(building: Mapping[str, Any]) -> str:
     """Return a building of the list in one sentence."""
     parts = [f"{name_text(building['building_id'])}: {name_text(building['risk_class'])}"]
     parts.append(f"severity {speed_text(number(building, 'severity'))}")
-    places = number(building, "latitude"), number(building, "longitude")
-    if all(map(math.isfinite, places)):
-        parts.append(f"at {places[0]:.5f}, {places[1]:.5f}")
+    parts += _at(building)
     return f"{', '.join(parts)}."

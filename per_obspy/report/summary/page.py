@@ -32,8 +32,8 @@ WARNING_COLOUR = "#AA0000"
 
 #: Columns of the list of pairs: title, place from the left.
 COLUMNS = {
-    "": 0.07, "pair": 0.10, "class": 0.36, "impact": 0.48, "contact": 0.58, "gap": 0.70,
-    "needed": 0.77, "latitude, longitude": 0.93,
+    "": 0.07, "pair": 0.10, "class": 0.31, "impact": 0.40, "contact": 0.485, "gap": 0.61,
+    "needed": 0.675, "latitude, longitude": 0.93,
 }  # fmt: skip
 
 

@@ -23,7 +23,14 @@ WIDTH = 72
 _UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/-]")
 
 #: Symbols with a word.
-_WORDS = {"%": " percent", "°": " degrees", "&": " and ", "_": " ", "+": " plus "}
+_WORDS = {
+    "cm/s": "cm per second",
+    "%": " percent",
+    "°": " degrees",
+    "&": " and ",
+    "_": " underscore ",
+    "+": " plus ",
+}
 
 
 def spoken(text: str) -> str:
@@ -33,7 +40,7 @@ def spoken(text: str) -> str:
     Examples
     --------
     >>> spoken("Añasco_1 <script>"), spoken("84 %")
-    ('Anasco 1 script', '84 percent')
+    ('Anasco underscore 1 script', '84 percent')
     """
     for symbol, word in _WORDS.items():
         text = text.replace(symbol, word)
