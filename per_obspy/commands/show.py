@@ -26,10 +26,12 @@ def show(
 
     if output is not None and output.suffix.lower() != ".png":
         raise CatalogError(str(output), f"unknown suffix {output.suffix!r}, expected .png")
+    # Drawn first: a reader that has enough ends the program at the next line
     found = find_pair(pair, results)
+    if output is not None:
+        draw_pair(found, output)
     if found.simulated:
         print("The ground motion is SIMULATED.")
     print(*pair_lines({str(name): value for name, value in found.row.items()}), sep="\n")
     if output is not None:
-        draw_pair(found, output)
         print(f"  {output}")

@@ -130,6 +130,7 @@ def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Regio
         attributes = [f"hypocentre_{name}" for name in names]
         if set(attributes) <= set(spectra.attrs):
             epicentre = (float(spectra.attrs[attributes[0]]), float(spectra.attrs[attributes[1]]))
+    # Classes in their order, the worst first
     classes = list(settings.screening.classes)
     return Region(settings.name, classes, simulated, places, epicentre)
 
@@ -153,9 +154,7 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
     return spectra
 
 
-def _summary(
-    settings: Run, risk: Path, folder: Path, place: Region, report: Report
-) -> RiskSummary:
+def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Report) -> RiskSummary:
     """Read the risk table once: for totals, figures, observations, notes, and all layers."""
     needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, *totals_columns(settings.totals)]
     is_whole = settings.geopackage or settings.spreadsheet
@@ -195,7 +194,9 @@ def _write_layers(
         place,
         read_stations(files[0].with_name("stations.csv")),
         lambda: region_totals(pieces.totals, settings.totals),
-        outlines_beside(settings.pairs and settings.pairs.file, files[0].with_name("pairs.csv")),
+        outlines_beside(
+            settings.pairs.file if settings.pairs else None, files[0].with_name("pairs.csv")
+        ),
         files,
     )
 

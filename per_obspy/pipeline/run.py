@@ -210,12 +210,15 @@ def _earlier_earthquakes(folder: Path) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-def _begun(
-    folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()
-) -> int | None:
+def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
     """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
-    begun = {"name": settings.name, "state": UNFINISHED, "stage": stage, "earlier_rows": rows}
+    begun: dict[str, Any] = {
+        "name": settings.name,
+        "state": UNFINISHED,
+        "stage": stage,
+        "earlier_rows": rows,
+    }
     # The summary states the earthquake before the run is finished
     begun["earthquakes"] = list(earthquakes)
     write_status(folder / RECORD, "", {}, begun, indent=1)

@@ -3,11 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import label
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
+
+IntArray = NDArray[np.int64]
 
 #: Cells along the longer side of a region; pairs in cells that touch are one cluster.
 CELLS = 24
@@ -70,7 +72,7 @@ def continuous(longitude: ArrayLike) -> FloatArray:
     return np.where(given < 0.0, given + 360.0, given)
 
 
-def clusters(longitude: FloatArray, latitude: FloatArray, whole: Frame) -> list[FloatArray]:
+def clusters(longitude: FloatArray, latitude: FloatArray, whole: Frame) -> list[IntArray]:
     """
     Separate points into clusters, in the order of their first points.
 
@@ -97,4 +99,4 @@ def clusters(longitude: FloatArray, latitude: FloatArray, whole: Frame) -> list[
     numbers, _ = label(occupied, structure=np.ones((3, 3)))
     found = numbers[row, column]
     order = list(dict.fromkeys(found.tolist()))
-    return [np.flatnonzero(found == number) for number in order]
+    return [np.flatnonzero(found == number).astype(np.int64) for number in order]

@@ -3,19 +3,21 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from string import ascii_uppercase
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import METRES_PER_DEGREE
-from per_obspy.report.clusters import Frame, clusters, continuous, frame_of
+from per_obspy.report.clusters import Frame, IntArray, clusters, continuous, frame_of
 from per_obspy.report.style import (
     FAINT_COLOUR,
     MOTION_COLOUR,
@@ -28,6 +30,9 @@ from per_obspy.report.style import (
 
 #: Clusters that have a map of their own, the worst ones.
 SHOWN_CLUSTERS = 6
+
+#: Pairs of a cluster that are hidden by each other on the map of the whole.
+FEWEST = 5
 
 #: A cluster this large beside the whole map is seen there already.
 LARGE = 0.6
@@ -66,10 +71,11 @@ class _Points(NamedTuple):
 
     longitude: FloatArray
     latitude: FloatArray
-    colour: FloatArray
+    colour: NDArray[np.object_]
 
-    def chosen(self, members: FloatArray) -> "_Points":
-        return _Points(*(values[members] for values in self))
+    def chosen(self, members: IntArray) -> "_Points":
+        """Return some of the points."""
+        return _Points(self.longitude[members], self.latitude[members], self.colour[members])
 
 
 def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
@@ -88,28 +94,33 @@ def draw_overview(table: pd.DataFrame, region: Region, path: Path) -> None:
     path : Path
         PNG file.
     """
-    points, has_gaps = _points(table, region), "demand" in table
-    whole = _whole_frame(points, region)
-    found = _own_maps(points, whole)
+    points = _points(table, region)
+    found = _own_maps(points, _whole_frame(points, region))
     rows = -(-min(len(found), SHOWN_CLUSTERS) // 3)
+    # Maps of clusters have rows of their own
     figure = Figure(figsize=(13.0, 6.2 + 3.8 * rows), layout="constrained")
-    top, *below = np.atleast_1d(
-        figure.subfigures(1 + bool(rows), 1, height_ratios=[5.7, *[3.8 * rows] * bool(rows)])
-    )
-    panels = np.atleast_1d(top.subplots(1, 1 + has_gaps))
-    draw_map(panels[0], table, region)
-    if has_gaps:
-        _draw_gaps(panels[1], table, region.classes)
-    if below:
-        _mark(panels[0], [frame for frame, _ in found])
-        if len(found) > SHOWN_CLUSTERS:
-            text = f"{panels[0].get_title()}; below: the worst {SHOWN_CLUSTERS} of {len(found)} places"
-            panels[0].set_title(text, fontsize=11)
-        _draw_clusters(below[0], table, region, points, found)
-    _add_legend(figure, table, region)
+    heights = [5.7, 3.8 * rows] if rows else [5.7]
+    parts = np.array(figure.subfigures(len(heights), 1, height_ratios=heights)).ravel().tolist()
+    whole = _draw_top(parts[0], table, region)
+    if rows:
+        _mark(whole, [frame for frame, _ in found])
+        _draw_clusters(parts[1], table, region, points, found)
+    # One legend and one title for everything
+    _add_legend(figure, whole, table, region)
     figure.suptitle(title_name(region.title), parse_math=False)
     fit_titles(figure)
     save(figure, path, region.simulated)
+
+
+def _draw_top(figure: SubFigure, table: pd.DataFrame, region: Region) -> Axes:
+    """Draw the map of the region, and gaps over demands where there are any; return the map."""
+    has_gaps = "demand" in table
+    panels = figure.subplots(1, 1 + has_gaps, squeeze=False).ravel()
+    whole: Axes = panels[0]
+    draw_map(whole, table, region)
+    if has_gaps:
+        _draw_gaps(panels[1], table, region.classes)
+    return whole
 
 
 def draw_map(axes: Axes, table: pd.DataFrame, region: Region) -> None:
@@ -142,8 +153,8 @@ def _points(table: pd.DataFrame, region: Region) -> _Points:
     colours = class_colours(region.classes)
     # Classes of an earlier configuration are grey
     colour = table["risk_class"].map(lambda name: colours.get(name, FAINT_COLOUR))
-    columns = continuous(table["longitude"]), table["latitude"].to_numpy(), colour.to_numpy()
-    return _Points(*columns)
+    latitude = table["latitude"].to_numpy(np.float64)
+    return _Points(continuous(table["longitude"]), latitude, colour.to_numpy(dtype=object))
 
 
 def _whole_frame(points: _Points, region: Region) -> Frame:
@@ -154,17 +165,20 @@ def _whole_frame(points: _Points, region: Region) -> Frame:
     stations = region.stations.dropna(subset=["longitude", "latitude"])
     longitude = np.concatenate([east, stations["longitude"]])
     latitude = np.concatenate([north, stations["latitude"]])
+    # The epicentre is part of every region
     if region.epicentre is not None:
         longitude = np.append(longitude, region.epicentre[0])
         latitude = np.append(latitude, region.epicentre[1])
     return frame_of(continuous(longitude), latitude).padded(MARGIN)
 
 
-def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, FloatArray]]:
+def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
     """Return frames and members of the clusters that the whole map hides, worst first."""
     if not points.longitude.size:
         return []
-    found = clusters(points.longitude, points.latitude, whole)
+    # A few pairs do not hide each other
+    every = clusters(points.longitude, points.latitude, whole)
+    found = [members for members in every if members.size >= FEWEST]
     frames = [
         frame_of(points.longitude[members], points.latitude[members]).padded(MARGIN)
         for members in found
@@ -177,8 +191,8 @@ def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:
     """Draw pairs, the worst on top, larger where there are few, within a frame."""
     size = float(np.clip(6000.0 / max(points.longitude.size, 1), 5.0, 36.0))
     chosen = points.chosen(np.arange(points.longitude.size)[::-1])
-    style = {"s": size, "linewidths": 0.3, "edgecolors": "black", "zorder": 3}
-    axes.scatter(chosen.longitude, chosen.latitude, c=chosen.colour, **style)
+    style: dict[str, Any] = {"s": size, "linewidths": 0.3, "edgecolors": "black", "zorder": 3}
+    axes.scatter(chosen.longitude, chosen.latitude, c=list(chosen.colour), **style)
     # A degree of longitude is shorter by the cosine of the latitude; the map fills its axes
     axes.update_datalim([(frame.west, frame.south), (frame.east, frame.north)])
     axes.margins(0.0)
@@ -187,13 +201,15 @@ def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:
 
 def _draw_stations(axes: Axes, region: Region, frame: Frame) -> None:
     """Draw stations as small open triangles below the pairs, and the epicentre as a star."""
-    style = {"facecolors": "none", "edgecolors": "black", "linewidths": 0.8, "zorder": 2}
+    outline: dict[str, Any] = {"facecolors": "none", "edgecolors": "black"}
+    outline |= {"linewidths": 0.8, "zorder": 2}
     places = region.stations[["longitude", "latitude"]].to_numpy(dtype=np.float64)
     for marker, size, marks in (("^", 30.0, places), ("*", 130.0, _epicentre(region))):
+        # Only those within the map, which they would widen otherwise
         east, north = _beside(marks[:, 0], 0.5 * (frame.west + frame.east)), marks[:, 1]
         inside = (east >= frame.west) & (east <= frame.east)
         inside &= (north >= frame.south) & (north <= frame.north)
-        axes.scatter(east[inside], north[inside], marker=marker, s=size, **style)
+        axes.scatter(east[inside], north[inside], marker=marker, s=size, **outline)
 
 
 def _epicentre(region: Region) -> FloatArray:
@@ -212,36 +228,35 @@ def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
         width, height = frame.east - frame.west, frame.north - frame.south
         corner = frame.west, frame.south
         axes.add_patch(Rectangle(corner, width, height, fill=False, linewidth=0.8, zorder=4))
-        axes.annotate(
-            letter,
-            (frame.east, frame.north),
-            xytext=(3.0, 3.0),
-            textcoords="offset points",
-            fontweight="bold",
-            zorder=5,
-        )
+        # Beside its corner, whatever the scale
+        place: dict[str, Any] = {"xytext": (3.0, 3.0), "textcoords": "offset points"}
+        axes.annotate(letter, (frame.east, frame.north), fontweight="bold", zorder=5, **place)
 
 
 def _draw_clusters(
-    figure: object,
+    figure: SubFigure,
     table: pd.DataFrame,
     region: Region,
     points: _Points,
-    found: Sequence[tuple[Frame, FloatArray]],
+    found: Sequence[tuple[Frame, IntArray]],
 ) -> None:
     """Draw the worst clusters, each with its number of pairs, its worst pair and a scale bar."""
     shown = found[:SHOWN_CLUSTERS]
     columns = min(len(shown), 3)
-    panels = figure.subplots(-(-len(shown) // columns), columns, squeeze=False).ravel()  # type: ignore[attr-defined]
+    panels = figure.subplots(-(-len(shown) // columns), columns, squeeze=False).ravel()
+    # Places without a cluster stay empty
     for panel in panels[len(shown) :]:
         panel.set_axis_off()
     for letter, panel, (frame, members) in zip(ascii_uppercase, panels, shown, strict=False):
         _draw_points(panel, points.chosen(members), frame)
         _draw_stations(panel, region, frame)
+        # Without coordinates, which the whole map has
         _add_scale_bar(panel, frame)
         worst = literal(str(table["pair_id"].iloc[int(members[0])]))[:30]
         panel.set_title(f"{letter}: {members.size} pairs, worst {worst}", fontsize=10)
         panel.set(xticks=[], yticks=[])
+    if len(found) > len(shown):
+        figure.suptitle(f"the worst {len(shown)} of {len(found)} places", fontsize=11)
 
 
 def _add_scale_bar(axes: Axes, frame: Frame) -> None:
@@ -258,20 +273,22 @@ def _add_scale_bar(axes: Axes, frame: Frame) -> None:
     axes.text(frame.west + 1.1 * degrees, -0.03, text, transform=place, va="center", fontsize=8)
 
 
-def _add_legend(figure: Figure, table: pd.DataFrame, region: Region) -> None:
+def _add_legend(figure: Figure, axes: Axes, table: pd.DataFrame, region: Region) -> None:
     """Add one legend below all panels, where it covers neither data nor labels."""
-    axes = figure.axes[0]
-    handles, counts = [], table["risk_class"].value_counts()
+    handles, counts = list[Line2D](), table["risk_class"].value_counts()
+    # Classes that a pair has
     for name, colour in class_colours(region.classes).items():
         if count := int(counts.get(name, 0)):
             text = f"{literal(name)}: {count} pairs"
-            style = {"marker": "o", "linestyle": "", "color": colour, "label": text}
-            handles += axes.plot([], [], markeredgecolor="black", markeredgewidth=0.3, **style)
+            style: dict[str, Any] = {"marker": "o", "linestyle": "", "color": colour}
+            style |= {"markeredgecolor": "black", "markeredgewidth": 0.3}
+            handles += axes.plot([], [], label=text, **style)
+    # Stations and epicentre, where they are known
     marks = {"^": ("station", len(region.stations)), "*": ("epicentre", region.epicentre)}
     for marker, (name, present) in marks.items():
         if present:
-            style = {"marker": marker, "linestyle": "", "color": "black", "label": name}
-            handles += axes.plot([], [], markerfacecolor="none", **style)
+            style = {"marker": marker, "linestyle": "", "color": "black"}
+            handles += axes.plot([], [], markerfacecolor="none", label=name, **style)
     figure.legend(handles=handles, loc="outside lower left", ncols=4, fontsize=9, frameon=False)
 
 

@@ -36,7 +36,7 @@ def draw_record_to_pair(station: xr.Dataset, pair: pd.Series, path: Path) -> Non
         PNG file.
     """
     figure = Figure(figsize=(13.0, 5.0), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=(2.1, 1.0))
+    left, right = np.array(figure.subfigures(1, 2, width_ratios=(2.1, 1.0))).tolist()
     motion, spectrum = left.subplots(1, 2, width_ratios=(1.15, 1.0))
     _draw_motion(motion, station, float(pair["azimuth_used"]))
     _draw_spectrum(spectrum, station, pair)
@@ -60,7 +60,7 @@ def draw_pair_alone(pair: pd.Series, simulated: bool, path: Path) -> None:
         PNG file.
     """
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
-    (part,) = np.atleast_1d(figure.subfigures(1, 1))
+    (part,) = np.array(figure.subfigures(1, 1)).ravel().tolist()
     _draw_two_gaps(part, pair, "")
     fit_titles(figure)
     save(figure, path, simulated)
@@ -100,13 +100,17 @@ def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
     label = "PER, largest over azimuth" if by_azimuth else "PER"
     axes.loglog(period, spectrum, color=FAINT_COLOUR, linestyle=":")
     axes.loglog(period[usable], spectrum[usable], color=MOTION_COLOUR, label=label)
+    axes.set_title(f"2  PER spectrum\ndamping {float(spectrum['damping']):.0%}", fontsize=11)
+    _draw_radii(axes, pair)
 
-    # The pair is computed at its own periods and dampings
+
+def _draw_radii(axes: Axes, pair: pd.Series) -> None:
+    """Draw the radii of the pair, which is computed at its own periods and dampings."""
     for i, colour in enumerate(BUILDING_COLOURS, start=1):
         text = f"building {i}: T = {pair[f'period_{i}']:.2f} s"
+        # At contact height a radius is this times its participation
         axes.plot(pair[f"period_{i}"], pair[f"per_{i}"], "o", color=colour, label=text)
     axes.set(xlabel="natural period (s)", ylabel="pseudo energy radius (m)")
-    axes.set_title(f"2  PER spectrum\ndamping {float(spectrum['damping']):.0%}", fontsize=11)
     axes.legend(fontsize=8, loc="lower right")
 
 
@@ -123,6 +127,7 @@ def _draw_two_gaps(figure: SubFigure, pair: pd.Series, number_text: str) -> None
     _draw_circles(needs, pair, needed, needed if np.isnan(gap) else max(gap, needed))
     needs.set_title(f"at the gap needed: {length_text(needed)}", fontsize=10)
     needs.set_xlabel("displacement at contact height (cm)")
+    # One label and one legend for both pictures
     figure.supylabel("velocity / frequency (cm)", fontsize=10)
     handles, labels = needs.get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=2, frameon=False)

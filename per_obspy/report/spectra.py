@@ -40,6 +40,7 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         colour = COMPONENT_COLOURS[index % len(COMPONENT_COLOURS)]
         _draw_component(panels, chosen, index, name, colour)
 
+    # SA is absolute, the pseudo-velocity is that of SD
     radius.set(ylabel="radius, displacement (m)")
     acceleration.set(ylabel="absolute acceleration SA (g)")
     velocity.set(ylabel="pseudo-velocity (m/s)")
@@ -49,12 +50,16 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         axes.grid(which="both", alpha=0.25)
         axes.legend(fontsize=8)
 
-    # The damping is that of the stored spectra
+    _write_title(figure, station, chosen)
+    save(figure, path, station.attrs["simulated"] == "true")
+
+
+def _write_title(figure: Figure, station: xr.Dataset, chosen: xr.Dataset) -> None:
+    """Write station, date and the damping of the stored spectra above a figure."""
     facts = f"damping {float(chosen['damping']):.0%}, usable periods only"
     name = title_name(str(station["station"].item()))
     figure.suptitle(f"{name}, {record_date(station)}\n{facts}", parse_math=False)
     fit_titles(figure)
-    save(figure, path, station.attrs["simulated"] == "true")
 
 
 def record_date(station: xr.Dataset) -> str:
@@ -74,6 +79,7 @@ def _draw_component(
     # Unusable periods are NaN, which breaks the lines
     radius.loglog(period, per * usable, color=colour, label=f"{name} PER")
     radius.loglog(period, sd * usable, color=colour, linestyle="--", label=f"{name} SD")
+    # SA in g, as hazard maps have it
     in_g = spectra["sa"][index].to_numpy() / STANDARD_GRAVITY
     acceleration.loglog(period, in_g * usable, color=colour, label=name)
     velocity.loglog(period, 2.0 * np.pi / period * sd * usable, color=colour, label=name)

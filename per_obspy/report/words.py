@@ -2,10 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 from per_obspy.errors import shortened
 from per_obspy.screening.columns import FLAGS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Longest name of a pair, station or class in a sentence, characters.
 LONGEST_NAME = 60
@@ -86,15 +90,15 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
         A row of the table of a run, of a design spectrum or of an ensemble; what it lacks is left
         out.
     """
-    parts = _verdict(pair), _gap_lines(pair), _impact_lines(pair), _building_lines(pair)
-    parts = (*parts, _motion_lines(pair), _prevention_lines(pair), _doubt_lines(pair))
-    return [line for lines in parts for line in lines]
+    judged = [*_verdict(pair), *_gap_lines(pair), *_impact_lines(pair)]
+    described = [*_building_lines(pair), *_motion_lines(pair)]
+    return [*judged, *described, *_prevention_lines(pair), *_doubt_lines(pair)]
 
 
-def number(pair: Mapping[str, Any], name: str) -> float:
+def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
     """Return a number of a row, NaN where there is none."""
     value = pair.get(name)
-    return float(value) if isinstance(value, (int, float)) else math.nan
+    return float(value) if isinstance(value, Real) else math.nan
 
 
 def _text(pair: Mapping[str, Any], name: str) -> str:
@@ -109,6 +113,7 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
         lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
+    # A run has one probability, an ensemble perhaps that of a year too
     if math.isfinite(number(pair, "probability")):
         lines.append(f"Probability of contact: {chance_text(number(pair, 'probability'))}.")
     if math.isfinite(number(pair, "annual_probability")):
@@ -135,6 +140,7 @@ def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
         if math.isfinite(high := number(pair, "impact_velocity_84")):
             text += f"; in 84 of 100 cases not above {speed_text(high)}"
         lines.append(f"{text}.")
+    # The exact history, where there is one
     if math.isfinite(impacts := number(pair, "impacts")):
         fastest = speed_text(number(pair, "impact_velocity_exact"))
         lines.append(f"In this record: {impacts:.0f} impacts, the fastest {fastest}.")
@@ -154,6 +160,7 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
             "latitude {:.5f}": number(pair, f"latitude_{i}"),
             "longitude {:.5f}": number(pair, f"longitude_{i}"),
         }
+        # Only what is known is said
         known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
         name = _text(pair, f"building_id_{i}")
         if known or name:
@@ -175,6 +182,7 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     """Say what would have prevented or softened it."""
     lines = list[str]()
+    # More gap, more damping, a softer contact
     if (missing := number(pair, "missing_gap")) > 0:
         lines.append(f"A gap wider by {length_text(missing)} would have kept them apart.")
     if (damping := number(pair, "supplemental_damping")) > 0:

@@ -146,7 +146,9 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
     """Append rows to a CSV file that has a header."""
     # Names of columns may differ in case only, or be anything: the database numbers them
-    numbered = arrow_cells(rounded_arrow(rows)).rename_columns([f"c{i}" for i in range(rows.num_columns)])
+    numbered = arrow_cells(rounded_arrow(rows)).rename_columns(
+        [f"c{i}" for i in range(rows.num_columns)]
+    )
     # It writes a file of its own, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", numbered)

@@ -70,6 +70,7 @@ def rounded_arrow(table: pa.Table) -> pa.Table:
     for position, field in enumerate(table.schema):
         if not pa.types.is_floating(field.type) or known_column(field.name) is None:
             continue
+        # Empty cells of a column without gaps are NaN here
         column = table[position].combine_chunks()
         numbers = column.to_numpy(zero_copy_only=False)
         found = _rounded_column(field.name, numbers)

@@ -10,9 +10,9 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.testing import assert_allclose
+from per_obspy.report.figures import draw_overview, draw_record_to_pair, motion_along
 from screening_samples import make_station
 
-from per_obspy.report.figures import draw_overview, draw_record_to_pair, motion_along
 from per_obspy.report.style import STATE_COLOURS
 from per_obspy.spectra.storage import region
 

@@ -9,8 +9,8 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-
 from per_obspy.report.gis import class_style, layer_names, write_pairs_layer, write_totals_layer
+
 from per_obspy.screening.region.outlines import box_outlines
 from per_obspy.screening.region.totals import grid_cells, totals
 

@@ -32,6 +32,7 @@ class Notes:
         self.expected += float(piece["probability"].sum())
         self.derived += int((_texts(piece, "derived") != "").sum())
         self.far += int(_texts(piece, "flags").str.contains(r"\bfar_station\b").sum())
+        # The first rows are the worst
         if self._rows < ROWS:
             self._worst.append(piece.head(ROWS - self._rows))
             self._rows += len(self._worst[-1])

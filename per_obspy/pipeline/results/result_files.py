@@ -51,9 +51,7 @@ class Screening(NamedTuple):
     areas: pd.DataFrame = pd.DataFrame()
 
 
-def write_results(
-    screening: Screening, notes: Notes, shown: pd.DataFrame, report: Report
-) -> None:
+def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, report: Report) -> None:
     """
     Write summary, KML and workbook; a file that cannot be made is one line of the report.
 
@@ -72,6 +70,7 @@ def write_results(
     worst = notes.worst
     buildings = _worst_buildings(folder / "buildings.parquet")
     facts = _facts(screening, notes, worst, buildings)
+    # Each file by itself: one that fails leaves the others
     with report.tried(folder / "summary.txt"):
         write_text(facts, folder / "summary.txt")
     with report.tried(folder / "summary.pdf"):
@@ -79,6 +78,7 @@ def write_results(
     with report.tried(folder / f"{stem}.kml"):
         title, classes = screening.region.title, screening.region.classes
         write_kml(worst, classes, title, folder / f"{stem}.kml")
+    # The workbook needs an optional library
     if screening.spreadsheet:
         with report.tried(folder / f"{stem}.xlsx"):
             sheets = _sheets(screening, worst, buildings)
@@ -92,7 +92,7 @@ def _facts(
     # The area with most pounding is worth a name where there are several
     area, totals = "", screening.areas
     if len(totals) > 1:
-        most = totals.loc[totals["expected_pounding"].idxmax()]
+        most = totals.iloc[int(totals["expected_pounding"].argmax())]
         place = place_text(float(most["latitude"]), float(most["longitude"]), 4)
         area = f"{name_text(most['area'])}, around {place}"
     made = f"per-obspy {version('per_obspy')}. All numbers and their units: {screening.stem}.csv."
@@ -123,6 +123,7 @@ def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) 
         str(name): column.unit for name in worst if (column := known_column(str(name))) is not None
     }
     of_stations = {name: column.unit for name, column in STATION_COLUMNS.items()}
+    # What every column means is a sheet too
     meanings = column_table(map(str, worst))
     given = [
         Sheet("pairs", worst, units),

@@ -22,6 +22,7 @@ def event_facts(event: Any) -> dict[str, object]:
     """
     origin = event.preferred_origin() or event.origins[0]
     magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    # What an event does not have is None
     facts = {
         "time": str(origin.time)[:19],
         "longitude": origin.longitude,
@@ -58,6 +59,7 @@ def event_of_run(record: Path, region: Region) -> dict[str, Any]:
     facts: dict[str, Any] = {}
     if region.epicentre is not None:
         facts = dict(zip(("longitude", "latitude"), region.epicentre, strict=True))
+    # One earthquake is screened
     for group in groups if isinstance(groups, list) else ():
         if isinstance(group, Mapping) and group.get("screened"):
             known = group.get("event") or group.get("headers") or {}
@@ -71,6 +73,9 @@ def read_stations(path: Path) -> pd.DataFrame:
     if not path.exists():
         return pd.DataFrame()
     types = {name: "str" for name, column in COLUMNS.items() if column.dtype == "str"}
-    return pd.read_csv(path, dtype=types, keep_default_na=False, na_values={
-        name: [""] for name, column in COLUMNS.items() if column.dtype != "str"
-    })
+    return pd.read_csv(
+        path,
+        dtype=types,
+        keep_default_na=False,
+        na_values={name: [""] for name, column in COLUMNS.items() if column.dtype != "str"},
+    )

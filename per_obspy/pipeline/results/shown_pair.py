@@ -54,6 +54,7 @@ def find_pair(name: str, folder: Path) -> ShownPair:
     tables = [folder / table for table in TABLES if (folder / table).is_file()]
     if not tables:
         raise CatalogError(str(folder), f"no results here: none of {', '.join(TABLES)}")
+    # By name or by rank
     column, value = ("rank", name[1:]) if name.startswith("#") else ("pair_id", name)
     with bounded_database(folder) as database:
         database.register("found", parquet_rows(tables[:1]))
@@ -93,6 +94,7 @@ def draw_pair(pair: ShownPair, path: Path) -> None:
         reason = "an ensemble has no radii: draw the pair from the results of one of its runs"
         raise CatalogError(str(pair.folder), reason)
     station = row.get("station")
+    # Pairs of a spectrum or a map have no record
     if not isinstance(station, str) or not station:
         draw_pair_alone(row, pair.simulated, path)
         return

@@ -51,6 +51,7 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
     report = Report([], [])
     if table.empty:
         return report
+    # The spectrum stands for the earthquake
     spectrum = name_text(settings.spectrum.name)
     title = f"Design spectrum {spectrum}"
     source = [f"Screened by the spectrum {spectrum}, not by an earthquake."]
@@ -61,9 +62,7 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
     return report
 
 
-def report_ensemble(
-    settings: Ensemble, folder: Path, simulated: bool, pairs: int
-) -> Report:
+def report_ensemble(settings: Ensemble, folder: Path, simulated: bool, pairs: int) -> Report:
     """
     Write summary, overview, KML, layers and workbook of an ensemble.
 
@@ -83,6 +82,7 @@ def report_ensemble(
     report = Report([], [])
     if not pairs:
         return report
+    # The scenarios stand for the earthquake
     limits, weights = ScreeningSettings(), settings.weights
     unit = "a year" if settings.yearly else "in weight"
     source = [f"{len(weights)} scenarios together.", *_scenario_sentences(weights, unit)]
@@ -130,6 +130,7 @@ def _write(
         files, none = layer_paths(folder, asked.stem), pd.DataFrame()
         with report.tried(*files):
             write_map_layers(noted, region, none, lambda: None, asked.outlines, files)
+    # All rows, or those that a layer left when it failed
     for _ in noted:
         continue
     points = pd.concat(shown, ignore_index=True)

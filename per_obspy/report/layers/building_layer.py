@@ -44,6 +44,7 @@ def building_layers(pairs: Path, ranked: Path, outlines: Path | None) -> Iterato
         else:
             database.register("pairs", parquet_rows([pairs]))
             query = _worst_pairs(set(pq.read_schema(pairs.absolute()).names))
+        # Each building has one outline, however often the file has it
         if outlines is not None:
             name = _primary_column(outlines)
             database.register("drawn", parquet_rows([outlines], ["building_id", name]))
@@ -94,6 +95,7 @@ def _layers(table: pd.DataFrame, with_outlines: bool) -> Iterator[Layer]:
         yield Layer(BUILDINGS, table, points(*places))
         return
     shapes = shapely.from_wkb(table.pop(_OUTLINE).to_numpy(dtype=object), on_invalid="ignore")
+    # Buildings without a polygon are points
     drawn = np.isin(shapely.get_type_id(shapes), (3, 6))
     yield Layer(BUILDINGS, table[drawn], _multiple(shapes[drawn]))
     if not drawn.all():

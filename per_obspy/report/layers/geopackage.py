@@ -3,17 +3,19 @@
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyogrio
 import shapely
-from numpy.typing import NDArray
 
 from per_obspy.errors import printable
 from per_obspy.report.layers.shapes import Shapes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: WGS 84; a GeoPackage keeps longitude before latitude, unlike the definition of EPSG.
 CRS = "EPSG:4326"
@@ -59,6 +61,7 @@ def append_layer(path: Path, layer: Layer, is_new: bool, facts: Mapping[str, str
         Facts that hold for all rows, which become the description of the layer.
     """
     description = "; ".join(f"{name}: {value}" for name, value in facts.items())
+    # The file is made with its first layer
     pyogrio.raw.write_arrow(
         with_shapes(layer.table, layer.shapes, GEOMETRY),
         path,
@@ -145,6 +148,7 @@ def write_styles(path: Path, styles: Mapping[str, str]) -> None:
         "owner": "",
         "ui": "",
     }
+    # One row per layer
     columns: dict[str, NDArray[Any]] = {
         name: np.array([text] * len(styles) if isinstance(text, str) else text, dtype=object)
         for name, text in texts.items()

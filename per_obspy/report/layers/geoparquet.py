@@ -57,4 +57,3 @@ class GeoParquet:
 def _types(shapes: Shapes) -> list[str]:
     """Return the types of the shapes; none means that they are unknown."""
     return [geometry_type(shapes)] if shapely.is_geometry(shapes).any() else []
-

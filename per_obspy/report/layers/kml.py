@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pandas as pd
@@ -39,22 +40,32 @@ def write_kml(worst: pd.DataFrame, classes: Sequence[str], title: str, path: Pat
     root = ElementTree.Element("kml", xmlns=NAMESPACE)
     document = ElementTree.SubElement(root, "Document")
     ElementTree.SubElement(document, "name").text = shortened(title, 200)
-    numbers = {name: number for number, name in enumerate(class_colours(classes))}
-    for name, colour in class_colours(classes).items():
-        _add_style(document, f"class{numbers[name]}", colour)
-    lines = has_both_places(worst.columns)
+    # One style per class
+    styles = dict[str, str]()
+    for number, (name, colour) in enumerate(class_colours(classes).items()):
+        styles[name] = f"#class{number}"
+        _add_style(document, f"class{number}", colour)
+    # Balloons with numbers, and shapes
     for row in worst.head(ROWS).to_dict("records"):
         pair = {str(name): value for name, value in row.items()}
-        mark = ElementTree.SubElement(document, "Placemark")
-        ElementTree.SubElement(mark, "name").text = name_text(pair["pair_id"])
-        # A balloon takes a description for HTML, and so angle brackets are written twice as safe
-        text = "<br/>".join(_as_html(line) for line in pair_lines(pair))
-        ElementTree.SubElement(mark, "description").text = text
-        style = f"#class{numbers.get(str(pair['risk_class']), len(numbers) - 1)}"
-        ElementTree.SubElement(mark, "styleUrl").text = style
-        _add_shape(mark, pair, lines)
+        mark = _add_mark(document, pair, styles)
+        _add_shape(mark, pair, has_both_places(worst.columns))
     with written_whole(path) as part:
         ElementTree.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True)
+
+
+def _add_mark(
+    document: ElementTree.Element, pair: dict[str, Any], styles: dict[str, str]
+) -> ElementTree.Element:
+    """Add a pair with its name, its numbers in words and its style."""
+    mark = ElementTree.SubElement(document, "Placemark")
+    ElementTree.SubElement(mark, "name").text = name_text(pair["pair_id"])
+    # A balloon takes a description for HTML
+    text = "<br/>".join(_as_html(line) for line in pair_lines(pair))
+    ElementTree.SubElement(mark, "description").text = text
+    if style := styles.get(str(pair["risk_class"])):
+        ElementTree.SubElement(mark, "styleUrl").text = style
+    return mark
 
 
 def _as_html(line: str) -> str:
@@ -67,6 +78,7 @@ def _add_style(document: ElementTree.Element, name: str, colour: str) -> None:
     """Add the style of a class; KML has opacity, blue, green, red."""
     red, green, blue = colour[1:3], colour[3:5], colour[5:7]
     style = ElementTree.SubElement(document, "Style", id=name)
+    # Pairs are points from far away and lines from near
     for kind, sizes in (("IconStyle", {"scale": "0.6"}), ("LineStyle", {"width": "5"})):
         element = ElementTree.SubElement(style, kind)
         ElementTree.SubElement(element, "color").text = f"ff{blue}{green}{red}".lower()
@@ -75,12 +87,13 @@ def _add_style(document: ElementTree.Element, name: str, colour: str) -> None:
     ElementTree.SubElement(ElementTree.SubElement(style, "LabelStyle"), "scale").text = "0"
 
 
-def _add_shape(mark: ElementTree.Element, pair: dict[str, object], line: bool) -> None:
+def _add_shape(mark: ElementTree.Element, pair: dict[str, Any], line: bool) -> None:
     """Add the line between both buildings with a point in its middle, or the point only."""
     parent = ElementTree.SubElement(mark, "MultiGeometry") if line else mark
     point = ElementTree.SubElement(parent, "Point")
     place = f"{pair['longitude']:.7f},{pair['latitude']:.7f}"
     ElementTree.SubElement(point, "coordinates").text = place
+    # From near both buildings are seen
     if line:
         ends = (f"{pair[f'longitude_{i}']:.7f},{pair[f'latitude_{i}']:.7f}" for i in (1, 2))
         element = ElementTree.SubElement(parent, "LineString")

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
 import shapely
 
-from per_obspy.checks import FloatArray
 from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.report.layers.building_layer import building_layers
@@ -19,6 +18,9 @@ from per_obspy.report.layers.qgis_style import class_style, column_aliases, sing
 from per_obspy.report.layers.shapes import has_both_places, pair_shapes, points
 from per_obspy.screening.columns import known_column
 from per_obspy.tables.totals import RegionTotals
+
+if TYPE_CHECKING:
+    from per_obspy.checks import FloatArray
 
 PAIRS, STATIONS, AREAS = "pairs", "stations", "areas"
 
@@ -79,9 +81,8 @@ def write_layers(
     package, project, whole = files
     with ExitStack() as stack:
         table_part = stack.enter_context(written_whole(whole))
-        part = stack.enter_context(
-            literal_path(stack.enter_context(written_whole(package)))
-        )
+        part = stack.enter_context(literal_path(stack.enter_context(written_whole(package))))
+        # All pairs in one pass
         book = _Package(part, sources)
         with GeoParquet(table_part) as rows:
             for table in tables:
@@ -111,6 +112,7 @@ class _Package:
             kind = geometry_type(layer.shapes)
             style = _style(layer, kind, self.sources.classes)
             self.layers[layer.name] = ProjectLayer(layer.name, kind, style)
+        # The view is that of the pairs
         append_layer(self.path, layer, is_new, self.sources.facts)
         if layer.name == PAIRS:
             self.has_places = has_both_places(layer.table.columns)
@@ -149,6 +151,7 @@ def _other_layers(sources: MapSources, pairs: Path, has_places: bool) -> Iterato
         places = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
         chosen = [name for name in _OF_STATIONS if name in table]
         yield Layer(STATIONS, table[chosen], points(*places))
+    # Totals are known once all pairs are taken
     totals = sources.totals()
     if totals is not None:
         yield _areas(totals)
@@ -160,6 +163,7 @@ def _areas(totals: RegionTotals) -> Layer:
     if totals.outlines is None:
         places = table["longitude"].to_numpy(float), table["latitude"].to_numpy(float)
         return Layer(AREAS, table, points(*places))
+    # Of one type with those of buildings
     polygons = [shapely.Polygon(corners) for corners in totals.outlines]
     shapes = shapely.multipolygons([[polygon] for polygon in polygons])
     return Layer(AREAS, table, shapes)

@@ -78,24 +78,35 @@ def write_project(
     ElementTree.SubElement(root, "title").text = printable(title)
     _add_reference(ElementTree.SubElement(root, "projectCrs"))
     tree = ElementTree.SubElement(root, "layer-tree-group")
-    view = ElementTree.SubElement(root, "mapcanvas", name="theMapCanvas", annotationsVisible="1")
-    ElementTree.SubElement(view, "units").text = "degrees"
-    corners = ElementTree.SubElement(view, "extent")
-    for name, value in zip(("xmin", "ymin", "xmax", "ymax"), extent, strict=True):
-        ElementTree.SubElement(corners, name).text = repr(float(value))
-    _add_reference(ElementTree.SubElement(view, "destinationsrs"))
+    _add_view(root, extent)
+    # Each layer stands in the tree, among the described layers and in their order
     described = ElementTree.SubElement(root, "projectlayers")
     order = ElementTree.SubElement(root, "layerorder")
     for layer in layers:
         _add_layer(tree, described, order, layer, f"./{data}|layername={layer.name}")
-    # Relative paths
-    paths = ElementTree.SubElement(ElementTree.SubElement(root, "properties"), "Paths")
-    ElementTree.SubElement(paths, "Absolute", type="bool").text = "false"
+    _add_relative_paths(root)
     document = DOCTYPE + ElementTree.tostring(root, encoding="unicode")
     # The same project has the same bytes: entries of an archive have a fixed date
     entry = zipfile.ZipInfo(f"{path.stem}.qgs", (1980, 1, 1, 0, 0, 0))
     with written_whole(path) as part, zipfile.ZipFile(part, "w") as archive:
         archive.writestr(entry, document.encode(), zipfile.ZIP_DEFLATED)
+
+
+def _add_relative_paths(root: ElementTree.Element) -> None:
+    """Add the setting that paths are seen from the project."""
+    paths = ElementTree.SubElement(ElementTree.SubElement(root, "properties"), "Paths")
+    ElementTree.SubElement(paths, "Absolute", type="bool").text = "false"
+
+
+def _add_view(root: ElementTree.Element, extent: tuple[float, float, float, float]) -> None:
+    """Add the part of the map that is seen first."""
+    view = ElementTree.SubElement(root, "mapcanvas", name="theMapCanvas", annotationsVisible="1")
+    ElementTree.SubElement(view, "units").text = "degrees"
+    corners = ElementTree.SubElement(view, "extent")
+    # West, south, east, north
+    for name, value in zip(("xmin", "ymin", "xmax", "ymax"), extent, strict=True):
+        ElementTree.SubElement(corners, name).text = repr(float(value))
+    _add_reference(ElementTree.SubElement(view, "destinationsrs"))
 
 
 def _add_reference(parent: ElementTree.Element) -> None:

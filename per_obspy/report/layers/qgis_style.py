@@ -80,6 +80,7 @@ def single_style(
     root = _root()
     renderer = ElementTree.SubElement(root, "renderer-v2", type="singleSymbol", symbollevels="0")
     symbols = ElementTree.SubElement(renderer, "symbols")
+    # Open symbols cover no pair
     kind = _KINDS[geometry][1]
     options = {
         "marker": {"name": "triangle", "size": "2.8", "color": "255,255,255,0"},
@@ -99,6 +100,7 @@ def _root() -> ElementTree.Element:
 
 def _document(root: ElementTree.Element, geometry: str, aliases: Mapping[str, str]) -> str:
     """Return a style as text, with the aliases of its columns."""
+    # Fields are found by their names, their places are those of the table
     listed = ElementTree.SubElement(root, "aliases")
     for index, (field, alias) in enumerate(aliases.items()):
         facts = {"field": printable(field), "index": str(index), "name": printable(alias)}
@@ -107,9 +109,7 @@ def _document(root: ElementTree.Element, geometry: str, aliases: Mapping[str, st
     return DOCTYPE + ElementTree.tostring(root, encoding="unicode")
 
 
-def _add_categories(
-    renderer: ElementTree.Element, classes: Sequence[str], geometry: str
-) -> None:
+def _add_categories(renderer: ElementTree.Element, classes: Sequence[str], geometry: str) -> None:
     """Add a category and its symbol for each risk class, and for pairs of unknown gap."""
     categories = ElementTree.SubElement(renderer, "categories")
     symbols = ElementTree.SubElement(renderer, "symbols")
@@ -152,6 +152,7 @@ def _add_symbol(
     layer = ElementTree.SubElement(
         symbol, "layer", {"class": layer_class, "enabled": "1", "locked": "0", "pass": "0"}
     )
+    # Options as QGIS stores them since version 3.24
     mapping = ElementTree.SubElement(layer, "Option", type="Map")
     for option, value in options.items():
         ElementTree.SubElement(mapping, "Option", type="QString", name=option, value=value)

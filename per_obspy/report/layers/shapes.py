@@ -27,6 +27,7 @@ def pair_shapes(table: pd.DataFrame) -> Shapes:
     if not has_both_places(table.columns):
         return points(table["longitude"].to_numpy(), table["latitude"].to_numpy())
     east_1, north_1, east_2, north_2 = (table[name].to_numpy(float) for name in BOTH_PLACES)
+    # Beyond the date line
     east_2 = east_2 - 360.0 * np.round((east_2 - east_1) / 360.0)
     ends = np.stack([np.column_stack([east_1, north_1]), np.column_stack([east_2, north_2])], 1)
     lines: Shapes = shapely.linestrings(ends)
@@ -36,5 +37,6 @@ def pair_shapes(table: pd.DataFrame) -> Shapes:
 def points(longitude: FloatArray, latitude: FloatArray) -> Shapes:
     """Return points; None where a coordinate is unknown."""
     known = np.isfinite(longitude) & np.isfinite(latitude)
-    shapes: Shapes = np.where(known, shapely.points(longitude, latitude), None)
+    shapes: Shapes = shapely.points(longitude, latitude)
+    shapes[~known] = None
     return shapes

@@ -78,6 +78,7 @@ def _cell(page: Any, value: object) -> object:
     """Return a value as a cell: numbers as numbers, anything else as text, nothing as empty."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
+    # A workbook has neither NaN nor infinity
     if isinstance(value, (int, float, np.integer, np.floating)):
         number = value.item() if isinstance(value, np.generic) else value
         if isinstance(number, int) or math.isfinite(number):

@@ -93,8 +93,10 @@ def event_sentences(facts: Mapping[str, Any]) -> list[str]:
     elif facts.get("start"):
         day = str(facts["start"])[:16].replace("T", " ")
         sentences.append(f"Origin time unknown; first record {day} UTC.")
+    # Size and place
     if math.isfinite(size := number(facts, "magnitude")):
         sentences.append(f"Magnitude {size:.1f}.")
+    # A place needs both coordinates
     east, north = number(facts, "longitude"), number(facts, "latitude")
     if math.isfinite(east) and math.isfinite(north):
         place = place_text(north, east, 3)
@@ -108,6 +110,7 @@ def five_numbers(facts: SummaryFacts) -> list[tuple[str, str]]:
     """Return the five numbers of the summary, each with its meaning."""
     counts, first = facts.counts, facts.region.classes[0]
     pounding = counts.states.get("yes", 0) + counts.states.get("likely", 0)
+    # Of all pairs the worst ones are the fastest
     fastest = facts.worst["expected_impact_velocity"].max() if len(facts.worst) else math.nan
     return [
         (str(counts.pairs), "pairs of buildings screened"),
@@ -123,6 +126,7 @@ def station_sentences(facts: SummaryFacts) -> list[str]:
     table = facts.stations
     if table.empty:
         return ["No station: the motion is not that of records."]
+    # Rejected stations are as good as missing
     used = table.loc[table["state"] == "used", "station"].tolist()
     missing = table.loc[table["state"] != "used", "station"].tolist()
     sentences = [f"{len(used)} stations used{_named(used)}."]
@@ -157,6 +161,7 @@ def first_steps(facts: SummaryFacts) -> list[str]:
 def sureness(facts: SummaryFacts) -> list[str]:
     """Say how sure the numbers are."""
     counts, sentences = facts.counts, list[str]()
+    # States between yes and no
     middle = sum(counts.states.get(state, 0) for state in ("likely", "possible", "unlikely"))
     sentences.append(f"{middle} pairs are open: neither a clear yes nor a clear no.")
     if counts.derived:
@@ -170,6 +175,7 @@ def sureness(facts: SummaryFacts) -> list[str]:
 def pair_sentence(pair: Mapping[str, Any]) -> str:
     """Return a pair of the list in one sentence."""
     parts = [f"{name_text(pair['pair_id'])}: {name_text(pair['risk_class'])}"]
+    # What is unknown is left out
     parts.append(f"impact {speed_text(number(pair, 'expected_impact_velocity'))}")
     if math.isfinite(chance := number(pair, "probability")):
         parts.append(f"contact in {chance_text(chance)}")

@@ -1,5 +1,6 @@
 """``summary.pdf``: one A4 page with a small map, made without a browser."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from textwrap import wrap
 
@@ -57,13 +58,13 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     axes = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225))
     draw_map(axes, shown, facts.region)
     axes.tick_params(labelsize=7)
-    axes.xaxis.label.set_size(8)
-    axes.yaxis.label.set_size(8)
-    axes.title.set_size(8)
+    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
+        text.set_fontsize(8)
     _write_legend(figure, facts, bottom + 0.005)
     lowest = _write_section(figure, "What to do first", first_steps(facts), at, HALF)
     lowest = _write_section(figure, "How sure", sureness(facts), lowest, HALF)
     _write_pairs(figure, facts, min(lowest, bottom))
+    # Where the numbers are from
     figure.text(LEFT, 0.03, literal(shortened(facts.made, 150)), fontsize=7, color=MOTION_COLOUR)
     # The same page has the same bytes
     with written_whole(path) as part:
@@ -80,6 +81,7 @@ def _write_head(figure: Figure, facts: SummaryFacts) -> float:
         text = "SIMULATED ground motion: this is not an earthquake"
         figure.text(LEFT, at, text, fontsize=12, color=WARNING_COLOUR, fontweight="bold")
         at -= 0.022
+    # Sentences one after the other
     for text in (" ".join(facts.source), " ".join(station_sentences(facts))):
         at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
     return at - 0.01
@@ -95,6 +97,7 @@ def _write_lines(figure: Figure, lines: list[str], at: float) -> float:
 
 def _write_numbers(figure: Figure, facts: SummaryFacts, at: float) -> float:
     """Write the five numbers side by side and return how far the page is filled."""
+    # A large number over its meaning
     width = (RIGHT - LEFT) / 5.0
     for place, (value, meaning) in enumerate(five_numbers(facts)):
         left = LEFT + place * width
@@ -118,6 +121,7 @@ def _write_section(
 
 def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the number of pairs of each class in its colour below the map."""
+    # As far apart as their texts are long
     left = 0.56
     for name, colour in class_colours(facts.region.classes).items():
         if count := facts.counts.classes.get(name, 0):
@@ -131,32 +135,37 @@ def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
     figure.text(LEFT, at, "The worst pairs", fontsize=11, fontweight="bold")
     at -= 0.02
-    for title, place in COLUMNS.items():
-        style = {"fontsize": 8, "color": MOTION_COLOUR, "ha": "right" if place > 0.9 else "left"}
-        figure.text(place, at, title, **style)
+    _write_row(figure, COLUMNS, at, MOTION_COLOUR)
     for position, pair in enumerate(facts.worst.to_dict("records"), start=1):
+        # As many as the summary lists, one per line
         at -= LINE
         cells = (
             str(position),
             shortened(str(pair["pair_id"]), 26),
             shortened(str(pair["risk_class"]), 12),
-            speed_text(number(pair, "expected_impact_velocity")),  # type: ignore[arg-type]
-            chance_text(number(pair, "probability")),  # type: ignore[arg-type]
-            length_text(number(pair, "gap")),  # type: ignore[arg-type]
-            length_text(number(pair, "demand")),  # type: ignore[arg-type]
+            speed_text(number(pair, "expected_impact_velocity")),
+            chance_text(number(pair, "probability")),
+            length_text(number(pair, "gap")),
+            length_text(number(pair, "demand")),
             f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
         )
-        for cell, place in zip(cells, COLUMNS.values(), strict=True):
-            align = "right" if place > 0.9 else "left"
-            figure.text(place, at, literal(cell), fontsize=8, ha=align)
+        _write_row(figure, cells, at, "black")
     if not facts.buildings.empty:
         _write_buildings(figure, facts, at - 2.5 * LINE)
+
+
+def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> None:
+    """Write the cells of a row; the last one ends at the margin."""
+    for cell, place in zip(cells, COLUMNS.values(), strict=True):
+        align = "right" if place == RIGHT else "left"
+        figure.text(place, at, literal(cell), fontsize=8, color=colour, ha=align)
 
 
 def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst buildings in two columns."""
     figure.text(LEFT, at, "The worst buildings", fontsize=11, fontweight="bold")
     for position, building in enumerate(facts.buildings.to_dict("records")):
+        # Five below each other
         left = LEFT if position < 5 else 0.52
         row = at - 0.02 - LINE * (position % 5)
         place = f"{building['latitude']:.5f}, {building['longitude']:.5f}"
