@@ -14,15 +14,15 @@ from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
-from per_obspy.pipeline.results.notes import Notes, needed_columns
 from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run, read_stations
+from per_obspy.pipeline.results.table_notes import Notes, needed_columns
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.overview import Region, draw_overview
 from per_obspy.report.pair_figure import draw_record_to_pair
-from per_obspy.report.summary.facts import event_sentences
+from per_obspy.report.summary.statements import event_sentences
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.risk import RankedTable, ranked_table

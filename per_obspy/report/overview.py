@@ -176,8 +176,9 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
     """Return frames and members of the clusters that the whole map hides, worst first."""
     if not points.longitude.size:
         return []
-    # A few pairs do not hide each other
-    every = clusters(points.longitude, points.latitude, whole)
+    # Stations and epicentre may be far away; a few pairs do not hide each other
+    pairs_frame = frame_of(points.longitude, points.latitude)
+    every = clusters(points.longitude, points.latitude, pairs_frame)
     found = [members for members in every if members.size >= FEWEST]
     frames = [
         frame_of(points.longitude[members], points.latitude[members]).padded(MARGIN)

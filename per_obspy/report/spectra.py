@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from per_obspy.checks import FloatArray
-from per_obspy.constants import STANDARD_GRAVITY
+from per_obspy.constants import STANDARD_GRAVITY, UNSET_DAYS
 from per_obspy.report.style import MOTION_COLOUR, fit_titles, literal, save, title_name
 from per_obspy.spectra.bilinear import bilinear_response
 
@@ -64,8 +64,11 @@ def _write_title(figure: Figure, station: xr.Dataset, chosen: xr.Dataset) -> Non
 
 def record_date(station: xr.Dataset) -> str:
     """Return the day and time at which the record of a station starts, as far as it is known."""
-    start = str(station.attrs.get("time_coverage_start", ""))[:16].replace("T", " ")
-    return f"{start} UTC" if start else "date unknown"
+    start = str(station.attrs.get("time_coverage_start", ""))[:16]
+    # Clocks that were never set stand at one of these days
+    unset = {f"{year:04}-{month:02}-{day:02}" for year, month, day in UNSET_DAYS}
+    is_known = start and start[:10] not in unset
+    return f"{start.replace('T', ' ')} UTC" if is_known else "date unknown"
 
 
 def _draw_component(

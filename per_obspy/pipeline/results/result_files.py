@@ -8,13 +8,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from per_obspy.pipeline.results.faults import Report
-from per_obspy.pipeline.results.notes import Notes
+from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.layers.kml import write_kml
-from per_obspy.report.layers.workbook import Sheet, write_workbook
+from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import Region
-from per_obspy.report.summary.facts import LISTED, SummaryFacts, place_text
-from per_obspy.report.summary.page import write_page
-from per_obspy.report.summary.text import write_text
+from per_obspy.report.summary.one_page import write_page
+from per_obspy.report.summary.spoken_text import write_text
+from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
 from per_obspy.report.words import name_text
 from per_obspy.screening.columns import column_table, known_column
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS

@@ -11,8 +11,8 @@ from per_obspy.config import Design, Ensemble
 from per_obspy.config import Screening as ScreeningSettings
 from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
-from per_obspy.pipeline.results.notes import Notes
 from per_obspy.pipeline.results.result_files import Screening, write_results
+from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region, draw_overview
 from per_obspy.report.words import name_text
 from per_obspy.screening.ranking import pounding_state, risk_class

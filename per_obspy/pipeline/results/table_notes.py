@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from per_obspy.report.layers.workbook import ROWS
-from per_obspy.report.summary.facts import Counts
+from per_obspy.report.layers.spreadsheet import ROWS
+from per_obspy.report.summary.statements import Counts
 
 #: Columns that notes need; those that a table lacks are left out.
 COLUMNS = (

@@ -6,12 +6,13 @@ from textwrap import wrap
 
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from per_obspy.errors import shortened
 from per_obspy.files import written_whole
 from per_obspy.report.overview import draw_map
 from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
-from per_obspy.report.summary.facts import (
+from per_obspy.report.summary.statements import (
     SummaryFacts,
     first_steps,
     five_numbers,
@@ -158,7 +159,16 @@ def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> 
     """Write the cells of a row; the last one ends at the margin."""
     for cell, place in zip(cells, COLUMNS.values(), strict=True):
         align = "right" if place == RIGHT else "left"
-        figure.text(place, at, literal(cell), fontsize=8, color=colour, ha=align)
+        text = figure.text(place, at, literal(cell), fontsize=8, color=colour, ha=align)
+        if place == COLUMNS["pair"]:
+            _fit(text, (COLUMNS["class"] - place - 0.01) * figure.bbox.width)
+
+
+def _fit(text: Text, room: float) -> None:
+    """Shrink a text that is wider than its room, pixels."""
+    width = text.get_window_extent().width
+    if width > room:
+        text.set_fontsize(8.0 * room / width)
 
 
 def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
@@ -170,5 +180,6 @@ def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
         row = at - 0.02 - LINE * (position % 5)
         place = f"{building['latitude']:.5f}, {building['longitude']:.5f}"
         name = shortened(str(building["building_id"]), 24)
-        text = f"{position + 1}  {name}, {shortened(str(building['risk_class']), 12)}, {place}"
-        figure.text(left, row, literal(text), fontsize=8)
+        words = f"{position + 1}  {name}, {shortened(str(building['risk_class']), 12)}, {place}"
+        text = figure.text(left, row, literal(words), fontsize=8)
+        _fit(text, 0.42 * figure.bbox.width)

@@ -6,7 +6,7 @@ from textwrap import wrap
 from unicodedata import normalize
 
 from per_obspy.files import written_whole
-from per_obspy.report.summary.facts import (
+from per_obspy.report.summary.statements import (
     SummaryFacts,
     building_sentence,
     first_steps,
