@@ -35,7 +35,7 @@ wheel: .venv/check
 	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
 
 benchmark: .venv/benchmark
-	@for script in start_up formats spectra pounding pair_estimates footprints screening; do \
+	@for script in start_up formats spectra pounding rows pair_estimates footprints screening; do \
 	  echo "== $$script"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/$$script.py || exit 1; done
 	@if [ -z "$(RECORDS)" ]; then echo "== processing: left out, name a folder of MiniSEED with RECORDS=..."; \
 	  else echo "== processing"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/processing.py "$(RECORDS)"; fi

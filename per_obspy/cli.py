@@ -20,6 +20,7 @@ from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init
 from per_obspy.commands.pairs import catalog, pairs
+from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
@@ -47,7 +48,8 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-for command in (run, init, simulate, process, spectra, screen, report, show, events, fetch, info):
+COMMANDS = (run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info)
+for command in COMMANDS:
     app.command()(command)
 
 

@@ -64,7 +64,7 @@ def info(
 
     Example: per-obspy info records
     """
-    from per_obspy.pipeline.inputs.description import described
+    from per_obspy.pipeline.inputs.described_inputs import described
 
     named_path(path)  # an empty name would be the folder of the shell
     found = described(path, stationxml)

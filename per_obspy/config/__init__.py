@@ -5,6 +5,7 @@ Only the pipeline and the commands see a configuration as a whole. Rooms below t
 or one section. Paths in a configuration are relative to the folder of its file.
 """
 
+from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
@@ -31,6 +32,7 @@ __all__ = [
     "Processing",
     "Records",
     "RelativePath",
+    "Rows",
     "Run",
     "Scenario",
     "Screening",

@@ -8,6 +8,7 @@ from pydantic import (
     model_validator,
 )
 
+from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
@@ -36,6 +37,7 @@ class Run(Section):
     building: Building = Building()
     screening: Screening = Screening()
     totals: Totals = Totals()
+    rows: Rows = Rows()
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
     )

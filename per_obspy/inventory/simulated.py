@@ -5,7 +5,7 @@ Shares and sizes follow street surveys of dense centres: low buildings dominate,
 have the same height, many touch, streets have a common direction. No real city is described.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -39,8 +39,9 @@ GAP, GAPS = (0.08, 0.9), (0.01, 1.5)
 #: Share of neighbours that are equally high, and of those that share a system.
 EQUAL, SAME_SYSTEM = 0.45, 0.7
 
-#: Share of pairs inside a row.
-INSIDE = 0.6
+#: Share of pairs that go on from building 2 of the pair before: straight on, and around a corner.
+#: Rows that go on with a share p have the share p² of their pairs between two others: here 0.6.
+STRAIGHT, CORNER = 0.775, 0.045
 
 #: Share of buildings with a measured period and damping.
 MEASURED = 0.5
@@ -101,12 +102,57 @@ def simulated_pairs(
     checks.between("touching", touching, 0, 1)
     # The order of the random numbers belongs to the seed
     generator = np.random.default_rng(seed)
-    columns = _buildings(generator, count)
+    rows = _rows(seed, count)
+    columns = _buildings(generator, rows)
     columns["gap"] = _gaps(generator, count, touching)
-    columns |= _places(generator, columns, stations, radius)
-    columns["position"] = np.where(generator.random(count) < INSIDE, POSITIONS[1], POSITIONS[0])
+    columns |= _places(generator, columns, rows, stations, radius)
+    columns |= _names(rows)
     columns["pair_id"] = np.array([f"P{number:07d}" for number in range(1, count + 1)])
     return pd.DataFrame({name: columns[name] for name in COLUMNS if name in columns})
+
+
+class _Rows(NamedTuple):
+    """
+    Pairs as rows of buildings, one after the other.
+
+    Attributes
+    ----------
+    goes_on, turns : (count,) ndarray of bool
+        Whether building 1 of a pair is building 2 of the pair before, and whether around a corner.
+    place : (count,) ndarray of int
+        Place of each pair in its row, from 0.
+    start : (count,) ndarray of int
+        The first pair of its row.
+    """
+
+    goes_on: NDArray[np.bool_]
+    turns: NDArray[np.bool_]
+    place: NDArray[np.int64]
+    start: NDArray[np.int64]
+
+
+def _rows(seed: int, count: int) -> _Rows:
+    """Return which pairs go on from the one before."""
+    # Random numbers of their own: those of buildings and places stay as they were
+    drawn = np.random.default_rng([seed, 1]).random(count)
+    goes_on = drawn < STRAIGHT + CORNER
+    goes_on[0] = False
+    number = np.arange(count)
+    start = np.maximum.accumulate(np.where(goes_on, 0, number))
+    return _Rows(goes_on, goes_on & (drawn >= STRAIGHT), number - start, start)
+
+
+def _names(rows: _Rows) -> Columns:
+    """Return identifiers of the buildings, and whether a pair stands at the end of its row."""
+    # Each pair has a new building 2, and the first of a row a new building 1
+    last = np.cumsum(np.where(rows.goes_on, 1, 2))
+    straight = rows.goes_on & ~rows.turns
+    inside = straight & np.append(straight[1:], False)
+    return {
+        "building_id_1": np.array([f"B{number:07d}" for number in (last - 1).tolist()]),
+        "building_id_2": np.array([f"B{number:07d}" for number in last.tolist()]),
+        "position": np.where(inside, POSITIONS[1], POSITIONS[0]),
+    }
 
 
 def _checked_stations(longitudes: ArrayLike, latitudes: ArrayLike) -> FloatArray:
@@ -129,9 +175,10 @@ def _lognormal(
     return values
 
 
-def _buildings(generator: np.random.Generator, count: int) -> Columns:
+def _buildings(generator: np.random.Generator, pairs: _Rows) -> Columns:
     """Return sizes, systems, measured periods and dampings of both buildings of each pair."""
-    storeys, height, system = _sizes(generator, count)
+    count = pairs.place.size
+    storeys, height, system = _sizes(generator, pairs)
     area = np.round(_lognormal(generator, count, *AREA))
     # Measured values, NaN where the building was not measured
     is_measured = generator.random((2, count)) < MEASURED
@@ -146,15 +193,20 @@ def _buildings(generator: np.random.Generator, count: int) -> Columns:
         "period": np.where(is_measured, period, np.nan),
         "damping": np.where(is_measured, damping, np.nan),
     }
+    # Building 1 of a pair that goes on is building 2 of the one before
+    on = np.flatnonzero(pairs.goes_on)
+    for values in rows.values():
+        values[0, on] = values[1, on - 1]
     return {f"{name}_{i}": values[i - 1] for name, values in rows.items() for i in (1, 2)}
 
 
-def _sizes(generator: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray, Any]:
+def _sizes(generator: np.random.Generator, pairs: _Rows) -> tuple[FloatArray, FloatArray, Any]:
     """
     Return storeys, heights in m and systems, (2, count) each.
 
     Building 2 often repeats the size or the system of building 1.
     """
+    count = pairs.place.size
     storeys = np.clip(np.rint(_lognormal(generator, count, *STOREYS)), 1, MOST_STOREYS)
     drawn = np.round(generator.normal(*STOREY_HEIGHT, (2, count)), 1)
     storey_height = np.clip(drawn, *STOREY_HEIGHTS)
@@ -162,9 +214,18 @@ def _sizes(generator: np.random.Generator, count: int) -> tuple[FloatArray, Floa
     # Neighbours of equal height have equal storeys
     is_equal = generator.random(count) < EQUAL
     has_same_system = generator.random(count) < SAME_SYSTEM
-    storeys[1, is_equal] = storeys[0, is_equal]
-    storey_height[1, is_equal] = storey_height[0, is_equal]
-    system[1, has_same_system] = system[0, has_same_system]
+    # From the first pair of each row to its last, each begins with the building before
+    for place in range(int(pairs.place.max()) + 1):
+        here = np.flatnonzero(pairs.place == place)
+        for values, alike in (
+            (storeys, is_equal),
+            (storey_height, is_equal),
+            (system, has_same_system),
+        ):
+            if place:
+                values[0, here] = values[1, here - 1]
+            same = here[alike[here]]
+            values[1, same] = values[0, same]
     return storeys, np.round(storeys * storey_height, 1), system
 
 
@@ -175,44 +236,82 @@ def _gaps(generator: np.random.Generator, count: int, touching: float) -> FloatA
 
 
 def _places(
-    generator: np.random.Generator, columns: Columns, stations: FloatArray, radius: float
+    generator: np.random.Generator,
+    columns: Columns,
+    rows: _Rows,
+    stations: FloatArray,
+    radius: float,
 ) -> Columns:
     """Return positions and azimuths in degrees; each station's neighbourhood has a street grid."""
-    count = columns["gap"].size
-    station = generator.integers(len(stations), size=count)
-    azimuth = _azimuths(generator, station, len(stations))
-    # Building 1 anywhere on the disc around its station
+    count = rows.place.size
+    # Pairs of a row are around one station
+    station = generator.integers(len(stations), size=count)[rows.start]
+    azimuth = _azimuths(generator, station, len(stations), rows)
+    # Building 1 of each row anywhere on the disc around its station
     bearing = np.deg2rad(generator.uniform(0.0, 360.0, count))
     distance = radius * np.sqrt(generator.random(count))
-    longitude, latitude = _moved(stations[station, 0], stations[station, 1], distance, bearing)
-    # Building 2 along the axis, by the half sides of two square buildings and the gap
+    first = (distance * _direction(bearing))[:, rows.start]
+    offsets = _offsets(first, _steps(columns, azimuth), rows, radius)
+    places = {}
+    for i, offset in enumerate(offsets, start=1):
+        longitude, latitude = _moved(stations[station, 0], stations[station, 1], *offset)
+        places[f"longitude_{i}"] = np.round(longitude, 7)
+        places[f"latitude_{i}"] = np.round(latitude, 7)
+    return {**places, "azimuth": azimuth}
+
+
+def _steps(columns: Columns, azimuth: FloatArray) -> FloatArray:
+    """Return from building 1 to 2 along the axis, (2, count), m; buildings are square."""
     half_sides = (np.sqrt(columns["area_1"]) + np.sqrt(columns["area_2"])) / 2.0
     separation = half_sides + columns["gap"]
-    longitude_2, latitude_2 = _moved(longitude, latitude, separation, np.deg2rad(azimuth))
-    return {
-        "longitude_1": np.round(longitude, 7),
-        "latitude_1": np.round(latitude, 7),
-        "longitude_2": np.round(longitude_2, 7),
-        "latitude_2": np.round(latitude_2, 7),
-        "azimuth": azimuth,
-    }
+    return np.asarray(separation * _direction(np.deg2rad(azimuth)))
+
+
+def _direction(azimuth: FloatArray) -> FloatArray:
+    """Return (2, count) unit vectors to the east and north along azimuths, radians."""
+    return np.stack([np.sin(azimuth), np.cos(azimuth)])
+
+
+def _offsets(
+    first: FloatArray, steps: FloatArray, rows: _Rows, radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return buildings 1 and 2 of all pairs from their stations, (2, count) each, m."""
+    ends = np.cumsum(steps, axis=1)
+    begins = ends - steps
+    one = first + begins - begins[:, rows.start]
+    # A row that would leave the disc is moved towards its station
+    starts = np.flatnonzero(~rows.goes_on)
+    distance = np.hypot(*one)
+    excess = np.maximum(np.maximum.reduceat(distance, starts) - radius, 0.0)
+    sizes = np.diff(starts, append=distance.size)
+    last = one[:, starts + sizes - 1]
+    inwards = last / np.maximum(np.hypot(*last), 1e-9)
+    one = one - np.repeat(excess * inwards, sizes, axis=1)
+    two = one + steps
+    # The same building has the same place, to the last digit
+    on = np.flatnonzero(rows.goes_on)
+    one[:, on] = two[:, on - 1]
+    return one, two
 
 
 def _azimuths(
-    generator: np.random.Generator, station: NDArray[np.int64], n_stations: int
+    generator: np.random.Generator, station: NDArray[np.int64], n_stations: int, rows: _Rows
 ) -> FloatArray:
     """Return azimuths along or across the streets around each pair's station, degrees."""
     street = generator.uniform(0.0, 90.0, n_stations)[station]
-    side = 90.0 * generator.integers(4, size=station.size)
+    side = 90.0 * generator.integers(4, size=station.size)[rows.start]
+    # Corners of a row turn to the right
+    turns = np.cumsum(rows.turns)
+    side += 90.0 * (turns - turns[rows.start])
     azimuth = np.round(street + side + generator.normal(0.0, STREET_SCATTER, station.size))
     return azimuth % 360.0
 
 
 def _moved(
-    longitude: FloatArray, latitude: FloatArray, distance: FloatArray, bearing: FloatArray
+    longitude: FloatArray, latitude: FloatArray, east: FloatArray, north: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return positions moved by a few kilometres (m) along a bearing (radians), Earth as flat."""
-    north = latitude + distance * np.cos(bearing) / METRES_PER_DEGREE
-    east = longitude + distance * np.sin(bearing) / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
+    """Return positions moved by a few kilometres (m) to the east and north, Earth as flat."""
+    northward = latitude + north / METRES_PER_DEGREE
+    eastward = longitude + east / METRES_PER_DEGREE / np.cos(np.deg2rad(latitude))
     # Longitudes between -180 and 180 degrees
-    return (east + 180.0) % 360.0 - 180.0, north
+    return (eastward + 180.0) % 360.0 - 180.0, northward

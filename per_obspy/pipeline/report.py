@@ -32,6 +32,7 @@ from per_obspy.tables.totals import (
     piece_totals,
     region_totals,
     totals_columns,
+    with_buildings,
     write_totals,
 )
 
@@ -176,9 +177,15 @@ def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Rep
         worst,
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        region_totals(pieces.totals, settings.totals),
+        _totals(settings, pieces, folder),
         pieces.notes,
     )
+
+
+def _totals(settings: Run, pieces: _Pieces, folder: Path) -> RegionTotals:
+    """Return the totals of all pieces, with the buildings of each area where they are known."""
+    totals = region_totals(pieces.totals, settings.totals)
+    return totals._replace(table=with_buildings(totals.table, folder / "buildings.parquet"))
 
 
 def _write_layers(
@@ -193,7 +200,7 @@ def _write_layers(
         noted,
         place,
         read_stations(files[0].with_name("stations.csv")),
-        lambda: region_totals(pieces.totals, settings.totals),
+        lambda: _totals(settings, pieces, files[0].parent),
         outlines_beside(
             settings.pairs.file if settings.pairs else None, files[0].with_name("pairs.csv")
         ),

@@ -223,8 +223,9 @@ def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] =
     begun["earthquakes"] = list(earthquakes)
     write_status(folder / RECORD, "", {}, begun, indent=1)
     # A table of an earlier run would be taken for one of this run
-    for name in ("risk.parquet", "risk.csv", "risk.columns.csv"):
-        remove_file(folder / name)
+    for name in ("risk", "rows", "buildings"):
+        for end in (".parquet", ".csv", ".columns.csv"):
+            remove_file(folder / f"{name}{end}")
     return rows
 
 

@@ -16,14 +16,15 @@ from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
+from per_obspy.pipeline.rows.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.tables.risk import write_risk
+from per_obspy.tables.risk import RiskFiles, write_risk
 from per_obspy.tables.table_files import write_rejected
 from per_obspy.threads import usable_processors
 
-KINDS = ("file", "record", "station", "service", "pair")
+KINDS = ("file", "record", "station", "service", "pair", "building", "row")
 
 
 class PairNotes(NamedTuple):
@@ -107,16 +108,33 @@ def screened(
     parts, notes = list[Part](), PairNotes()
     if stations or maps:
         parts, notes = _parts(settings, folder, ground, executor, progress)
-    outputs, states, served = [folder / "rejected.csv"], Counter[str](), Counter[str]()
-    kinds = write_rejected(chain(rejected, unplaced, rejections(parts)), outputs[0])
+    states, served, rows = Counter[str](), Counter[str](), NO_ROWS
+    outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
     if tables := [part.path for part in parts if part.path]:
-        progress("ranking", 0, 1)
-        risk = write_risk(tables, folder, _facts(settings, stations), settings.csv_rows)
-        outputs, states, served = [*outputs, *risk.files], risk.states, risk.stations
-        progress("ranking", 1, 1)
-    failed = any(part.failed for part in parts)
-    return Screened(outputs, _counts(states, kinds, parts), served, unplaced, failed, notes)
+        facts = _facts(settings, stations)
+        files, states, served = _ranked(tables, folder, facts, settings.csv_rows, progress)
+        # Rows of buildings are read from it
+        rows = building_rows(settings, folder, ground, facts, executor, progress)
+        outputs += [*files, *rows.outputs]
+    left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
+    counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
+    return Screened(outputs, counts, served, unplaced, _any_failed(parts, rows), notes)
+
+
+def _ranked(
+    tables: Sequence[Path], folder: Path, facts: dict[str, str], csv_rows: int, progress: Progress
+) -> RiskFiles:
+    """Write the risk table of all parts."""
+    progress("ranking", 0, 1)
+    risk = write_risk(tables, folder, facts, csv_rows)
+    progress("ranking", 1, 1)
+    return risk
+
+
+def _any_failed(parts: Sequence[Part], rows: BuildingRowsDone) -> bool:
+    """Return whether the work of a chunk failed unexpectedly."""
+    return rows.failed or any(part.failed for part in parts)
 
 
 def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]:
@@ -125,12 +143,15 @@ def _facts(settings: Run, stations: Sequence[FinishedStation]) -> dict[str, str]
     return {"name": settings.name, "simulated": str(is_simulated).lower()}
 
 
-def _counts(states: Counter[str], kinds: Counter[str], parts: Sequence[Part]) -> dict[str, int]:
-    """Return the numbers of pairs, of rejections of each kind and of chunks."""
+def _counts(
+    states: Counter[str], kinds: Counter[str], parts: Sequence[Part], rows: BuildingRowsDone
+) -> dict[str, int]:
+    """Return the numbers of pairs, of rejections of each kind, of chunks, and those of rows."""
     counts = {"pairs": states.total()}
     counts |= {state: states[state] for state in EVERY_STATE}
     counts |= {f"rejected_{kind}": kinds[kind] for kind in KINDS}
-    return counts | {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    counts |= {"chunks": len(parts), "chunks_resumed": sum(part.resumed for part in parts)}
+    return counts | rows.counts
 
 
 def _maps(settings: Run) -> tuple[Path, ...]:

@@ -37,6 +37,11 @@ _PART = "order_part"
 _ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 
+def some_columns(table: Dataset, names: Sequence[str]) -> Dataset:
+    """Return some columns of Parquet files for a database, to which others may have equal names."""
+    return table.replace_schema(pa.schema([table.schema.field(name) for name in names]))
+
+
 @contextmanager
 def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     """

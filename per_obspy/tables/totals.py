@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Totals
@@ -84,17 +86,73 @@ def piece_totals(piece: pd.DataFrame, settings: Totals, classes: Sequence[str]) 
     classes : sequence of str
         Risk classes, each of which has a column even if no pair is of it.
     """
-    longitude, latitude = piece["longitude"], piece["latitude"]
-    if settings.area:
-        area = np.asarray(piece[settings.area].fillna("").astype(str), dtype=object)
-        return PieceTotals(partial_totals(piece, area, classes))
-    if settings.h3 is not None:
-        area = hexagons(longitude, latitude, settings.h3)
+    if settings.area or settings.h3 is not None:
+        area = areas_of(piece, settings, settings.area or "")
         return PieceTotals(partial_totals(piece, area, classes))
     # Cells of a grid, whose outlines are known
-    cells = grid_cells(longitude, latitude, settings.cell)
+    cells = grid_cells(piece["longitude"], piece["latitude"], settings.cell)
     boxes = dict(zip(cells.boxes.index, box_outlines(cells.boxes), strict=True))
     return PieceTotals(partial_totals(piece, cells.cell, classes), boxes)
+
+
+def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.object_]:
+    """
+    Return the area or cell of each row of a table.
+
+    Parameters
+    ----------
+    piece : DataFrame
+        With ``longitude, latitude``, degrees, and the column of areas if these have names.
+    settings : Totals
+        Kind of areas.
+    column : str
+        Which column names the area, for named areas.
+    """
+    if settings.area:
+        return np.asarray(piece[column].fillna("").astype(str), dtype=object)
+    longitude, latitude = piece["longitude"], piece["latitude"]
+    if settings.h3 is not None:
+        return np.asarray(hexagons(longitude, latitude, settings.h3), dtype=object)
+    return grid_cells(longitude, latitude, settings.cell).cell
+
+
+def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
+    """
+    Return totals with the buildings of each area, if there is a table of buildings.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Totals by ``area``.
+    buildings : Path
+        ``buildings.parquet``, worst first; it need not exist.
+
+    Returns
+    -------
+    DataFrame
+        With the columns ``BUILDING_TOTALS``. A building counts in the area of its worst pair, so
+        that no other areas are needed.
+    """
+    if not buildings.exists():
+        return table
+    names = ["area", "building_id", "impacts", "probability_common", "probability_independent"]
+    found = pq.read_table(buildings.absolute(), columns=names, use_threads=False).to_pandas()
+    # The worst building stands first
+    groups = found.assign(hit=found["impacts"].fillna(0) > 0).groupby("area", sort=True)
+    counted = pd.DataFrame(
+        {
+            "buildings": groups.size(),
+            "buildings_hit": groups["hit"].sum(),
+            "expected_buildings_common": groups["probability_common"].sum(),
+            "expected_buildings_independent": groups["probability_independent"].sum(),
+            "worst_building": groups["building_id"].first(),
+        }
+    ).reindex(table["area"])
+    # An area whose pairs are all repeated elsewhere has no building of its own
+    numbers = counted.columns.drop("worst_building")
+    counted[numbers] = counted[numbers].fillna(0)
+    counted = counted.astype({"buildings": np.int64, "buildings_hit": np.int64})
+    return table.join(counted, on="area")
 
 
 def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTotals:

@@ -56,9 +56,15 @@ def test_streets_share_their_direction(pairs):
     assert abs(folded.mean()) == pytest.approx(expected, abs=0.002)
 
 
+#: Pairs of a row share buildings, and neighbours their system with 0.7: the correlation from one
+#: pair to the next is at most 0.82 * 0.7 = 0.57, which adds (1 + 0.57) / (1 - 0.57) = 3.7 to a
+#: variance.
+ALIKE = np.sqrt(3.7)
+
+
 def _scatter(share: float, count: int) -> float:
-    """Return four standard deviations of a binomial share."""
-    return 4 * np.sqrt(share * (1 - share) / count)
+    """Return four standard deviations of a share of pairs that come in rows."""
+    return 4 * ALIKE * np.sqrt(share * (1 - share) / count)
 
 
 @pytest.mark.parametrize(
@@ -82,9 +88,9 @@ def test_half_the_buildings_are_measured(pairs, column):
 
 
 def test_neighbours_are_often_equally_high(pairs):
-    # 45 % on purpose, and of the others as many as two buildings of different pairs by chance
+    # 45 % on purpose, and of the others as many as two buildings of different rows by chance
     share = (pairs["height_1"] == pairs["height_2"]).mean()
-    by_chance = (pairs["height_1"].to_numpy() == np.roll(pairs["height_2"], 1)).mean()
+    by_chance = (pairs["height_1"].to_numpy() == np.roll(pairs["height_2"], 100)).mean()
     expected = 0.45 + 0.55 * by_chance
     assert abs(share - expected) < _scatter(expected, len(pairs)) + _scatter(by_chance, len(pairs))
 
@@ -107,6 +113,36 @@ def test_measured_periods_scatter_about_the_formula(pairs):
     # four standard errors of the mean and of the deviation of a normal quantity
     assert abs(residual.mean()) < 4 * 0.3 / np.sqrt(len(measured))
     assert abs(residual.std() - 0.3) < 4 * 0.3 / np.sqrt(2 * len(measured))
+
+
+BUILDING = ("building_id", "longitude", "latitude", "height", "storeys", "system", "area")
+
+
+def test_rows_share_their_buildings(pairs):
+    # every building has one description, whichever pair gives it; each pair ends with a new one
+    sides = [
+        pairs[[f"{name}_{i}" for name in (*BUILDING, "period", "damping")]].set_axis(
+            [*BUILDING, "period", "damping"], axis=1
+        )
+        for i in (1, 2)
+    ]
+    described = pd.concat(sides).drop_duplicates()
+    assert described["building_id"].is_unique
+    assert pairs["building_id_2"].is_unique
+    goes_on = pairs["building_id_1"].iloc[1:].to_numpy() == pairs["building_id_2"].iloc[:-1]
+    # independent of each other: binomial
+    assert abs(goes_on.mean() - 0.82) < 4 * np.sqrt(0.82 * 0.18 / len(goes_on))
+
+
+def test_a_pair_inside_its_row_has_a_pair_before_and_behind_on_its_axis(pairs):
+    inside = np.flatnonzero(pairs["position"] == "inside")
+    for other in (inside - 1, inside + 1):
+        turn = pairs["azimuth"].to_numpy()[inside] - pairs["azimuth"].to_numpy()[other]
+        # two scatters of 2 degrees, rounded: 6 of their standard deviations
+        assert np.abs((turn + 180) % 360 - 180).max() < 6 * np.sqrt(2) * 2.1
+    identifiers = pairs[["building_id_1", "building_id_2"]].to_numpy()
+    assert (identifiers[inside, 0] == identifiers[inside - 1, 1]).all()
+    assert (identifiers[inside, 1] == identifiers[inside + 1, 0]).all()
 
 
 def test_touching_is_a_parameter():

@@ -17,7 +17,7 @@ from per_obspy.errors import Unfinished
 from per_obspy.jobs import chunk, ground_files, station
 from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
-from per_obspy.records import archives
+from per_obspy.records.archives import archive_files
 
 from .small_run import InProcess, plain_figure, write_configuration, write_smallest_configuration
 
@@ -52,7 +52,7 @@ def no_memory(*_, **__):
 
 #: What fails, and how: at a record, a shard, a chunk, and when a chunk reads a shard.
 FAULTS = {
-    "record not opened": (archives, "_archive_of", system_error(errno.EMFILE)),
+    "record not opened": (archive_files, "_archive_of", system_error(errno.EMFILE)),
     "shard not read back": (station, "_read_shard", system_error(errno.EIO)),
     "part not written": (chunk, "write_part", system_error(errno.EIO)),
     "memory for pairs": (chunk, "risk_rows", no_memory),

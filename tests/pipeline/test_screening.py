@@ -17,7 +17,10 @@ from per_obspy.spectra.storage import read_spectra
 
 from .small_run import SPECTRA, InProcess, write_configuration
 
-RESULTS = ("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv")
+RESULTS = (
+    *("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv"),
+    *("rows.parquet", "buildings.parquet", "buildings.csv"),
+)
 CHUNK = "per_obspy.pipeline.screening.CHUNK"
 
 
@@ -83,7 +86,9 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
 
 def test_results_do_not_depend_on_workers(copied, monkeypatch):
     before = results(copied)
-    monkeypatch.setattr(CHUNK, 20)
+    shutil.rmtree(copied / "out" / "rows")
+    for name in (CHUNK, "per_obspy.pipeline.rows.building_rows.CHUNK"):
+        monkeypatch.setattr(name, 20)
     screen(copied / "run.toml")
     assert results(copied) == before
 
@@ -223,7 +228,7 @@ def write_map_configuration(folder, reach):
     )
 
 
-@pytest.mark.parametrize("reach", [300.0, 1.0])
+@pytest.mark.parametrize("reach", [1000.0, 1.0])
 def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     # reach 1 m: no pair has a station, there is no worst pair with a record to draw
     write_map_configuration(copied, reach)

@@ -69,6 +69,12 @@ class CsvFile:
         self.names: Sequence[str] = [name for name in self._columns if name]
 
     @property
+    def own_names(self) -> list[str]:
+        """Names of the columns as the file has them, in the order of ``names``."""
+        pairs = zip(self.headings, self._columns, strict=True)
+        return [given_text(heading.strip()) for heading, column in pairs if column]
+
+    @property
     def recognised(self) -> str:
         """What is not plain about the file, empty if nothing is; reads the whole file."""
         return "; ".join(text for text in (self._form.sentence(), self.recognised_numbers) if text)

@@ -86,12 +86,14 @@ def read_list(file: Path) -> BuildingList:
         message names those.
     """
     table = CsvFile(file)
-    columns = _columns(file, table.names)
+    # Headings as they are: their translations are those of pairs
+    names = table.own_names
+    columns = _columns(file, names)
     blocks = list(table.rows(ALL))
     if not blocks:
         raise CatalogError(str(file), "the table has no rows")
     broken = tuple(line._replace(kind="building") for rows in blocks for line in rows.broken)
-    rows = pa.concat_tables([block.table for block in blocks])
+    rows = pa.concat_tables([block.table for block in blocks]).rename_columns(names)
     lines = np.concatenate([block.lines for block in blocks])
     # Outlines as they are, or as rectangles
     outlines, faults = _outlines(rows, columns)

@@ -170,15 +170,36 @@ def free_acceleration(row, i, acceleration):
 
 
 @lean
+def closing_acceleration(row, j, acceleration):
+    """
+    Return a bound of the acceleration at which the two sides of a touching interface close.
+
+    Each side is pushed by its own structure, or by one behind it that touches it: the acceleration
+    of structures that move together is a mean of theirs.
+    """
+    # strongest push from the left
+    left = free_acceleration(row, j, acceleration)
+    k = j
+    while k > 0 and is_touching(row, k - 1):
+        k -= 1
+        left = max(left, free_acceleration(row, k, acceleration))
+    # strongest push from the right
+    k = j + 1
+    right = free_acceleration(row, k, acceleration)
+    while k < row.shape[0] - 1 and is_touching(row, k):
+        k += 1
+        right = min(right, free_acceleration(row, k, acceleration))
+    return left - right
+
+
+@lean
 def is_lingering(row, j, acceleration):
     """Return whether a touching pair separates so slowly that it may stay in contact."""
     separation = row[j + 1, V] - row[j, V]
     if separation <= row[0, STICKING_SPEED] or row[0, BOUNCES] >= row[0, BOUNCE_LIMIT]:
         return True
     # a bounce lasts 2 separation / closing acceleration
-    left = free_acceleration(row, j, acceleration)
-    right = free_acceleration(row, j + 1, acceleration)
-    return separation <= row[0, STICKING_DELAY] * (left - right)
+    return separation <= row[0, STICKING_DELAY] * closing_acceleration(row, j, acceleration)
 
 
 @lean
@@ -252,13 +273,16 @@ def resolve_contact(row, log, segment, elapsed, hit):
     """
     acceleration = segment.acceleration + segment.slope * elapsed
     apply_impacts(row, log, hit, segment.start + elapsed)
-    # open every touching interface; note where it may stay closed
-    lingering = False
+    # open every touching interface
     for j in range(row.shape[0] - 1):
         row[j, LINGERING] = 0.0
         if j == hit or is_touching(row, j):
             row[j, CLEARANCE_ORDER] = 1.0 if row[j + 1, V] > row[j, V] else 2.0
             row[j, IN_CONTACT] = 0.0
+    # note where one may stay closed
+    lingering = False
+    for j in range(row.shape[0] - 1):
+        if row[j, CLEARANCE_ORDER] > 0.0:
             row[j, LINGERING] = is_lingering(row, j, acceleration)
             lingering |= row[j, LINGERING] != 0.0
     if lingering:

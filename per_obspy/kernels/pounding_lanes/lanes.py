@@ -118,7 +118,7 @@ def start_tile(lanes, north, east):
 
 
 @lean
-def _step_structure(lanes, first, lane, u, z, high, low, radius_squared, ground, next_ground):
+def step_structure(lanes, first, lane, u, z, high, low, radius_squared, ground, next_ground):
     """Return displacement, velocity and extremes of a structure after a step."""
     after = step_value(lanes, first + STEP_DISPLACEMENT, lane, u, z, ground, next_ground)
     z = step_value(lanes, first + STEP_VELOCITY, lane, u, z, ground, next_ground)
@@ -149,10 +149,10 @@ def advance_one_step(lanes, n0, e0, n1, e1):
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
         # step
-        u1, z1, high_1, low_1, squared_1 = _step_structure(
+        u1, z1, high_1, low_1, squared_1 = step_structure(
             lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
         )
-        u2, z2, high_2, low_2, squared_2 = _step_structure(
+        u2, z2, high_2, low_2, squared_2 = step_structure(
             lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
         )
         least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
@@ -193,37 +193,37 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         # first step, from a0 to a1: ground accelerations along the pair
         a0 = cosine * n0 + sine * e0
         a1 = cosine * n1 + sine * e1
-        u1, z1, high_1, low_1, squared_1 = _step_structure(
+        u1, z1, high_1, low_1, squared_1 = step_structure(
             lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a0, a1
         )
-        u2, z2, high_2, low_2, squared_2 = _step_structure(
+        u2, z2, high_2, low_2, squared_2 = step_structure(
             lanes, second, lane, u2, z2, high_2, low_2, squared_2, a0, a1
         )
         least = min(least, contact_value(lanes, lane, u1, u2, z1, a1))
         # second step
         a2 = cosine * n2 + sine * e2
-        u1, z1, high_1, low_1, squared_1 = _step_structure(
+        u1, z1, high_1, low_1, squared_1 = step_structure(
             lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a1, a2
         )
-        u2, z2, high_2, low_2, squared_2 = _step_structure(
+        u2, z2, high_2, low_2, squared_2 = step_structure(
             lanes, second, lane, u2, z2, high_2, low_2, squared_2, a1, a2
         )
         least = min(least, contact_value(lanes, lane, u1, u2, z1, a2))
         # third step
         a3 = cosine * n3 + sine * e3
-        u1, z1, high_1, low_1, squared_1 = _step_structure(
+        u1, z1, high_1, low_1, squared_1 = step_structure(
             lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a2, a3
         )
-        u2, z2, high_2, low_2, squared_2 = _step_structure(
+        u2, z2, high_2, low_2, squared_2 = step_structure(
             lanes, second, lane, u2, z2, high_2, low_2, squared_2, a2, a3
         )
         least = min(least, contact_value(lanes, lane, u1, u2, z1, a3))
         # fourth step
         a4 = cosine * n4 + sine * e4
-        u1, z1, high_1, low_1, squared_1 = _step_structure(
+        u1, z1, high_1, low_1, squared_1 = step_structure(
             lanes, 0, lane, u1, z1, high_1, low_1, squared_1, a3, a4
         )
-        u2, z2, high_2, low_2, squared_2 = _step_structure(
+        u2, z2, high_2, low_2, squared_2 = step_structure(
             lanes, second, lane, u2, z2, high_2, low_2, squared_2, a3, a4
         )
         least = min(least, contact_value(lanes, lane, u1, u2, z1, a4))

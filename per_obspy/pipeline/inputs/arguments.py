@@ -9,7 +9,7 @@ from per_obspy.config.changes import merged, parsed_changes
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError, printable
 from per_obspy.pipeline.inputs.event_section import event_section
-from per_obspy.pipeline.inputs.recognition import (
+from per_obspy.pipeline.inputs.input_kinds import (
     PAIR_KINDS,
     RECORD_KINDS,
     Kind,

@@ -11,7 +11,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.formats.text.station_table import is_station_table, read_station_table
 from per_obspy.pipeline.inputs.facts import Facts, Places, some, span, unzipped
-from per_obspy.pipeline.inputs.recognition import Kind
+from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.records.contents.metadata_files import read_inventories
 from per_obspy.records.event_file import read_event
 from per_obspy.records.shakemap import is_scenario, read_shakemap

@@ -11,7 +11,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.pipeline.inputs.described_tables import risk_table_facts
 from per_obspy.pipeline.inputs.facts import Facts, Places, some
-from per_obspy.pipeline.inputs.recognition import Kind
+from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.resume import StatusError, read_status
 
 #: Keys of a configuration that are listed.

@@ -13,7 +13,7 @@ from per_obspy.inventory.schema import COLUMNS
 from per_obspy.inventory.table_checks import derived_counts, suspicions, unused_columns
 from per_obspy.inventory.table_columns import numbers_in
 from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
-from per_obspy.pipeline.inputs.recognition import Kind
+from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.screening.ranking import EVERY_STATE, STATES
 from per_obspy.tables.parts import parquet_rows
 

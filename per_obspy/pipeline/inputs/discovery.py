@@ -12,7 +12,7 @@ from per_obspy.config.section import with_paths
 from per_obspy.errors import CatalogError
 from per_obspy.files import written_whole
 from per_obspy.pipeline.inputs.arguments import RESULTS, run_content
-from per_obspy.pipeline.inputs.recognition import (
+from per_obspy.pipeline.inputs.input_kinds import (
     PAIR_KINDS,
     RECORD_KINDS,
     Kind,

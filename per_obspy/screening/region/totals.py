@@ -56,6 +56,28 @@ TOTALS: dict[str, Column] = {
     )
 }
 
+#: Columns of the buildings, where the pairs name them.
+BUILDING_TOTALS: dict[str, Column] = {
+    column.name: column
+    for column in (
+        Column("buildings", "int64", "1", "buildings whose worst pair is in the area"),
+        Column("buildings_hit", "int64", "1", "of these, hit in the exact history of a row"),
+        Column(
+            "expected_buildings_common",
+            "float64",
+            "1",
+            "expected number of buildings that are hit, if one cause decides all pairs of each",
+        ),
+        Column(
+            "expected_buildings_independent",
+            "float64",
+            "1",
+            "the same if its pairs were independent; the truth lies in between",
+        ),
+        Column("worst_building", "str", "", "building_id of the area's worst building"),
+    )
+}
+
 
 class ExpectedCount(NamedTuple):
     """

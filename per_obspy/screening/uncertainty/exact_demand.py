@@ -162,7 +162,9 @@ def _may_touch(station: StationMotion, table: Table, chance: FloatArray) -> NDAr
 
 def _kinds(table: Table, chance: FloatArray) -> list[tuple[NDArray[np.bool_], int, int]]:
     """Return masks of pairs, each with the numbers of its first nodes and of all of them."""
-    yields, touching = can_yield(table), values(table, "gap") == 0.0
+    yields = can_yield(table)
+    # drawn outlines that touch may still have a gap
+    touching = (values(table, "gap") == 0.0) & (gap_dispersion(table) == 0.0)
     sure = ~touching & (chance > 1.0 - NEGLIGIBLE)
     others = ~touching & ~sure
     # fewer nodes of yielding pairs, and of those that surely touch

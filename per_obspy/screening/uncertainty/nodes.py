@@ -27,6 +27,9 @@ BUILDINGS, DEMAND, GAP = slice(0, 4), 4, 5
 #: touch and from ``WIDE`` standard deviations on; in between they are interpolated.
 TOUCHING, APART, WIDE = (0.01, 0.9), (0.16, 0.84), 3.0
 
+#: Chance that buildings whose drawn outlines touch have one wall.
+ONE_WALL = 0.5
+
 #: Largest damping of a node, fraction of critical: an oscillator has less than the critical one.
 LARGEST_DAMPING = 0.99
 
@@ -89,6 +92,12 @@ def gap_dispersion(pairs: Table) -> FloatArray:
 def median_gap(pairs: Table) -> FloatArray:
     """Return the median of a lognormal gap, m, as :func:`gap_dispersion`."""
     return _lognormal_gap(pairs)[0]
+
+
+def one_wall_chance(pairs: Table) -> FloatArray:
+    """Return the chance that buildings whose outlines touch have one wall; 0 of other pairs."""
+    touching = (values(pairs, "gap") == 0.0) & (values(pairs, "gap_std") > 0.0)
+    return np.where(touching, ONE_WALL, 0.0)
 
 
 def _lognormal_gap(pairs: Table) -> tuple[FloatArray, FloatArray]:

@@ -19,7 +19,13 @@ import numpy as np
 
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pairs.node_outcomes import OUTCOME_ROWS, fill_chances, fill_outcomes
-from per_obspy.screening.uncertainty.nodes import DEMAND, GAP, gap_dispersion, median_gap
+from per_obspy.screening.uncertainty.nodes import (
+    DEMAND,
+    GAP,
+    gap_dispersion,
+    median_gap,
+    one_wall_chance,
+)
 from per_obspy.screening.uncertainty.severity import RelativeMotion
 from per_obspy.screening.values import Columns, Table, both, values
 
@@ -82,6 +88,9 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
     every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
     outcome = np.empty((OUTCOME_ROWS, len(facts[0])))
     fill_outcomes(np.ascontiguousarray(every), facts, deviates, outcome)
+    # the lognormal gap has no share of exactly 0, at which any motion is contact
+    moving = (uncertain.motion.demand > 0.0).mean(axis=1)
+    outcome[0] = np.maximum(outcome[0], one_wall_chance(pairs) * moving)
     return dict(zip(COLUMNS, outcome, strict=True))
 
 

@@ -135,3 +135,15 @@ def test_draws_of_exact_histories(station, record):
     # P of 128 nodes is within 0.021 of 4096 at 95 of 100 pairs; the velocity fit within 25 % a node
     assert_allclose(row["probability"], np.mean(hit.impact_velocity > 0), atol=0.03)
     assert_allclose(row["expected_impact_velocity"], hit.impact_velocity.mean(), rtol=0.25)
+
+
+@pytest.mark.parametrize("way", [{}, DERIVED, {"azimuth": np.nan}])
+def test_half_of_the_touching_outlines_are_one_wall(way):
+    # weak motion, a hundredth of the error of the outlines: a wall that is one is still hit
+    station = make_station(scale=0.001)
+    row = {**GIVEN, **way, "gap": 0.0, "gap_std": 0.1}
+    table = _table(station, [row, {**row, "gap": 0.4}])
+    assert (table["demand"] < 1e-3).all()
+    # the error of the outlines alone adds 0.4 %
+    assert table["probability"].iloc[0] == pytest.approx(0.5, abs=0.01)
+    assert table["state"].tolist() == ["likely", "no"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from per_obspy.pounding.history.bridges import bridge_history
+from per_obspy.pounding.history.with_walls.bridges import bridge_history
 from per_obspy.pounding.structure import Structure
 
 DT = 0.02

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from per_obspy.pipeline.inputs.facts import Facts
-from per_obspy.pipeline.inputs.recognition import (
+from per_obspy.pipeline.inputs.input_kinds import (
     PAIR_KINDS,
     Kind,
     files_in,

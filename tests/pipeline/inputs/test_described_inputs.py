@@ -13,8 +13,8 @@ import pytest
 
 from per_obspy.config import Scenario
 from per_obspy.errors import CatalogError
+from per_obspy.pipeline.inputs.described_inputs import described
 from per_obspy.pipeline.inputs.described_tables import MOST_ROWS
-from per_obspy.pipeline.inputs.description import described
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap,ward\n"

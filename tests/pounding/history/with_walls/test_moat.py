@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from per_obspy.pounding.history.moat import moat_history
+from per_obspy.pounding.history.with_walls.moat import moat_history
 from per_obspy.pounding.structure import Structure
 
 DT = 0.02

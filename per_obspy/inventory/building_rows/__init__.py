@@ -1,0 +1,1 @@
+"""Rows of neighbouring buildings, found from pairs."""

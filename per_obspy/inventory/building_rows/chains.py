@@ -1,0 +1,265 @@
+"""
+Rows of buildings: chains of joined contacts, cut where they close, bend, or are too long.
+
+Every pair is in exactly one row. A row that is cut at a gap leaves the pair of that gap as a row of
+its own, so that no contact is lost; one that is cut at a bend has the building there in both parts.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+
+from per_obspy.checks import FloatArray
+from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray
+from per_obspy.inventory.building_rows.joints import Joints
+
+#: Contacts of a chain beyond which it is halved before anything else: the other cuts take one part
+#: at a time, and a damaged table may make one chain of all its pairs.
+HALVED = 1000
+
+#: One contact of a chain: its pair, and whether building 1 of the pair is the later one.
+Link = tuple[int, bool]
+
+#: Flags of a row of buildings, and the meaning of each.
+ROW_FLAGS: dict[str, str] = {
+    "ring": "the buildings close a ring, which is cut at its widest gap",
+    "cut": "longer than the configured number of buildings, or next to such a cut: the pair of the "
+    "widest gap is a row of its own, and hits do not travel across it",
+    "bent": "the axes of a longer chain turn by more than the configured angle: cut at the bend",
+    "fork": "a building has more neighbours on a side than a row can have: the row follows the "
+    "narrowest gaps, the others are rows of their own",
+    "contradictory": "pairs contradict each other about a building: cut there, see rejected.csv",
+    "no_building_id": "the pair names no building: a row of two buildings of its own",
+    "ambiguous_id": "an identifier stands for buildings at different places, or for too many: each "
+    "pair is a row of its own there",
+    "unknown_gap": "the pair table gives no gap: a row of two without a history, or with the gap "
+    "that the configuration assumes",
+    "unknown_azimuth": "the axis is not given: a row of two along the worst azimuth",
+}
+
+
+class Chains(NamedTuple):
+    """
+    Rows of contacts.
+
+    Attributes
+    ----------
+    pair : (n_contacts,) ndarray of int
+        Pairs in the order of the rows, and within each along its axis.
+    turned : (n_contacts,) ndarray of bool
+        Whether building 2 of the pair stands before building 1 along the axis.
+    first : (n_rows + 1,) ndarray of int
+        Place of the first contact of each row, and the end.
+    azimuth : (n_rows,) ndarray
+        Of the axis from the first building to the last, from 0 to below 180 degrees; NaN if
+        unknown.
+    flags : dict of str to (n_rows,) ndarray of bool
+        By the names of ``ROW_FLAGS``.
+    """
+
+    pair: IntArray
+    turned: BoolArray
+    first: IntArray
+    azimuth: FloatArray
+    flags: dict[str, BoolArray]
+
+
+class _Piece(NamedTuple):
+    """A part of a chain, the names of its flags, and whether its ends are joined."""
+
+    links: list[Link]
+    flags: frozenset[str]
+    closed: bool = False
+
+    def flagged(self, name: str) -> "_Piece":
+        """Return the part with one flag more."""
+        return self._replace(flags=self.flags | {name})
+
+
+def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) -> Chains:
+    """
+    Follow the joints from contact to contact, and cut the chains into rows.
+
+    Parameters
+    ----------
+    contacts, joints : Contacts, Joints
+        Contacts and how they are joined.
+    angle : float
+        Largest angle between the axes of two contacts of a row, degrees.
+    longest : int
+        Largest number of buildings of a row.
+
+    Returns
+    -------
+    Chains
+        In the order of the smallest name of a pair of each row; every pair that repeats no other
+        is in one of them.
+    """
+    cutter = _Cutter(contacts, angle, longest)
+    rows = list(chain.from_iterable(map(cutter.pieces, _followed(contacts, joints))))
+    order = contacts.order.tolist()
+    rows.sort(key=lambda row: min(order[pair] for pair, _ in row.links))
+    pair, turned, first = _flat(rows)
+    # Along the axis, whose azimuth is below 180 degrees
+    azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
+    pair, turned = _reversed(pair, turned, first, backwards)
+    flags = {}
+    for name in ROW_FLAGS:
+        flags[name] = np.array([name in row.flags for row in rows], dtype=bool)
+    # And those that follow from their buildings and pairs
+    for name, raised in _flags_of_buildings(contacts, joints, pair).items():
+        if raised.size:
+            flags[name] |= np.logical_or.reduceat(raised, first[:-1])
+    return Chains(pair, turned, first, azimuth, flags)
+
+
+def _flat(rows: Sequence[_Piece]) -> tuple[IntArray, BoolArray, IntArray]:
+    """Return pairs, which of them are turned, and the place of the first one of each row."""
+    # Link by link
+    links = [link for row in rows for link in row.links]
+    pair = np.array([link[0] for link in links], dtype=np.int64)
+    turned = np.array([link[1] for link in links], dtype=bool)
+    sizes = [0, *(len(row.links) for row in rows)]
+    return pair, turned, np.cumsum(sizes, dtype=np.int64)
+
+
+def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
+    """Yield the chains of joined contacts; those that close are flagged as rings."""
+    joined = joints.joined.tolist()
+    done = contacts.repeated.tolist()
+    by_name = np.argsort(contacts.order, kind="stable").tolist()
+    # Chains begin at an end that is free; what is left afterwards are rings
+    for pair in by_name:
+        for end in (2 * pair, 2 * pair + 1):
+            if not done[pair] and joined[end] < 0:
+                yield _Piece(_walked(end, joined, done), frozenset())
+    for pair in by_name:
+        if not done[pair]:
+            yield _Piece(_walked(2 * pair, joined, done), frozenset({"ring"}), closed=True)
+
+
+def _walked(end: int, joined: list[int], done: list[bool]) -> list[Link]:
+    """Return the contacts from one end on, and mark them as done."""
+    links = []
+    while end >= 0 and not done[end // 2]:
+        done[end // 2] = True
+        # At its end 1 a contact is entered at building 2
+        links.append((end // 2, end % 2 == 1))
+        end = joined[end ^ 1]
+    return links
+
+
+class _Cutter:
+    """Cuts chains into rows."""
+
+    def __init__(self, contacts: Contacts, angle: float, longest: int) -> None:
+        self._buildings = contacts.buildings.tolist()
+        self._azimuth = contacts.azimuth.tolist()
+        self._gap = contacts.gap.tolist()
+        self._angle = angle
+        self._longest = longest
+
+    def pieces(self, whole: _Piece) -> Iterator[_Piece]:
+        """Yield the rows of a chain."""
+        waiting = [whole]
+        while waiting:
+            row = waiting.pop()
+            parts = self._cut(row)
+            if parts is None:
+                yield row
+            else:
+                waiting.extend(part for part in parts if part.links)
+
+    def _cut(self, row: _Piece) -> list[_Piece] | None:
+        """Return the parts of a row that cannot stay one; None if it can."""
+        length = len(row.links)
+        if length == 1:
+            return None
+        if length > HALVED:
+            return self._at_gap(row.flagged("cut"), length // 3, 2 * length // 3)
+        # A row that comes back to a building is a ring, whether its axes tell so or not
+        repetition = self._repetition(row.links)
+        if repetition is not None:
+            return self._at_gap(row.flagged("ring"), *repetition)
+        bend = self._bend(row.links)
+        if bend is not None:
+            bent = row.flagged("bent")
+            return [bent._replace(links=part) for part in (row.links[:bend], row.links[bend:])]
+        if length + 1 > self._longest:
+            return self._at_gap(row.flagged("cut"), 0, length)
+        return None
+
+    def _repetition(self, links: list[Link]) -> tuple[int, int] | None:
+        """Return the first contacts between two visits of one building, as a range."""
+        seen = {self._buildings[links[0][0]][links[0][1]]: 0}
+        for place, (pair, turned) in enumerate(links, start=1):
+            building = self._buildings[pair][not turned]
+            if building in seen:
+                return seen[building], place
+            seen[building] = place
+        return None
+
+    def _bend(self, links: list[Link]) -> int | None:
+        """Return the place of the sharpest bend of contacts whose axes turn too far."""
+        azimuth = [self._azimuth[pair] + 180.0 * turned for pair, turned in links]
+        turns = np.diff(azimuth)
+        turns = (turns + 180.0) % 360.0 - 180.0
+        along = np.concatenate([[0.0], np.cumsum(turns)])
+        # Rounding alone cuts no row
+        if np.ptp(along) <= self._angle + 1e-9:
+            return None
+        return int(np.argmax(np.abs(turns))) + 1
+
+    def _at_gap(self, row: _Piece, first: int, last: int) -> list[_Piece]:
+        """Return a row cut at the widest gap of a range of contacts, nearest to its middle."""
+        # Of equal gaps the one nearest to the middle
+        middle = (first + last - 1) / 2.0
+        links = row.links
+        place = max(range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle)))
+        before, cut, behind = links[:place], links[place : place + 1], links[place + 1 :]
+        # What is left of a ring is one row
+        parts = [behind + before, cut] if row.closed else [before, cut, behind]
+        return [row._replace(links=part, closed=False) for part in parts]
+
+
+def _axes(azimuth: FloatArray, first: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Return the mean azimuth of each row, from 0 to below 180, and which have to be turned."""
+    if not azimuth.size:
+        return np.empty(0), np.empty(0, dtype=bool)
+    angle = np.radians(azimuth)
+    north, east = (np.add.reduceat(part(angle), first[:-1]) for part in (np.cos, np.sin))
+    mean = np.degrees(np.arctan2(east, north))
+    # One contact has its own azimuth, to the last digit
+    single = np.diff(first) == 1
+    mean = np.where(single, azimuth[first[:-1]], mean) % 360.0
+    backwards = mean >= 180.0
+    return np.where(backwards, mean - 180.0, mean), backwards
+
+
+def _reversed(
+    pair: IntArray, turned: BoolArray, first: IntArray, backwards: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return the contacts with some rows in the opposite order."""
+    # Where the row of each contact begins and ends
+    sizes = np.diff(first)
+    starts, ends = np.repeat(first[:-1], sizes), np.repeat(first[1:], sizes)
+    back = np.repeat(backwards, sizes)
+    place = np.arange(pair.size)
+    source = np.where(back, starts + ends - 1 - place, place)
+    return pair[source], turned[source] ^ back
+
+
+def _flags_of_buildings(contacts: Contacts, joints: Joints, pair: IntArray) -> dict[str, BoolArray]:
+    """Return which contacts raise each flag that follows from their buildings."""
+    buildings = contacts.buildings[pair]
+    # A building raises the flags of all its rows
+    return {
+        "fork": np.asarray(joints.forks[buildings].any(axis=1)),
+        "contradictory": np.asarray(joints.contradictory[buildings].any(axis=1)),
+        "ambiguous_id": contacts.ambiguous[pair] | joints.crowded[buildings].any(axis=1),
+        "no_building_id": ~contacts.named[buildings].all(axis=1) & ~contacts.ambiguous[pair],
+        "unknown_gap": ~contacts.gap_given[pair],
+        "unknown_azimuth": np.isnan(contacts.azimuth[pair]),
+    }

@@ -1,0 +1,245 @@
+"""
+Contacts between numbered buildings, from the pairs of a table.
+
+A building is known by its identifier. Pairs without identifiers have two buildings of their own,
+and so have pairs whose identifier stands for buildings at different places.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.constants import EARTH_RADIUS
+from per_obspy.errors import Rejection
+from per_obspy.inventory.building_rows.given import is_derived
+from per_obspy.inventory.table_columns import numbers_in
+
+#: Largest distance between the positions that the pairs of a building give for it, m: a survey may
+#: give the middle of each wall, and blocks are that long.
+SAME_PLACE = 100.0
+
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+class Contacts(NamedTuple):
+    """
+    Pairs as contacts between numbered buildings.
+
+    Attributes
+    ----------
+    buildings : (n_pairs, 2) ndarray of int
+        Numbers of buildings 1 and 2.
+    names : (n_buildings,) ndarray of str
+        Identifier of each building; ``PAIR#1`` and ``PAIR#2`` are those of a pair without.
+    named : (n_buildings,) ndarray of bool
+        Whether the identifier is that of the table.
+    azimuth : (n_pairs,) ndarray
+        From building 1 to 2, degrees; NaN if unknown.
+    gap, facing_length : (n_pairs,) ndarray
+        m; NaN where the gap is unknown, 0 where the facing length is.
+    gap_given : (n_pairs,) ndarray of bool
+        Whether the table gives the gap.
+    pair_id : (n_pairs,) ndarray of str
+        Identifiers of the pairs.
+    order : (n_pairs,) ndarray of int
+        Place of each identifier in their alphabetical order, by which ties are broken.
+    repeated : (n_pairs,) ndarray of bool
+        Whether another pair describes the same contact.
+    ambiguous : (n_pairs,) ndarray of bool
+        Whether an identifier of the pair stands for buildings at different places.
+    rejected : tuple of Rejection
+        One for each repeated contact and each ambiguous identifier.
+    """
+
+    buildings: IntArray
+    names: NDArray[np.object_]
+    named: BoolArray
+    azimuth: FloatArray
+    gap: FloatArray
+    facing_length: FloatArray
+    gap_given: BoolArray
+    pair_id: NDArray[np.object_]
+    order: IntArray
+    repeated: BoolArray
+    ambiguous: BoolArray
+    rejected: tuple[Rejection, ...]
+
+
+def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
+    """
+    Give the buildings of a pair table numbers, and find contacts that are described twice.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        With ``pair_id, gap, derived, longitude_i, latitude_i``, and ``building_id_i, azimuth,
+        facing_length`` where they are known.
+    angle : float
+        Pairs of the same two buildings are one contact if their axes differ by no more, degrees.
+
+    Returns
+    -------
+    Contacts
+    """
+    # Buildings by their identifiers
+    pair_id = pairs["pair_id"].to_numpy(dtype=object)
+    codes, identifiers = _identified(pairs)
+    is_ambiguous, rejected = _ambiguous(pairs, codes, identifiers)
+    buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
+    # Contacts that are described twice
+    azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
+    order = np.asarray(pd.factorize(pair_id, sort=True)[0], dtype=np.int64)
+    sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
+    repeated, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
+    return Contacts(
+        buildings=buildings,
+        names=names,
+        named=np.arange(names.size) < len(identifiers),
+        azimuth=azimuth,
+        gap=gap,
+        facing_length=_facing(pairs),
+        gap_given=_given(pairs, gap),
+        pair_id=pair_id,
+        order=order,
+        repeated=repeated,
+        ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
+        rejected=(*rejected, *found),
+    )
+
+
+def _facing(pairs: pd.DataFrame) -> FloatArray:
+    """Return lengths over which walls face each other, m; 0 where they are unknown."""
+    return np.asarray(np.nan_to_num(numbers_in(pairs, "facing_length")))
+
+
+def _given(pairs: pd.DataFrame, gap: FloatArray) -> BoolArray:
+    """Return which gaps are neither unknown nor assumed."""
+    return np.isfinite(gap) & ~is_derived(pairs["derived"], "gap")
+
+
+def _numbered(
+    pair_id: NDArray[np.object_],
+    codes: IntArray,
+    identifiers: NDArray[np.object_],
+    is_ambiguous: BoolArray,
+) -> tuple[IntArray, NDArray[np.object_]]:
+    """Return the numbers of the buildings of each pair, and the names of all buildings."""
+    own = (codes < 0) | is_ambiguous[codes]
+    # Buildings of their own are numbered after those with an identifier
+    buildings = codes.copy()
+    buildings[own] = len(identifiers) + np.arange(int(own.sum()))
+    return buildings, np.concatenate([identifiers, _own_names(pair_id, own)])
+
+
+def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
+    """Return a code per pair and side, -1 without an identifier, and the identifiers, sorted."""
+    sides = []
+    for name in ("building_id_1", "building_id_2"):
+        given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
+        sides.append(given.fillna("").astype(str).to_numpy(dtype=object))
+    # Sorted, so that numbers do not depend on the order of the table
+    text = np.stack(sides, axis=1).ravel()
+    text[text == ""] = None
+    codes, identifiers = pd.factorize(text, sort=True)
+    numbers = np.asarray(codes, dtype=np.int64).reshape(-1, 2)
+    return numbers, np.asarray(identifiers, dtype=object)
+
+
+def _ambiguous(
+    pairs: pd.DataFrame, codes: IntArray, identifiers: NDArray[np.object_]
+) -> tuple[BoolArray, tuple[Rejection, ...]]:
+    """Return which identifiers stand for several places, with one entry more, and why."""
+    # One entry more, which is that of the code -1
+    spread = np.zeros(len(identifiers) + 1)
+    if len(identifiers):
+        spread[:-1] = _spread(pairs, codes)
+    ambiguous = spread > SAME_PLACE
+    reasons = []
+    for code in np.flatnonzero(ambiguous).tolist():
+        reason = (
+            f"building_id = {identifiers[code]!r}: its pairs place it up to {spread[code]:.0f} m "
+            f"apart, at most {SAME_PLACE:g} m are taken for one building: each pair has a "
+            "building of its own"
+        )
+        reasons.append(Rejection("building", identifiers[code], "", None, (reason,)))
+    return ambiguous, tuple(reasons)
+
+
+def _spread(pairs: pd.DataFrame, codes: IntArray) -> FloatArray:
+    """Return the diagonal of the box around the positions of each identifier, m."""
+    # Boxes in space hold across the date line too
+    sides = [_on_sphere(pairs, i) for i in (1, 2)]
+    places = np.stack(sides, axis=1).reshape(-1, 3)
+    known = codes.ravel() >= 0
+    groups = pd.DataFrame(places[known]).groupby(codes.ravel()[known])
+    sizes = (groups.max() - groups.min()).to_numpy()
+    return np.asarray(EARTH_RADIUS * np.sqrt(np.square(sizes).sum(axis=1)))
+
+
+def _on_sphere(pairs: pd.DataFrame, i: int) -> FloatArray:
+    """Return positions of building i on the unit sphere, (n_pairs, 3)."""
+    east = np.radians(numbers_in(pairs, f"longitude_{i}"))
+    north = np.radians(numbers_in(pairs, f"latitude_{i}"))
+    level = np.cos(north)
+    return np.stack([level * np.cos(east), level * np.sin(east), np.sin(north)], axis=1)
+
+
+def _own_names(pair_id: NDArray[np.object_], own: BoolArray) -> NDArray[np.object_]:
+    """Return the names of the buildings that belong to one pair only."""
+    rows, sides = np.nonzero(own)
+    names = [f"{pair_id[row]}#{side + 1}" for row, side in zip(rows, sides, strict=True)]
+    return np.array(names, dtype=object)
+
+
+def _repeated(
+    pair_id: NDArray[np.object_],
+    buildings: IntArray,
+    azimuth: FloatArray,
+    gap: FloatArray,
+    order: NDArray[np.intp],
+    angle: float,
+) -> tuple[BoolArray, tuple[Rejection, ...]]:
+    """Return which pairs repeat the contact of another one with at most their gap, and why."""
+    ends = np.sort(buildings, axis=1)[order]
+    same = (ends[1:] == ends[:-1]).all(axis=1)
+    repeated = np.zeros(gap.size, dtype=bool)
+    reasons, kept = [], list[int]()
+    # The narrowest gap stands first; only few pairs have the buildings of another
+    for place in np.flatnonzero(same).tolist():
+        # A new group of pairs of the same buildings, or one more of it
+        before, row = int(order[place]), int(order[place + 1])
+        if not (place and same[place - 1]):
+            kept = [before]
+        twin = [other for other in kept if _one_axis(azimuth[other], azimuth[row], angle)]
+        if not twin:
+            kept.append(row)
+            continue
+        repeated[row] = True
+        reasons.append(_repetition(pair_id, gap, row, twin[0]))
+    return repeated, tuple(reasons)
+
+
+def _one_axis(first: float, second: float, angle: float) -> bool:
+    """Return whether two axes agree, in either direction; an unknown one agrees with all."""
+    if np.isnan(first) or np.isnan(second):
+        return True
+    between = abs((first - second + 90.0) % 180.0 - 90.0)
+    return bool(between <= angle)
+
+
+def _repetition(pair_id: NDArray[np.object_], gap: FloatArray, row: int, kept: int) -> Rejection:
+    """Return the rejection of a pair whose contact another one describes."""
+    reason = (
+        f"it repeats the contact of pair {pair_id[kept]!r} between the same buildings: "
+        f"rows take the gap of {_metres(gap[kept])} instead of {_metres(gap[row])}"
+    )
+    return Rejection("row", pair_id[row], "", None, (reason,))
+
+
+def _metres(gap: float) -> str:
+    """Return a gap as a text."""
+    return f"{gap:g} m" if np.isfinite(gap) else "unknown width"

@@ -1,0 +1,251 @@
+"""
+Work on one chunk of rows of buildings: whole rows of one station, and their exact histories.
+
+Chunks are independent of each other and are resumed as those of pairs are: see
+:mod:`per_obspy.jobs.chunk`.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from per_obspy.errors import Rejection
+from per_obspy.files import file_hash, remove_file
+from per_obspy.jobs.ground_files import StationFile, read_station_once
+from per_obspy.jobs.parallel import Work, results
+from per_obspy.resume import earlier_status, read_status, write_status
+from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
+from per_obspy.screening.building_rows.members import IntArray
+from per_obspy.screening.values import Columns, chosen, components
+from per_obspy.tables.building_rows import write_rows_part
+
+#: Contacts of a chunk, about: a worker needs 1 kB for each.
+CHUNK = 10_000
+
+
+class RowsJob(NamedTuple):
+    """
+    One chunk to do.
+
+    Attributes
+    ----------
+    number : int
+        Place of the chunk.
+    contacts : Table
+        Contacts of whole rows, one after the other, with the columns of their interfaces that are
+        known, ``row`` (rising) and those of ``members.NEEDED``.
+    station : StationFile or None
+        Whose record they are followed under; None: no history is computed.
+    part : Path
+        Where the interfaces go.
+    key : str
+        Hash of everything on which the part depends; :func:`do_row_chunks` computes it.
+    """
+
+    number: int
+    contacts: pa.Table
+    station: StationFile | None
+    part: Path
+    key: str = ""
+
+
+class RowsPart(NamedTuple):
+    """
+    Result of a chunk.
+
+    Attributes
+    ----------
+    number : int
+        Its place.
+    rows : int
+        Number of contacts.
+    path, status : Path
+        Its interfaces, and the status file with what was left out.
+    resumed, failed : bool
+        Whether an earlier run had done it; whether its work failed unexpectedly.
+    """
+
+    number: int
+    rows: int
+    path: Path
+    status: Path
+    resumed: bool = False
+    failed: bool = False
+
+
+def rows_rejections(parts: Iterable[RowsPart]) -> Iterator[Rejection]:
+    """Yield the rows whose history could not be computed."""
+    for part in parts:
+        yield from map(Rejection.stored, read_status(part.status)["rejected"])
+
+
+def do_row_chunks(
+    jobs: Iterable[RowsJob], workers: int, executor: Executor | None
+) -> Iterator[RowsPart]:
+    """
+    Yield every part as it is finished, in parallel; what an earlier run did is not done again.
+
+    Parameters
+    ----------
+    jobs : iterable of RowsJob
+        Chunks, which are taken while the work goes on.
+    workers : int
+        Number of processes.
+    executor : Executor or None
+        Where to work instead.
+
+    Raises
+    ------
+    WriteError
+        If a part cannot be written.
+    Unfinished
+        After all other chunks, if the machine failed at some.
+    """
+    resumed = list[RowsPart]()
+
+    def missing() -> Iterator[RowsJob]:
+        """Yield the jobs that have to be done; the others are resumed on the way."""
+        for job in jobs:
+            keyed = job._replace(key=_key(job))
+            status = earlier_status(_status_file(job), keyed.key)
+            if status is None or "rejected" not in status:
+                yield keyed
+            else:
+                resumed.append(_part(job)._replace(resumed=True))
+
+    # Resumed parts are passed on as soon as the next one is finished
+    for part in results(missing(), Work(do_rows, _failed, _name), workers, executor):
+        yield from resumed
+        resumed.clear()
+        yield part
+    yield from resumed
+
+
+def do_rows(job: RowsJob) -> RowsPart:
+    """Follow the rows of a chunk, write its part and status, and return the finished part."""
+    remove_file(job.part)
+    contacts = _columns(job.contacts)
+    if job.station is None:
+        return _recorded(job, contacts, no_outcomes(job.contacts.num_rows), ())
+    dataset = read_station_once(job.station.shard, job.station.hash)
+    # Along a single horizontal whatever the axis: it counts as north
+    one_horizontal = dataset.sizes["horizontal"] == 1
+    if one_horizontal:
+        contacts["flags"] = _flagged(contacts["flags"], "one_horizontal", None)
+    axis = np.zeros(job.contacts.num_rows) if one_horizontal else contacts["azimuth"]
+    outcomes, rejected = _known_outcomes(components(dataset), contacts | {"axis": axis})
+    return _recorded(job, contacts, outcomes, rejected)
+
+
+def _columns(table: pa.Table) -> Columns:
+    """Return a table as arrays."""
+    frame = table.to_pandas()
+    return {str(name): frame[name].to_numpy() for name in frame}
+
+
+def _known_outcomes(
+    motion: tuple[np.ndarray, np.ndarray, float], contacts: Columns
+) -> tuple[Columns, tuple[Rejection, ...]]:
+    """Compute the outcomes of all rows but those of unknown gap, which are rows of two."""
+    known = np.flatnonzero(np.isfinite(contacts["gap"]))
+    found = no_outcomes(contacts["row"].size)
+    if not known.size:
+        return found, ()
+    # Rows of unknown gap stay empty
+    outcomes, rejected = _outcomes(motion, chosen(contacts, known))
+    for name, column in outcomes.items():
+        found[name][known] = column
+    return found, rejected
+
+
+def _outcomes(
+    motion: tuple[np.ndarray, np.ndarray, float], contacts: Columns
+) -> tuple[Columns, tuple[Rejection, ...]]:
+    """Compute the outcomes of all rows but those that fail, which are found by halving."""
+    first = _first(contacts["row"])
+    try:
+        return row_outcomes(motion, contacts, first, contacts["axis"][first[:-1]]), ()
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        if first.size == 2:
+            rejection = Rejection("row", contacts["row_id"][0], "", None, (str(error),))
+            return no_outcomes(contacts["row"].size), (rejection,)
+
+    # A row among several fails: each half is computed alone
+    middle = first[first.size // 2]
+    before = {name: column[:middle] for name, column in contacts.items()}
+    behind = {name: column[middle:] for name, column in contacts.items()}
+    (one, rejected), (other, more) = _outcomes(motion, before), _outcomes(motion, behind)
+    # Both halves in their order
+    joined = {name: np.concatenate([one[name], other[name]]) for name in one}
+    return joined, (*rejected, *more)
+
+
+def _first(row: IntArray) -> IntArray:
+    """Return the place of the first contact of each row, and the end."""
+    starts = np.flatnonzero(np.diff(row, prepend=row[:1] - 1))
+    return np.append(starts, row.size)
+
+
+def _flagged(flags: np.ndarray, name: str, where: np.ndarray | None) -> np.ndarray:
+    """Return texts of flags with one more, everywhere or in some rows."""
+    longer = np.array([f"{text} {name}".strip() for text in flags.tolist()], dtype=object)
+    return longer if where is None else np.where(where, longer, flags)
+
+
+def _recorded(
+    job: RowsJob, contacts: Columns, outcomes: Columns, rejected: Sequence[Rejection]
+) -> RowsPart:
+    """Write a part, its status after it, and return the part."""
+    row = contacts["row"]
+    # What holds for one contact of a row holds for all of it
+    reconciled = np.isin(row, row[outcomes["reconciled"]])
+    flags = _flagged(contacts["flags"], "values_reconciled", reconciled)
+    failed = np.isin(contacts["row_id"], [rejection.name for rejection in rejected])
+    flags = _flagged(flags, "no_history", failed)
+    write_rows_part({**contacts, **outcomes, "flags": flags}, job.part)
+    outputs = {job.part.name: file_hash(job.part)}
+    write_status(_status_file(job), job.key, outputs, {"rejected": list(rejected)})
+    return _part(job)
+
+
+def _part(job: RowsJob) -> RowsPart:
+    """Return the part of a chunk."""
+    return RowsPart(job.number, job.contacts.num_rows, job.part, _status_file(job))
+
+
+def _status_file(job: RowsJob) -> Path:
+    """Return the status file of a chunk."""
+    return job.part.with_suffix(".json")
+
+
+def _key(job: RowsJob) -> str:
+    """Return the hash of everything on which the part depends."""
+    station = job.station.hash if job.station else ""
+    digest = hashlib.sha256("\n".join([version("per_obspy"), station]).encode())
+    content = pa.BufferOutputStream()
+    with pa.ipc.new_stream(content, job.contacts.schema) as stream:
+        stream.write_table(job.contacts.combine_chunks())
+    digest.update(content.getvalue())
+    return digest.hexdigest()
+
+
+def _name(job: RowsJob) -> str:
+    """Return the name of a chunk in messages."""
+    rows = job.contacts["row_id"]
+    return f"rows of buildings from {rows[0]} to {rows[-1]}"
+
+
+def _failed(job: RowsJob, reason: str) -> RowsPart:
+    """Return a part without histories, because its work failed; the next run does it again."""
+    contacts = _columns(job.contacts)
+    names = dict.fromkeys(contacts["row_id"].tolist())
+    rejected = [Rejection("row", name, "", None, (reason,)) for name in names]
+    undone = job._replace(key="")
+    part = _recorded(undone, contacts, no_outcomes(job.contacts.num_rows), rejected)
+    return part._replace(failed=True)

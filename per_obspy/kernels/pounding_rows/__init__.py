@@ -1,0 +1,1 @@
+"""Advance many rows of buildings that hit each other, many rows per call."""

@@ -1,0 +1,117 @@
+"""Maxima of a row of more buildings than there are lanes, from event to event."""
+
+import math
+
+import numpy as np
+
+from per_obspy.kernels._jit import kernel, lean
+from per_obspy.kernels.pounding_events.contact import (
+    COUNTED_SHARE,
+    LOG_BEFORE_1,
+    LOG_BEFORE_2,
+    LOG_LEFT,
+    SLOWEST_COUNTED,
+)
+from per_obspy.kernels.pounding_events.motion import (
+    APPROACH,
+    BOUNCES,
+    IMPACTS,
+    LARGEST_ENERGY_RADIUS_SQUARED,
+    Segment,
+    taylor_terms,
+)
+from per_obspy.kernels.pounding_events.row_history import is_settled
+from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
+from per_obspy.kernels.pounding_lanes.step_by_step import run_events
+
+
+@lean
+def _advance_interval(row, log, time, start, slope, refinement, duration, terms):
+    """Carry a row through one sampling interval; return whether it got through."""
+    is_through = True
+    for part in range(refinement):
+        shift = part * duration
+        row[0, BOUNCES] = 0.0
+        segment = Segment(time + shift, duration, start + slope * shift, slope, terms)
+        is_through &= run_events(row, log, segment, 0.0)
+    return is_through
+
+
+@kernel
+def run_row_by_events(north, east, cosine, sine, dt, refinement, row, log, free_steps):
+    """
+    Run one row of buildings through a record and the free vibration after it.
+
+    Parameters
+    ----------
+    north, east : (n_samples,) ndarray
+        Ground acceleration, m/s². The ground rests after it.
+    cosine, sine : float
+        Of the azimuth of the row's axis, from its first to its last building.
+    dt : float
+        Sampling interval, s.
+    refinement : int
+        Number of segments into which each sampling interval is cut.
+    row : (n_buildings, ROW_COLUMNS) ndarray
+        Row at rest, then at the end; see `motion` for its columns. It holds the results:
+        LARGEST_DISPLACEMENT (m), LARGEST_RADIUS_SQUARED (m²), IMPACTS and APPROACH (m/s).
+    log : (n_lines, LOG_COLUMNS) ndarray
+        Receives one line per impact as long as there is room; see `contact` for its columns.
+    free_steps : int
+        Sampling intervals of free vibration at most.
+
+    Returns
+    -------
+    bool
+        Whether every segment ended: no segment had too many events.
+    """
+    duration = dt / refinement
+    terms = taylor_terms(row, duration)
+    # the energy radius is not computed
+    row[:, LARGEST_ENERGY_RADIUS_SQUARED] = math.inf
+    is_through = True
+    # the record
+    before = cosine * north[0] + sine * east[0]
+    for k in range(1, north.size):
+        after = cosine * north[k] + sine * east[k]
+        is_through &= _advance_interval(
+            row, log, (k - 1) * dt, before, (after - before) / dt, refinement, duration, terms
+        )
+        before = after
+    # free vibration, until the row is settled
+    for k in range(free_steps):
+        if k % SETTLING_STEPS == 0 and is_settled(row):
+            break
+        time = (north.size - 1 + k) * dt
+        is_through &= _advance_interval(row, log, time, 0.0, 0.0, refinement, duration, terms)
+    return is_through
+
+
+@kernel
+def count_row_impacts(row, log, scale):
+    """
+    Return the number of impacts of each interface that count, chatter left out.
+
+    Parameters
+    ----------
+    row : (n_buildings, ROW_COLUMNS) ndarray
+        Of the row at the end of its history; see `motion` for the columns.
+    log : (n_lines, LOG_COLUMNS) ndarray
+        Holds all its impacts.
+    scale : (n_buildings,) ndarray
+        Speed in the row over that at the contact height of each interface.
+
+    Returns
+    -------
+    (n_buildings,) ndarray of int
+        Impacts above SLOWEST_COUNTED, and above COUNTED_SHARE of the interface's fastest; 0 for
+        the last building.
+    """
+    counts = np.zeros(row.shape[0], np.int64)
+    lines = int(row[:, IMPACTS].sum())
+    for line in range(lines):
+        # the fastest is known at the end only
+        j = int(log[line, LOG_LEFT])
+        limit = max(SLOWEST_COUNTED * scale[j], COUNTED_SHARE * row[j, APPROACH])
+        counts[j] += log[line, LOG_BEFORE_1] - log[line, LOG_BEFORE_2] > limit
+    return counts

@@ -1,0 +1,1 @@
+"""Rows of buildings as a stage of a run."""

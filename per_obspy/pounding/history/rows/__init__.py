@@ -1,0 +1,1 @@
+"""Rows of buildings as tables and blocks for the kernels."""

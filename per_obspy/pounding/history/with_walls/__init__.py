@@ -1,0 +1,1 @@
+"""Rows of structures that end at walls: seismically isolated buildings and bridges."""

@@ -1,0 +1,1 @@
+"""Order of visits to buildings after an earthquake: routes, and their files."""

@@ -1,0 +1,1 @@
+"""Exact histories of rows of buildings, and one row per building."""

@@ -1,0 +1,121 @@
+"""Columns of ``rows.parquet`` and ``buildings.parquet``, with units, meanings and flags."""
+
+from per_obspy.inventory.building_rows.chains import ROW_FLAGS
+from per_obspy.inventory.schema import Column
+
+#: Flags of the history of a row, and the meaning of each.
+HISTORY_FLAGS: dict[str, str] = {
+    "several_stations": "the nearest stations of its pairs differ: the one of most pairs serves",
+    "no_record": "no record serves it (a map does): there is no history",
+    "no_history": "its history could not be computed: see rejected.csv",
+    "one_horizontal": "the station has one horizontal: it shakes the row whatever its axis",
+    "values_reconciled": "two pairs differ about a building: a given value, else the mean is used",
+}
+
+#: All flags of a row.
+FLAGS: dict[str, str] = {**ROW_FLAGS, **HISTORY_FLAGS}
+
+#: Flags of a building beside those of its rows, and the meaning of each.
+BUILDING_FLAGS: dict[str, str] = {
+    "hit_only_in_row": "it is hit in its row at a gap that its pair alone does not close",
+    "floor_to_column": "floors of a neighbour may hit its columns: outside the method",
+}
+
+
+def _number(name: str, unit: str, meaning: str) -> Column:
+    return Column(name, "float64", unit, meaning)
+
+
+def _count(name: str, meaning: str) -> Column:
+    return Column(name, "int64", "1", meaning)
+
+
+def _text(name: str, meaning: str) -> Column:
+    return Column(name, "str", "", meaning)
+
+
+def _truth(name: str, meaning: str) -> Column:
+    return Column(name, "bool", "", meaning)
+
+
+_SIDES = tuple(
+    column
+    for side in ("left", "right")
+    for column in (
+        _text(f"building_id_{side}", f"building on the {side}; PAIR#1 if the table has no name"),
+        _count(f"building_number_{side}", "its number in this run: names need not be unique"),
+        _number(f"amplification_{side}", "1", "its largest radius in the row / without contact"),
+        _number(f"displacement_{side}", "m", "its largest, of the oscillator, in the row"),
+        _number(f"amplification_alone_{side}", "1", "the same as amplification, of the pair alone"),
+    )
+)
+
+#: One row per interface of a row of buildings.
+ROWS: tuple[Column, ...] = (
+    _text("row_id", "R- and the first of the names of its pairs"),
+    _count("buildings", "buildings of the row"),
+    _count("interface", "1 is that between the first and the second building of the row"),
+    _text("pair_id", "pair of this interface in risk.parquet"),
+    _truth("turned", "whether building 1 of the pair is the one on the right"),
+    *_SIDES,
+    _number("azimuth", "degrees", "of the axis of the row, from its first to its last building"),
+    _text("station", "whose record the row is followed under; empty if none"),
+    _number("gap", "m", "clear distance of this interface"),
+    _count("impacts", "in the row, faster than 1 mm/s and than 1 % of the fastest; empty without"),
+    _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
+    _count("impacts_alone", "the same of the pair alone, under the same motion"),
+    _number("impact_velocity_alone", "m/s", "the same of the pair alone, under the same motion"),
+    _number("longitude", "degrees", "of the middle of the pair, east"),
+    _number("latitude", "degrees", "of the middle of the pair, north"),
+    _text("flags", "of the row, separated by spaces, each explained in a row flag_..."),
+)
+
+#: Compass sides of a building: names of their columns, and the azimuth of the middle of each.
+COMPASS = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
+
+#: Places of a building among its neighbours.
+POSITIONS = ("inside", "end", "corner", "single")
+
+#: One row per building, worst first.
+BUILDINGS: tuple[Column, ...] = (
+    _count("rank", "1 is inspected first: by severity, amplification, probability, importance"),
+    _text("building_id", "of the pair table; PAIR#1 or PAIR#2 where it names none"),
+    _number(
+        "severity",
+        "m/s",
+        "largest over its pairs of expected_impact_velocity, plus what the exact history of the "
+        "row adds to the impact velocity of the pair alone",
+    ),
+    _text("risk_class", "by severity; names and thresholds are those of the pairs"),
+    _number("probability_independent", "1", "that any neighbour hits it, if pairs are independent"),
+    _number("probability_common", "1", "the same if one cause decides all: the largest of them"),
+    _text("position", "inside its row; end of it; corner of two rows; single: it has one pair"),
+    _count("neighbours", "buildings that it has a gap to"),
+    _count(
+        "neighbours_that_can_hit",
+        "of these, by the state of the pair (not no) or an impact in the row",
+    ),
+    _count("impacts", "hits in all its rows; empty without a history"),
+    *(_count(f"impacts_{side}", f"of these, from the {side}") for side in COMPASS),
+    _number("impact_velocity", "m/s", "largest in its rows"),
+    _number("amplification_row", "1", "largest radius in a row / without contact"),
+    _number("amplification_pair", "1", "the same in the worst of its pairs, each alone"),
+    _text("worst_neighbour", "neighbour of the largest severity"),
+    _text("worst_pair", "pair with it"),
+    _number("worst_azimuth", "degrees", "towards it; empty if unknown"),
+    _text("prevention", "what would have kept it from being hit, or else softened the hit"),
+    _number("missing_gap", "m", "largest of its pairs; all of its row together are enough"),
+    _number(
+        "supplemental_damping", "1", "largest of its pairs; empty if 0.4 is too little for one"
+    ),
+    _number("bumper_restitution", "1", "smallest of its pairs; empty if none helps at one"),
+    _truth("floors_misaligned", "floors of a neighbour may hit its columns"),
+    _text("rows", "row_id of its rows, separated by spaces"),
+    _count("longest_row", "buildings of the longest of them"),
+    _text("area", "area or cell of its worst pair, as in totals.csv"),
+    _number("longitude", "degrees", "east"),
+    _number("latitude", "degrees", "north"),
+    _number("importance", "1", "importance factor; empty if unknown"),
+    _number("occupants", "1", "people in the building; empty if unknown"),
+    _text("flags", "of its rows and of itself, separated by spaces; each explained in flag_..."),
+)

@@ -1,0 +1,181 @@
+"""Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row."""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from per_obspy.inventory.building_rows.chains import ROW_FLAGS, chains_of
+from per_obspy.inventory.building_rows.contacts import contacts_of
+from per_obspy.inventory.building_rows.given import given_values
+from per_obspy.inventory.building_rows.joints import joints_of
+
+from .street import street, terrace
+
+
+def rows_of(table, angle=30.0, longest=30):
+    """Return the buildings of each row along its axis, its flags, and all that was found."""
+    contacts = contacts_of(table, angle)
+    joints = joints_of(contacts, given_values(table), angle)
+    chains = chains_of(contacts, joints, angle, longest)
+    rows, flags = [], []
+    for number, (begin, end) in enumerate(pairwise(chains.first.tolist())):
+        sides = [
+            contacts.names[contacts.buildings[pair][:: -1 if turned else 1]].tolist()
+            for pair, turned in zip(chains.pair[begin:end], chains.turned[begin:end], strict=True)
+        ]
+        # each contact begins with the building with which the one before ends
+        assert all(one[1] == two[0] for one, two in pairwise(sides))
+        rows.append([sides[0][0], *(side[1] for side in sides)])
+        flags.append({name for name in ROW_FLAGS if chains.flags[name][number]})
+    kept = np.flatnonzero(~contacts.repeated)
+    assert sorted(chains.pair.tolist()) == kept.tolist()
+    return rows, flags, chains
+
+
+def test_a_terrace_is_one_row():
+    rows, flags, chains = rows_of(street(("b", "c", 90, 0), ("b", "a", 272, 0), ("d", "c", 270, 0)))
+    assert rows == [["a", "b", "c", "d"]]
+    assert flags == [set()]
+    # the mean of 90, 92 and 90 degrees; of such small angles the mean direction is the mean
+    assert chains.azimuth[0] == pytest.approx(90 + 2 / 3, abs=1e-3)
+
+
+def test_a_row_is_named_from_azimuth_0_to_180():
+    rows, _, chains = rows_of(street(("c", "b", 265, 0), ("b", "a", 275, 0)))
+    assert rows == [["a", "b", "c"]]
+    assert chains.azimuth[0] == pytest.approx(90.0)
+
+
+def test_a_corner_building_is_in_two_rows():
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0), ("b", "c", 90, 0), ("c", "d", 0, 0)))
+    assert rows == [["a", "b", "c"], ["c", "d"]]
+    assert flags == [set(), set()]
+
+
+def test_pairs_without_names_are_rows_of_two():
+    rows, flags, _ = rows_of(street(("", "", 90, 0), ("", "", 90, 0)))
+    assert rows == [["p0#1", "p0#2"], ["p1#1", "p1#2"]]
+    assert flags == [{"no_building_id"}] * 2
+
+
+def test_an_unknown_axis_is_a_row_of_two():
+    rows, flags, chains = rows_of(street(("a", "b", np.nan, 0), ("b", "c", 90, 0)))
+    assert rows == [["a", "b"], ["b", "c"]]
+    assert flags == [{"unknown_azimuth"}, set()]
+    assert np.isnan(chains.azimuth[0])
+
+
+def test_the_other_branch_of_a_fork_is_a_row_of_its_own():
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0.0), ("b", "c", 90, 0.1), ("b", "d", 90, 0.2)))
+    assert rows == [["a", "b", "c"], ["b", "d"]]
+    assert flags == [{"fork"}] * 2
+
+
+def test_contradictory_pairs_cut_a_row():
+    table = street(("a", "b", 90, 0), ("b", "c", 90, 0))
+    rows, flags, _ = rows_of(table.assign(period_1=[9.0, 0.5], period_2=[0.6, 9.0]))
+    assert rows == [["a", "b"], ["b", "c"]]
+    assert flags == [{"contradictory"}] * 2
+
+
+def test_a_ring_around_a_square_is_cut_at_its_widest_gap():
+    # twelve buildings, each turned by 30 degrees against the one before
+    count = 12
+    gaps = np.where(np.arange(count) == 7, 0.5, 0.1)
+    pairs = [(f"b{k:02}", f"b{(k + 1) % count:02}", 30.0 * k, gaps[k]) for k in range(count)]
+    rows, flags, _ = rows_of(street(*pairs), angle=40.0)
+    assert ["b07", "b08"] in rows or ["b08", "b07"] in rows
+    # the rest turns by 300 degrees, and a row by 40 at most
+    assert all(len(row) <= 3 for row in rows)
+    assert all("ring" in found for found in flags)
+
+
+def test_buildings_in_a_circle_along_one_azimuth_are_a_ring():
+    # impossible on the ground, possible in a table
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0.1), ("b", "c", 90, 0.3), ("c", "a", 90, 0.2)))
+    assert sorted(map(sorted, rows)) == [["a", "b", "c"], ["b", "c"]]
+    assert flags == [{"ring"}] * 2
+
+
+def test_a_curved_street_is_cut_at_its_sharpest_bend():
+    azimuth = [90, 100, 110, 125, 135]
+    pairs = [(f"b{k}", f"b{k + 1}", angle, 0.0) for k, angle in enumerate(azimuth)]
+    rows, flags, _ = rows_of(street(*pairs))
+    # the bend of 15 degrees at b3; its building is in both rows
+    assert rows == [["b0", "b1", "b2", "b3"], ["b3", "b4", "b5"]]
+    assert flags == [{"bent"}] * 2
+
+
+def test_a_long_row_is_cut_at_its_widest_gap():
+    gaps = [0.0, 0.0, 0.3, 0.0, 0.0]
+    rows, flags, _ = rows_of(terrace(6, gaps=gaps), longest=5)
+    # the pair of that gap keeps a row of its own
+    names = [f"b{k:04}" for k in range(6)]
+    assert rows == [names[:3], names[2:4], names[3:]]
+    assert flags == [{"cut"}] * 3
+
+
+def test_of_equal_gaps_a_long_row_is_cut_near_its_middle():
+    rows, _, _ = rows_of(terrace(8), longest=7)
+    assert sorted(map(len, rows)) == [2, 4, 4]
+
+
+@pytest.mark.parametrize("gaps", [0.0, np.linspace(1.0, 0.0, 29_999)])
+def test_a_table_that_is_one_chain_takes_seconds(gaps):
+    # with falling gaps every cut would take one pair from the end: 30 000 copies of the rest
+    start = time.perf_counter()
+    rows, flags, _ = rows_of(terrace(30_000, gaps=gaps), longest=30)
+    assert max(map(len, rows)) <= 30
+    assert all(found == {"cut"} for found in flags)
+    # 1 s on one core; copies of the rest would take minutes
+    assert time.perf_counter() - start < 30.0
+
+
+def test_rows_do_not_depend_on_the_order_of_the_table():
+    generator = np.random.default_rng(1)
+    pairs = [(f"b{a}", f"b{b}", float(z), 0.1) for a, b, z in generator.integers(0, 12, (30, 3))]
+    pairs = [pair for pair in pairs if pair[0] != pair[1]]
+    table = street(*pairs)
+    expected = rows_of(table)
+    shuffled = table.iloc[generator.permutation(len(table))].reset_index(drop=True)
+    found = rows_of(shuffled)
+    assert found[:2] == expected[:2]
+
+
+def test_a_row_read_backwards_is_the_same_row():
+    table = street(("a", "b", 80, 0.1), ("b", "c", 90, 0.2), ("c", "d", 95, 0.3))
+    turned = table.rename(
+        columns={"building_id_1": "building_id_2", "building_id_2": "building_id_1"}
+    )
+    turned["azimuth"] += 180.0
+    rows, _, chains = rows_of(table)
+    backwards, _, same = rows_of(turned)
+    assert rows == backwards
+    np.testing.assert_allclose(same.azimuth, chains.azimuth, rtol=1e-12)
+
+
+def test_of_a_ring_only_one_gap_is_cut():
+    # a ring of 15 buildings in a row of at most 180 degrees: two bends, each at a building
+    count = 15
+    gaps = np.where(np.arange(count) == 4, 0.5, 0.1)
+    pairs = [(f"b{k:02}", f"b{(k + 1) % count:02}", 24.0 * k, gaps[k]) for k in range(count)]
+    rows, _, _ = rows_of(street(*pairs), angle=80.0)
+    # 14 pairs that turn by 24 degrees each: no row has more than four of them
+    assert sum(len(row) - 1 for row in rows) == count
+    assert sorted(map(len, rows))[0] == 2
+    assert max(map(len, rows)) == 5
+
+
+def test_no_row_goes_on_across_an_unknown_gap():
+    rows, flags, _ = rows_of(street(("a", "b", 90, 0), ("b", "c", 90, np.nan), ("c", "d", 90, 0)))
+    assert rows == [["a", "b"], ["b", "c"], ["c", "d"]]
+    assert flags == [set(), {"unknown_gap"}, set()]
+
+
+def test_an_assumed_gap_is_followed_and_flagged():
+    table = street(("a", "b", 90, 0), ("b", "c", 90, 0.5), derived=["", "gap"])
+    rows, flags, _ = rows_of(table)
+    assert rows == [["a", "b", "c"]]
+    assert flags == [{"unknown_gap"}]

@@ -1,0 +1,96 @@
+"""Blocks of rows: packing, and the laws of impact at every single hit."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from per_obspy.kernels.pounding_events import contact as log_columns
+from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_lanes.deferred_maxima import Record
+from per_obspy.pounding.history.rows.row_blocks import packed_rows, run_logged_block
+
+
+@given(st.lists(st.tuples(st.integers(1, 40), st.sampled_from([1, 2])), min_size=1, max_size=60))
+def test_every_row_is_in_one_block_that_has_room(rows):
+    # catches: a lost last block, a long row that is cut, rows of different steps together
+    sizes, parts = (np.array(numbers) for numbers in zip(*rows, strict=True))
+    blocks = packed_rows(np.append(0, np.cumsum(sizes)), parts)
+    assert_array_equal(np.sort(np.concatenate(blocks)), np.arange(len(rows)))
+    for block in blocks:
+        assert sizes[block].sum() <= 32 or block.size == 1
+        assert np.unique(parts[block]).size == 1
+
+
+def rows_at_rest(sizes, gap, seed):
+    """Return lines of random buildings at rest, and the first of each row."""
+    random, count = np.random.default_rng(seed), sum(sizes)
+    lines = np.zeros((count, columns.ROW_COLUMNS))
+    frequency = 2 * np.pi / random.uniform(0.3, 1.5, count)
+    lines[:, columns.DAMPING_RATE], lines[:, columns.STIFFNESS] = 0.05 * frequency, frequency**2
+    lines[:, columns.YIELD], lines[:, columns.PARTICIPATION] = np.inf, 1.0
+    lines[:, columns.MASS] = random.uniform(1.0, 5.0, count)
+    lines[:, columns.GAP], lines[:, columns.IN_CONTACT] = gap, gap == 0.0
+    lines[:, columns.RESTITUTION] = random.uniform(0.3, 0.9, count)
+    lines[:, columns.STICKING_SPEED], lines[:, columns.BOUNCE_LIMIT] = 1e-11, 300.0
+    lines[:, columns.STICKING_DELAY] = 1e-5
+    return lines, np.append(0, np.cumsum(sizes))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_momentum_and_energy_close_at_every_impact(gap):
+    # catches: a mass of the neighbour, an impact that is applied and not logged
+    start, firsts = rows_at_rest([5, 4], gap, seed=2)
+    noise = np.convolve(np.random.default_rng(3).normal(size=400), np.ones(5) / 5, mode="same")
+    record = Record(np.stack([6.0 * noise, np.zeros(400)]), 1, 0.02)
+    none = np.zeros(2, dtype=np.int64)
+    lines, logs = run_logged_block(record, start, firsts, np.zeros(2), none)
+    for first, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
+        row = lines[first:end]
+        impacts = log[: int(row[:, columns.IMPACTS].sum())]
+        assert len(impacts) > 50
+        left = impacts[:, log_columns.LOG_LEFT].astype(int)
+        mass, other = row[left, columns.MASS], row[left + 1, columns.MASS]
+        before = impacts[:, [log_columns.LOG_BEFORE_1, log_columns.LOG_BEFORE_2]].T
+        after = impacts[:, [log_columns.LOG_AFTER_1, log_columns.LOG_AFTER_2]].T
+        impulse, scale = impacts[:, log_columns.LOG_IMPULSE], abs(before).max()
+        # momentum of both, restitution, and the energy lost; rounding of the velocities
+        assert (impulse > 0.0).all()
+        assert_allclose(mass * (after[0] - before[0]), -impulse, atol=1e-13 * scale)
+        assert_allclose(other * (after[1] - before[1]), impulse, atol=1e-13 * scale)
+        approach, separation = before[0] - before[1], after[1] - after[0]
+        restitution = row[left, columns.RESTITUTION]
+        assert_allclose(separation, restitution * approach, atol=1e-13 * scale)
+        energy = 0.5 * (mass * (before[0] ** 2 - after[0] ** 2))
+        energy += 0.5 * (other * (before[1] ** 2 - after[1] ** 2))
+        reduced = mass * other / (mass + other)
+        lost = 0.5 * reduced * (1.0 - restitution**2) * approach**2
+        assert_allclose(energy, lost, atol=1e-13 * scale**2)
+        # they meet where the gap is closed
+        displacements = impacts[:, [log_columns.LOG_DISPLACEMENT_1, log_columns.LOG_DISPLACEMENT_2]]
+        overlap = displacements[:, 0] - displacements[:, 1] - gap
+        assert_allclose(overlap, 0.0, atol=1e-10 * abs(displacements).max())  # required of contacts
+
+
+@pytest.mark.parametrize("size", [5, 33])
+def test_a_step_without_end_is_an_error(size):
+    # catches: maxima of a history that stopped
+    start, firsts = rows_at_rest([size], 0.001, seed=4)
+    start[:, columns.BOUNCE_LIMIT] = 0.0
+    record = Record(np.stack([np.sin(np.arange(60.0)), np.zeros(60)]), 1, 0.02)
+    with pytest.raises(RuntimeError, match="no end of events"):
+        run_logged_block(record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64))
+
+
+def test_a_log_that_is_too_short_grows(monkeypatch):
+    # catches: impacts beyond the room that are counted from memory that holds none
+    start, firsts = rows_at_rest([4], 0.01, seed=5)
+    record = Record(np.stack([5 * np.sin(np.arange(200.0) / 8), np.zeros(200)]), 1, 0.02)
+    arguments = record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64)
+    lines, logs = run_logged_block(*arguments)
+    used = int(lines[:, columns.IMPACTS].sum())
+    monkeypatch.setattr("per_obspy.pounding.history.rows.row_blocks.FIRST_ROOM", 3)
+    _, grown = run_logged_block(*arguments)
+    assert used > 3
+    assert_array_equal(grown[0, :used], logs[0, :used])
