@@ -5,7 +5,7 @@ from pathlib import Path
 from textwrap import wrap
 
 from matplotlib.colors import LinearSegmentedColormap, to_hex
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
@@ -98,8 +98,11 @@ def fit_titles(figure: Figure) -> None:
     """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
     figure.draw_without_rendering()
     titles = [(axes.title, axes.bbox.width) for axes in figure.axes]
-    # The title of the whole figure
-    titles += [(heading, figure.bbox.width) for heading in figure.texts]
+    # Titles of the whole figure and of its parts
+    parts: list[Figure | SubFigure] = [figure, *figure.subfigs]
+    for part in parts:
+        level = (text for text in part.texts if not text.get_rotation())
+        titles += [(heading, part.bbox.width) for heading in level]
     for title, room in titles:
         # Letters are whole pixels wide: a smaller font may need a little more than its share
         width, available = title.get_window_extent().width, 0.95 * room

@@ -17,6 +17,7 @@ from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.stations import file_stem
+from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.coast import lines_around
 from per_obspy.report.page.content import (
@@ -30,7 +31,7 @@ from per_obspy.report.page.document import write_page
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
-from per_obspy.report.page.texts import LANGUAGES
+from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
@@ -96,6 +97,49 @@ def write_run_page(
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=_histories(worst, stations),
         provenance=_provenance(settings),
+    )
+    write_page(data, folder / "report.html")
+
+
+def write_table_page(
+    folder: Path, region: Region, source: Sequence[str], tally: PairTally, worst: pd.DataFrame
+) -> None:
+    """
+    Write ``report.html`` of a screening without stations: by a design spectrum, or an ensemble.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    region : Region
+        Title, classes, and whether the motion is simulated.
+    source : sequence of str
+        Sentences on what stands for the earthquake.
+    tally : PairTally
+        Counts of all pairs.
+    worst : DataFrame
+        The worst pairs.
+    """
+    # There are no stations, totals and rows of buildings
+    rejected, rejections = _rejected(folder / "rejected.csv")
+    longitude, latitude = _column(worst, "longitude"), _column(worst, "latitude")
+    data = PageData(
+        title=region.title,
+        language="en",
+        simulated=region.simulated,
+        classes=tuple(region.classes),
+        event=Event("", "", math.nan, None, 0, 0, " ".join(source)),
+        tally=tally,
+        worst=worst,
+        stations=pd.DataFrame(),
+        areas=pd.DataFrame(),
+        rejected=rejected,
+        rejections=rejections,
+        buildings=None,
+        outlines=[],
+        lines=lines_around(longitude, latitude),
+        histories={},
+        provenance=_made("en"),
     )
     write_page(data, folder / "report.html")
 
@@ -258,8 +302,16 @@ def _provenance(settings: Run) -> list[tuple[str, str]]:
     texts = LANGUAGES[settings.report.language]
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [
-        (texts["made"], datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
-        (texts["made_with"], f"per_obspy {version('per_obspy')}"),
+        *_made(settings.report.language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
+    ]
+
+
+def _made(language: Language) -> list[tuple[str, str]]:
+    """Return when and with what the page was made."""
+    texts = LANGUAGES[language]
+    return [
+        (texts["made"], datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
+        (texts["made_with"], f"per_obspy {version('per_obspy')}"),
     ]

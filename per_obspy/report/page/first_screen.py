@@ -16,6 +16,9 @@ NAMED = 5
 #: Longest name in a sentence, characters.
 LONGEST_NAME = 40
 
+#: Longest text on what stands for an earthquake, characters.
+LONGEST_SOURCE = 500
+
 #: Flags that are counted on the first screen, with the keys of their sentences.
 DOUBTS = {
     "derived_inputs": "sure_derived",
@@ -43,6 +46,8 @@ class Event(NamedTuple):
         Longitude and latitude of the hypocentre, degrees, and its depth, m.
     used, missing : int
         Stations that serve pairs and those that do not.
+    source : str
+        Sentences on what stands for the earthquake, instead of all that; empty if there is one.
     """
 
     start: str
@@ -51,6 +56,7 @@ class Event(NamedTuple):
     place: tuple[float, float, float] | None
     used: int
     missing: int
+    source: str = ""
 
 
 class FirstScreen(NamedTuple):
@@ -110,26 +116,34 @@ def first_screen(
 
 def _event_line(event: Event, language: Language) -> str:
     """Return time, place and stations in one line."""
+    if event.source:
+        return shortened(event.source, LONGEST_SOURCE)
     # Facts that are unknown are left out
     texts, parts = LANGUAGES[language], list[str]()
     if math.isfinite(event.magnitude):
         parts.append(texts["event_magnitude"].format(value=written(event.magnitude, 1, language)))
     if event.time:
         parts.append(f"{event.time} UTC")
-    # Else the time of the records is the next best
     elif event.start:
         parts.append(texts["event_time"].format(time=event.start))
-    if event.place is not None:
-        longitude, latitude, depth = event.place
-        place = {"latitude": written(latitude, 2, language)}
-        parts.append(
-            texts["event_place"].format(longitude=written(longitude, 2, language), **place)
-        )
-        if math.isfinite(depth):
-            kilometres = written(depth / 1000.0, 0, language)
-            parts.append(texts["event_depth"].format(value=kilometres))
+    # Where, and by how many stations
+    parts += _place_texts(event, language)
     parts.append(texts["event_stations"].format(used=event.used, missing=event.missing))
     return ", ".join(parts) + "."
+
+
+def _place_texts(event: Event, language: Language) -> list[str]:
+    """Return epicentre and depth, as far as they are known."""
+    if event.place is None:
+        return []
+    # Latitude first, as people say it
+    texts, (longitude, latitude, depth) = LANGUAGES[language], event.place
+    place = {"latitude": latitude, "longitude": longitude}
+    numbers = {name: written(degrees, 2, language) for name, degrees in place.items()}
+    epicentre = texts["event_place"].format(**numbers)
+    if not math.isfinite(depth):
+        return [epicentre]
+    return [epicentre, texts["event_depth"].format(value=written(depth / 1000.0, 0, language))]
 
 
 def _numbers(

@@ -6,9 +6,13 @@ per_obspy.report.page.first_screen.
 """
 
 import csv
+import math
 import re
 
+import pandas as pd
 import pytest
+
+from per_obspy.report.page.first_screen import Event
 
 from .made_up import HOSTILE, page_data, pair_table
 
@@ -242,6 +246,21 @@ def test_rest_of_the_page(opened):
     assert page.texts("#areas tbody td:first-child") == ["centre", "harbour"]
     assert "gap: -1" in page.page.inner_text("#rejected")
     assert "today" in page.page.inner_text("#provenance")
+
+
+def test_a_table_of_few_columns_has_a_page_too(opened):
+    """As of a design spectrum: no station, no areas, no buildings, no classes of the default."""
+    columns = ["rank", "pair_id", "state", "probability", "expected_impact_velocity", "gap"]
+    columns += ["demand", "demand_rule", "longitude", "latitude", "per_1"]
+    table = pair_table(30)[columns]
+    nothing = pd.DataFrame()
+    event = Event("", "", math.nan, None, 0, 0, "Screened by a spectrum.")
+    data = page_data(table, stations=nothing, areas=nothing, histories={}, event=event)
+    page = opened(data)
+    assert page.page.inner_text("#event") == "Screened by a spectrum."
+    page.page.click("#pairs tbody tr:first-child button")
+    assert "P0000000" in page.page.inner_text("#detail h2")
+    assert page.page.is_hidden("#stations")
 
 
 def drawing_seconds(page):
