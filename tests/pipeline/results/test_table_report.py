@@ -43,7 +43,9 @@ def done(tmp_path_factory):
     # The same pairs with names that nobody should trust
     pairs = pd.read_csv(folder / "run" / "pairs.csv").assign(pair_id=HOSTILE)
     pairs.to_parquet(folder / "pairs.parquet")
-    (folder / "code.csv").write_text("period,damping,sd\n0.01,0.05,0.001\n20.0,0.05,2\n")
+    (folder / "code.csv").write_text(
+        "period,damping,sd\n0.01,0.001,0.001\n20.0,0.001,2\n0.01,0.5,0.001\n20.0,0.5,1\n"
+    )
     design = f'spectrum = "code.csv"\npairs = "pairs.parquet"\noutput = "design"\n{WANTED}'
     (folder / "design.toml").write_text(design)
     member = '[[scenario]]\nname = "one"\nrun = "run.toml"\nrate = 0.01\n'
