@@ -12,6 +12,8 @@ demo: .venv/run
 figures: .venv/run
 	@echo "== redraw the paper's figures, on real records if PER_OBSPY_DATA or ../shared/data has them"
 	$(BIN)/python workflows/paper_figures.py
+	@echo "== redraw the figures of the README"
+	$(BIN)/python workflows/readme_figures.py
 
 test: .venv/test
 	@echo "== tests, doctests and README"

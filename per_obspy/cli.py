@@ -24,6 +24,7 @@ from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
 from per_obspy.commands.run import process, report, run, simulate, spectra
 from per_obspy.commands.screen import screen
+from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.machine import machine_fault
@@ -47,7 +48,7 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-COMMANDS = (run, init, simulate, process, spectra, screen, report, plan, events, fetch, info)
+COMMANDS = (run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info)
 for command in COMMANDS:
     app.command()(command)
 

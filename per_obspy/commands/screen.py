@@ -21,6 +21,7 @@ from per_obspy.commands.run import print_result
 if TYPE_CHECKING:
     import pandas as pd
 
+    from per_obspy.config import Design
     from per_obspy.jobs.output_folder import Result
 
 #: Columns of the worst pairs that are printed: by a design spectrum, and of an ensemble where the
@@ -92,16 +93,17 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
     """Screen pairs by a design or user spectrum instead of a record, and print the result."""
     from per_obspy.config import Design, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
+    from per_obspy.pipeline.preflight import require_extras
     from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
     from per_obspy.screening.by_spectrum.design_table import design_table
-    from per_obspy.tables.design import write_design
 
     # Screen
     settings = load(configuration, Design)
+    require_extras(settings)
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
     table = design_table(spectrum, pairs, settings.building, settings.screening)
-    files = write_design(table, output or settings.output)
+    files = _write_design(settings, table, output or settings.output)
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
@@ -116,6 +118,18 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
         _print_spectrum_result(table, counts, rejected, files)
     if table.empty:
         stop_if_nothing(0, why_nothing(files[-1]))
+
+
+def _write_design(settings: "Design", table: "pd.DataFrame", folder: Path) -> list[Path]:
+    """Write the files of a screening by a design spectrum, ``rejected.csv`` last."""
+    from per_obspy.pipeline.results.table_report import report_design
+    from per_obspy.tables.design import write_design
+
+    *files, rejected = write_design(table, folder)
+    made = report_design(settings, table, folder)
+    for fault in made.faults:
+        print(f"per-obspy: {fault}", file=sys.stderr)
+    return [*files, *made.outputs, rejected]
 
 
 def _state_counts(table: "pd.DataFrame") -> dict[str, int]:

@@ -26,6 +26,12 @@ class Ensemble(Section):
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in ensemble.csv, the worst"
     )
+    geopackage: bool = Field(
+        False, description="write ensemble.gpkg, ensemble.qgz and GeoParquet; needs per_obspy[gis]"
+    )
+    spreadsheet: bool = Field(
+        False, description="write ensemble.xlsx too; needs per_obspy[spreadsheet]"
+    )
 
     @property
     def yearly(self) -> bool:

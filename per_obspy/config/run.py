@@ -42,7 +42,10 @@ class Run(Section):
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
     )
     geopackage: bool = Field(
-        False, description="write risk.gpkg for QGIS too; needs per_obspy[gis]"
+        False, description="write risk.gpkg, risk.qgz and GeoParquet; needs per_obspy[gis]"
+    )
+    spreadsheet: bool = Field(
+        False, description="write risk.xlsx too; needs per_obspy[spreadsheet]"
     )
 
     @model_validator(mode="after")
@@ -74,6 +77,12 @@ class Design(Section):
     output: RelativePath = Field(description="folder of the results")
     building: Building = Building()
     screening: Screening = Screening()
+    geopackage: bool = Field(
+        False, description="write design.gpkg, design.qgz and GeoParquet; needs per_obspy[gis]"
+    )
+    spreadsheet: bool = Field(
+        False, description="write design.xlsx too; needs per_obspy[spreadsheet]"
+    )
 
 
 def screening_kind(path: Path) -> type[Run] | type[Design] | type[Ensemble]:

@@ -25,6 +25,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.pipeline.preflight import check_inputs, require_extras
+from per_obspy.pipeline.results.table_report import report_ensemble
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
@@ -70,6 +71,7 @@ def screen_scenarios(
     """
     configuration = configuration.resolve()
     settings = load(configuration, Ensemble)
+    require_extras(settings)
     folder = (output or settings.output).resolve()
     _check_runs(settings, configuration, folder)
     # Each run takes its own folder, one after the other
@@ -100,13 +102,15 @@ def _joined(
     tables = {name: _risk_table(result) for name, result in runs.items()}
     scenarios = Scenarios(tables, settings.weights, settings.yearly)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
+    made = report_ensemble(settings, folder, simulated, counts["pairs"])
     # Rejections make a result partial, those of a run too
     is_partial = any(result.record["partial"] for result in runs.values())
     return {
         "state": "complete" if counts["pairs"] else "nothing_usable",
         "partial": counts["rejected_pair"] > 0 or is_partial,
         "counts": counts,
-        "outputs": file_hashes(folder, files),
+        "faults": made.faults,
+        "outputs": file_hashes(folder, [*files, *made.outputs]),
         "versions": software_versions(),
     }
 

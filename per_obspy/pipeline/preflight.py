@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from per_obspy.config import Run
+from per_obspy.config import Design, Ensemble, Run
 from per_obspy.errors import CatalogError, require_extra
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.files.formats import pair_file
@@ -15,9 +15,9 @@ from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
 
 
-def require_extras(settings: Run) -> None:
+def require_extras(settings: Run | Design | Ensemble) -> None:
     """
-    Check that the optional libraries of a run are installed, before anything is computed.
+    Check that the optional libraries of a screening are installed, before anything is computed.
 
     Raises
     ------
@@ -26,7 +26,9 @@ def require_extras(settings: Run) -> None:
     """
     if settings.geopackage:
         require_extra("gis", "pyogrio", "shapely")
-    if settings.totals.h3 is not None:
+    if settings.spreadsheet:
+        require_extra("spreadsheet", "openpyxl")
+    if isinstance(settings, Run) and settings.totals.h3 is not None:
         require_extra("gis", "h3")
 
 

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,14 +9,20 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.config import Run
-from per_obspy.errors import CatalogError, PerError
-from per_obspy.files import remove_file
+from per_obspy.errors import CatalogError
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.results.faults import Report
+from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
+from per_obspy.pipeline.results.result_files import Screening, write_results
+from per_obspy.pipeline.results.run_facts import event_of_run, read_stations
+from per_obspy.pipeline.results.table_notes import Notes, needed_columns
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
-from per_obspy.report.figures import draw_overview, draw_record_to_pair
+from per_obspy.report.overview import Region, draw_overview
+from per_obspy.report.pair_figure import draw_record_to_pair
+from per_obspy.report.summary.statements import event_sentences
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.risk import RankedTable, ranked_table
@@ -35,7 +40,7 @@ from per_obspy.tables.totals import (
 SHOWN = 20_000
 
 #: Columns of the pairs that a figure shows.
-SHOWN_COLUMNS = ["rank", "state", "longitude", "latitude", "demand", "gap"]
+SHOWN_COLUMNS = ["rank", "pair_id", "risk_class", "longitude", "latitude", "demand", "gap"]
 
 #: Columns of the pairs whose pounding was observed.
 OBSERVED_COLUMNS = ["observed", "state", "probability"]
@@ -55,44 +60,15 @@ class RiskSummary(NamedTuple):
         Pairs whose pounding was observed.
     totals : RegionTotals
         By area.
+    notes : Notes
+        Numbers of the whole table, and its worst rows.
     """
 
     worst: pd.Series | None
     shown: pd.DataFrame
     observed: pd.DataFrame
     totals: RegionTotals
-
-
-class Report(NamedTuple):
-    """
-    What the report has written.
-
-    Attributes
-    ----------
-    outputs : list of Path
-        Its files.
-    faults : list of str
-        Figures and layers that could not be made, each with the reason.
-    """
-
-    outputs: list[Path]
-    faults: list[str]
-
-    @contextmanager
-    def tried(self, *paths: Path) -> Iterator[None]:
-        """Note files that the block writes; a fault of the drawing leaves them out, in one line."""
-        try:
-            yield
-        except (PerError, OSError, MemoryError):
-            raise
-        except Exception as error:  # noqa: BLE001 - whatever a library has against a picture
-            # Pictures of an earlier table are none of this one
-            for path in paths:
-                remove_file(path)
-            reason = " ".join(str(error).split())
-            self.faults.append(f"{paths[0]}: cannot be drawn: {type(error).__name__} {reason:.200}")
-        else:
-            self.outputs.extend(paths)
+    notes: Notes
 
 
 class _Pieces(NamedTuple):
@@ -103,6 +79,7 @@ class _Pieces(NamedTuple):
     shown: list[pd.DataFrame]
     observed: list[pd.DataFrame]
     totals: list[PieceTotals]
+    notes: Notes
 
 
 def reported(
@@ -132,19 +109,43 @@ def reported(
         report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
     if risk.exists():
-        facts = _facts(settings, simulated)
-        summary = _summary(settings, risk, folder, facts, report)
+        place = _region(settings, simulated, spectra)
+        summary = _summary(settings, risk, folder, place, report)
         # Totals, layers and the comparison with observations need no record
         write_totals(summary.totals.table, folder / "totals.csv")
         report.outputs.append(folder / "totals.csv")
         report.outputs.extend(write_evaluation(summary.observed, folder, simulated))
-        if settings.geopackage:
-            with report.tried(folder / "totals.gpkg"):
-                _write_totals_layer(summary.totals, folder / "totals.gpkg", facts)
-        if spectra is not None:
-            _draw_figures(settings, summary, spectra, stations, folder, report)
+        _write_summary(settings, summary, folder, place, report)
+        _draw_figures(summary, place, stations, folder, report)
     progress("report", 1, 1)
     return report
+
+
+def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Region:
+    """Return title, classes, stations and epicentre of a run."""
+    places = pd.DataFrame({"longitude": [], "latitude": []}, dtype="float64")
+    epicentre = None
+    if spectra is not None:
+        names = ("longitude", "latitude")
+        places = pd.DataFrame({name: spectra[name].to_numpy() for name in names})
+        attributes = [f"hypocentre_{name}" for name in names]
+        if set(attributes) <= set(spectra.attrs):
+            epicentre = (float(spectra.attrs[attributes[0]]), float(spectra.attrs[attributes[1]]))
+    # Classes in their order, the worst first
+    classes = list(settings.screening.classes)
+    return Region(settings.name, classes, simulated, places, epicentre)
+
+
+def _write_summary(
+    settings: Run, summary: RiskSummary, folder: Path, place: Region, report: Report
+) -> None:
+    """Write summary, KML and workbook."""
+    source = event_sentences(event_of_run(folder / "run.json", place))
+    stations = read_stations(folder / "stations.csv")
+    written = Screening(
+        folder, "risk", place, source, settings.spreadsheet, stations, summary.totals.table
+    )
+    write_results(written, summary.notes, summary.shown, report)
 
 
 def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Dataset:
@@ -154,31 +155,56 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
     return spectra
 
 
-def _summary(
-    settings: Run, risk: Path, folder: Path, facts: dict[str, str], report: Report
-) -> RiskSummary:
-    """Read the risk table once: for totals, figures, observations, and the layer of the pairs."""
-    needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, "station", *totals_columns(settings.totals)]
-    columns = None if settings.geopackage else list(dict.fromkeys(needed))
+def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Report) -> RiskSummary:
+    """Read the risk table once: for totals, figures, observations, notes, and all layers."""
+    needed = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, *totals_columns(settings.totals)]
+    is_whole = settings.geopackage or settings.spreadsheet
+    columns = None if is_whole else needed_columns(needed)
     # The layer takes the pieces one by one, and so they are noted on the way
-    pieces = _Pieces([], [], [], [], [])
+    pieces = _Pieces([], [], [], [], [], Notes())
     with ranked_table(risk, columns) as table:
         noted = _noted(table, settings, pieces)
         if settings.geopackage:
-            with report.tried(folder / "risk.gpkg"):
-                _write_pairs_layer(settings, noted, folder / "risk.gpkg", facts)
+            files = layer_paths(folder, "risk")
+            with report.tried(*files):
+                _write_layers(settings, noted, pieces, place, files)
         # All rows, or those that a layer left when it failed; a table that fails is a fault
         deque(noted, maxlen=0)
         if sum(pieces.rows) != table.pairs:
             raise CatalogError(str(risk), "cannot be read to its end: run again")
         worst = table.row(pieces.first_named[0]) if pieces.first_named else None
-    totals = region_totals(pieces.totals, settings.totals)
-    counted = with_buildings(totals.table, folder / "buildings.parquet")
     return RiskSummary(
         worst,
         pd.concat(pieces.shown, ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
-        totals._replace(table=counted),
+        _totals(settings, pieces, folder),
+        pieces.notes,
+    )
+
+
+def _totals(settings: Run, pieces: _Pieces, folder: Path) -> RegionTotals:
+    """Return the totals of all pieces, with the buildings of each area where they are known."""
+    totals = region_totals(pieces.totals, settings.totals)
+    return totals._replace(table=with_buildings(totals.table, folder / "buildings.parquet"))
+
+
+def _write_layers(
+    settings: Run,
+    noted: Iterator[pd.DataFrame],
+    pieces: _Pieces,
+    place: Region,
+    files: tuple[Path, Path, Path],
+) -> None:
+    """Write all layers; totals are known when the last piece has been taken."""
+    write_map_layers(
+        noted,
+        place,
+        read_stations(files[0].with_name("stations.csv")),
+        lambda: _totals(settings, pieces, files[0].parent),
+        outlines_beside(
+            settings.pairs.file if settings.pairs else None, files[0].with_name("pairs.csv")
+        ),
+        files,
     )
 
 
@@ -197,21 +223,21 @@ def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.Dat
             observed = piece["observed"].notna()
             found.observed.append(piece.loc[observed, OBSERVED_COLUMNS])
         found.totals.append(piece_totals(piece, settings.totals, classes))
+        found.notes.add(piece)
         yield piece
 
 
 def _draw_figures(
-    settings: Run,
     summary: RiskSummary,
-    spectra: xr.Dataset,
+    place: Region,
     stations: Sequence[FinishedStation],
     folder: Path,
     report: Report,
 ) -> None:
-    """Draw the worst pair that has a record, and the region."""
+    """Draw the region, and the worst pair that has a record."""
     walk, overview = (folder / "figures" / name for name in ("worst_pair.png", "overview.png"))
     with report.tried(overview):
-        draw_overview(summary.shown, spectra, settings.name, overview)
+        draw_overview(summary.shown, place, overview)
     worst = summary.worst
     if worst is None:
         return
@@ -222,24 +248,3 @@ def _draw_figures(
     motion = read_station_once(station.shard, station.hash)
     with report.tried(walk):
         draw_record_to_pair(motion, worst, walk)
-
-
-def _facts(settings: Run, simulated: bool) -> dict[str, str]:
-    """Return the facts of the whole table that layers state."""
-    return {"name": settings.name, "simulated": str(simulated).lower()}
-
-
-def _write_pairs_layer(
-    settings: Run, pieces: Iterator[pd.DataFrame], path: Path, facts: dict[str, str]
-) -> None:
-    """Write the pairs as a layer for QGIS with the optional libraries."""
-    from per_obspy.report.gis import write_pairs_layer
-
-    write_pairs_layer(pieces, list(settings.screening.classes), path, facts)
-
-
-def _write_totals_layer(totals: RegionTotals, path: Path, facts: dict[str, str]) -> None:
-    """Write the totals as a layer for QGIS with the optional libraries."""
-    from per_obspy.report.gis import write_totals_layer
-
-    write_totals_layer(*totals, path, facts)

@@ -139,7 +139,7 @@ def screen(
         drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
         earthquakes = _earlier_earthquakes(folder)
-        earlier_rows = _begun(folder, settings, SCREENING)
+        earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
         head = asked.head(None, {})
@@ -192,7 +192,7 @@ def _all_stages(
     with timed(seconds, "stations"), compiling(progress):
         progress("stations", 0, len(found.jobs))
         stations = finished_stations(found.jobs, settings.workers, executor, progress)
-    _begun(folder, settings, SCREENING)
+    _begun(folder, settings, SCREENING, found.earthquakes)
     # From here on no record is needed
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
@@ -210,10 +210,17 @@ def _earlier_earthquakes(folder: Path) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-def _begun(folder: Path, settings: Run, stage: str) -> int | None:
+def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
     """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
-    begun = {"name": settings.name, "state": UNFINISHED, "stage": stage, "earlier_rows": rows}
+    begun: dict[str, Any] = {
+        "name": settings.name,
+        "state": UNFINISHED,
+        "stage": stage,
+        "earlier_rows": rows,
+    }
+    # The summary states the earthquake before the run is finished
+    begun["earthquakes"] = list(earthquakes)
     write_status(folder / RECORD, "", {}, begun, indent=1)
     # A table of an earlier run would be taken for one of this run
     for name in ("risk", "rows", "buildings"):

@@ -12,6 +12,7 @@ from per_obspy.errors import CatalogError, Rejection, WriteError
 from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
 from per_obspy.names import inside
+from per_obspy.pipeline.results.run_facts import with_event
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
@@ -87,7 +88,8 @@ def find_station_jobs(
     jobs = station_jobs(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
-    return FoundStations(jobs, list(found.rejected), found.hashes, found.earthquakes)
+    earthquakes = with_event(found.earthquakes, found.event and found.event.event)
+    return FoundStations(jobs, list(found.rejected), found.hashes, earthquakes)
 
 
 def station_jobs(

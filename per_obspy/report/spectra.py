@@ -1,5 +1,6 @@
 """Figures of one station: its spectra, and the state-space trace of one oscillator."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from per_obspy.checks import FloatArray
-from per_obspy.report.style import MOTION_COLOUR, literal, save
+from per_obspy.constants import STANDARD_GRAVITY, UNSET_DAYS
+from per_obspy.report.style import MOTION_COLOUR, fit_titles, literal, save, title_name
 from per_obspy.spectra.bilinear import bilinear_response
 
 #: Colours of components, in their order (Okabe & Ito 2008).
@@ -18,7 +20,7 @@ COMPONENT_COLOURS = ("#0072B2", "#D55E00", "#009E73")
 
 def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
     """
-    Draw PER, SD, pseudo-velocity and PER/SD of every component of a station at one damping.
+    Draw PER and SD, SA, pseudo-velocity and PER/SD of every component of a station at one damping.
 
     Parameters
     ----------
@@ -30,39 +32,59 @@ def draw_spectra(station: xr.Dataset, damping: float, path: Path) -> None:
         PNG file.
     """
     chosen = station.sel(damping=damping, method="nearest")
-    figure = Figure(figsize=(13.0, 4.2), layout="constrained")
-    radius, velocity, ratio = figure.subplots(1, 3)
+    figure = Figure(figsize=(11.0, 8.0), layout="constrained")
+    panels = radius, acceleration, velocity, ratio = figure.subplots(2, 2).ravel()
     # More components than colours begin again
     for index, channel in enumerate(station["channel"].to_numpy()):
         name = literal(str(channel))
         colour = COMPONENT_COLOURS[index % len(COMPONENT_COLOURS)]
-        _draw_component((radius, velocity, ratio), chosen, index, name, colour)
+        _draw_component(panels, chosen, index, name, colour)
 
+    # SA is absolute, the pseudo-velocity is that of SD
     radius.set(ylabel="radius, displacement (m)")
+    acceleration.set(ylabel="absolute acceleration SA (g)")
     velocity.set(ylabel="pseudo-velocity (m/s)")
     ratio.set(ylabel="PER / SD (1)")
-    for axes in (radius, velocity, ratio):
+    for axes in panels:
         axes.set_xlabel("natural period (s)")
         axes.grid(which="both", alpha=0.25)
         axes.legend(fontsize=8)
 
-    # The damping is that of the stored spectra
-    name = literal(str(station["station"].item()))
-    figure.suptitle(f"{name}, damping {float(chosen['damping']):.0%}, usable periods only")
+    _write_title(figure, station, chosen)
     save(figure, path, station.attrs["simulated"] == "true")
 
 
+def _write_title(figure: Figure, station: xr.Dataset, chosen: xr.Dataset) -> None:
+    """Write station, date and the damping of the stored spectra above a figure."""
+    facts = f"damping {float(chosen['damping']):.0%}, usable periods only"
+    name = title_name(str(station["station"].item()))
+    figure.suptitle(f"{name}, {record_date(station)}\n{facts}", parse_math=False)
+    fit_titles(figure)
+
+
+def record_date(station: xr.Dataset) -> str:
+    """Return the day and time at which the record of a station starts, as far as it is known."""
+    start = str(station.attrs.get("time_coverage_start", ""))[:16]
+    # Clocks that were never set stand at one of these days
+    unset = {f"{year:04}-{month:02}-{day:02}" for year, month, day in UNSET_DAYS}
+    is_known = start and start[:10] not in unset
+    return f"{start.replace('T', ' ')} UTC" if is_known else "date unknown"
+
+
 def _draw_component(
-    panels: tuple[Axes, Axes, Axes], spectra: xr.Dataset, index: int, name: str, colour: str
+    panels: Sequence[Axes], spectra: xr.Dataset, index: int, name: str, colour: str
 ) -> None:
-    """Draw PER and SD, pseudo-velocity, and their ratio of one component at usable periods."""
-    radius, velocity, ratio = panels
+    """Draw PER and SD, SA, pseudo-velocity and PER/SD of one component at usable periods."""
+    radius, acceleration, velocity, ratio = panels
     period = spectra["period"].to_numpy()
     usable = np.where(spectra["usable"] == 1, 1.0, np.nan)
     per, sd = spectra["per"][index].to_numpy(), spectra["sd"][index].to_numpy()
     # Unusable periods are NaN, which breaks the lines
     radius.loglog(period, per * usable, color=colour, label=f"{name} PER")
     radius.loglog(period, sd * usable, color=colour, linestyle="--", label=f"{name} SD")
+    # SA in g, as hazard maps have it
+    in_g = spectra["sa"][index].to_numpy() / STANDARD_GRAVITY
+    acceleration.loglog(period, in_g * usable, color=colour, label=name)
     velocity.loglog(period, 2.0 * np.pi / period * sd * usable, color=colour, label=name)
     ratio.semilogx(period, per / sd * usable, color=colour, label=name)
 

@@ -1,12 +1,15 @@
 """Colours of all figures, and writing them as PNG."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
 
-from matplotlib.figure import Figure
+from matplotlib.colors import LinearSegmentedColormap, to_hex
+from matplotlib.figure import Figure, SubFigure
 
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: State of a pair -> colour (Okabe & Ito 2008, distinct for colour-blind readers too).
 STATE_COLOURS = {
@@ -33,6 +36,32 @@ LONGEST_NAME = 80
 
 #: Characters per line of a name in a title.
 LINE_WIDTH = 40
+
+
+def class_colours(classes: Sequence[str]) -> dict[str, str]:
+    """
+    Return the colour of each class of severity, hexadecimal: one meaning in figures and layers.
+
+    Parameters
+    ----------
+    classes : sequence of str
+        Names of the risk classes, worst first; pairs of unknown gap are added as a class.
+
+    Examples
+    --------
+    >>> class_colours(["severe", "low"])
+    {'severe': '#D55E00', 'low': '#009E73', 'gap unknown': '#999999'}
+    """
+    known, last = list(STATE_COLOURS.values()), max(len(classes) - 1, 1)
+    if len(classes) > len(known):
+        ramp = LinearSegmentedColormap.from_list("risk", known)
+        chosen = [to_hex(ramp(number / last)) for number in range(len(classes))]
+    else:
+        # Mixed colours would not be distinct for colour-blind readers
+        steps = (round(number / last * (len(known) - 1)) for number in range(len(classes)))
+        chosen = [known[step] for step in steps]
+    colours = dict(zip(classes, chosen, strict=True))
+    return colours | {UNKNOWN_CLASS: UNKNOWN_COLOUR}
 
 
 def title_name(name: str) -> str:
@@ -69,8 +98,11 @@ def fit_titles(figure: Figure) -> None:
     """Shrink the titles that are wider than their axes or figure, so that none is clipped."""
     figure.draw_without_rendering()
     titles = [(axes.title, axes.bbox.width) for axes in figure.axes]
-    # The title of the whole figure
-    titles += [(heading, figure.bbox.width) for heading in figure.texts]
+    # Titles of the whole figure and of its parts
+    parts: list[Figure | SubFigure] = [figure, *figure.subfigs]
+    for part in parts:
+        level = (text for text in part.texts if not text.get_rotation())
+        titles += [(heading, part.bbox.width) for heading in level]
     for title, room in titles:
         # Letters are whole pixels wide: a smaller font may need a little more than its share
         width, available = title.get_window_extent().width, 0.95 * room

@@ -8,6 +8,7 @@ from per_obspy.inventory.schema import COLUMNS, COMPLETED, Column
 from per_obspy.screening.by_spectrum.design_table import DESIGN
 from per_obspy.screening.codes import rule_columns
 from per_obspy.screening.columns import RESULTS
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv, write_described, write_parquet, write_rejected
 
 FILES = ("design.csv", "design.parquet", "design.columns.csv", "rejected.csv")
@@ -25,7 +26,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
         Where to: ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
-    write_csv(table, text)
+    write_csv(rounded_table(table), text)
     write_parquet(table, whole)
     # Columns of the pair table that nothing here computes are carried through
     known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()

@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
 from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, text_columns
+from per_obspy.tables.rounding import rounded_arrow
 from per_obspy.tables.table_files import write_columns
 
 #: Rows that are read and written together.
@@ -145,7 +146,9 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
     """Append rows to a CSV file that has a header."""
     # Names of columns may differ in case only, or be anything: the database numbers them
-    numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
+    numbered = arrow_cells(rounded_arrow(rows)).rename_columns(
+        [f"c{i}" for i in range(rows.num_columns)]
+    )
     # It writes a file of its own, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", numbered)

@@ -19,6 +19,7 @@ from per_obspy.screening.region.totals import (
     joined_totals,
     partial_totals,
 )
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv
 
 #: Columns of the risk table that totals need.
@@ -179,5 +180,5 @@ def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTota
 
 
 def write_totals(table: pd.DataFrame, path: Path) -> None:
-    """Write the totals as CSV."""
-    write_csv(table, path)
+    """Write the totals as CSV, numbers rounded."""
+    write_csv(rounded_table(table), path)

@@ -78,7 +78,7 @@ def test_every_scenario_is_run_and_the_probabilities_are_joined(copied, capsys):
     assert "2 scenarios, 3 pairs; 0 rejected" in out
     assert "small: stations: 1 of 1" in err
     assert "large: stations" not in err  # it was done
-    table = pd.read_csv(copied / "both" / "ensemble.csv").set_index("pair_id")
+    table = pd.read_parquet(copied / "both" / "ensemble.parquet").set_index("pair_id")
     # joined by pandas instead
     large, small = (
         pd.read_parquet(copied / name / "risk.parquet")

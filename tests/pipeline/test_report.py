@@ -14,7 +14,7 @@ from pyarrow import parquet
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline import report as report_stage
-from per_obspy.pipeline.report import Report, _summary
+from per_obspy.pipeline.report import Report, _region, _summary
 from per_obspy.pipeline.run import report, run
 from per_obspy.tables import risk
 
@@ -62,7 +62,7 @@ def test_a_report_needs_a_finished_run(copied):
 
 def summary(folder):
     settings, table = load(folder / "run.toml", Run), folder / "out" / "risk.parquet"
-    return _summary(settings, table, folder, {}, Report([], []))
+    return _summary(settings, table, folder, _region(settings, True, None), Report([], []))
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
@@ -89,7 +89,7 @@ def test_a_large_table_is_shown_in_equal_steps(copied, monkeypatch):
     assert summary(copied).shown["rank"].tolist() == list(range(1, count + 1, step))
 
 
-KINDS = [("", "Polygon"), ("[totals]\nh3 = 6\n", "Polygon")]
+KINDS = [("", "MultiPolygon"), ("[totals]\nh3 = 6\n", "MultiPolygon")]
 KINDS += [('[totals]\narea = "position"\n', "Point")]
 
 
@@ -97,8 +97,10 @@ KINDS += [('[totals]\narea = "position"\n', "Point")]
 def test_totals_are_a_layer_too(copied, kind, shape):
     write_configuration(copied, f"geopackage = true\n{PAIRS}{kind}")
     result = run(copied / "run.toml", executor=InProcess())
-    assert {"risk.gpkg", "totals.gpkg", "totals.csv"} <= set(result.record["outputs"])
-    information = pyogrio.read_info(copied / "out" / "totals.gpkg")
+    assert {"risk.gpkg", "risk.qgz", "risk.geoparquet", "totals.csv"} <= set(
+        result.record["outputs"]
+    )
+    information = pyogrio.read_info(copied / "out" / "risk.gpkg", layer="areas")
     # one row per area, in both forms
     table = pd.read_csv(copied / "out" / "totals.csv", dtype={"area": str})
     assert (information["features"], information["geometry_type"]) == (len(table), shape)
@@ -170,7 +172,7 @@ def test_hostile_names_and_values_reach_every_file(copied, call):
     assert not {"\x1b", "\u202e"} & set(output)
 
 
-@pytest.mark.parametrize("failing", ["draw_overview", "_write_pairs_layer"])
+@pytest.mark.parametrize("failing", ["draw_overview", "_write_layers"])
 def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, failing):
     # would catch a traceback after all the work, totals of some rows, and an old picture
     text = (copied / "run.toml").read_text()

@@ -69,9 +69,9 @@ def test_the_function_gives_the_table_of_the_run(finished):
     assert table.index.tolist() == ran.index.tolist()
     numbers = [name for name in ran if pd.api.types.is_numeric_dtype(ran[name])]
     assert "probability" in numbers
-    # risk.csv has nine digits
+    # risk.csv has five digits: half a unit of the last of 10 000; coordinates seven decimals
     expected = table[numbers].to_numpy(np.float64)
-    assert_allclose(ran[numbers].to_numpy(np.float64), expected, rtol=1e-8, atol=1e-12)
+    assert_allclose(ran[numbers].to_numpy(np.float64), expected, rtol=5e-5, atol=5.1e-8)
 
 
 @pytest.mark.parametrize("size", [1, 7, 25])

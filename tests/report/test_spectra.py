@@ -12,6 +12,7 @@ from per_obspy.report.spectra import (
     add_state_space,
     draw_spectra,
     draw_state_space,
+    record_date,
 )
 from per_obspy.spectra.bilinear import bilinear_response
 
@@ -27,7 +28,7 @@ def panels(station, drawn):
     draw_spectra(station, 0.06, "spectra.png")
     ((figure, _, simulated),) = figures
     assert not simulated
-    assert figure.get_suptitle() == "XX.ONE, damping 5%, usable periods only"
+    assert figure.get_suptitle() == ("XX.ONE, date unknown\ndamping 5%, usable periods only")
     return figure.axes
 
 
@@ -46,22 +47,37 @@ def test_every_component_is_drawn_where_its_periods_are_usable(station, panels):
 def test_pseudo_velocity_and_ratio_follow_from_the_spectra(station, panels):
     chosen, usable = station.sel(damping=0.05), station["usable"].to_numpy() == 1
     period, sd = station["period"].to_numpy(), chosen["sd"][1].to_numpy()
-    assert_allclose(panels[1].lines[1].get_ydata()[usable], (2 * np.pi / period * sd)[usable])
-    ratio = panels[2].lines[1].get_ydata()[usable]
+    assert_allclose(panels[2].lines[1].get_ydata()[usable], (2 * np.pi / period * sd)[usable])
+    ratio = panels[3].lines[1].get_ydata()[usable]
     assert_allclose(ratio, (chosen["per"][1] / chosen["sd"][1])[usable], rtol=1e-6)
     # the radius contains the displacement
     assert (ratio >= 1.0).all()
 
 
+def test_accelerations_are_in_units_of_gravity(station, panels):
+    # would catch m/s²: by definition 9.80665 m/s² are 1 g
+    chosen, usable = station.sel(damping=0.05), station["usable"].to_numpy() == 1
+    drawn_in_g = panels[1].lines[0].get_ydata()[usable]
+    assert_allclose(drawn_in_g * 9.80665, chosen["sa"][0][usable], rtol=1e-6)
+
+
 def test_axes_have_units_and_scales(panels):
     assert [axes.get_ylabel() for axes in panels] == [
         "radius, displacement (m)",
+        "absolute acceleration SA (g)",
         "pseudo-velocity (m/s)",
         "PER / SD (1)",
     ]
-    assert [axes.get_yscale() for axes in panels] == ["log", "log", "linear"]
+    assert [axes.get_yscale() for axes in panels] == ["log", "log", "log", "linear"]
     assert {axes.get_xlabel() for axes in panels} == {"natural period (s)"}
     assert {axes.get_xscale() for axes in panels} == {"log"}
+
+
+def test_a_title_has_the_day_of_the_record(station):
+    dated = station.assign_attrs(time_coverage_start="1985-09-19T13:19:46.5Z")
+    assert record_date(dated) == "1985-09-19 13:19 UTC"
+    # a clock that was never set
+    assert record_date(station) == "date unknown"
 
 
 def test_simulated_motion_is_passed_on(station, drawn):
@@ -110,4 +126,4 @@ def test_the_state_space_has_one_scale():
 
 def test_the_file_is_a_picture(station, tmp_path):
     draw_spectra(station, 0.05, tmp_path / "spectra.png")
-    assert imread(tmp_path / "spectra.png").shape[1] > 1500
+    assert imread(tmp_path / "spectra.png").shape[1] > 1300

@@ -9,7 +9,7 @@ import shapely
 
 from per_obspy.files import written_whole
 from per_obspy.inventory.footprints.gdal_paths import literal_path
-from per_obspy.report.gis import write_layer
+from per_obspy.report.layers.geopackage import Layer, append_layer
 
 
 def write_plan_layers(table: pd.DataFrame, path: Path, facts: Mapping[str, str]) -> None:
@@ -33,5 +33,6 @@ def write_plan_layers(table: pd.DataFrame, path: Path, facts: Mapping[str, str])
         lines.append(shapely.LineString(corners))
         rows.append({"team": team, "visits": len(visits), "way": float(visits["way"].sum())})
     with written_whole(path) as whole, literal_path(whole) as part:
-        write_layer(part, "visits", shapely.points(places), table, False, facts)
-        write_layer(part, "routes", np.array(lines, dtype=object), pd.DataFrame(rows), True, facts)
+        append_layer(part, Layer("visits", table, shapely.points(places)), True, facts)
+        routes = Layer("routes", pd.DataFrame(rows), np.array(lines, dtype=object))
+        append_layer(part, routes, True, facts)

@@ -1,4 +1,4 @@
-"""Figures of a run: the data that they show and the labels that they carry."""
+"""Figure of a pair: the data that it shows and the labels that it carries."""
 
 from contextlib import nullcontext
 from itertools import pairwise
@@ -6,15 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.testing import assert_allclose
 from screening_samples import make_station
 
-from per_obspy.report.figures import draw_overview, draw_record_to_pair, motion_along
-from per_obspy.report.style import STATE_COLOURS
-from per_obspy.spectra.storage import region
+from per_obspy.report.pair_figure import draw_pair_alone, draw_record_to_pair, motion_along
 
 PAIR = {
     "pair_id": "P7",
@@ -29,15 +26,6 @@ PAIR = {
     "gap": 0.05,
     "demand": 0.123,
 }
-TABLE = pd.DataFrame(
-    {
-        "state": ["yes", "no", "no", "likely"],
-        "longitude": [20.0, 20.1, 20.2, 20.3],
-        "latitude": [60.0, 60.1, 59.9, 60.0],
-        "demand": [0.3, 0.1, 0.0, 0.2],
-        "gap": [0.1, 0.2, 0.4, 0.25],
-    }
-)
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +34,12 @@ def station():
 
 
 def _panels(station, drawn, **changes):
-    figures = drawn("figures")
+    figures = drawn("pair_figure")
     draw_record_to_pair(station, pd.Series(PAIR | changes), "walk.png")
     ((figure, path, simulated),) = figures
     assert (path, simulated) == ("walk.png", False)
-    return figure.axes
+    left, right = figure.subfigs
+    return [*left.axes, *right.axes]
 
 
 def test_the_motion_is_that_along_the_azimuth_of_the_pair(station, drawn):
@@ -61,7 +50,7 @@ def test_the_motion_is_that_along_the_azimuth_of_the_pair(station, drawn):
     assert_allclose(motion.lines[0].get_ydata(), expected, rtol=1e-12, atol=1e-14)
     assert motion.get_xlabel() == "time (s)"
     assert motion.get_ylabel() == "ground acceleration (m/s²)"
-    assert motion.get_title() == "1  record XX.ONE, along 30°"
+    assert motion.get_title() == "1  record XX.ONE\ndate unknown, along 30°"
     # the burst of 40 s is silent at its ends, but 5 s of margin are shown
     start, end = motion.get_xlim()
     assert -5.0 < start < 10.0
@@ -69,7 +58,7 @@ def test_the_motion_is_that_along_the_azimuth_of_the_pair(station, drawn):
 
 
 def test_the_spectrum_is_the_stored_one_and_the_points_are_the_pairs(station, drawn):
-    _, spectrum, _ = _panels(station, drawn, damping_1=0.06)
+    _, spectrum, *_ = _panels(station, drawn, damping_1=0.06)
     # The nearest stored damping; only usable periods are drawn in full
     everywhere, usable, *points = spectrum.lines
     assert_allclose(everywhere.get_ydata(), station["per_rotd100"].sel(damping=0.05))
@@ -86,24 +75,43 @@ def test_the_spectrum_is_the_stored_one_and_the_points_are_the_pairs(station, dr
     assert spectrum.get_ylabel() == "pseudo energy radius (m)"
 
 
-def test_the_circles_are_the_radii_at_contact_height_a_gap_from_each_other(station, drawn):
+def test_the_circles_are_the_radii_at_contact_height_at_both_gaps(station, drawn):
     # would catch a radius without its participation, and a centre on the wrong side
-    *_, circles = _panels(station, drawn)
-    first, second, *_ = circles.lines
-    for line, radius, centre in ((first, 1.2 * 0.2, 0.0), (second, 0.9 * 0.1, 0.05)):
-        x, y = line.get_xydata().T
-        assert_allclose(np.hypot(x - centre, y), radius, rtol=1e-12)
-    assert circles.get_title() == "3  pair P7\ngap 5 cm, needed 12 cm"
-    assert circles.get_aspect() == 1.0
-    assert circles.get_xlabel() == "displacement at contact height (m)"
+    *_, has, needs = _panels(station, drawn)
+    for circles, gap in ((has, 5.0), (needs, 12.3)):
+        outlines = [line for line in circles.lines if len(line.get_xdata()) > 2]
+        for line, radius, centre in zip(outlines, (24.0, 9.0), (0.0, gap), strict=True):
+            x, y = line.get_xydata().T
+            assert_allclose(np.hypot(x - centre, y), radius, rtol=1e-12)
+        assert circles.get_aspect() == 1.0
+    assert has.get_title() == "at the gap there is: 5 cm"
+    assert needs.get_title() == "at the gap needed: 12.3 cm"
+    assert needs.get_xlabel() == "displacement at contact height (cm)"
+
+
+def test_a_pair_of_unknown_gap_has_one_picture_of_circles(station, drawn):
+    *_, has, needs = _panels(station, drawn, gap=np.nan)
+    assert not has.axison
+    assert needs.get_title() == "at the gap needed: 12.3 cm"
+
+
+def test_a_pair_without_a_record_is_drawn_by_its_displacements(drawn):
+    figures = drawn("pair_figure")
+    pair = {name: value for name, value in PAIR.items() if not name.startswith("per_")}
+    draw_pair_alone(pd.Series(pair | {"sd_1": 0.15, "sd_2": 0.1}), True, "alone.png")
+    ((figure, _, simulated),) = figures
+    assert simulated
+    x, _ = figure.subfigs[0].axes[0].lines[0].get_xydata().T
+    # 1.2 times 15 cm
+    assert x.max() == pytest.approx(18.0)
 
 
 def test_one_horizontal_has_its_own_motion_and_spectrum(drawn):
     station = make_station(channels=("HNN",))
-    motion, spectrum, _ = _panels(station, drawn, azimuth_used=np.nan)
+    motion, spectrum, *_ = _panels(station, drawn, azimuth_used=np.nan)
     # along its sensor, whose azimuth may be unknown
     assert_allclose(motion.lines[0].get_ydata(), station["acceleration"][0])
-    assert motion.get_title() == "1  record XX.ONE"
+    assert motion.get_title() == "1  record XX.ONE\ndate unknown"
     assert spectrum.get_legend().get_texts()[0].get_text() == "PER"
     assert_allclose(spectrum.lines[0].get_ydata(), station["per"][0].sel(damping=0.05))
 
@@ -112,59 +120,6 @@ def test_azimuths_are_counted_from_north_to_east(station):
     north, east = station["acceleration"].to_numpy()
     assert_allclose(motion_along(station, 0.0), north)
     assert_allclose(motion_along(station, 90.0), east, atol=1e-12)
-
-
-@pytest.fixture
-def overview(station, drawn):
-    figures = drawn("figures")
-    spectra = region([station]).assign_attrs(simulated="true")
-    draw_overview(TABLE, spectra, "old town", "overview.png")
-    ((figure, _, simulated),) = figures
-    assert simulated
-    assert figure.get_suptitle() == "old town"
-    return figure.axes
-
-
-def _points_of(axes, state):
-    """Return the points in the colour of a state."""
-    (found,) = [
-        points.get_offsets()
-        for points in axes.collections
-        if to_hex(points.get_facecolor()[0]).upper() == STATE_COLOURS[state]
-    ]
-    return np.asarray(found).tolist()
-
-
-def test_the_map_has_every_pair_and_station_at_its_place(overview):
-    chart = overview[0]
-    assert _points_of(chart, "yes") == [[20.0, 60.0]]
-    assert _points_of(chart, "no") == [[20.1, 60.1], [20.2, 59.9]]
-    assert _points_of(chart, "likely") == [[20.3, 60.0]]
-    assert np.asarray(chart.collections[-1].get_offsets()).tolist() == [[20.0, 10.0]]
-    # a degree of longitude is half as long at 60 degrees north
-    assert chart.get_aspect() == pytest.approx(2.0)
-    labels = [text.get_text() for text in chart.get_legend().get_texts()]
-    assert labels == ["2 pairs: no", "1 pairs: likely", "1 pairs: yes", "stations"]
-    assert (chart.get_xlabel(), chart.get_ylabel()) == ("longitude (°E)", "latitude (°N)")
-
-
-def test_gaps_are_drawn_over_demands_in_centimetres(overview):
-    gaps = overview[1]
-    assert _points_of(gaps, "yes") == [[30.0, 10.0]]
-    assert gaps.lines[0].get_xydata().tolist() == [[0.0, 0.0], [30.0, 30.0]]
-    assert (gaps.get_xlabel(), gaps.get_ylabel()) == ("demand (cm)", "gap (cm)")
-    # zero demands and gaps are inside, and so is the largest of both
-    assert gaps.get_xlim()[0] < 0.0
-    assert gaps.get_ylim()[0] < 0.0
-    assert gaps.get_xlim()[1] >= 30.0
-    assert gaps.get_ylim()[1] >= 40.0
-
-
-def test_a_region_without_demand_can_be_drawn(station, tmp_path):
-    # would catch a logarithmic axis of no extent
-    still = TABLE.assign(demand=0.0, gap=0.0)
-    draw_overview(still, region([station]), "still", tmp_path / "overview.png")
-    assert imread(tmp_path / "overview.png").shape[0] > 500
 
 
 def test_the_file_is_a_picture_of_some_content(station, tmp_path):
@@ -185,19 +140,19 @@ def test_no_title_is_clipped(station, tmp_path, monkeypatch, name, simulated):
     monkeypatch.setattr("per_obspy.report.style.written_whole", nullcontext)
     marked = station.assign_attrs(simulated=simulated)
     draw_record_to_pair(marked, pd.Series(PAIR | {"pair_id": name}), tmp_path / "walk.png")
-    draw_overview(TABLE, region([marked]), name, tmp_path / "overview.png")
     for figure in figures:
         figure.draw_without_rendering()
         titles = [axes.title for axes in figure.axes]
+        titles += [text for part in figure.subfigs for text in part.texts]
         # one pixel: extents are rounded outwards
         for title in [*titles, *figure.texts]:
             box = title.get_window_extent()
             assert -1.0 <= box.x0 <= box.x1 <= figure.bbox.width + 1.0
             assert -1.0 <= box.y0 <= box.y1 <= figure.bbox.height + 1.0
-    assert len(figures) == 2
+    assert len(figures) == 1
 
 
 def test_neighbouring_titles_do_not_overlap(station, drawn):
     panels = _panels(station, drawn, pair_id="W" * 300)
-    boxes = [axes.title.get_window_extent() for axes in panels]
+    boxes = [axes.title.get_window_extent() for axes in panels[:3]]
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))

@@ -1,0 +1,1 @@
+"""Results for people: summary, layers and workbook of every kind of screening."""

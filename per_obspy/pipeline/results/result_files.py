@@ -1,0 +1,135 @@
+"""Summary, KML and workbook of a screening of any kind."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+import pyarrow.parquet as pq
+
+from per_obspy.pipeline.results.faults import Report
+from per_obspy.pipeline.results.table_notes import Notes
+from per_obspy.report.layers.kml import write_kml
+from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
+from per_obspy.report.overview import Region
+from per_obspy.report.summary.one_page import write_page
+from per_obspy.report.summary.spoken_text import write_text
+from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
+from per_obspy.report.words import name_text
+from per_obspy.screening.columns import column_table, known_column
+from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
+
+
+class Screening(NamedTuple):
+    """
+    What is known of a screening beside its table.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the results.
+    stem : str
+        Name of its files: ``risk``, ``design`` or ``ensemble``.
+    region : Region
+        Title, classes, stations and epicentre.
+    source : list of str
+        Sentences on the earthquake, spectrum or scenarios.
+    spreadsheet : bool
+        Whether a workbook is written.
+    stations : DataFrame
+        Rows of ``stations.csv``; empty where there are none.
+    areas : DataFrame
+        Totals by area; empty where there are none.
+    """
+
+    folder: Path
+    stem: str
+    region: Region
+    source: list[str]
+    spreadsheet: bool = False
+    stations: pd.DataFrame = pd.DataFrame()
+    areas: pd.DataFrame = pd.DataFrame()
+
+
+def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, report: Report) -> None:
+    """
+    Write summary, KML and workbook; a file that cannot be made is one line of the report.
+
+    Parameters
+    ----------
+    screening : Screening
+        What is known beside the table.
+    notes : Notes
+        Of all rows of the table.
+    shown : DataFrame
+        Pairs of the map of the summary.
+    report : Report
+        Takes files and faults.
+    """
+    folder, stem = screening.folder, screening.stem
+    worst = notes.worst
+    buildings = _worst_buildings(folder / "buildings.parquet")
+    facts = _facts(screening, notes, worst, buildings)
+    # Each file by itself: one that fails leaves the others
+    with report.tried(folder / "summary.txt"):
+        write_text(facts, folder / "summary.txt")
+    with report.tried(folder / "summary.pdf"):
+        write_page(facts, shown, folder / "summary.pdf")
+    with report.tried(folder / f"{stem}.kml"):
+        title, classes = screening.region.title, screening.region.classes
+        write_kml(worst, classes, title, folder / f"{stem}.kml")
+    # The workbook needs an optional library
+    if screening.spreadsheet:
+        with report.tried(folder / f"{stem}.xlsx"):
+            sheets = _sheets(screening, worst, buildings)
+            write_workbook(sheets, folder / f"{stem}.xlsx")
+
+
+def _facts(
+    screening: Screening, notes: Notes, worst: pd.DataFrame, buildings: pd.DataFrame
+) -> SummaryFacts:
+    """Return the facts of the summary."""
+    # The area with most pounding is worth a name where there are several
+    area, totals = "", screening.areas
+    if len(totals) > 1:
+        most = totals.iloc[int(totals["expected_pounding"].argmax())]
+        place = place_text(float(most["latitude"]), float(most["longitude"]), 4)
+        area = f"{name_text(most['area'])}, around {place}"
+    made = f"per-obspy {version('per_obspy')}. All numbers and their units: {screening.stem}.csv."
+    listed = worst.head(LISTED), buildings.head(LISTED)
+    return SummaryFacts(
+        screening.region,
+        screening.source,
+        notes.counts,
+        *listed,
+        screening.stations,
+        area,
+        made,
+    )
+
+
+def _worst_buildings(path: Path) -> pd.DataFrame:
+    """Return the first rows of the table of the buildings; none where there is no such table."""
+    if not path.exists():
+        return pd.DataFrame()
+    with pq.ParquetFile(path.absolute()) as file:
+        batch = next(file.iter_batches(5000), None)
+        return pd.DataFrame() if batch is None else batch.to_pandas()
+
+
+def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) -> list[Sheet]:
+    """Return the sheets of the workbook."""
+    units = {
+        str(name): column.unit for name in worst if (column := known_column(str(name))) is not None
+    }
+    of_stations = {name: column.unit for name, column in STATION_COLUMNS.items()}
+    # What every column means is a sheet too
+    meanings = column_table(map(str, worst))
+    given = [
+        Sheet("pairs", worst, units),
+        Sheet("buildings", buildings, {"severity": "m/s"}),
+        Sheet("areas", screening.areas, {"worst_expected_impact_velocity": "m/s"}),
+        Sheet("stations", screening.stations, of_stations),
+        Sheet("columns", meanings, {}),
+    ]
+    return [sheet for sheet in given if not sheet.table.empty]

@@ -1,0 +1,81 @@
+"""Facts of a run that its summary states: the earthquake and the stations."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from per_obspy.report.overview import Region
+from per_obspy.resume import StatusError, read_status
+from per_obspy.tables.station_summary import COLUMNS
+
+
+def event_facts(event: Any) -> dict[str, object]:
+    """
+    Return time, place and size of an earthquake, as far as it has them.
+
+    Parameters
+    ----------
+    event : obspy.core.event.Event
+        With at least one origin.
+    """
+    origin = event.preferred_origin() or event.origins[0]
+    magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    # What an event does not have is None
+    facts = {
+        "time": str(origin.time)[:19],
+        "longitude": origin.longitude,
+        "latitude": origin.latitude,
+        "depth": origin.depth,
+        "magnitude": magnitude.mag if magnitude else None,
+    }
+    return {name: value for name, value in facts.items() if value is not None}
+
+
+def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[dict[str, object]]:
+    """Return the earthquakes of a folder; the screened one has the facts of its event file."""
+    if event is None:
+        return list(groups)
+    facts = event_facts(event)
+    return [group | {"event": facts} if group["screened"] else group for group in groups]
+
+
+def event_of_run(record: Path, region: Region) -> dict[str, Any]:
+    """
+    Return the facts of the earthquake of a run: of its file, else of the headers of its records.
+
+    Parameters
+    ----------
+    record : Path
+        ``run.json``, finished or not.
+    region : Region
+        Whose epicentre counts where nothing else is known.
+    """
+    try:
+        groups = read_status(record).get("earthquakes")
+    except StatusError:
+        groups = None
+    facts: dict[str, Any] = {}
+    if region.epicentre is not None:
+        facts = dict(zip(("longitude", "latitude"), region.epicentre, strict=True))
+    # One earthquake is screened
+    for group in groups if isinstance(groups, list) else ():
+        if isinstance(group, Mapping) and group.get("screened"):
+            known = group.get("event") or group.get("headers") or {}
+            facts |= {"start": group.get("start")}
+            facts |= {name: value for name, value in known.items() if value is not None}
+    return facts
+
+
+def read_stations(path: Path) -> pd.DataFrame:
+    """Return the rows of ``stations.csv``; none where there is no such table."""
+    if not path.exists():
+        return pd.DataFrame()
+    types = {name: "str" for name, column in COLUMNS.items() if column.dtype == "str"}
+    return pd.read_csv(
+        path,
+        dtype=types,
+        keep_default_na=False,
+        na_values={name: [""] for name, column in COLUMNS.items() if column.dtype != "str"},
+    )

@@ -1,0 +1,1 @@
+"""Results as layers for a map and for a spreadsheet."""

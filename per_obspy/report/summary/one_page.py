@@ -1,0 +1,185 @@
+"""``summary.pdf``: one A4 page with a small map, made without a browser."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from textwrap import wrap
+
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from per_obspy.errors import shortened
+from per_obspy.files import written_whole
+from per_obspy.report.overview import draw_map
+from per_obspy.report.style import MOTION_COLOUR, class_colours, literal
+from per_obspy.report.summary.statements import (
+    SummaryFacts,
+    first_steps,
+    five_numbers,
+    station_sentences,
+    sureness,
+)
+from per_obspy.report.words import chance_text, length_text, number, speed_text
+
+#: A4, inches; margins and lines as shares of the page.
+PAGE = (8.27, 11.69)
+LEFT, RIGHT = 0.07, 0.93
+LINE = 0.0148
+
+#: Characters of a line of text of size 9 across half a page, and across the page.
+HALF, WHOLE = 52, 108
+
+#: Colour of the warning that motion is simulated.
+WARNING_COLOUR = "#AA0000"
+
+#: Columns of the list of pairs: title, place from the left.
+COLUMNS = {
+    "": 0.07, "pair": 0.10, "class": 0.31, "impact": 0.40, "contact": 0.485, "gap": 0.61,
+    "needed": 0.675, "latitude, longitude": 0.93,
+}  # fmt: skip
+
+
+def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
+    """
+    Write the summary as one page of PDF, whole or not at all.
+
+    Parameters
+    ----------
+    facts : SummaryFacts
+        What it states.
+    shown : DataFrame
+        Pairs of the map: ``risk_class, longitude, latitude``.
+    path : Path
+        ``.pdf``.
+    """
+    figure = Figure(figsize=PAGE)
+    at = _write_head(figure, facts)
+    at = _write_numbers(figure, facts, at)
+    bottom = at - 0.30
+    axes = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225))
+    draw_map(axes, shown, facts.region)
+    axes.tick_params(labelsize=7)
+    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
+        text.set_fontsize(8)
+    _write_legend(figure, facts, bottom + 0.005)
+    lowest = _write_section(figure, "What to do first", first_steps(facts), at, HALF)
+    lowest = _write_section(figure, "How sure", sureness(facts), lowest, HALF)
+    _write_pairs(figure, facts, min(lowest, bottom))
+    # Where the numbers are from
+    figure.text(LEFT, 0.03, literal(shortened(facts.made, 150)), fontsize=7, color=MOTION_COLOUR)
+    # The same page has the same bytes
+    with written_whole(path) as part:
+        figure.savefig(part, metadata={"CreationDate": None})
+
+
+def _write_head(figure: Figure, facts: SummaryFacts) -> float:
+    """Write title, warning, earthquake and stations; return how far the page is filled."""
+    at = 0.955
+    for line in wrap(shortened(facts.region.title, 140), 70):
+        figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
+        at -= 0.024
+    if facts.region.simulated:
+        text = "SIMULATED ground motion: this is not an earthquake"
+        figure.text(LEFT, at, text, fontsize=12, color=WARNING_COLOUR, fontweight="bold")
+        at -= 0.022
+    # Sentences one after the other
+    for text in (" ".join(facts.source), " ".join(station_sentences(facts))):
+        at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
+    return at - 0.01
+
+
+def _write_lines(figure: Figure, lines: list[str], at: float) -> float:
+    """Write lines of text and return how far the page is filled."""
+    for line in lines:
+        figure.text(LEFT, at, literal(line), fontsize=9)
+        at -= LINE
+    return at
+
+
+def _write_numbers(figure: Figure, facts: SummaryFacts, at: float) -> float:
+    """Write the five numbers side by side and return how far the page is filled."""
+    # A large number over its meaning
+    width = (RIGHT - LEFT) / 5.0
+    for place, (value, meaning) in enumerate(five_numbers(facts)):
+        left = LEFT + place * width
+        figure.text(left, at - 0.02, literal(value), fontsize=17, fontweight="bold")
+        for row, line in enumerate(wrap(meaning, 22)[:3]):
+            figure.text(left, at - 0.035 - 0.011 * row, literal(line), fontsize=7.5)
+    return at - 0.085
+
+
+def _write_section(
+    figure: Figure, title: str, sentences: list[str], at: float, width: int
+) -> float:
+    """Write a titled list of sentences and return how far the page is filled."""
+    figure.text(LEFT, at, title, fontsize=11, fontweight="bold")
+    at -= 0.02
+    for sentence in sentences:
+        lines = wrap(sentence, width)
+        at = _write_lines(figure, [f"- {lines[0]}", *(f"  {line}" for line in lines[1:])], at)
+    return at - 0.012
+
+
+def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> None:
+    """Write the number of pairs of each class in its colour below the map."""
+    # As far apart as their texts are long
+    left = 0.56
+    for name, colour in class_colours(facts.region.classes).items():
+        if count := facts.counts.classes.get(name, 0):
+            text = f"{shortened(name, 14)} {count}"
+            figure.text(left, at, "●", fontsize=9, color=colour)
+            figure.text(left + 0.016, at, literal(text), fontsize=7.5)
+            left += 0.034 + 0.0075 * len(text)
+
+
+def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
+    """Write the worst pairs, and the worst buildings where there are any."""
+    figure.text(LEFT, at, "The worst pairs", fontsize=11, fontweight="bold")
+    at -= 0.02
+    _write_row(figure, COLUMNS, at, MOTION_COLOUR)
+    for position, pair in enumerate(facts.worst.to_dict("records"), start=1):
+        # As many as the summary lists, one per line
+        at -= LINE
+        cells = (
+            str(position),
+            shortened(str(pair["pair_id"]), 26),
+            shortened(str(pair["risk_class"]), 12),
+            speed_text(number(pair, "expected_impact_velocity")),
+            chance_text(number(pair, "probability")),
+            length_text(number(pair, "gap")),
+            length_text(number(pair, "demand")),
+            f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
+        )
+        _write_row(figure, cells, at, "black")
+    if not facts.buildings.empty:
+        _write_buildings(figure, facts, at - 2.5 * LINE)
+
+
+def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> None:
+    """Write the cells of a row; the last one ends at the margin."""
+    for cell, place in zip(cells, COLUMNS.values(), strict=True):
+        align = "right" if place == RIGHT else "left"
+        text = figure.text(place, at, literal(cell), fontsize=8, color=colour, ha=align)
+        if place == COLUMNS["pair"]:
+            _fit(text, (COLUMNS["class"] - place - 0.01) * figure.bbox.width)
+
+
+def _fit(text: Text, room: float) -> None:
+    """Shrink a text that is wider than its room, pixels."""
+    width = text.get_window_extent().width
+    if width > room:
+        text.set_fontsize(8.0 * room / width)
+
+
+def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
+    """Write the worst buildings in two columns."""
+    figure.text(LEFT, at, "The worst buildings", fontsize=11, fontweight="bold")
+    for position, building in enumerate(facts.buildings.to_dict("records")):
+        # Five below each other
+        left = LEFT if position < 5 else 0.52
+        row = at - 0.02 - LINE * (position % 5)
+        place = f"{building['latitude']:.5f}, {building['longitude']:.5f}"
+        name = shortened(str(building["building_id"]), 24)
+        words = f"{position + 1}  {name}, {shortened(str(building['risk_class']), 12)}, {place}"
+        text = figure.text(left, row, literal(words), fontsize=8)
+        _fit(text, 0.42 * figure.bbox.width)

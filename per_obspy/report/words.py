@@ -1,0 +1,204 @@
+"""Numbers in words: of one pair, for the console, the summary and figures."""
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+from per_obspy.errors import shortened
+from per_obspy.screening.columns import FLAGS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Longest name of a pair, station or class in a sentence, characters.
+LONGEST_NAME = 60
+
+#: States of a pair in a sentence.
+STATE_WORDS = {
+    "yes": "pounds",
+    "likely": "likely pounds",
+    "possible": "possibly pounds",
+    "unlikely": "is unlikely to pound",
+    "no": "does not pound",
+    "unknown": "may pound: its gap is unknown",
+}
+
+
+def name_text(name: object) -> str:
+    """Return a name of data on one line, shortened."""
+    return shortened(str(name), LONGEST_NAME)
+
+
+def length_text(metres: float) -> str:
+    """
+    Return a length with two or three digits, in mm, cm or m; ``unknown`` for NaN.
+
+    Examples
+    --------
+    >>> length_text(0.0), length_text(0.0042), length_text(0.123), length_text(2.5)
+    ('0 cm', '4.2 mm', '12.3 cm', '2.5 m')
+    """
+    if not math.isfinite(metres):
+        return "unknown"
+    # Half a unit of the last digit counts as the next one
+    if abs(metres) >= 0.9995:
+        return f"{metres:.3g} m"
+    centimetres = abs(metres) >= 0.00995 or metres == 0.0
+    return f"{100 * metres:.3g} cm" if centimetres else f"{1000 * metres:.2g} mm"
+
+
+def speed_text(metres_per_second: float) -> str:
+    """
+    Return a velocity in cm/s with two digits; ``unknown`` for NaN.
+
+    Examples
+    --------
+    >>> speed_text(0.2154), speed_text(0.0), speed_text(0.0004), speed_text(1.234)
+    ('22 cm/s', '0 cm/s', '0.04 cm/s', '120 cm/s')
+    """
+    if not math.isfinite(metres_per_second):
+        return "unknown"
+    return f"{float(f'{100 * metres_per_second:.2g}'):g} cm/s"
+
+
+def chance_text(probability: float) -> str:
+    """
+    Return a probability as a share of 100 cases; never certain where it is not.
+
+    Examples
+    --------
+    >>> chance_text(1.0), chance_text(0.999), chance_text(0.004), chance_text(0.0)
+    ('100 of 100', 'over 99 of 100', 'under 1 of 100', '0 of 100')
+    """
+    if not math.isfinite(probability):
+        return "unknown"
+    if 0.0 < probability < 0.005:
+        return "under 1 of 100"
+    if 0.995 <= probability < 1.0:
+        return "over 99 of 100"
+    return f"{100 * probability:.0f} of 100"
+
+
+def pair_lines(pair: Mapping[str, Any]) -> list[str]:
+    """
+    Return the numbers of a pair in words, one sentence per line.
+
+    Parameters
+    ----------
+    pair : mapping of str to object
+        A row of the table of a run, of a design spectrum or of an ensemble; what it lacks is left
+        out.
+    """
+    judged = [*_verdict(pair), *_gap_lines(pair), *_impact_lines(pair)]
+    described = [*_building_lines(pair), *_motion_lines(pair)]
+    return [*judged, *described, *_prevention_lines(pair), *_doubt_lines(pair)]
+
+
+def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
+    """Return a number of a row, NaN where there is none."""
+    value = pair.get(name)
+    return float(value) if isinstance(value, Real) else math.nan
+
+
+def _text(pair: Mapping[str, Any], name: str) -> str:
+    """Return a text of a row, empty where there is none."""
+    value = pair.get(name)
+    return value if isinstance(value, str) else ""
+
+
+def _verdict(pair: Mapping[str, Any]) -> list[str]:
+    """Say whether it pounds."""
+    state = STATE_WORDS.get(_text(pair, "state"), "has been screened")
+    lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
+    if _text(pair, "risk_class"):
+        lines.append(f"Class {name_text(pair['risk_class'])}, rank {pair.get('rank', 'unknown')}.")
+    # A run has one probability, an ensemble perhaps that of a year too
+    if math.isfinite(number(pair, "probability")):
+        lines.append(f"Probability of contact: {chance_text(number(pair, 'probability'))}.")
+    if math.isfinite(number(pair, "annual_probability")):
+        lines.append(f"Probability of contact in a year: {number(pair, 'annual_probability'):.2g}.")
+    if _text(pair, "worst_scenario"):
+        lines.append(f"Worst scenario: {name_text(pair['worst_scenario'])}.")
+    return lines
+
+
+def _gap_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Say which gap there is, and which is needed."""
+    lines = [f"Gap: {length_text(number(pair, 'gap'))}."]
+    if math.isfinite(needed := number(pair, "demand")):
+        rule = _text(pair, "demand_rule").replace("_", " ")
+        lines.append(f"Gap needed: {length_text(needed)}, by {rule or 'an unknown rule'}.")
+    return lines
+
+
+def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Say how hard it pounds."""
+    lines = list[str]()
+    if math.isfinite(expected := number(pair, "expected_impact_velocity")):
+        text = f"Expected impact velocity: {speed_text(expected)}"
+        if math.isfinite(high := number(pair, "impact_velocity_84")):
+            text += f"; in 84 of 100 cases not above {speed_text(high)}"
+        lines.append(f"{text}.")
+    # The exact history, where there is one
+    if math.isfinite(impacts := number(pair, "impacts")):
+        fastest = speed_text(number(pair, "impact_velocity_exact"))
+        lines.append(f"In this record: {impacts:.0f} impacts, the fastest {fastest}.")
+    if math.isfinite(growth := number(pair, "expected_amplification")):
+        lines.append(f"Motion with pounding over motion without: {growth:.2f}.")
+    return lines
+
+
+def _building_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Describe both buildings."""
+    lines = list[str]()
+    for i in (1, 2):
+        facts = {
+            "period {:.2f} s": number(pair, f"period_{i}"),
+            "height {:.3g} m": number(pair, f"height_{i}"),
+            "{:.0f} storeys": number(pair, f"storeys_{i}"),
+            "latitude {:.5f}": number(pair, f"latitude_{i}"),
+            "longitude {:.5f}": number(pair, f"longitude_{i}"),
+        }
+        # Only what is known is said
+        known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
+        name = _text(pair, f"building_id_{i}")
+        if known or name:
+            title = f"Building {i} ({name_text(name)})" if name else f"Building {i}"
+            lines.append(f"{title}: {', '.join(known)}.")
+    return lines
+
+
+def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Say which ground motion it is judged by."""
+    if station := _text(pair, "station"):
+        away = number(pair, "distance") / 1000.0
+        return [f"Record: station {name_text(station)}, {away:.1f} km away."]
+    if spectrum := _text(pair, "spectrum"):
+        return [f"Spectrum: {name_text(spectrum)}, not a record."]
+    return ["Ground motion: a map, no record."] if "station" in pair else []
+
+
+def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Say what would have prevented or softened it."""
+    lines = list[str]()
+    # More gap, more damping, a softer contact
+    if (missing := number(pair, "missing_gap")) > 0:
+        lines.append(f"A gap wider by {length_text(missing)} would have kept them apart.")
+    if (damping := number(pair, "supplemental_damping")) > 0:
+        lines.append(f"So would {100 * damping:.2g} percent more damping in both.")
+    if missing > 0 and math.isfinite(rebound := number(pair, "bumper_restitution")):
+        lines.append(f"A bumper of restitution {rebound:.2g} or less would soften it.")
+    return lines
+
+
+def _doubt_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Explain every flag, and name what was derived."""
+    lines = [
+        f"Flag {name_text(flag)}: {FLAGS.get(flag, 'see the table of columns')}."
+        for flag in _text(pair, "flags").split()
+    ]
+    if derived := _text(pair, "derived"):
+        names = ", ".join(derived.split()).replace("_", " ")
+        lines.append(f"Derived, not given: {shortened(names, 300)}.")
+    return lines

@@ -1,0 +1,162 @@
+"""
+Every kind of screening has its summary, overview, layers and workbook, and its pairs are shown.
+
+Tests of per_obspy.pipeline.results.faults, per_obspy.pipeline.results.table_notes,
+per_obspy.pipeline.results.result_files, per_obspy.pipeline.results.layer_sources,
+per_obspy.pipeline.results.run_facts and per_obspy.pipeline.results.shown_pair too, through
+per_obspy.commands.show and the commands that screen.
+"""
+
+import json
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pyogrio
+import pytest
+from pyarrow import parquet
+
+from per_obspy.pipeline.results.run_facts import event_of_run
+from per_obspy.pipeline.results.table_notes import Notes
+from per_obspy.report.overview import Region
+
+SCENARIO = "[scenario]\nstations = 1\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 4\n"
+SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
+WANTED = "geopackage = true\nspreadsheet = true\n"
+LAYERS = ("gpkg", "qgz", "geoparquet", "kml", "xlsx")
+HOSTILE = ["<script>x</script>", '=HYPERLINK("x")', "\u202eevil", "x" * 300]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Results of a run, of a design spectrum and of an ensemble, by their stems."""
+    from typer.testing import CliRunner
+
+    from per_obspy.cli import app
+
+    folder = tmp_path_factory.mktemp("every")
+    (folder / "scenario.toml").write_text(SCENARIO)
+    run = f'name = "small"\noutput = "run"\n{WANTED}simulation = "scenario.toml"\n{SPECTRA}'
+    (folder / "run.toml").write_text(run)
+    result = CliRunner().invoke(app, ["run", str(folder / "run.toml")])
+    assert result.exit_code == 0, result.output
+    # The same pairs with names that nobody should trust
+    pairs = pd.read_csv(folder / "run" / "pairs.csv").assign(pair_id=HOSTILE)
+    pairs.to_parquet(folder / "pairs.parquet")
+    (folder / "code.csv").write_text(
+        "period,damping,sd\n0.01,0.001,0.001\n20.0,0.001,2\n0.01,0.5,0.001\n20.0,0.5,1\n"
+    )
+    design = f'spectrum = "code.csv"\npairs = "pairs.parquet"\noutput = "design"\n{WANTED}'
+    (folder / "design.toml").write_text(design)
+    member = '[[scenario]]\nname = "one"\nrun = "run.toml"\nrate = 0.01\n'
+    both = f'name = "both"\noutput = "ensemble"\n{WANTED}{member}'
+    (folder / "ensemble.toml").write_text(both)
+    for name in ("design.toml", "ensemble.toml"):
+        result = CliRunner().invoke(app, ["screen", str(folder / name)])
+        assert result.exit_code == 0, result.output
+    return {"risk": folder / "run", "design": folder / "design", "ensemble": folder / "ensemble"}
+
+
+@pytest.mark.parametrize("stem", ["risk", "design", "ensemble"])
+def test_every_screening_has_everything(done, stem):
+    folder = done[stem]
+    names = {f"{stem}.{suffix}" for suffix in LAYERS} | {"summary.txt", "summary.pdf"}
+    assert names <= {file.name for file in folder.iterdir()}
+    assert (folder / "figures" / "overview.png").exists()
+    text = (folder / "summary.txt").read_text()
+    assert "4 pairs of buildings screened." in text
+    # simulated motion is never taken for an earthquake
+    assert ("SIMULATED" in text) == (stem != "design")
+    assert pyogrio.read_info(folder / f"{stem}.gpkg", layer="pairs")["features"] == 4
+    assert parquet.read_metadata(folder / f"{stem}.geoparquet").num_rows == 4
+    pairs = openpyxl.load_workbook(folder / f"{stem}.xlsx")["pairs"]
+    assert pairs.max_row == 6
+    assert "f" not in {cell.data_type for row in pairs.iter_rows() for cell in row}
+
+
+def test_the_summary_of_a_run_has_its_earthquake_and_stations(done):
+    text = (done["risk"] / "summary.txt").read_text()
+    assert "Earthquake of 2000-01-01 00:00:00 UTC." in text
+    assert "Magnitude 6.5." in text
+    assert "1 stations used: XX.S001." in text
+    layers = dict(pyogrio.list_layers(done["risk"] / "risk.gpkg"))
+    assert {"pairs": "LineString", "stations": "Point", "areas": "MultiPolygon"}.items() <= (
+        layers.items()
+    )
+
+
+@pytest.mark.parametrize("name", ["#1", "P0000002"])
+def test_a_pair_is_shown_in_words_and_as_a_figure(done, call, tmp_path, name):
+    code, output, _ = call("show", name, done["risk"], "-o", tmp_path / "pair.png")
+    assert code == 0
+    assert output.startswith("The ground motion is SIMULATED.\nPair P000000")
+    assert (tmp_path / "pair.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_pair_of_a_spectrum_is_shown_whatever_its_name(done, call, tmp_path, name):
+    code, output, _ = call("show", name, done["design"], "-o", tmp_path / "pair.png")
+    assert code == 0
+    assert not {"\x1b", "\u202e"} & set(output)
+    assert "Spectrum: " in output
+    assert (tmp_path / "pair.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("nope", "risk"), "no pair 'nope': name a pair_id of the table, or a rank as #1"),
+        (("' OR 1=1 --", "risk"), "no pair"),
+        (("#1", "ensemble", "-o", "x.png"), "an ensemble has no radii"),
+        (("#1", "risk", "-o", "x.pdf"), "unknown suffix '.pdf', expected .png"),
+    ],
+)
+def test_a_pair_that_cannot_be_shown_is_one_line(done, call, arguments, message):
+    pair, stem, *rest = arguments
+    code, _, errors = call("show", pair, done[stem], *rest)
+    assert (code, errors.count("\n")) == (2, 1)
+    assert message in errors
+
+
+def test_a_folder_without_results_is_one_line(call, tmp_path):
+    code, _, errors = call("show", "P1", tmp_path)
+    assert code == 2
+    assert "no results here" in errors
+
+
+def test_a_pair_of_an_ensemble_is_shown_in_words(done, call):
+    code, output, _ = call("show", "#1", done["ensemble"])
+    assert code == 0
+    assert "Probability of contact in a year: 0.0" in output
+
+
+def test_notes_do_not_depend_on_pieces():
+    table = pd.DataFrame(
+        {
+            "state": ["yes", "unknown", "no"],
+            "risk_class": ["severe", "gap unknown", "low"],
+            "probability": [0.9, np.nan, 0.1],
+            "flags": ["far_station touching", "", "not_far_station_"],
+            "derived": ["mass_1", "", ""],
+        }
+    )
+    for pieces in ([table], [table[:1], table[1:]]):
+        notes = Notes()
+        for piece in pieces:
+            notes.add(piece)
+        # an unknown gap adds nothing to what is expected, and is counted
+        assert notes.counts.expected == pytest.approx(1.0)
+        assert (notes.counts.pairs, notes.counts.derived, notes.counts.far) == (3, 1, 1)
+        pd.testing.assert_frame_equal(notes.worst, table)
+
+
+def test_headers_tell_the_earthquake_where_no_file_does(tmp_path):
+    headers = {"time": "1985-09-19T13:17:47", "magnitude": 8.1, "depth": None}
+    groups = [{"screened": False}, {"screened": True, "start": "1985", "headers": headers}]
+    record = {"key": "", "outputs": {}, "earthquakes": groups}
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    places = pd.DataFrame({"longitude": [], "latitude": []})
+    region = Region("x", ["low"], False, places, (-102.5, 18.2))
+    facts = event_of_run(tmp_path / "run.json", region)
+    assert (facts["time"], facts["magnitude"]) == ("1985-09-19T13:17:47", 8.1)
+    assert (facts["longitude"], facts["latitude"]) == (-102.5, 18.2)

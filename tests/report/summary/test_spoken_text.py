@@ -1,0 +1,148 @@
+"""
+Summary of a screening as text and as a page.
+
+Tests of per_obspy.report.summary.statements and per_obspy.report.summary.one_page too.
+"""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from per_obspy.report.overview import Region
+from per_obspy.report.summary.one_page import write_page
+from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
+from per_obspy.report.summary.statements import Counts, SummaryFacts, event_sentences
+
+HOSTILE = ["<script>alert(1)</script>", "=HYPERLINK(1)", "\u202eevil", "x" * 10_000, "$a_{b"]
+EVENT = {
+    "time": "2019-07-06T03:19:53",
+    "magnitude": 7.1,
+    "longitude": -117.6,
+    "latitude": 35.77,
+    "depth": 8000.0,
+}
+
+
+def make_facts(names=("P1", "P2"), simulated=True, buildings=False):
+    """Return the facts of a summary whose pairs have these names."""
+    worst = pd.DataFrame(
+        {
+            "pair_id": names,
+            "risk_class": "severe",
+            "probability": 0.9999,
+            "expected_impact_velocity": np.linspace(0.6, 0.5, len(names)),
+            "gap": 0.0,
+            "demand": 0.1,
+            "latitude": -20.3,
+            "longitude": -68.1,
+        }
+    )
+    listed = worst.rename(columns={"pair_id": "building_id"}).assign(severity=0.6)
+    stations = pd.DataFrame(
+        {"station": ["XX.A", "XX.B", "XX.C"], "state": ["used", "rejected", "used"]}
+    )
+    places = pd.DataFrame({"longitude": [-68.0], "latitude": [-20.0]})
+    counts = Counts({"yes": 3, "likely": 2, "possible": 4, "unknown": 7}, {"severe": 5}, 5.4, 6, 0)
+    return SummaryFacts(
+        Region("old town", ["severe", "low"], simulated, places, (-68.2, -20.2)),
+        event_sentences(EVENT),
+        counts,
+        worst,
+        listed if buildings else pd.DataFrame(),
+        stations,
+        "",
+        "per-obspy 0.1.0.",
+    )
+
+
+@pytest.fixture
+def page_text(tmp_path):
+    """Return a function that writes the page, and its texts as they were drawn."""
+
+    def page_text(facts, monkeypatch):
+        figures = []
+        with monkeypatch.context() as patch:
+            save = Figure.savefig
+
+            def noted(figure, *arguments, **options):
+                figures.append(figure)
+                save(figure, *arguments, **options)
+
+            patch.setattr(Figure, "savefig", noted)
+            write_page(facts, facts.worst, tmp_path / "summary.pdf")
+        return figures[0], tmp_path / "summary.pdf"
+
+    return page_text
+
+
+def test_the_summary_says_what_where_and_how_sure():
+    text = " ".join(summary_lines(make_facts()))
+    for expected in (
+        "Earthquake of 2019-07-06 03:19:53 UTC. Magnitude 7.1.",
+        "Epicentre 35.770 north, 117.600 west, depth 8 km.",
+        "SIMULATED. THIS IS NOT AN EARTHQUAKE.",
+        "2 stations used: XX.A, XX.C. 1 stations missing or refused: XX.B.",
+        "16 pairs of buildings screened.",
+        "5 pairs that pound or are likely to.",
+        "5 pairs expected to pound in all.",
+        "5 pairs of the worst class, severe.",
+        "60 cm per second largest expected impact velocity.",
+        "Measure the gap of 7 pairs whose gap is unknown.",
+        "1. P1: severe, impact 60 cm per second, contact in over 99 of 100, at 20.30000 south,",
+        "6 pairs have derived inputs",
+    ):
+        assert expected in text
+    assert "SIMULATED" not in " ".join(summary_lines(make_facts(simulated=False)))
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_every_line_can_be_read_aloud(tmp_path, name):
+    facts = make_facts([name] * 10, buildings=True)
+    facts = facts._replace(region=facts.region._replace(title=name))
+    write_text(facts, tmp_path / "summary.txt")
+    lines = (tmp_path / "summary.txt").read_text(encoding="ascii").splitlines()
+    assert max(map(len, lines)) <= WIDTH
+    assert all(re.fullmatch(r"[A-Za-z0-9 .,:;()'/-]*", line) for line in lines)
+    assert "WORST BUILDINGS" in lines
+    # one page of radio, whatever the names are
+    assert len(lines) < 120
+
+
+def test_accents_and_signs_become_letters_and_words():
+    assert spoken("Ciudad Juárez & 5 %") == "Ciudad Juarez and 5 percent"
+
+
+@pytest.mark.parametrize("buildings", [False, True])
+@pytest.mark.parametrize("names", [("P1",), HOSTILE * 2])
+def test_the_page_is_one_and_no_text_leaves_it(page_text, monkeypatch, names, buildings):
+    figure, path = page_text(make_facts(names, buildings=buildings), monkeypatch)
+    content = path.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert content.count(b"/Type /Page ") == 1
+    figure.draw_without_rendering()
+    texts = [text for text in figure.texts if text.get_text()]
+    boxes = [text.get_window_extent() for text in texts]
+    for text, box in zip(texts, boxes, strict=True):
+        assert box.x0 >= 0, text
+        assert box.x1 <= figure.bbox.width, text
+        assert box.y0 >= 0, text
+    # nor lies on another one
+    for first, one in enumerate(boxes):
+        for second in boxes[first + 1 :]:
+            width = min(one.x1, second.x1) - max(one.x0, second.x0)
+            height = min(one.y1, second.y1) - max(one.y0, second.y0)
+            # ascenders and descenders of lines may meet
+            assert not (width > 1.0 and height > 0.3 * min(one.height, second.height))
+    drawn = " ".join(text.get_text() for text in texts)
+    assert "SIMULATED" in drawn
+    assert ("The worst buildings" in drawn) == buildings
+
+
+def test_the_same_facts_are_the_same_bytes(tmp_path):
+    # results of a run are compared by their hashes
+    for name in ("a.pdf", "b.pdf"):
+        write_page(make_facts(), make_facts().worst, tmp_path / name)
+    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()

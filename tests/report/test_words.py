@@ -1,0 +1,76 @@
+"""Numbers of a pair in words."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from per_obspy.report.words import chance_text, length_text, pair_lines, speed_text
+
+PAIR = {
+    "pair_id": "P7",
+    "rank": 3,
+    "state": "likely",
+    "risk_class": "high",
+    "probability": 0.52,
+    "gap": 0.05,
+    "demand": 0.123,
+    "demand_rule": "exact",
+    "expected_impact_velocity": 0.215,
+    "impact_velocity_84": 0.31,
+    "impacts": np.int64(4),
+    "impact_velocity_exact": 0.4,
+    "period_1": 0.23,
+    "building_id_1": "tower",
+    "station": "XX.ONE",
+    "distance": 1234.0,
+    "missing_gap": 0.073,
+    "supplemental_damping": 0.12,
+    "bumper_restitution": 0.4,
+    "flags": "touching simulated",
+    "derived": "mass_1",
+}
+
+
+def test_every_number_of_a_pair_is_said():
+    lines = pair_lines(PAIR)
+    for expected in (
+        "Pair P7 likely pounds.",
+        "Probability of contact: 52 of 100.",
+        "Gap: 5 cm.",
+        "Gap needed: 12.3 cm, by exact.",
+        "Expected impact velocity: 22 cm/s; in 84 of 100 cases not above 31 cm/s.",
+        "In this record: 4 impacts, the fastest 40 cm/s.",
+        "Building 1 (tower): period 0.23 s.",
+        "Record: station XX.ONE, 1.2 km away.",
+        "A gap wider by 7.3 cm would have kept them apart.",
+        "So would 12 percent more damping in both.",
+        "A bumper of restitution 0.4 or less would soften it.",
+        "Flag simulated: the ground motion is simulated.",
+        "Derived, not given: mass 1.",
+    ):
+        assert expected in lines
+
+
+def test_a_row_of_pandas_says_the_same():
+    assert pair_lines(dict(pd.Series(PAIR).items())) == pair_lines(PAIR)
+
+
+def test_an_unknown_gap_is_no_promise():
+    # would catch a pair that looks safe because nothing is said
+    lines = pair_lines(PAIR | {"state": "unknown", "gap": np.nan, "probability": np.nan})
+    assert lines[0] == "Pair P7 may pound: its gap is unknown."
+    assert "Gap: unknown." in lines
+    assert not any(line.startswith("Probability") for line in lines)
+
+
+@pytest.mark.parametrize("name", ["<script>alert(1)</script>", "\u202eevil\n", "x" * 10_000])
+def test_hostile_names_are_short_and_on_one_line(name):
+    lines = pair_lines(PAIR | {"pair_id": name, "flags": name, "building_id_1": name})
+    assert all(len(line) < 500 and line.isprintable() for line in lines)
+
+
+def test_certainty_is_not_rounded_up():
+    assert chance_text(0.9999) == "over 99 of 100"
+    assert chance_text(1e-6) == "under 1 of 100"
+    assert [length_text(value) for value in (np.nan, 0.00004)] == ["unknown", "0.04 mm"]
+    assert speed_text(np.nan) == "unknown"
