@@ -1,8 +1,8 @@
 """
 The figures of the README, from the demonstration: a pair from its record on, and the region.
 
-``make figures`` writes them to ``output/readme_figures``; with ``-o docs/figures`` they are those of
-the README. The demonstration is run first where it is not done.
+``make figures`` writes them to ``output/readme_figures``; with ``-o docs/figures`` they are those
+of the README. The demonstration is run first where it is not done.
 """
 
 import argparse
