@@ -37,6 +37,9 @@ FEWEST = 5
 #: A cluster this large beside the whole map is seen there already.
 LARGE = 0.6
 
+#: Maps of clusters are drawn where one of them is smaller than this share of the whole map.
+SMALL = 0.15
+
 #: Space around the points of a map, share of its longer side.
 MARGIN = 0.06
 
@@ -185,6 +188,8 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
         for members in found
     ]
     pairs = list(zip(frames, found, strict=True))
+    if not any(frame.size < SMALL * whole.size for frame in frames):
+        return []
     return [pair for pair in pairs if pair[0].size < LARGE * whole.size]
 
 
