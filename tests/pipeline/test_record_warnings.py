@@ -15,7 +15,7 @@ from per_obspy.screening.columns import RECORD_FLAGS
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
-DOUBLED, ALONE, FILM = "XX.S001", "XX.S002", "XX.S003"
+DOUBLED, ALONE, FILM = "XX.S003", "XX.S002", "XX.S001"
 
 #: The film's baseline shifts too.
 SHIFTED = FILM
