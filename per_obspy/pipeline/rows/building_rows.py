@@ -118,9 +118,7 @@ def building_rows(
     risk = parquet_rows([folder / "risk.parquet"])
     if not _enabled(settings.rows, risk):
         return NO_ROWS
-    progress("finding rows", 0, 1)
     found = _found(settings.rows, risk)
-    progress("finding rows", 1, 1)
     progress("rows", 0, len(found.placed))
     jobs = _jobs(settings, folder, ground, risk, found)
     workers, parts, done = settings.workers or usable_processors(), list[RowsPart](), 0
