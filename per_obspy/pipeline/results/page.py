@@ -16,6 +16,7 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.results.layer_sources import outlines_beside
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
@@ -93,7 +94,7 @@ def write_run_page(
         rejected=rejected,
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
-        outlines=_outlines(settings, worst),
+        outlines=_outlines(settings, folder, worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=_histories(worst, stations),
         provenance=_provenance(settings),
@@ -265,13 +266,15 @@ def _buildings(path: Path) -> pd.DataFrame | None:
     return None if first is None else first.to_pandas()
 
 
-def _outlines(settings: Run, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
+def _outlines(settings: Run, folder: Path, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
     """Return the outlines of the buildings of the worst pairs, if the pairs came with them."""
-    pairs = settings.pairs
-    if pairs is None or pairs.file is None or "building_id_1" not in worst:
+    given = settings.pairs.file if settings.pairs else None
+    # Of a layer, a run keeps pairs and outlines in its folder
+    beside = outlines_beside(given, folder / "pairs.parquet")
+    if beside is None or "building_id_1" not in worst:
         return []
     names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
-    return read_outlines(pairs.file.with_suffix(".buildings.parquet"), names.unique().tolist())
+    return read_outlines(beside, names.unique().tolist())
 
 
 def _histories(
