@@ -17,6 +17,7 @@ from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.layer_sources import outlines_beside
+from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
@@ -33,7 +34,6 @@ from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
-from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
 
@@ -78,15 +78,17 @@ def write_run_page(
         Whether the motion is simulated.
     """
     tally, worst, areas = found
-    # Tables that the stages before have written
+    # Files that the stages before have written
+    region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
+    # Sentences are made of tables, and the map of pairs
     table = _station_table(folder / "stations.csv", stations)
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
-        title=settings.name,
+        title=region.title,
         language=settings.report.language,
         simulated=simulated,
-        classes=tuple(settings.screening.classes),
-        event=_event(stations, table, _known_event(folder / "run.json")),
+        classes=tuple(region.classes),
+        event=_event(stations, table, event_of_run(folder / "run.json", region)),
         tally=tally,
         worst=worst,
         stations=table,
@@ -193,21 +195,6 @@ def _number(value: Any) -> float:
     """Return a number of a status file, NaN where there is none."""
     is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return float(value) if is_number else math.nan
-
-
-def _known_event(record: Path) -> Mapping[str, Any]:
-    """Return time and magnitude of the screened earthquake as ``run.json`` knows them."""
-    try:
-        groups = read_status(record).get("earthquakes")
-    except StatusError:
-        return {}
-    # Only one of several earthquakes is screened
-    screened = [
-        group.get("event") or group.get("headers")
-        for group in (groups if isinstance(groups, list) else [])
-        if isinstance(group, Mapping) and group.get("screened")
-    ]
-    return screened[0] if screened and isinstance(screened[0], Mapping) else {}
 
 
 def _is_dated(facts: Mapping[str, Any]) -> bool:
