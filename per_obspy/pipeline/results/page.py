@@ -16,6 +16,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.results.layer_sources import outlines_beside
+from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
@@ -32,7 +34,6 @@ from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
-from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
 
@@ -77,15 +78,17 @@ def write_run_page(
         Whether the motion is simulated.
     """
     tally, worst, areas = found
-    # Tables that the stages before have written
+    # Files that the stages before have written
+    region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
+    # Sentences are made of tables, and the map of pairs
     table = _station_table(folder / "stations.csv", stations)
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
-        title=settings.name,
+        title=region.title,
         language=settings.report.language,
         simulated=simulated,
-        classes=tuple(settings.screening.classes),
-        event=_event(stations, table, _known_event(folder / "run.json")),
+        classes=tuple(region.classes),
+        event=_event(stations, table, event_of_run(folder / "run.json", region)),
         tally=tally,
         worst=worst,
         stations=table,
@@ -93,7 +96,7 @@ def write_run_page(
         rejected=rejected,
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
-        outlines=_outlines(settings, worst),
+        outlines=_outlines(settings, folder, worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=_histories(worst, stations),
         provenance=_provenance(settings),
@@ -194,21 +197,6 @@ def _number(value: Any) -> float:
     return float(value) if is_number else math.nan
 
 
-def _known_event(record: Path) -> Mapping[str, Any]:
-    """Return time and magnitude of the screened earthquake as ``run.json`` knows them."""
-    try:
-        groups = read_status(record).get("earthquakes")
-    except StatusError:
-        return {}
-    # Only one of several earthquakes is screened
-    screened = [
-        group.get("event") or group.get("headers")
-        for group in (groups if isinstance(groups, list) else [])
-        if isinstance(group, Mapping) and group.get("screened")
-    ]
-    return screened[0] if screened and isinstance(screened[0], Mapping) else {}
-
-
 def _is_dated(facts: Mapping[str, Any]) -> bool:
     """Return whether a record has a start time; undated ones begin in 1970."""
     return str(facts.get("time_coverage_start", "1970")) >= "1971"
@@ -265,13 +253,15 @@ def _buildings(path: Path) -> pd.DataFrame | None:
     return None if first is None else first.to_pandas()
 
 
-def _outlines(settings: Run, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
+def _outlines(settings: Run, folder: Path, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
     """Return the outlines of the buildings of the worst pairs, if the pairs came with them."""
-    pairs = settings.pairs
-    if pairs is None or pairs.file is None or "building_id_1" not in worst:
+    given = settings.pairs.file if settings.pairs else None
+    # Of a layer, a run keeps pairs and outlines in its folder
+    beside = outlines_beside(given, folder / "pairs.parquet")
+    if beside is None or "building_id_1" not in worst:
         return []
     names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
-    return read_outlines(pairs.file.with_suffix(".buildings.parquet"), names.unique().tolist())
+    return read_outlines(beside, names.unique().tolist())
 
 
 def _histories(

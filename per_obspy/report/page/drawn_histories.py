@@ -10,7 +10,7 @@ import xarray as xr
 from per_obspy.checks import FloatArray
 from per_obspy.pounding.history.row_history import PoundingHistory, pounding_history
 from per_obspy.pounding.structure import Structure
-from per_obspy.screening.values import components
+from per_obspy.report.pair_figure import motion_along
 
 #: Intervals of time in a drawing, each with the smallest and the largest displacement in it.
 INTERVALS = 300
@@ -49,7 +49,7 @@ def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None
     azimuth, gap = float(pair["azimuth_used"]), float(pair["gap"])
     if not math.isfinite(gap) or station.sizes["time"] > MOST_SAMPLES:
         return None
-    motion = _along(station, azimuth)
+    motion = motion_along(station, azimuth)
     try:
         structures = [_structure(pair, 1), _structure(pair, 2)]
         history = pounding_history(
@@ -79,14 +79,6 @@ def _structure(pair: pd.Series, number: int) -> Structure:
         hardening=float(pair[f"hardening_{number}"]) if math.isfinite(limit) else 0.0,
         participation=share,
     )
-
-
-def _along(station: xr.Dataset, azimuth: float) -> FloatArray:
-    """Return the acceleration along an azimuth (degrees), or that of the only sensor, m/s²."""
-    north, east, _ = components(station)
-    angle = np.radians(azimuth) if station.sizes["horizontal"] == 2 else 0.0
-    along: FloatArray = north * np.cos(angle) + east * np.sin(angle)
-    return along
 
 
 def _thinned(history: PoundingHistory) -> dict[str, Any]:
