@@ -46,7 +46,7 @@ def test_json_is_for_machines(screened):
     code, out, _ = screened("--json")
     said = json.loads(out)
     assert code == 0
-    assert (said["pairs"], said["yes"], said["rejected"], len(said["files"])) == (1, 1, 1, 8)
+    assert (said["pairs"], said["yes"], said["rejected"], len(said["files"])) == (1, 1, 1, 9)
 
 
 def test_a_wrong_spectrum_stops_with_one_line(screened, tmp_path):

@@ -223,7 +223,8 @@ def write_map_configuration(folder, reach):
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     write_shakemap(folder / "grid.xml")
     (folder / "map.toml").write_text(
-        'name = "map"\noutput = "map"\n[records]\nfolder = "records"\nshakemap = "grid.xml"\n'
+        'name = "map"\noutput = "map"\ngeopackage = true\n'
+        '[records]\nfolder = "records"\nshakemap = "grid.xml"\n'
         f'[pairs]\nfile = "pairs.csv"\n[screening]\nlargest_distance = {reach}\n{SPECTRA}'
     )
 
@@ -243,6 +244,11 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     assert table["flags"].str.contains("shakemap_demand").equals(mapped)
     assert record["counts"]["pairs"] + record["counts"]["rejected_pair"] == 61
     assert ("figures/worst_pair.png" in record["outputs"]) == (not mapped.all())
+    # everything that people look at is there, with or without a record
+    people = {"summary.pdf", "summary.txt", "figures/overview.png"}
+    people |= {f"risk.{suffix}" for suffix in ("gpkg", "qgz", "geoparquet", "kml")}
+    assert people <= set(record["outputs"])
+    assert record["faults"] == []
 
 
 def test_a_changed_map_changes_every_chunk(copied):
