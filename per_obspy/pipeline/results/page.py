@@ -3,7 +3,6 @@
 import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -302,6 +301,5 @@ def _made(language: Language) -> list[tuple[str, str]]:
     """Return when and with what the page was made."""
     texts = LANGUAGES[language]
     return [
-        (texts["made"], datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
         (texts["made_with"], f"per_obspy {version('per_obspy')}"),
     ]

@@ -182,7 +182,6 @@ SPANISH: dict[str, str] = {
     "head_source": "fuente",
     "head_row": "fila",
     "head_reasons": "razones",
-    "made": "hecho",
     "made_with": "hecho con",
     "files": "archivos junto a esta página",
     "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (entradas con sus huellas)",

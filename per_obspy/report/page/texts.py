@@ -194,7 +194,6 @@ ENGLISH: dict[str, str] = {
     "head_source": "source",
     "head_row": "row",
     "head_reasons": "reasons",
-    "made": "made",
     "made_with": "made with",
     "files": "files beside this page",
     "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (inputs with their hashes)",

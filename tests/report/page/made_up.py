@@ -113,6 +113,6 @@ def page_data(table, language="en", **changes):
         lines={"coast": [[12.9, 43.0, 13.3, 43.3]], "borders": []},
         histories={1: {"time": [0.0, 1.0], "one": [-5.0, 5.0], "two": [-9.0, 9.0],
                        "impacts": [[0.4, 0.7]]}},
-        provenance=[("made", "today")],
+        provenance=[("made with", "per_obspy")],
     )  # fmt: skip
     return data._replace(**changes)
