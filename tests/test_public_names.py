@@ -120,3 +120,12 @@ def test_a_format_plugin_loads_nothing_heavy():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert not {"numba", "pandas", "xarray", "matplotlib"} & set(loaded)
+
+
+def test_a_run_needs_no_library_of_an_extra():
+    code = "import sys, per_obspy.pipeline.run, per_obspy.commands.screen; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    extras = {"gpxpy", "h3", "openpyxl", "playwright", "pyogrio", "pyproj", "pyvrp", "shapely"}
+    assert not extras & set(loaded)

@@ -96,8 +96,8 @@ def test_the_plan_of_a_long_transform_is_not_kept():
     before = resident()
     rfft(record)
     long_records.forget_plans(record.size)
-    # The plan has the size of the record; a tenth of it for whatever else has changed
-    assert resident() - before < record.nbytes / 10
+    # The plan has the size of the record; a third of it for whatever else has changed
+    assert resident() - before < record.nbytes / 3
 
 
 def resident():

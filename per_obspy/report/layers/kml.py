@@ -9,7 +9,7 @@ import pandas as pd
 
 from per_obspy.errors import printable, shortened
 from per_obspy.files import written_whole
-from per_obspy.report.layers.shapes import has_both_places
+from per_obspy.report.layers.pair_places import has_both_places
 from per_obspy.report.style import class_colours
 from per_obspy.report.words import name_text, pair_lines
 

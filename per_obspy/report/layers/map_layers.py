@@ -13,9 +13,10 @@ from per_obspy.inventory.footprints.gdal_paths import literal_path
 from per_obspy.report.layers.building_layer import building_layers
 from per_obspy.report.layers.geopackage import Layer, append_layer, geometry_type, write_styles
 from per_obspy.report.layers.geoparquet import GeoParquet
+from per_obspy.report.layers.pair_places import has_both_places
 from per_obspy.report.layers.qgis_project import ProjectLayer, write_project
 from per_obspy.report.layers.qgis_style import class_style, column_aliases, single_style
-from per_obspy.report.layers.shapes import has_both_places, pair_shapes, points
+from per_obspy.report.layers.shapes import pair_shapes, points
 from per_obspy.screening.columns import known_column
 from per_obspy.tables.totals import RegionTotals
 

@@ -6,16 +6,9 @@ import shapely
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
-
-#: Columns of the places of both buildings.
-BOTH_PLACES = ("longitude_1", "latitude_1", "longitude_2", "latitude_2")
+from per_obspy.report.layers.pair_places import BOTH_PLACES, has_both_places
 
 Shapes = NDArray[np.object_]
-
-
-def has_both_places(columns: "pd.Index[str]") -> bool:
-    """Return whether a table has the places of both buildings."""
-    return set(BOTH_PLACES) <= set(columns)
 
 
 def pair_shapes(table: pd.DataFrame) -> Shapes:

@@ -77,7 +77,7 @@ def rounded(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
     Examples
     --------
     >>> rounded(np.array([0.1, np.inf], dtype=np.float32)).tolist()
-    [0.0999908447265625, inf]
+    [0.09999847412109375, inf]
     """
     with np.errstate(invalid="ignore"):
         fraction, exponent = np.frexp(numbers)

@@ -245,7 +245,7 @@ def test_rest_of_the_page(opened):
     assert "clipped" in page.page.inner_text("#stations")
     assert page.texts("#areas tbody td:first-child") == ["centre", "harbour"]
     assert "gap: -1" in page.page.inner_text("#rejected")
-    assert "today" in page.page.inner_text("#provenance")
+    assert "per_obspy" in page.page.inner_text("#provenance")
 
 
 def test_a_table_of_few_columns_has_a_page_too(opened):
