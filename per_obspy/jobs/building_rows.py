@@ -18,7 +18,7 @@ import pyarrow as pa
 from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
 from per_obspy.jobs.ground_files import StationFile, read_station_once
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, new_and_resumed
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.building_rows.histories import no_outcomes, row_outcomes
 from per_obspy.screening.building_rows.members import IntArray
@@ -107,24 +107,17 @@ def do_row_chunks(
     Unfinished
         After all other chunks, if the machine failed at some.
     """
-    resumed = list[RowsPart]()
+    keyed = (job._replace(key=_key(job)) for job in jobs)
+    work = Work(do_rows, _failed, _name)
+    yield from new_and_resumed(keyed, _earlier, work, workers, executor)
 
-    def missing() -> Iterator[RowsJob]:
-        """Yield the jobs that have to be done; the others are resumed on the way."""
-        for job in jobs:
-            keyed = job._replace(key=_key(job))
-            status = earlier_status(_status_file(job), keyed.key)
-            if status is None or "rejected" not in status:
-                yield keyed
-            else:
-                resumed.append(_part(job)._replace(resumed=True))
 
-    # Resumed parts are passed on as soon as the next one is finished
-    for part in results(missing(), Work(do_rows, _failed, _name), workers, executor):
-        yield from resumed
-        resumed.clear()
-        yield part
-    yield from resumed
+def _earlier(job: RowsJob) -> RowsPart | None:
+    """Return the part as an earlier run left it, if it did the same and the part is whole."""
+    status = earlier_status(_status_file(job), job.key)
+    if status is None or "rejected" not in status:
+        return None
+    return _part(job)._replace(resumed=True)
 
 
 def do_rows(job: RowsJob) -> RowsPart:

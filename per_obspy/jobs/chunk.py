@@ -21,7 +21,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import file_hash, remove_file
 from per_obspy.inventory.files.reading import PairChunk, checked_chunk
 from per_obspy.jobs.ground_files import GroundFiles, read_ground
-from per_obspy.jobs.parallel import Work, results
+from per_obspy.jobs.parallel import Work, new_and_resumed
 from per_obspy.resume import earlier_status, read_status, write_status
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.ranking import in_order
@@ -115,25 +115,9 @@ def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None)
     Unfinished
         After all other chunks, if the machine failed at some.
     """
-    resumed = list[Part]()
-
-    def missing() -> Iterator[ChunkJob]:
-        """Yield the jobs that have to be done; the others are resumed on the way."""
-        for job in jobs:
-            keyed = job._replace(key=_key(job))
-            earlier = _earlier(keyed)
-            if earlier is None:
-                yield keyed
-            else:
-                resumed.append(earlier)
-
-    # Resumed parts are passed on as soon as the next one is finished
+    keyed = (job._replace(key=_key(job)) for job in jobs)
     work = Work(do_chunk, _failed, _name)
-    for part in results(missing(), work, workers, executor):
-        yield from resumed
-        resumed.clear()
-        yield part
-    yield from resumed
+    yield from new_and_resumed(keyed, _earlier, work, workers, executor)
 
 
 def do_chunk(job: ChunkJob) -> Part:

@@ -130,6 +130,44 @@ def _all_results(
             yield from _alone(task, watched)
 
 
+def new_and_resumed(
+    tasks: Iterable[Task],
+    earlier: Callable[[Task], Result | None],
+    work: Work[Task, Result],
+    workers: int,
+    executor: Executor | None,
+) -> Iterator[Result]:
+    """
+    Yield the result of every task; what an earlier run did is not done again.
+
+    Parameters
+    ----------
+    tasks : iterable
+        Taken while the work goes on.
+    earlier : callable
+        Returns the result that an earlier run left of a task, None if there is none.
+    work, workers, executor
+        As of :func:`results`, whose errors are raised.
+    """
+    resumed = list[Result]()
+
+    def missing() -> Iterator[Task]:
+        """Yield the tasks that have to be done; the others are resumed on the way."""
+        for task in tasks:
+            found = earlier(task)
+            if found is None:
+                yield task
+            else:
+                resumed.append(found)
+
+    # Resumed results are passed on as soon as the next one is finished
+    for result in results(missing(), work, workers, executor):
+        yield from resumed
+        resumed.clear()
+        yield result
+    yield from resumed
+
+
 class _Watched(Generic[Task, Result]):
     """Work whose errors become results, if they are faults of the data, or else faults."""
 
