@@ -16,7 +16,7 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region, draw_overview
 from per_obspy.report.page.content import PAIR_KINDS
-from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.page.tally import PAGE_PAIRS
 from per_obspy.report.words import name_text
 from per_obspy.screening.ranking import pounding_state, risk_class
 from per_obspy.tables.risk import ranked_table
@@ -127,10 +127,10 @@ def _write(
     report: Report,
 ) -> None:
     """Read a table once, and write everything that people look at."""
-    notes, shown, folder = Notes(), list[pd.DataFrame](), asked.folder
+    notes, shown, folder = Notes(region.classes), list[pd.DataFrame](), asked.folder
     # Of all pairs, and of those that the page holds
-    tally, worst = PairTally(region.classes), list[pd.DataFrame]()
-    noted = _tallied(_noted(pieces, pairs, notes, shown), tally, worst)
+    worst = list[pd.DataFrame]()
+    noted = _kept(_noted(pieces, pairs, notes, shown), worst)
     if asked.geopackage:
         files, none = layer_paths(folder, asked.stem), pd.DataFrame()
         with report.tried(*files):
@@ -142,20 +142,22 @@ def _write(
     written = Screening(folder, asked.stem, region, source, asked.spreadsheet)
     write_results(written, notes, points, report)
     with report.tried(folder / "report.html"):
-        write_table_page(folder, region, source, tally, pd.concat(worst, ignore_index=True))
+        found = pd.concat(worst, ignore_index=True)
+        write_table_page(folder, region, source, notes.tally, found)
     overview = folder / "figures" / "overview.png"
     with report.tried(overview):
         draw_overview(points, region, overview)
 
 
-def _tallied(
-    pieces: Iterator[pd.DataFrame], tally: PairTally, worst: list[pd.DataFrame]
+def _kept(
+    pieces: Iterator[pd.DataFrame], worst: list[pd.DataFrame]
 ) -> Iterator[pd.DataFrame]:
-    """Yield pieces, and note what the page says of all pairs and the pairs that it holds."""
+    """Yield pieces, and keep the pairs that the page holds."""
+    rows = 0
     for piece in pieces:
-        kept = piece.head(max(PAGE_PAIRS - tally.pairs, 0))
+        kept = piece.head(max(PAGE_PAIRS - rows, 0))
         worst.append(kept[[name for name in PAIR_KINDS if name in kept]])
-        tally.add(piece)
+        rows += len(kept)
         yield piece
 
 

@@ -51,7 +51,8 @@ def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
     table : DataFrame
         Its rows keep their order.
     kinds : mapping of str to str
-        Column -> ``number``, ``place`` (degrees), ``choice`` (few different texts) or ``text``.
+        Column -> ``number`` (four digits), ``whole`` (all digits), ``place`` (degrees), ``choice``
+        (few different texts) or ``text``.
     """
     # Data follow each other in the order of the descriptions
     columns, pieces = list[dict[str, Any]](), list[bytes]()
@@ -83,6 +84,14 @@ def rounded(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
         fraction, exponent = np.frexp(numbers)
         scale = np.float32(2.0 ** (FRACTION_BITS + 1))
         return np.ldexp(np.rint(fraction * scale) / scale, exponent).astype(np.float32)
+
+
+def _wholes(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return whole numbers of up to nine digits."""
+    numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+    known = np.isfinite(numbers)
+    whole = np.where(known, numbers, 0.0).astype(np.int32)
+    return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
 
 
 def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
@@ -117,7 +126,13 @@ def _planes(values: NDArray[Any]) -> bytes:
     return little.view(np.uint8).reshape(-1, 4).T.tobytes()
 
 
-_PACKERS = {"number": _numbers, "place": _places, "choice": _choices, "text": _texts}
+_PACKERS = {
+    "number": _numbers,
+    "whole": _wholes,
+    "place": _places,
+    "choice": _choices,
+    "text": _texts,
+}
 
 
 def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
