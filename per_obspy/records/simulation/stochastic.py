@@ -87,7 +87,7 @@ def source_spectrum(
     Reference: Boore (2003), eq. 3, 5 and 6; shape of Atkinson & Silva (2000).
     """
     constant = RADIATION * FREE_SURFACE * PARTITION / (4.0 * np.pi * density * shear_velocity**3)
-    # each part of the moment has a corner of its own
+    # each part of the moment has a separate corner
     source = source_of(magnitude)
     low = (1.0 - source.high_share) / (1.0 + (frequency / source.low_corner) ** 2)
     high = source.high_share / (1.0 + (frequency / source.high_corner) ** 2)
