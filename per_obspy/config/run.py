@@ -25,6 +25,9 @@ class ReportTexts(Section):
     language: Literal["en", "es"] = Field(
         "en", description="of the page: en (English) or es (Spanish)"
     )
+    revision: int = Field(
+        0, ge=0, description="number of the revision that the page shows; 0: none is shown"
+    )
 
 
 class Run(Section):

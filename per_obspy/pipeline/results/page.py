@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,43 +13,36 @@ import pyarrow.parquet as pq
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Run
-from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.layer_sources import outlines_beside
-from per_obspy.pipeline.results.run_facts import event_of_run
-from per_obspy.pipeline.stations import file_stem
+from per_obspy.pipeline.results.page_drawings import histories, page_drawings
+from per_obspy.pipeline.results.run_facts import event_of_run, revision_of_run
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.coast import lines_around
 from per_obspy.report.page.content import (
     BUILDING_KINDS,
     MOST_ROWS,
-    PAIR_KINDS,
     REJECTED_COLUMNS,
     PageData,
 )
 from per_obspy.report.page.document import write_page
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
+from per_obspy.report.page.export_columns import MOST_COLUMNS
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
 
-#: Pairs whose history is drawn, the worst ones.
-HISTORIES = 50
-
 #: Period and damping of the spectra in the table of stations.
 SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
 
-#: Columns of the worst pairs that the page needs.
-PAGE_COLUMNS = tuple(dict.fromkeys((*PAIR_KINDS, *HISTORY_COLUMNS)))
-
-
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
-    """Return the worst pairs of a risk table with the columns of the page and their areas."""
+    """Return the worst pairs of a risk table with all columns and their areas."""
+    # The leading columns are those of the package, those of the inventory follow
     area = [settings.totals.area] if settings.totals.area else []
-    worst = table.first(PAGE_PAIRS, [*PAGE_COLUMNS, *area])
+    names = table.file.schema_arrow.names[: 2 * MOST_COLUMNS]
+    worst = table.first(PAGE_PAIRS, [*names, *area])
     return worst.assign(area=areas_of(worst, settings.totals, settings.totals.area or ""))
 
 
@@ -81,13 +74,14 @@ def write_run_page(
     region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
     # Sentences are made of tables, and the map of pairs
     table = _station_table(folder / "stations.csv", stations)
+    event = _event(stations, table, event_of_run(folder / "run.json", region))
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
         title=region.title,
         language=settings.report.language,
         simulated=simulated,
         classes=tuple(region.classes),
-        event=_event(stations, table, event_of_run(folder / "run.json", region)),
+        event=_with_revision(event, settings, folder),
         tally=tally,
         worst=worst,
         stations=table,
@@ -97,8 +91,9 @@ def write_run_page(
         buildings=_buildings(folder / "buildings.parquet"),
         outlines=_outlines(settings, folder, worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
-        histories=_histories(worst, stations),
+        histories=histories(worst, stations),
         provenance=_provenance(settings),
+        drawings=page_drawings(settings, worst, stations),
     )
     write_page(data, folder / "report.html")
 
@@ -168,6 +163,12 @@ def _event(
         used=used,
         missing=len(table) - used,
     )
+
+
+def _with_revision(event: Event, settings: Run, folder: Path) -> Event:
+    """Return an event with number and time of the revision, if the run has them."""
+    number, time = revision_of_run(folder / "run.json")
+    return event._replace(revision=settings.report.revision or number, revised=time)
 
 
 def _place(
@@ -261,28 +262,6 @@ def _outlines(settings: Run, folder: Path, worst: pd.DataFrame) -> list[tuple[st
         return []
     names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
     return read_outlines(beside, names.unique().tolist())
-
-
-def _histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> dict[int, dict[str, Any]]:
-    """Return the histories of the worst pairs with a gap and a record, by their rank."""
-    if not set(HISTORY_COLUMNS) <= set(worst):
-        return {}
-    usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
-    shards = {station.shard.stem: station for station in stations if station.shard}
-    histories = {}
-    # Station by station, because motions are large
-    for name, pairs in usable.groupby("station", sort=False):
-        station = shards.get(file_stem(str(name)))
-        if station is None or station.shard is None:
-            continue
-        motion = read_station_once(station.shard, station.hash)
-        for _, pair in pairs.iterrows():
-            history = drawn_history(motion, pair)
-            if history is not None:
-                histories[int(pair["rank"])] = history
-    return histories
 
 
 def _provenance(settings: Run) -> list[tuple[str, str]]:

@@ -1,5 +1,6 @@
 """Facts of a run that its summary states: the earthquake and the stations."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,9 @@ import pandas as pd
 from per_obspy.report.overview import Region
 from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.station_summary import COLUMNS
+
+#: A time of ISO 8601 up to its minute.
+TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
 
 
 def event_facts(event: Any) -> dict[str, object]:
@@ -66,6 +70,25 @@ def event_of_run(record: Path, region: Region) -> dict[str, Any]:
             facts |= {"start": group.get("start")}
             facts |= {name: value for name, value in known.items() if value is not None}
     return facts
+
+
+def revision_of_run(record: Path) -> tuple[int, str]:
+    """
+    Return number and time (``HH:MM``, UTC) of the revision of a run; 0 and empty where unknown.
+
+    Parameters
+    ----------
+    record : Path
+        ``run.json``, finished or not: ``revision``, and ``revised`` or else ``started``.
+    """
+    try:
+        known = read_status(record)
+    except StatusError:
+        return 0, ""
+    number = known.get("revision")
+    is_number = isinstance(number, int) and not isinstance(number, bool) and number > 0
+    time = str(known.get("revised") or known.get("started") or "")
+    return number if is_number else 0, time[11:16] if TIME.match(time) else ""
 
 
 def read_stations(path: Path) -> pd.DataFrame:

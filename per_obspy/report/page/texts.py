@@ -179,6 +179,10 @@ ENGLISH: dict[str, str] = {
         "Building 1 solid, building 2 dashed and a gap away; bars below: impacts, the higher the "
         "faster. Follows the record; after some ten impacts two correct programs may differ."
     ),
+    "history_apart": (
+        "With the inputs of this page they do not meet, as where both periods are the same; the "
+        "probability counts the other values that the inputs may have."
+    ),
     "no_history": (
         "The page holds the histories of the {count} worst pairs with a known gap and a record. "
         "For this pair, in the folder of the results: {command}"
@@ -227,7 +231,7 @@ ENGLISH: dict[str, str] = {
     # One station
     "station_pairs": "Its record serves {count} pairs.",
     "station_pairs_one": "Its record serves {count} pair.",
-    "station_record": "Processed acceleration, m/s²: north (solid) and east (dashed)",
+    "station_record": "Processed acceleration, m/s²: north above, east below",
     "station_record_note": (
         "Each interval of {value} s is drawn from its smallest to its largest sample, so that "
         "every peak stays."

@@ -164,6 +164,10 @@ SPANISH: dict[str, str] = {
         "impactos, más altas cuanto más rápidos. Sigue el registro; tras unos diez impactos dos "
         "programas correctos pueden diferir."
     ),
+    "history_apart": (
+        "Con los datos de esta página no se tocan, como cuando ambos períodos son iguales; la "
+        "probabilidad cuenta los otros valores que los datos pueden tener."
+    ),
     "no_history": (
         "La página contiene las historias de los {count} peores pares con separación conocida y "
         "registro. Para este par, en la carpeta de los resultados: {command}"
@@ -213,7 +217,7 @@ SPANISH: dict[str, str] = {
     "position_single": "un solo par",
     "station_pairs": "Su registro sirve a {count} pares.",
     "station_pairs_one": "Su registro sirve a {count} par.",
-    "station_record": "Aceleración procesada, m/s²: norte (continua) y este (a trazos)",
+    "station_record": "Aceleración procesada, m/s²: norte arriba, este abajo",
     "station_record_note": (
         "Cada intervalo de {value} s se dibuja de su menor a su mayor muestra: ningún máximo se "
         "pierde."
