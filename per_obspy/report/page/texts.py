@@ -35,7 +35,9 @@ ENGLISH: dict[str, str] = {
     "stations_expected": "{count} stations expected",
     "stations_expected_one": "{count} station expected",
     "stations_used": "{count} used",
+    "stations_used_one": "{count} used",
     "stations_missing": "{count} missing or rejected",
+    "stations_missing_one": "{count} missing or rejected",
     "and_more": "and {count} more",
     "todo_exercise": "Send nobody: the motion is simulated.",
     "todo_worst": "Inspect the pairs of the fastest impacts first: {names}.",
@@ -241,6 +243,7 @@ ENGLISH: dict[str, str] = {
         "The larger horizontal. Shaded: periods that are not usable. PER far above SD comes from "
         "slow motion, of which PER holds the velocity too."
     ),
+    "station_none_one": "The page draws the {count} station that serves most pairs.",
     "station_none": "The page draws the {count} stations that serve most pairs.",
     "station_clear": "No check of its record has failed.",
     "show_pairs": "filter its pairs",

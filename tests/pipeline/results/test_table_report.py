@@ -142,7 +142,7 @@ def test_notes_do_not_depend_on_pieces():
         }
     )
     for pieces in ([table], [table[:1], table[1:]]):
-        notes = Notes()
+        notes = Notes(["severe"])
         for piece in pieces:
             notes.add(piece)
         # an unknown gap adds nothing to what is expected, and is counted

@@ -80,7 +80,7 @@ SPANISH_PHRASES: dict[str, str] = {
     " is outside ": " está fuera de ",
     " is unknown, expected ": " se desconoce, se espera ",
     " or more": " o más",
-    "stands in an earlier row already": "ya está en una fila anterior",
+    "occurs in an earlier row already": "ya está en una fila anterior",
     "is a number, one is needed": "es un número, hace falta uno",
     "is above the lower building": "está sobre el edificio más bajo",
     "is a placeholder, not a position": "es un relleno, no una posición",

@@ -25,6 +25,8 @@ SPANISH: dict[str, str] = {
     "stations_expected": "{count} estaciones esperadas",
     "stations_expected_one": "{count} estación esperada",
     "stations_used": "{count} usadas",
+    "stations_used_one": "{count} usada",
+    "stations_missing_one": "{count} ausente o rechazada",
     "stations_missing": "{count} ausentes o rechazadas",
     "and_more": "y {count} más",
     "todo_exercise": "No envíe a nadie: el movimiento es simulado.",
@@ -229,6 +231,7 @@ SPANISH: dict[str, str] = {
         "La horizontal mayor. Sombreado: períodos no utilizables. Un PER muy por encima de SD "
         "viene de movimiento lento, cuya velocidad también entra en PER."
     ),
+    "station_none_one": "La página dibuja la {count} estación que sirve a más pares.",
     "station_none": "La página dibuja las {count} estaciones que sirven a más pares.",
     "station_clear": "Ninguna revisión de su registro falló.",
     "show_pairs": "filtrar sus pares",
