@@ -208,7 +208,7 @@ WHOLE = {
     "a period twice": (
         {"code.csv": CURVE + "1.0,0.05,0.2\n"},
         "screen design.toml",
-        "period = 1, damping = 0.05 stands twice",
+        "period = 1, damping = 0.05 occurs twice",
     ),
     "PDF as spectrum": (
         {"code.csv": PDF},
