@@ -113,7 +113,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ),
         (
             GOOD + "[building]\ndamping = 5\n",
-            r"building\.damping: .*less than 1 \(got 5\), expected: damping of .*, fraction of critical",
+            r"building\.damping: .*less than 1 \(got 5\), expected: damping of .*of critical",
         ),
         (GOOD + "[totals]\nh3 = 16\n", r"totals\.h3: .*less than or equal to 15 \(got 16\)"),
         (
