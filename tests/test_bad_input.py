@@ -361,7 +361,7 @@ ROWS = {
     ),
     "28 m floor": ({"storeys_1": 1, "height_1": 28}, "makes floors of 28 m"),
     "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown"),
-    "same name": ({"pair_id": "a"}, "pair_id = 'a' stands in an earlier row"),
+    "same name": ({"pair_id": "a"}, "pair_id = 'a' occurs in an earlier row"),
     "same building": (
         {"building_id_1": "h", "building_id_2": "h"},
         "a building has no gap to itself",

@@ -258,7 +258,7 @@ def test_a_bomb_is_one_row_and_takes_no_memory(tmp_path: Path, write):
     assert peak < 32 * 2**20
     assert list(found.stations) == [".SOMESCHOOL"]
     (row,) = found.rejected
-    assert "records.archives.largest_ratio = 200 times its own size" in row.reasons[0]
+    assert "records.archives.largest_ratio = 200 times its packed size" in row.reasons[0]
 
 
 @pytest.mark.parametrize(("key", "value"), [("largest_total", 8000), ("most_members", 2)])
