@@ -142,7 +142,7 @@ def map_event(path: Path) -> dict[str, object]:
     found = dict[str, Mapping[str, str]]()
     try:
         parser.feed(_text(path)[:_HEAD])
-        for _, element in cast(Iterable[tuple[str, ElementTree.Element]], parser.read_events()):
+        for _, element in cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events()):
             found[_name(element)] = element.attrib
     except ElementTree.ParseError:
         return {}

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
-from per_obspy.pipeline.run import run, screen
+from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
@@ -258,6 +258,9 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     assert "Motion of ShakeMap x, version 3" in page["event"]
     assert "no displacement history" in page["provenance"][-1][1]
     assert page["epicentre"] is not None
+    # and can be written again, in another language, also where no station was needed
+    report(copied / "map.toml")
+    screen(copied / "map.toml", executor=InProcess())
 
 
 def test_a_changed_map_changes_every_chunk(copied):

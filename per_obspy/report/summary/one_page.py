@@ -59,7 +59,7 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     at = _write_numbers(figure, facts, at)
     bottom = at - 0.30
     axes = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225))
-    draw_map(axes, shown, facts.region)
+    draw_map(axes, shown, facts.region, around_pairs=True)
     texts = facts.texts
     axes.set_title(texts["map_title"].format(count=len(shown)))
     axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
@@ -143,7 +143,12 @@ def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
     figure.text(LEFT, at, facts.texts["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
-    titles = ["", *(facts.texts[f"head_{key}"] for key in list(COLUMNS)[1:])]
+    # An ensemble has no gap needed
+    known = [key for key in list(COLUMNS)[1:] if key != "needed" or "demand" in facts.worst]
+    titles = [
+        "",
+        *(facts.texts[f"head_{key}"] if key in known else "" for key in list(COLUMNS)[1:]),
+    ]
     _write_row(figure, titles, at, MOTION_COLOUR)
     for position, (_, pair) in enumerate(facts.worst.iterrows(), start=1):
         # As many as the summary lists, one per line
@@ -166,7 +171,7 @@ def _number_cells(pair: dict[Hashable, Any]) -> list[str]:
         speed_text(number(pair, "expected_impact_velocity")),
         chance_text(number(pair, "probability")),
         length_text(number(pair, "gap")),
-        length_text(number(pair, "demand")),
+        length_text(number(pair, "demand")) if "demand" in pair else "",
     ]
 
 
