@@ -3,10 +3,10 @@
 import gzip
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -118,6 +118,55 @@ def is_scenario(path: Path) -> bool:
     """Return whether a ShakeMap is of a simulated earthquake, from the head of its grid."""
     head = _text(path)[:_HEAD].upper()
     return re.search(r"SHAKEMAP_EVENT_TYPE\s*=\s*[\"']SCENARIO[\"']", head) is not None
+
+
+def map_event(path: Path) -> dict[str, object]:
+    """
+    Return the facts of the earthquake that the head of a grid states.
+
+    Facts that are missing or implausible are left out: they describe the map, and decide no number.
+
+    Parameters
+    ----------
+    path : Path
+        ``grid.xml``.
+
+    Returns
+    -------
+    dict
+        ``time`` (ISO 8601, UTC), ``magnitude``, ``longitude``, ``latitude`` (degrees), ``depth``
+        (m); ``map`` and ``version``, texts that name the map.
+    """
+    # The head ends within the grid: tags until there are enough
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start",))
+    found = dict[str, Mapping[str, str]]()
+    try:
+        parser.feed(_text(path)[:_HEAD])
+        for _, element in cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events()):
+            found[_name(element)] = element.attrib
+    except ElementTree.ParseError:
+        return {}
+    event, root = found.get("event", {}), found.get("shakemap_grid", {})
+    time = re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", event.get("event_timestamp", ""))
+    facts = {
+        "time": time[0] if time else None,
+        "magnitude": _within(event.get("magnitude"), -2.0, 10.0),
+        "longitude": _within(event.get("lon"), -180.0, 360.0),
+        "latitude": _within(event.get("lat"), -90.0, 90.0),
+        "depth": _within(event.get("depth"), -10.0, 1000.0, 1000.0),
+        "map": root.get("event_id") or root.get("shakemap_id"),
+        "version": root.get("shakemap_version"),
+    }
+    return {name: value for name, value in facts.items() if value is not None}
+
+
+def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> float | None:
+    """Return a number times a factor, None where it is none or outside its limits."""
+    try:
+        value = float(text or "")
+    except ValueError:
+        return None
+    return factor * value if low <= value <= high else None
 
 
 def _variable(dimensions: tuple[str, ...], values: FloatArray, unit: str, meaning: str) -> Any:

@@ -126,7 +126,7 @@ def _draw_top(figure: SubFigure, table: pd.DataFrame, region: Region) -> Axes:
     return whole
 
 
-def draw_map(axes: Axes, table: pd.DataFrame, region: Region) -> None:
+def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool = False) -> None:
     """
     Draw pairs in the colours of their classes, stations and the epicentre on axes of any shape.
 
@@ -138,9 +138,13 @@ def draw_map(axes: Axes, table: pd.DataFrame, region: Region) -> None:
         As for :func:`draw_overview`.
     region : Region
         As for :func:`draw_overview`.
+    around_pairs : bool
+        Show the surroundings of the pairs only, without stations and an epicentre that are further
+        away: a small map of a large region would hide all pairs behind one mark.
     """
     points = _points(table, region)
-    frame = _whole_frame(points, region)
+    seen = region._replace(stations=region.stations[:0], epicentre=None) if around_pairs else region
+    frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
     _draw_stations(axes, region, frame)
     axes.set_title(f"{len(table)} pairs shown", fontsize=11)
@@ -179,8 +183,18 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
     """Return frames and members of the clusters that the whole map hides, worst first."""
     if not points.longitude.size:
         return []
-    # Stations and epicentre may be far away; a few pairs do not hide each other
+    # Stations and epicentre may be far away: then one town has a map of its own too
     pairs_frame = frame_of(points.longitude, points.latitude)
+    seen, first = whole, list[tuple[Frame, IntArray]]()
+    if pairs_frame.size < SMALL * whole.size and points.longitude.size >= FEWEST:
+        seen = pairs_frame.padded(MARGIN)
+        first = [(seen, np.arange(points.longitude.size))]
+    return _cluster_maps(points, pairs_frame, seen) or first
+
+
+def _cluster_maps(points: _Points, pairs_frame: Frame, seen: Frame) -> list[tuple[Frame, IntArray]]:
+    """Return frames and members of the clusters that a map of all pairs hides, worst first."""
+    # A few pairs do not hide each other
     every = clusters(points.longitude, points.latitude, pairs_frame)
     found = [members for members in every if members.size >= FEWEST]
     frames = [
@@ -188,9 +202,9 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
         for members in found
     ]
     pairs = list(zip(frames, found, strict=True))
-    if not any(frame.size < SMALL * whole.size for frame in frames):
+    if not any(frame.size < SMALL * seen.size for frame in frames):
         return []
-    return [pair for pair in pairs if pair[0].size < LARGE * whole.size]
+    return [pair for pair in pairs if pair[0].size < LARGE * seen.size]
 
 
 def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:

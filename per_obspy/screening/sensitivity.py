@@ -16,7 +16,12 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Building, Screening
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.rows import risk_rows
-from per_obspy.screening.uncertainty.nodes import gap_dispersion, median_gap, one_wall_chance
+from per_obspy.screening.uncertainty.nodes import (
+    LARGEST_DAMPING,
+    gap_dispersion,
+    median_gap,
+    one_wall_chance,
+)
 from per_obspy.screening.uncertainty.unknown_gaps import kept_apart
 from per_obspy.screening.values import values
 
@@ -28,6 +33,9 @@ TAIL = 0.16
 
 #: A row that is computed again must have its probability; else its inputs are not all known.
 TOLERANCE = 0.005
+
+#: Lower and upper values of an input, and rows in which it is uncertain.
+Ends = tuple[FloatArray, FloatArray, NDArray[np.bool_]]
 
 
 class Sensitivity(NamedTuple):
@@ -79,17 +87,11 @@ def input_sensitivity(
         None of a pair without probability, or whose row cannot be computed again from its columns.
     """
     known = rows[rows["probability"].notna()].reset_index(drop=True)
-    if known.empty:
-        return []
-    given = _as_given(known)
-    # Every variant is a pair of its own
-    variants = [given.assign(pair_id=_names(known, "", 0))]
     inputs = {name: ends for name, ends in _ends(known).items() if ends[2].any()}
-    for name, (low, high, varies) in inputs.items():
-        for side, value in enumerate((low, high)):
-            changed = _with_value(given, name, value).assign(pair_id=_names(known, name, side))
-            variants.append(changed[varies])
-    found, _ = risk_rows(pd.concat(variants, ignore_index=True), ground, building, screening)
+    if not inputs:
+        return []
+    # Rows are compared with themselves: of other settings they have other probabilities
+    found, _ = risk_rows(_variants(known, inputs), ground, building, screening)
     by_name = found.set_index("pair_id")[["probability", "state"]]
     same = _same(known, by_name)
     return [
@@ -97,6 +99,18 @@ def input_sensitivity(
         for name, (low, high, varies) in inputs.items()
         for row in np.flatnonzero(varies & same).tolist()
     ]
+
+
+def _variants(known: pd.DataFrame, inputs: dict[str, Ends]) -> pd.DataFrame:
+    """Return the rows as they are, and with each input at both of its values, as a pair table."""
+    given = _as_given(known)
+    # Every variant is a pair with a name of its own
+    variants = [given.assign(pair_id=_names(known, "", 0))]
+    for name, (low, high, varies) in inputs.items():
+        for side, value in enumerate((low, high)):
+            changed = _with_value(given, name, value).assign(pair_id=_names(known, name, side))
+            variants.append(changed[varies])
+    return pd.concat(variants, ignore_index=True)
 
 
 def _names(rows: pd.DataFrame, name: str, side: int) -> list[str]:
@@ -115,9 +129,10 @@ def _outcome(
     pair_id: str, name: str, ends: tuple[float, float], found: pd.DataFrame, row: int
 ) -> Sensitivity:
     """Return the outcome of one pair at both values of an input."""
-    low, high = (found.loc[f"{row} {name} {side}"] for side in (0, 1))
-    chances = float(low["probability"]), float(high["probability"])
-    return Sensitivity(pair_id, name, *map(float, ends), *chances, low["state"], high["state"])
+    variants = found.loc[[f"{row} {name} {side}" for side in (0, 1)]]
+    low, high = values(variants, "probability").tolist()
+    states = variants["state"].astype(str).tolist()
+    return Sensitivity(pair_id, name, float(ends[0]), float(ends[1]), low, high, *states)
 
 
 def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
@@ -134,23 +149,23 @@ def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
 def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFrame:
     """Return a pair table in which one input is certain."""
     deviation = "gap_std" if name == "gap" else name.replace("_", "_log_std_")
-    return given.assign(**{name: value, deviation: 0.0})
+    certain = np.zeros(len(given))
+    return given.assign(**{name: value, deviation: certain})
 
 
-def _ends(rows: pd.DataFrame) -> dict[str, tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
+def _ends(rows: pd.DataFrame) -> dict[str, Ends]:
     """Return the lower and the upper value of each input, and the rows in which it is uncertain."""
     ends = {}
     for name in LOGNORMAL:
-        median = values(rows, name)
         deviation = np.nan_to_num(values(rows, name.replace("_", "_log_std_")))
-        spread = np.exp(deviation)
-        ends[name] = median / spread, np.minimum(median * spread, 0.99), deviation > 0.0
-        if name.startswith("period"):
-            ends[name] = median / spread, median * spread, deviation > 0.0
+        median, spread = values(rows, name), np.exp(deviation)
+        # A damping stays below the critical one, as at the nodes
+        largest = np.maximum(median, LARGEST_DAMPING) if "damping" in name else np.inf
+        ends[name] = median / spread, np.minimum(median * spread, largest), deviation > 0.0
     return ends | {"gap": _gap_ends(rows)}
 
 
-def _gap_ends(rows: pd.DataFrame) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+def _gap_ends(rows: pd.DataFrame) -> Ends:
     """Return both values of the gap, m; the lower one is 0 where the walls may be one."""
     marked = kept_apart(rows)
     median, deviation = median_gap(marked), gap_dispersion(marked)

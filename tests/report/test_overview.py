@@ -172,3 +172,10 @@ def test_nothing_is_clipped_and_the_legend_covers_nothing(monkeypatch, tmp_path,
         texts = [label for label in axis.get_ticklabels() if label.get_text()]
         boxes = [label.get_window_extent() for label in texts]
         assert not any(first.overlaps(second) for first, second in combinations(boxes, 2))
+
+
+def test_a_far_epicentre_hides_no_single_town(overview):
+    # would catch: all pairs are one mark, as the town alone would have no map of its own
+    whole, _, own = overview(towns(1, 40, 0.1), ALONE._replace(epicentre=(-103.0, 18.0))).axes
+    assert own.get_title().startswith("A: 40 pairs")
+    assert [text.get_text() for text in whole.texts] == ["A"]

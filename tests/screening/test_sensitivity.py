@@ -61,7 +61,8 @@ def test_ends_are_a_standard_deviation_from_the_median(table, found):
     by_name = table.set_index("pair_id")
     one = found["P0", "period_1"]
     median, deviation = by_name.loc["P0", ["period_1", "period_log_std_1"]]
-    assert np.log([one.low, one.high]) == pytest.approx(np.log(median) + deviation * np.array([-1, 1]))
+    expected = np.log(median) + deviation * np.array([-1.0, 1.0])
+    assert np.log([one.low, one.high]) == pytest.approx(expected)
     # A gap that is far from 0 in terms of its deviation is nearly normal: Phi(1) is 84.1 %
     gap = found["P1", "gap"]
     assert [gap.low, gap.high] == pytest.approx([0.2, 0.26], rel=0.01)
@@ -74,7 +75,7 @@ def test_a_wider_gap_is_less_likely_closed(found):
 
 def test_outlines_that_touch_may_have_one_wall(found):
     one = found["P3", "gap"]
-    assert 0.5 > TAIL
+    assert TAIL < 0.5
     assert one.low == 0.0
     assert one.probability_low == pytest.approx(1.0)
 

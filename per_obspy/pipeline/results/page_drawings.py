@@ -1,24 +1,18 @@
 """Everything that a page draws of single pairs and stations, computed again for some of them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from per_obspy.config import Run
 from per_obspy.jobs.ground_files import ground_files, read_ground, read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.screening import shakemap_files
-from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.page.content import PageDrawings
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 from per_obspy.report.page.drawn_stations import drawn_station
 from per_obspy.screening.ground_motion.site_motion import RegionalMotion
 from per_obspy.screening.sensitivity import input_sensitivity
-
-#: Pairs whose history is drawn, the worst ones: 2 kB and 0.05 s each, 0.2 s in a long record.
-HISTORIES = 100
 
 #: Pairs whose sensitivity is computed, 0.06 s each: the worst ones, and those whose probability is
 #: nearest to a half, of which a better input may turn the verdict.
@@ -99,35 +93,3 @@ def _station_drawings(
         for one in able[:STATIONS]
         if one.shard is not None
     }
-
-
-def histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> dict[int, dict[str, Any]]:
-    """
-    Return the histories of the worst pairs with a gap and a record, by their rank.
-
-    Parameters
-    ----------
-    worst : DataFrame
-        Pairs of the page.
-    stations : iterable of FinishedStation
-        With shards.
-    """
-    if not set(HISTORY_COLUMNS) <= set(worst):
-        return {}
-    is_known = np.asarray(worst["gap"].notna() & (worst["station"] != ""))
-    usable = worst[is_known].head(HISTORIES)
-    shards = {station.shard.stem: station for station in stations if station.shard}
-    found = {}
-    # Station by station, because motions are large
-    for name, pairs in usable.groupby("station", sort=False):
-        station = shards.get(file_stem(str(name)))
-        if station is None or station.shard is None:
-            continue
-        motion = read_station_once(station.shard, station.hash)
-        for _, pair in pairs.iterrows():
-            history = drawn_history(motion, pair)
-            if history is not None:
-                found[int(pair["rank"])] = history
-    return found

@@ -1,5 +1,6 @@
 """Summary, KML and workbook of a screening of any kind."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -12,9 +13,11 @@ from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.layers.kml import write_kml
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import Region
+from per_obspy.report.page.texts import Language
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
+from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
 from per_obspy.screening.columns import column_table, known_column
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
@@ -36,6 +39,10 @@ class Screening(NamedTuple):
         Sentences on the earthquake, spectrum or scenarios.
     spreadsheet : bool
         Whether a workbook is written.
+    language : Language
+        Of the summary.
+    own : sequence of str
+        Columns of pairs that are computed, besides those of every risk table.
     stations : DataFrame
         Rows of ``stations.csv``; empty where there are none.
     areas : DataFrame
@@ -47,6 +54,8 @@ class Screening(NamedTuple):
     region: Region
     source: list[str]
     spreadsheet: bool = False
+    language: Language = "en"
+    own: Sequence[str] = ()
     stations: pd.DataFrame = pd.DataFrame()
     areas: pd.DataFrame = pd.DataFrame()
 
@@ -90,12 +99,12 @@ def _facts(
 ) -> SummaryFacts:
     """Return the facts of the summary."""
     # The area with most pounding is worth a name where there are several
-    area, totals = "", screening.areas
+    area, totals, texts = "", screening.areas, WORDING[screening.language]
     if len(totals) > 1:
         most = totals.iloc[int(totals["expected_pounding"].argmax())]
-        place = place_text(float(most["latitude"]), float(most["longitude"]), 4)
-        area = f"{name_text(most['area'])}, around {place}"
-    made = f"per-obspy {version('per_obspy')}. All numbers and their units: {screening.stem}.csv."
+        place = place_text(float(most["latitude"]), float(most["longitude"]), 4, screening.language)
+        area = texts["around"].format(name=name_text(most["area"]), place=place)
+    made = texts["made"].format(version=version("per_obspy"), table=screening.stem)
     listed = worst.head(LISTED), buildings.head(LISTED)
     return SummaryFacts(
         screening.region,
@@ -105,6 +114,7 @@ def _facts(
         screening.stations,
         area,
         made,
+        screening.language,
     )
 
 
@@ -125,11 +135,12 @@ def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) 
     of_stations = {name: column.unit for name, column in STATION_COLUMNS.items()}
     # What every column means is a sheet too
     meanings = column_table(map(str, worst))
+    velocity = {"worst_expected_impact_velocity": "m/s"}
     given = [
-        Sheet("pairs", worst, units),
-        Sheet("buildings", buildings, {"severity": "m/s"}),
-        Sheet("areas", screening.areas, {"worst_expected_impact_velocity": "m/s"}),
-        Sheet("stations", screening.stations, of_stations),
+        Sheet("pairs", worst, units, screening.own),
+        Sheet("buildings", buildings, {"severity": "m/s"}, buildings.columns),
+        Sheet("areas", screening.areas, velocity, screening.areas.columns),
+        Sheet("stations", screening.stations, of_stations, screening.stations.columns),
         Sheet("columns", meanings, {}),
     ]
     return [sheet for sheet in given if not sheet.table.empty]

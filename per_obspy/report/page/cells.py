@@ -76,5 +76,5 @@ class CellCounts:
 
 def _codes(column: pd.Series, names: Sequence[str]) -> NDArray[np.int64]:
     """Return the number of each row's name, of other names the last one."""
-    codes = pd.Index(names).get_indexer(column).astype(np.int64)
+    codes = pd.Index(names).get_indexer(pd.Index(column)).astype(np.int64)
     return np.where(codes < 0, len(names) - 1, codes)

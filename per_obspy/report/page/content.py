@@ -148,6 +148,7 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, and its tables, whose descriptions the content holds."""
     # Sentences first, then whatever the script draws
     facts = data.language, data.simulated
+    # Tables of which it names rows
     found = data.areas, data.stations
     screen = first_screen(data.event, data.tally, data.worst, found, data.buildings, facts)
     texts, tables = LANGUAGES[data.language], _tables(data)
@@ -192,7 +193,7 @@ def _tables(data: PageData) -> list[PackedTable]:
     """Return pairs, cells, buildings, and the columns of pairs that only the export needs."""
     cells = data.tally.cells.table()
     kinds = dict.fromkeys(("longitude", "latitude"), "place")
-    kinds |= {name: "whole" for name in cells if name not in kinds}
+    kinds |= {str(name): "whole" for name in cells if name not in kinds}
     # Places of the inventory by name, for the search
     address = addresses(data.worst)
     pairs = data.worst if address is None else data.worst.assign(address=address)

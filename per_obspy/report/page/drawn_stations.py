@@ -38,6 +38,7 @@ def drawn_station(station: xr.Dataset) -> dict[str, Any]:
     """
     north, east, interval = components(station)
     edges = _edges(north**2 + east**2)
+    # Spectra of the horizontals, at the damping of all records
     count = int(station.attrs["horizontals"])
     near = station.sel(damping=REFERENCE_DAMPING, method="nearest")
     # Pads at both ends are left out

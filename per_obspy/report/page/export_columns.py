@@ -1,7 +1,7 @@
 """Columns of pairs that the page holds for its export and its search only."""
 
 import zlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import pandas as pd
@@ -48,6 +48,7 @@ def pack_export(pairs: pd.DataFrame, known: Collection[str]) -> PackedTable:
     PackedTable
         Its description has ``left_out``, the names of columns for which there is no room.
     """
+    # Columns of the package come first, those of the inventory after them
     names = [str(name) for name in pairs if str(name) not in known]
     packed, room, left_out = list[PackedTable](), MOST_BYTES, list[str]()
     for number, name in enumerate(names):
@@ -99,10 +100,16 @@ def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
     names = [name for name in pairs if _is_place(str(name))]
     if not names:
         return None
+    # What is missing is empty
     columns = [pairs[name].astype(object).where(pairs[name].notna(), "") for name in names]
-    rows = (dict.fromkeys(str(text).strip() for text in row) for row in zip(*columns, strict=True))
-    joined = [", ".join(text for text in row if text) for row in rows]
+    joined = [_joined(row) for row in zip(*columns, strict=True)]
     return pd.Series(joined, index=pairs.index, dtype=str)
+
+
+def _joined(names: Iterable[object]) -> str:
+    """Return names in their order, each once."""
+    texts = dict.fromkeys(str(name).strip() for name in names)
+    return ", ".join(text for text in texts if text)
 
 
 def _is_place(name: str) -> bool:

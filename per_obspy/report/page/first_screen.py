@@ -158,6 +158,7 @@ def _expected(stations: pd.DataFrame, language: Language) -> str:
     """Return how many stations are expected, and the names of the used and the missing ones."""
     if stations.empty or not {"station", "state"} <= set(stations):
         return ""
+    # Whatever is not used serves no pair
     is_used = (stations["state"] == "used").to_numpy()
     used, missing = stations[is_used], stations[~is_used]
     parts = [counted(language, "stations_expected", len(stations))]
@@ -209,7 +210,9 @@ def _numbers(
         numbers.append((hit, "number_buildings"))
     else:
         numbers.append((tally.expected, "number_expected"))
-    counts = [(written(value, 0, language), _meaning(key, value, language)) for value, key in numbers]
+    counts = [
+        (written(value, 0, language), _meaning(key, value, language)) for value, key in numbers
+    ]
     # The class of the worst pair is the worst that occurs
     if "risk_class" in worst and len(worst):
         name = str(worst["risk_class"].iloc[0])

@@ -106,9 +106,7 @@ def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
     return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
 
 
-def _choices(
-    column: pd.Series, longest: int = LONGEST_TEXT
-) -> tuple[dict[str, Any], bytes]:
+def _choices(column: pd.Series, longest: int = LONGEST_TEXT) -> tuple[dict[str, Any], bytes]:
     """Return the different texts, and the number of each row's text."""
     codes, texts = pd.factorize(column.fillna("").astype(str))
     if len(texts) > MOST_CHOICES:

@@ -51,6 +51,7 @@ class PairTally:
         self.classes.update(_counts(piece, "risk_class"))
         for names, count in _counts(piece, "flags").items():
             self.flags.update(dict.fromkeys(names.split(), count))
+        # Rows with a name of a derived column
         derived = _counts(piece, "derived")
         self.derived += sum(derived.values()) - derived.get("", 0)
         if "probability" in piece:

@@ -51,9 +51,7 @@ def test_page_states_what_the_run_found(content, risk):
     counts = {state["name"]: state["count"] for state in content["states"]}
     assert counts["yes"] == (risk["state"] == "yes").sum()
     assert content["numbers"][0][0] == str(len(risk))
-    assert content["expected"] == (
-        "3 stations expected; 3 used: XX.S001, XX.S002, XX.S003."
-    )
+    assert content["expected"] == ("3 stations expected; 3 used: XX.S001, XX.S002, XX.S003.")
     assert content["revision"] == ""
     assert [row[0] for row in content["stations"]["rows"]] == ["XX.S001", "XX.S002", "XX.S003"]
 
@@ -92,9 +90,7 @@ def test_stations_are_drawn_with_their_peaks_and_spectra(content):
         # Three digits
         assert max(peaks) == pytest.approx(row[heads.index("PGA, m/s²")], rel=5e-3)
         at_one = min(range(12), key=lambda i: abs(drawn["period"][i] - 1.0))
-        assert drawn["per"][at_one] == pytest.approx(
-            row[heads.index("PER (1 s), cm")], rel=5e-3
-        )
+        assert drawn["per"][at_one] == pytest.approx(row[heads.index("PER (1 s), cm")], rel=5e-3)
 
 
 def test_sensitivities_surround_the_probability(content, risk):

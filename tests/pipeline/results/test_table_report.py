@@ -3,11 +3,14 @@ Every kind of screening has its summary, overview, layers and workbook, and its 
 
 Tests of per_obspy.pipeline.results.faults, per_obspy.pipeline.results.table_notes,
 per_obspy.pipeline.results.result_files, per_obspy.pipeline.results.layer_sources,
-per_obspy.pipeline.results.run_facts and per_obspy.pipeline.results.shown_pair too, through
+per_obspy.pipeline.results.run_facts, per_obspy.pipeline.results.station_facts,
+per_obspy.pipeline.results.scenario_runs and per_obspy.pipeline.results.shown_pair too, through
 per_obspy.commands.show and the commands that screen.
 """
 
+import csv
 import json
+import re
 
 import numpy as np
 import openpyxl
@@ -19,6 +22,8 @@ from pyarrow import parquet
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
+
+from .test_page import content_of
 
 SCENARIO = "[scenario]\nstations = 1\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 4\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -73,6 +78,69 @@ def test_every_screening_has_everything(done, stem):
     pairs = openpyxl.load_workbook(folder / f"{stem}.xlsx")["pairs"]
     assert pairs.max_row == 6
     assert "f" not in {cell.data_type for row in pairs.iter_rows() for cell in row}
+
+
+def test_the_page_of_an_ensemble_knows_buildings_stations_and_histories(done):
+    ensemble = content_of(done["ensemble"] / "report.html")
+    run = content_of(done["risk"] / "report.html")
+    assert [row[0] for row in ensemble["stations"]["rows"]] == ["XX.S001 (one)"]
+    assert [row[1:] for row in ensemble["stations"]["rows"]] == [
+        row[1:] for row in run["stations"]["rows"]
+    ]
+    assert ensemble["areas"]["rows"]
+    # the only scenario is the worst of every pair, so that the histories are those of its run
+    assert sorted(map(str, ensemble["histories"].values())) == sorted(
+        map(str, run["histories"].values())
+    )
+    assert ensemble["histories"]
+    columns = {column["name"] for column in ensemble["tables"][0]["columns"]}
+    assert {"building_id_1", "longitude_2", "height_1", "area", "derived"} <= columns
+    layers = dict(pyogrio.list_layers(done["ensemble"] / "ensemble.gpkg"))
+    assert layers["pairs"] == "LineString"
+    assert {"buildings", "stations", "areas"} <= set(layers)
+
+
+def test_the_page_of_a_spectrum_says_what_it_leaves_out(done):
+    content = content_of(done["design"] / "report.html")
+    assert content["histories"] == {}
+    assert content["stations"]["rows"] == []
+    assert content["areas"]["rows"]
+    assert "neither stations nor displacement histories" in content["provenance"][-1][1]
+    assert "areas" in dict(pyogrio.list_layers(done["design"] / "design.gpkg"))
+
+
+@pytest.mark.parametrize("stem", ["design", "ensemble"])
+def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
+    configuration = done[stem].parent / f"{stem}.toml"
+    code, _, errors = call("screen", configuration, "-o", tmp_path / "es", "--language", "es")
+    assert code == 0, errors
+    content = content_of(tmp_path / "es" / "report.html")
+    assert content["texts"]["close"] == "cerrar"
+    text = (tmp_path / "es" / "summary.txt").read_text()
+    assert "4 pares de edificios evaluados." in text
+    assert not re.search(r"\b(the|pairs|with|of)\b", text.split("\n\n", 1)[1])
+
+
+#: Digits that a number of a CSV file needs at most; coordinates have seven decimals.
+MOST_DIGITS = 5
+
+
+@pytest.mark.parametrize("stem", ["risk", "design", "ensemble"])
+def test_numbers_of_every_csv_file_are_rounded(done, stem):
+    checked = 0
+    for path in done[stem].glob("*.csv"):
+        # as simulated: an input of the run, with all its digits
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = [] if path.name == "pairs.csv" else list(csv.DictReader(file))
+        for row in rows:
+            for name, text in row.items():
+                number = re.fullmatch(r"-?(\d+\.\d*)(e[-+]\d+)?", text)
+                if number and not name.startswith(("longitude", "latitude")):
+                    digits = number[1].replace(".", "").strip("0")
+                    assert len(digits) <= MOST_DIGITS, (path.name, name, text)
+                    checked += 1
+    # a file of every kind has numbers
+    assert checked > 20
 
 
 def test_the_summary_of_a_run_has_its_earthquake_and_stations(done):

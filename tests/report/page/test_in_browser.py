@@ -8,6 +8,7 @@ per_obspy.report.page.first_screen.
 import csv
 import math
 import re
+from itertools import pairwise
 
 import pandas as pd
 import pytest
@@ -115,9 +116,7 @@ def test_filter_takes_several_flags(opened, kind, passes):
     page.page.check("input[value='far_station']")
     page.page.select_option("#flag", kind)
     names = [set(flags.split()) for flags in table["flags"]]
-    expected = [
-        pair for pair, flags in zip(table["pair_id"], names, strict=True) if passes(flags)
-    ]
+    expected = [pair for pair, flags in zip(table["pair_id"], names, strict=True) if passes(flags)]
     assert page.column(2) == expected
     assert page.page.inner_text("#filters summary") == "Flags: 2"
     page.page.click("#clear")
@@ -213,7 +212,7 @@ def test_every_control_has_a_name_for_a_screen_reader(opened):
     page = opened(page_data(pair_table(30)))
     unnamed = page.page.evaluate(
         """[...document.querySelectorAll("button, input, select, canvas")].filter((control) => {
-          const label = control.labels && control.labels.length ? control.labels[0].textContent : "";
+          const label = control.labels?.length ? control.labels[0].textContent : "";
           return !(label + (control.getAttribute("aria-label") || "") + control.innerText).trim();
         }).map((control) => control.outerHTML)"""
     )
@@ -289,11 +288,9 @@ def test_hostile_names_of_outlines_and_stations(opened):
     stations = pd.DataFrame(
         {"station": HOSTILE, "state": "used", "longitude": 13.1, "latitude": 43.1}
     )
-    drawn = {name: STATION for name in HOSTILE}
+    drawn = dict.fromkeys(HOSTILE, STATION)
     drawings = PageDrawings(drawn, {}, 0, 0)
-    page = opened(
-        page_data(table, outlines=outlines, stations=stations, drawings=drawings)
-    )
+    page = opened(page_data(table, outlines=outlines, stations=stations, drawings=drawings))
     for row in range(len(HOSTILE)):
         page.page.click(f"#pairs tbody tr:nth-child({row + 1}) td:nth-child(2) button")
         page.page.click(f"#stations tbody tr:nth-child({row + 1}) button")
@@ -363,7 +360,7 @@ def test_what_a_screen_reader_is_given(opened):
         '- spinbutton "probability from, %"',
         '- combobox "area"',
         '- searchbox "search"',
-        '- status: 30 of 30 pairs of this page (30 screened)',
+        "- status: 30 of 30 pairs of this page (30 screened)",
         '- button "export as CSV"',
         '- columnheader "rank"',
         '- columnheader "impact, cm/s"',
@@ -396,7 +393,7 @@ def test_tab_walks_through_the_page_from_top_to_bottom(opened):
     assert {"probability", "velocity", "area", "search", "export"} <= set(names)
     # Never upwards by more than a row of controls: the order is that of the page
     tops = [top for _, top in seen[5:]]
-    assert all(after > before - 60 for before, after in zip(tops, tops[1:], strict=False))
+    assert all(after > before - 60 for before, after in pairwise(tops))
 
 
 def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkeypatch):

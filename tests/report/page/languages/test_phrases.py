@@ -27,7 +27,9 @@ def test_every_phrase_is_written_by_a_module(sources):
     assert [phrase for phrase in SPANISH_PHRASES if phrase not in sources] == []
 
 
-@pytest.mark.parametrize("text", [NOTHING, ELSEWHERE, MEASURE, _sentence(0.1, 0.2, 0.3, True, "B7")])
+@pytest.mark.parametrize(
+    "text", [NOTHING, ELSEWHERE, MEASURE, _sentence(0.1, 0.2, 0.3, True, "B7")]
+)
 def test_prevention_of_a_building_is_wholly_spanish(text):
     english = re.compile(r"\b(the|of|to|in|or|up|more|less|gap|gaps|first|its|by|are|not|and)\b")
     assert english.search(text)
