@@ -81,7 +81,7 @@ def test_outlines_that_touch_may_have_one_wall(found):
 
 
 def test_a_row_of_other_settings_has_no_sensitivity(table, ground):
-    """Would catch numbers of one configuration beside the probability of another one."""
+    """Catch numbers of one configuration next to the probability of another one."""
     changed = table.assign(probability=table["probability"] - 0.1)
     assert input_sensitivity(changed, ground, Building(), Screening()) == []
 

@@ -65,7 +65,7 @@ LONGEST_CELL = 300
 
 class PageDrawings(NamedTuple):
     """
-    What is computed again for some pairs and stations.
+    Drawings and sensitivities, computed again for some pairs and stations.
 
     Attributes
     ----------

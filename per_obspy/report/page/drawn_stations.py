@@ -60,7 +60,7 @@ def drawn_station(station: xr.Dataset) -> dict[str, Any]:
 def _edges(squared: FloatArray) -> Any:
     """Return the first samples of the intervals, and the end of the last one."""
     energy = np.cumsum(squared)
-    # All of it where nothing moves
+    # All of a record at rest
     shares = np.array([QUIET, 1.0 - QUIET]) if energy[-1] > 0.0 else np.array([0.0, 1.0])
     first, last = np.searchsorted(energy, shares * energy[-1])
     end = min(max(int(last), int(first) + 1) + 1, squared.size)

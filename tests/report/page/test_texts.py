@@ -64,7 +64,7 @@ def test_one_thing_is_in_the_singular():
 
 
 def test_every_text_with_a_count_of_pairs_has_a_singular():
-    """Would catch a new sentence that says "1 pairs"."""
+    """Catch a new sentence with "1 pairs"."""
     plural = re.compile(r"\{count\} (pairs|gaps|stations|impacts|times)")
     lacking = {
         key for key, text in ENGLISH.items() if plural.search(text) and f"{key}_one" not in ENGLISH

@@ -23,7 +23,7 @@ def sources():
 
 
 def test_every_phrase_is_written_by_a_module(sources):
-    """Would catch a phrase whose English was changed, which would stay English on the page."""
+    """Catch a phrase whose English was changed, which would stay English on the page."""
     assert [phrase for phrase in SPANISH_PHRASES if phrase not in sources] == []
 
 
