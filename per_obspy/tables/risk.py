@@ -173,7 +173,7 @@ def write_worst(table: Path, rows: int, path: Path) -> None:
     """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
     with (
         bounded_database(path.parent) as database,
-        pq.ParquetFile(table.absolute()) as file,
+        pq.ParquetFile(table.absolute(), pre_buffer=False) as file,
         written_whole(path) as part,
     ):
         part.write_text(header(file.schema_arrow.names), encoding="utf-8")
@@ -197,5 +197,6 @@ def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[R
     columns : sequence of str, optional
         Columns that are read, all if not given; those that the table lacks are left out.
     """
-    with pq.ParquetFile(path.absolute()) as file:
+    # Buffers that are read ahead stay in memory until the end of the file
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
         yield RankedTable(file, None if columns is None else list(columns))

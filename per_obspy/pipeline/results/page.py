@@ -268,7 +268,7 @@ def _buildings(path: Path) -> pd.DataFrame | None:
     """Return the worst buildings with the columns of the page, None without a table."""
     if not path.is_file():
         return None
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path, pre_buffer=False) as file:
         names = [name for name in BUILDING_KINDS if name in file.schema_arrow.names]
         batches = file.iter_batches(PAGE_PAIRS, columns=names)
         first = next(batches, None)
