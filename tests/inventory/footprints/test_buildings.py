@@ -1,4 +1,4 @@
-"""Buildings beside the pairs, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
+"""Buildings of a layer, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
 
 import numpy as np
 import pandas as pd

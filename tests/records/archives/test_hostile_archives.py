@@ -209,7 +209,7 @@ def test_encrypted_and_unknown_packing_are_rows(tmp_path: Path):
 
 
 class Zeros:
-    """A file of zeros as long as wanted, of which nothing is in memory."""
+    """A file of zeros of any length, of which no byte is in memory."""
 
     def __init__(self, size: int) -> None:
         self.left = size
