@@ -39,7 +39,7 @@ def main(project: str, picture: str) -> int:
 
 
 def _draw(project, layers, extent, picture):
-    """Draw the surroundings of the pairs, and the legend beside them."""
+    """Draw the surroundings of the pairs, and the legend next to them."""
     layout = QgsPrintLayout(project)
     layout.initializeDefaults()
     # A4, landscape, in millimetres

@@ -116,6 +116,7 @@ def draw_state_space(station: xr.Dataset, period: float, damping: float, path: P
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
     axes = figure.subplots()
     add_state_space(axes, motion.displacement, motion.velocity, period)
+    # A record is named by its station, channel and day
     name = f"{station['station'].item()} {station['channel'].values[strongest]}"
     title = f"{title_name(name)}, {record_date(station)}\nT = {period:g} s, ξ = {damping:g}"
     axes.set_title(title, fontsize=11, parse_math=False)

@@ -74,20 +74,15 @@ def write_run_page(
     tally, worst, areas = found
     # Files that the stages before have written
     region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
-    shakemap = settings.records.shakemap if settings.records else None
-    known = event_of_run(folder / "run.json", region, shakemap)
     # Sentences are made of tables, and the map of pairs
     table = station_rows(folder / "stations.csv", stations)
     rejected, rejections = _rejected(folder / "rejected.csv")
-    # Of a layer, a run keeps pairs and outlines in its folder
-    given = settings.pairs.file if settings.pairs else None
-    notes = [WORDING[settings.report.language]["page_shakemap"]] if shakemap else []
     data = PageData(
         title=region.title,
         language=settings.report.language,
         simulated=simulated,
         classes=tuple(region.classes),
-        event=_event(stations, table, known, settings.report.language),
+        event=_event(stations, table, _known(settings, folder, region), settings.report.language),
         tally=tally,
         worst=worst,
         stations=table,
@@ -95,12 +90,24 @@ def write_run_page(
         rejected=rejected,
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
-        outlines=_outlines(outlines_beside(given, folder / "pairs.parquet"), worst),
+        outlines=_outlines(_outlines_of(settings, folder), worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=pair_histories(worst, stations),
-        provenance=[*_provenance(settings), *_content(notes, settings.report.language)],
+        provenance=_provenance(settings),
     )
     write_page(data, folder / "report.html")
+
+
+def _known(settings: Run, folder: Path, region: Region) -> Mapping[str, Any]:
+    """Return the facts of the earthquake of a run."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return event_of_run(folder / "run.json", region, shakemap)
+
+
+def _outlines_of(settings: Run, folder: Path) -> Path | None:
+    """Return the outlines of a run: of a layer, it keeps pairs and outlines in its folder."""
+    given = settings.pairs.file if settings.pairs else None
+    return outlines_beside(given, folder / "pairs.parquet")
 
 
 class TableSources(NamedTuple):
@@ -154,8 +161,10 @@ def write_table_page(
     """
     rejected, rejections = _rejected(folder / "rejected.csv")
     region, stations = sources.region, sources.stations
+    # Stations of all scenarios; a spectrum has none
     used = int((stations["state"] == "used").sum()) if "state" in stations else 0
     counts = used, len(stations) - used
+    # The sentences replace an earthquake
     data = PageData(
         title=region.title,
         language=sources.language,
@@ -287,11 +296,14 @@ def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return how the results were made."""
     # Everything else is in the files beside the page
     texts = LANGUAGES[settings.report.language]
+    has_map = settings.records is not None and settings.records.shakemap is not None
+    notes = [WORDING[settings.report.language]["page_shakemap"]] if has_map else []
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [
         *_made(settings.report.language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
+        *_content(notes, settings.report.language),
     ]
 
 

@@ -27,7 +27,7 @@ from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 
 class Screening(NamedTuple):
     """
-    What is known of a screening beside its table.
+    Facts of a screening that are not in its table.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, repor
     Parameters
     ----------
     screening : Screening
-        What is known beside the table.
+        Facts that are not in the table.
     notes : Notes
         Of all rows of the table.
     shown : DataFrame
