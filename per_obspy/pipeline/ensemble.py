@@ -106,6 +106,7 @@ def _joined(
     tables = {name: _risk_table(result) for name, result in runs.items()}
     scenarios = Scenarios(tables, settings.weights, settings.yearly)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
+    # Results of the runs know buildings, stations and records
     scenarios_run = {
         scenario.name: ScenarioRun(load(scenario.run, Run), runs[scenario.name].folder)
         for scenario in settings.scenario

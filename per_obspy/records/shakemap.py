@@ -37,7 +37,6 @@ _HEAD = 10_000
 
 _SPECTRAL, _MAP = ("period", "latitude", "longitude"), ("latitude", "longitude")
 
-
 #: Bytes that are read at once.
 PIECE = 2**20
 
@@ -124,7 +123,7 @@ def map_event(path: Path) -> dict[str, object]:
     """
     Return the facts of the earthquake that the head of a grid states.
 
-    Facts that are missing or implausible are left out: they describe the map, and decide no number.
+    Facts that are missing or implausible are left out: they decide no number.
 
     Parameters
     ----------
@@ -137,17 +136,10 @@ def map_event(path: Path) -> dict[str, object]:
         ``time`` (ISO 8601, UTC), ``magnitude``, ``longitude``, ``latitude`` (degrees), ``depth``
         (m); ``map`` and ``version``, texts that name the map.
     """
-    # The head ends within the grid: tags until there are enough
-    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start",))
-    found = dict[str, Mapping[str, str]]()
-    try:
-        parser.feed(_text(path)[:_HEAD])
-        for _, element in cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events()):
-            found[_name(element)] = element.attrib
-    except ElementTree.ParseError:
-        return {}
-    event, root = found.get("event", {}), found.get("shakemap_grid", {})
+    tags = _head_tags(path)
+    event, root = tags.get("event", {}), tags.get("shakemap_grid", {})
     time = re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", event.get("event_timestamp", ""))
+    # Kilometres become metres
     facts = {
         "time": time[0] if time else None,
         "magnitude": _within(event.get("magnitude"), -2.0, 10.0),
@@ -158,6 +150,18 @@ def map_event(path: Path) -> dict[str, object]:
         "version": root.get("shakemap_version"),
     }
     return {name: value for name, value in facts.items() if value is not None}
+
+
+def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
+    """Return the attributes of the elements that begin in the head of a grid."""
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start",))
+    try:
+        parser.feed(_text(path)[:_HEAD])
+        # The head ends within the grid, so that the document stays open
+        events = cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events())
+        return {_name(element): element.attrib for _, element in events}
+    except ElementTree.ParseError:
+        return {}
 
 
 def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> float | None:

@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
@@ -321,7 +321,9 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame, classes: Sequence[str]) -> None:
     # The demand of the medians; the class is that of the whole population
     demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
     demand, gap = (value if np.isfinite(value) else 0.0 for value in (demand, gap))
-    axes.plot([0.0, demand], [0.0, demand], color=MOTION_COLOUR, linewidth=0.8)
+    # Scales of both axes differ: equal values lie on a curve
+    equal = np.linspace(0.0, demand, 500)
+    axes.plot(equal, equal, color=MOTION_COLOUR, linewidth=0.8)
     # Next to its end, where no mark is hidden
     axes.annotate("gap = demand", (demand, demand), ha="right", va="bottom", fontsize=8)
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)")
@@ -336,5 +338,6 @@ def _from_zero(
     """Make an axis linear up to 1, or to a tenth of a smaller largest value; logarithmic beyond."""
     linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
     set_scale("symlog", linthresh=linear)
+    axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=linear, subs=(1.0, 2.0, 5.0)))
     set_limits(-0.1 * linear, 1.5 * max(largest, linear))
     axis.set_major_formatter("{x:g}")

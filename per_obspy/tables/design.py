@@ -29,7 +29,7 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
     write_csv(rounded_table(table, own=known), text)
     write_parquet(table, whole)
-    # Columns of the pair table that nothing here computes are carried through
+    # Columns of the pair table that are not computed here are carried through
     carried = Column("", "", "", "carried through from the pair table")
     described = (known.get(name, carried)._replace(name=name) for name in map(str, table))
     write_described(described, columns)

@@ -156,7 +156,7 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
     """Append rows, rounded already, to a CSV file that has a header."""
     # Names of columns may differ in case only, or be anything: the database numbers them
     numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
-    # It writes a file of its own, which is appended to the others
+    # It writes a separate file, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", numbered)
     try:
@@ -173,7 +173,7 @@ def write_worst(table: Path, rows: int, path: Path) -> None:
     """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
     with (
         bounded_database(path.parent) as database,
-        pq.ParquetFile(table.absolute()) as file,
+        pq.ParquetFile(table.absolute(), pre_buffer=False) as file,
         written_whole(path) as part,
     ):
         part.write_text(header(file.schema_arrow.names), encoding="utf-8")
@@ -197,5 +197,6 @@ def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[R
     columns : sequence of str, optional
         Columns that are read, all if not given; those that the table lacks are left out.
     """
-    with pq.ParquetFile(path.absolute()) as file:
+    # Buffers that are read ahead stay in memory until the end of the file
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
         yield RankedTable(file, None if columns is None else list(columns))

@@ -90,7 +90,7 @@ def write_run_page(
         rejected=rejected,
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
-        outlines=_outlines(_outlines_of_run(settings, folder), worst),
+        outlines=_outlines(_outlines_of(settings, folder), worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=pair_histories(worst, stations),
         provenance=_provenance(settings),
@@ -99,8 +99,14 @@ def write_run_page(
     write_page(data, folder / "report.html")
 
 
-def _outlines_of_run(settings: Run, folder: Path) -> Path | None:
-    """Return the file of the outlines; of a layer, a run keeps pairs and outlines in its folder."""
+def _known(settings: Run, folder: Path, region: Region) -> Mapping[str, Any]:
+    """Return the facts of the earthquake of a run."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return event_of_run(folder / "run.json", region, shakemap)
+
+
+def _outlines_of(settings: Run, folder: Path) -> Path | None:
+    """Return the outlines of a run: of a layer, it keeps pairs and outlines in its folder."""
     given = settings.pairs.file if settings.pairs else None
     return outlines_beside(given, folder / "pairs.parquet")
 
@@ -157,9 +163,10 @@ def write_table_page(
     # Files that the stages before have written
     rejected, rejections = _rejected(folder / "rejected.csv")
     region, stations = sources.region, sources.stations
+    # Stations of all scenarios; a spectrum has none
     used = int((stations["state"] == "used").sum()) if "state" in stations else 0
     counts = used, len(stations) - used
-    # Records are those of its scenarios, if it has any
+    # The sentences replace an earthquake
     data = PageData(
         title=region.title,
         language=sources.language,
@@ -223,10 +230,9 @@ def _run_event(
     table: pd.DataFrame,
 ) -> Event:
     """Return the earthquake of a run, with number and time of its revision, if it has them."""
-    shakemap, record = settings.records.shakemap if settings.records else None, folder / "run.json"
-    known = event_of_run(record, region, shakemap)
+    known = _known(settings, folder, region)
     event = _event(stations, table, known, settings.report.language)
-    number, time = revision_of_run(record)
+    number, time = revision_of_run(folder / "run.json")
     return event._replace(revision=settings.report.revision or number, revised=time)
 
 
@@ -287,7 +293,7 @@ def _buildings(path: Path) -> pd.DataFrame | None:
     """Return the worst buildings with the columns of the page, None without a table."""
     if not path.is_file():
         return None
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path, pre_buffer=False) as file:
         names = [name for name in BUILDING_KINDS if name in file.schema_arrow.names]
         batches = file.iter_batches(PAGE_PAIRS, columns=names)
         first = next(batches, None)
@@ -305,15 +311,15 @@ def _outlines(beside: Path | None, worst: pd.DataFrame) -> list[tuple[str, list[
 def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return how the results were made."""
     # Everything else is in the files beside the page
-    language = settings.report.language
-    texts, shakemap = LANGUAGES[language], settings.records and settings.records.shakemap
-    notes = [WORDING[language]["page_shakemap"]] if shakemap else []
+    texts = LANGUAGES[settings.report.language]
+    has_map = settings.records is not None and settings.records.shakemap is not None
+    notes = [WORDING[settings.report.language]["page_shakemap"]] if has_map else []
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [
-        *_made(language),
+        *_made(settings.report.language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
-        *_content(notes, language),
+        *_content(notes, settings.report.language),
     ]
 
 

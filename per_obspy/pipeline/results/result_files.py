@@ -10,7 +10,9 @@ import pyarrow.parquet as pq
 
 from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.table_notes import Notes
+from per_obspy.report.layers.kml import ROWS as KML_ROWS
 from per_obspy.report.layers.kml import write_kml
+from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import Region
 from per_obspy.report.page.texts import Language
@@ -25,7 +27,7 @@ from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 
 class Screening(NamedTuple):
     """
-    What is known of a screening beside its table.
+    Facts of a screening that are not in its table.
 
     Attributes
     ----------
@@ -67,7 +69,7 @@ def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, repor
     Parameters
     ----------
     screening : Screening
-        What is known beside the table.
+        Facts that are not in the table.
     notes : Notes
         Of all rows of the table.
     shown : DataFrame
@@ -86,11 +88,13 @@ def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, repor
         write_page(facts, shown, folder / "summary.pdf")
     with report.tried(folder / f"{stem}.kml"):
         title, classes = screening.region.title, screening.region.classes
-        write_kml(worst, classes, title, folder / f"{stem}.kml")
+        note = _extent(screening, notes, KML_ROWS)
+        write_kml(worst, classes, title, folder / f"{stem}.kml", note)
     # The workbook needs an optional library
     if screening.spreadsheet:
         with report.tried(folder / f"{stem}.xlsx"):
-            sheets = _sheets(screening, worst, buildings)
+            note = _extent(screening, notes, SHEET_ROWS)
+            sheets = _sheets(screening, worst, buildings, note)
             write_workbook(sheets, folder / f"{stem}.xlsx")
 
 
@@ -122,12 +126,22 @@ def _worst_buildings(path: Path) -> pd.DataFrame:
     """Return the first rows of the table of the buildings; none where there is no such table."""
     if not path.exists():
         return pd.DataFrame()
-    with pq.ParquetFile(path.absolute()) as file:
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
         batch = next(file.iter_batches(5000), None)
         return pd.DataFrame() if batch is None else batch.to_pandas()
 
 
-def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) -> list[Sheet]:
+def _extent(screening: Screening, notes: Notes, most: int) -> str:
+    """Return a sentence on how many pairs a file has, the worst, and where all of them are."""
+    pairs = notes.counts.pairs
+    if pairs <= most:
+        return f"All {pairs} pairs."
+    return f"The worst {most} of {pairs} pairs; all of them are in {screening.stem}.parquet."
+
+
+def _sheets(
+    screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame, note: str
+) -> list[Sheet]:
     """Return the sheets of the workbook."""
     units = {
         str(name): column.unit for name in worst if (column := known_column(str(name))) is not None
@@ -138,6 +152,7 @@ def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) 
     velocity = {"worst_expected_impact_velocity": "m/s"}
     given = [
         Sheet("pairs", worst, units, screening.own),
+        Sheet("contents", pd.DataFrame({"sheet": ["pairs"], "content": [note]}), {}),
         Sheet("buildings", buildings, {"severity": "m/s"}, buildings.columns),
         Sheet("areas", screening.areas, velocity, screening.areas.columns),
         Sheet("stations", screening.stations, of_stations, screening.stations.columns),

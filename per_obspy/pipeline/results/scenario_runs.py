@@ -43,7 +43,7 @@ class ScenarioRun(NamedTuple):
 
     @property
     def risk(self) -> Path:
-        """Return the path of its risk table, which is missing where nothing was usable."""
+        """Return the path of its risk table, which is missing if no pair was usable."""
         return self.folder / "risk.parquet"
 
 

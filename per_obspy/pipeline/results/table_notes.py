@@ -36,7 +36,7 @@ class Notes:
         self.tally.add(piece)
         # The first rows are the worst
         if self._rows < ROWS:
-            self._worst.append(piece.head(ROWS - self._rows))
+            self._worst.append(piece.head(ROWS - self._rows).copy())
             self._rows += len(self._worst[-1])
 
     @property

@@ -42,7 +42,7 @@ _SHOWN_COLUMNS = ("rank", "pair_id", "risk_class", "longitude", "latitude", "dem
 
 class _Asked(NamedTuple):
     """
-    Which results are wanted, where, and everything that is not in the table.
+    Results that are wanted, their place, and everything that is not in the table.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
     report = Report([], [])
     if table.empty:
         return report
-    # The spectrum stands for the earthquake
+    # The spectrum replaces the earthquake
     if settings.totals.area and settings.totals.area not in table:
         reason = f"area: the pair table has no column {settings.totals.area!r}"
         raise CatalogError("totals", reason)
@@ -163,7 +163,7 @@ def report_ensemble(
     report = Report([], [])
     if not pairs:
         return report
-    # The scenarios stand for the earthquake
+    # The scenarios replace the earthquake
     limits, texts = ScreeningSettings(), WORDING[settings.report.language]
     asked = _Asked(
         folder,
@@ -232,7 +232,9 @@ def _write(asked: _Asked, pieces: Iterator[pd.DataFrame], pairs: int, report: Re
 
 def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Report) -> None:
     """Write summary, KML, workbook, page and overview."""
+    # Each file is tried by itself
     folder, region = asked.folder, _with_stations(asked)
+    # Pairs of figures, and those of the page
     points = pd.concat(found.shown, ignore_index=True)
     worst = pd.concat(found.worst, ignore_index=True)
     language = asked.settings.report.language
@@ -288,6 +290,7 @@ def _noted(
         # Figures show some of the pairs
         columns = [name for name in _SHOWN_COLUMNS if name in piece]
         found.shown.append(piece.loc[piece["rank"].to_numpy() % step == 1 % step, columns])
+        # Totals by area, and the rest from the same pass
         found.totals.append(piece_totals(piece, totals, classes))
         # The page holds the worst pairs, with all columns for its export
         kept = piece.head(max(PAGE_PAIRS - before, 0))

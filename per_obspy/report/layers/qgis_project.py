@@ -18,7 +18,7 @@ _GEOMETRIES = {
     "MultiPolygon": "Polygon",
 }
 
-#: WGS 84 as projects describe it; longitude and latitude are told by the authority's name.
+#: WGS 84 as projects describe it; the authority's name implies longitude and latitude.
 _REFERENCE = {
     "proj4": "+proj=longlat +datum=WGS84 +no_defs",
     "srsid": "3452",
@@ -79,7 +79,7 @@ def write_project(
     _add_reference(ElementTree.SubElement(root, "projectCrs"))
     tree = ElementTree.SubElement(root, "layer-tree-group")
     _add_view(root, extent)
-    # Each layer stands in the tree, among the described layers and in their order
+    # Each layer is in the tree, among the described layers and in their order
     described = ElementTree.SubElement(root, "projectlayers")
     order = ElementTree.SubElement(root, "layerorder")
     for layer in layers:

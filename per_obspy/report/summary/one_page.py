@@ -58,15 +58,8 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     at = _write_head(figure, facts)
     at = _write_numbers(figure, facts, at)
     bottom = at - 0.30
-    axes = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225))
-    draw_map(axes, shown, facts.region, around_pairs=True)
+    _draw_map(figure, facts, shown, bottom)
     texts = facts.texts
-    axes.set_title(texts["map_title"].format(count=len(shown)))
-    axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
-    axes.tick_params(labelsize=7)
-    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
-        text.set_fontsize(8)
-    _write_legend(figure, facts, bottom + 0.005)
     lowest = _write_section(figure, texts["what_first"], first_steps(facts), at, HALF)
     lowest = _write_section(figure, texts["how_sure"], sureness(facts), lowest, HALF)
     _write_pairs(figure, facts, min(lowest, bottom))
@@ -75,6 +68,19 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     # The same page has the same bytes
     with written_whole(path) as part:
         figure.savefig(part, metadata={"CreationDate": None})
+
+
+def _draw_map(figure: Figure, facts: SummaryFacts, shown: pd.DataFrame, bottom: float) -> None:
+    """Draw the map of the pairs on the right, with its legend."""
+    axes, texts = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225)), facts.texts
+    draw_map(axes, shown, facts.region, around_pairs=True)
+    # Labels in the language of the summary
+    axes.set_title(texts["map_title"].format(count=len(shown)))
+    axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
+    axes.tick_params(labelsize=7)
+    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
+        text.set_fontsize(8)
+    _write_legend(figure, facts, bottom + 0.005)
 
 
 def _write_head(figure: Figure, facts: SummaryFacts) -> float:
@@ -143,13 +149,7 @@ def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
     figure.text(LEFT, at, facts.texts["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
-    # An ensemble has no gap needed
-    known = [key for key in list(COLUMNS)[1:] if key != "needed" or "demand" in facts.worst]
-    titles = [
-        "",
-        *(facts.texts[f"head_{key}"] if key in known else "" for key in list(COLUMNS)[1:]),
-    ]
-    _write_row(figure, titles, at, MOTION_COLOUR)
+    _write_row(figure, _titles(facts), at, MOTION_COLOUR)
     for position, (_, pair) in enumerate(facts.worst.iterrows(), start=1):
         # As many as the summary lists, one per line
         at -= LINE
@@ -163,6 +163,12 @@ def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
         _write_row(figure, cells, at, "black")
     if not facts.buildings.empty:
         _write_buildings(figure, facts, at - 2.5 * LINE)
+
+
+def _titles(facts: SummaryFacts) -> list[str]:
+    """Return the titles of the columns; an ensemble has no gap needed."""
+    hidden = set() if "demand" in facts.worst else {"needed"}
+    return [facts.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
 
 
 def _number_cells(pair: dict[Hashable, Any]) -> list[str]:

@@ -53,6 +53,17 @@ def spoken(text: str, language: Language = "en") -> str:
 
 def summary_lines(facts: SummaryFacts) -> list[str]:
     """Return the lines of a summary, none longer than ``WIDTH`` characters."""
+    lines = list[str]()
+    for title, sentences in _sections(facts).items():
+        if sentences:
+            lines += ["", spoken(title).upper()] if title else []
+            plain = (spoken(sentence, facts.language) for sentence in sentences)
+            lines += [line for sentence in plain for line in wrap(sentence, WIDTH)]
+    return lines
+
+
+def _sections(facts: SummaryFacts) -> dict[str, list[str]]:
+    """Return the sentences of each section by its title; the first has none."""
     texts, language = facts.texts, facts.language
     simulated = [texts["simulated_spoken"]] if facts.region.simulated else []
     head = [
@@ -61,10 +72,12 @@ def summary_lines(facts: SummaryFacts) -> list[str]:
         *facts.source,
         *station_sentences(facts.stations, language),
     ]
+    # Pairs and buildings with their places in the ranking
     numbers = [f"{value} {meaning}." for value, meaning in five_numbers(facts)]
     pairs = [pair_sentence(dict(row), language) for _, row in facts.worst.iterrows()]
     buildings = [building_sentence(dict(row), language) for _, row in facts.buildings.iterrows()]
-    sections = {
+    # In the order of their weight for a listener
+    return {
         "": head,
         texts["five_numbers"]: numbers,
         texts["what_first"]: first_steps(facts),
@@ -73,13 +86,6 @@ def summary_lines(facts: SummaryFacts) -> list[str]:
         texts["how_sure"]: sureness(facts),
         texts["made_by"]: [facts.made],
     }
-    lines = list[str]()
-    for title, sentences in sections.items():
-        if sentences:
-            lines += ["", spoken(title).upper()] if title else []
-            plain = (spoken(sentence, language) for sentence in sentences)
-            lines += [line for sentence in plain for line in wrap(sentence, WIDTH)]
-    return lines
 
 
 def _numbered(sentences: list[str]) -> list[str]:

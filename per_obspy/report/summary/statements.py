@@ -173,6 +173,7 @@ def _named(names: Sequence[str], texts: Mapping[str, str]) -> str:
 def first_steps(facts: SummaryFacts) -> list[str]:
     """Return what to do first."""
     counts, texts = facts.counts, facts.texts
+    # The rest depends on the results
     steps = [texts["inspect"]]
     if facts.area:
         steps.append(texts["area_first"].format(area=facts.area))
@@ -234,6 +235,7 @@ def place_text(north: float, east: float, decimals: int, language: Language = "e
     '0.07316 south, 0.30000 east'
     """
     texts = WORDING[language]
+    # Longitudes may go beyond 180 degrees
     east = (east + 180.0) % 360.0 - 180.0
     sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
     return (
