@@ -16,7 +16,7 @@ from per_obspy.report.page.packing import (
 )
 
 #: Bytes of all columns for the export, deflated; the columns after them are left out.
-MOST_BYTES = 2_000_000
+MOST_BYTES = 1_500_000
 
 #: Columns for the export: wide tables would make large pages.
 MOST_COLUMNS = 300
