@@ -123,8 +123,6 @@ def map_event(path: Path) -> dict[str, object]:
     """
     Return the facts of the earthquake that the head of a grid states.
 
-    Facts that are missing or implausible are left out: they decide no number.
-
     Parameters
     ----------
     path : Path
@@ -133,8 +131,8 @@ def map_event(path: Path) -> dict[str, object]:
     Returns
     -------
     dict
-        ``time`` (ISO 8601, UTC), ``magnitude``, ``longitude``, ``latitude`` (degrees), ``depth``
-        (m); ``map`` and ``version``, texts that name the map.
+        ``time`` (ISO 8601), ``magnitude``, ``longitude, latitude`` (degrees), ``depth`` (m), and
+        ``map, version``; without those that are missing or implausible.
     """
     tags = _head_tags(path)
     event, root = tags.get("event", {}), tags.get("shakemap_grid", {})
@@ -167,10 +165,9 @@ def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
 def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> float | None:
     """Return a number times a factor, None where it is none or outside its limits."""
     try:
-        value = float(text or "")
+        return factor * value if low <= (value := float(text or "")) <= high else None
     except ValueError:
         return None
-    return factor * value if low <= value <= high else None
 
 
 def _variable(dimensions: tuple[str, ...], values: FloatArray, unit: str, meaning: str) -> Any:
