@@ -1,7 +1,8 @@
 """
 Summary of a screening as text and as a page.
 
-Tests of per_obspy.report.summary.statements and per_obspy.report.summary.one_page too.
+Tests of per_obspy.report.summary.statements, per_obspy.report.summary.wording and
+per_obspy.report.summary.one_page too.
 """
 
 import re
