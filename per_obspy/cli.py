@@ -18,6 +18,7 @@ import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init
+from per_obspy.commands.operation.status import status
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
@@ -27,7 +28,13 @@ from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.machine import machine_fault
-from per_obspy.termination import INTERRUPTED, TERMINATED, end_now, ending_in_time, has_working_threads
+from per_obspy.termination import (
+    INTERRUPTED,
+    TERMINATED,
+    end_now,
+    ending_in_time,
+    has_working_threads,
+)
 
 #: Words for the ends by a signal.
 SIGNALLED = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
@@ -48,7 +55,10 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-COMMANDS = (run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info)
+COMMANDS = (
+    *(run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info),
+    status,
+)
 for command in COMMANDS:
     app.command()(command)
 
