@@ -48,7 +48,7 @@ def ending_in_time() -> Iterator[None]:
     End the program by SIGTERM and SIGINT within :data:`LIMIT` seconds, whatever the block does.
 
     SIGTERM raises :class:`Terminated`, and SIGINT ``KeyboardInterrupt``. Outside the main thread
-    and on systems without these signals nothing changes.
+    and on systems without these signals the block runs as it is.
     """
     if os.name != "posix" or threading.current_thread() is not threading.main_thread():
         yield

@@ -10,7 +10,7 @@ import logging
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,13 +25,13 @@ ROOT = logging.getLogger("per_obspy")
 PROGRESS = logging.getLogger("per_obspy.progress")
 
 #: User and password of an address, and values of keys that are secrets.
-_USER = re.compile(r"(?<=://)[^\s/@]*(?:@|/[^\s@]*@)")
+_USER = re.compile(r"(?<=://)\S*@")
 _SECRET = re.compile(r"(?i)\b(token|password|passwd|secret|api_?key)(=|: ?)[^\s&;,]+")
 
 
 class LogOptions(NamedTuple):
     """
-    Where a command logs.
+    Places of the log of a command.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def _log_end(reason: str) -> None:
 
 
 class _File(logging.FileHandler):
-    """Log file; where it cannot be written, one line says so and the work goes on."""
+    """Log file; where it cannot be written, one line reports it and the work goes on."""
 
     has_failed = False
 
@@ -119,6 +119,11 @@ class _File(logging.FileHandler):
         if not self.has_failed:
             self.has_failed = True
             print(f"per-obspy: {self.baseFilename}: the log cannot be written", file=sys.stderr)
+
+    @override
+    def close(self) -> None:
+        with suppress(OSError):
+            super().close()
 
 
 def log_progress(stage: str, done: int, total: int) -> None:

@@ -159,7 +159,7 @@ def _settled(
     """Return the state of the files that can be read, and the files that are still written."""
     if settle <= 0:
         return {}, set()
-    # A folder of which nothing is finished is read later
+    # A folder without a finished file is read later
     states = file_states(paths)
     waiting = growing_files(states, settle)
     if waiting and waiting == set(states):

@@ -37,7 +37,7 @@ def status(
     """
     Print the state of a watcher or of a run; the exit code is for monitoring.
 
-    0: fine. 2: no folder of a watcher or run. 3: the run had nothing usable. 75: late, failing,
+    0: fine. 2: no folder of a watcher or run. 3: no pair was usable. 75: late, failing,
     stopped, or unfinished.
 
     Example: per-obspy status watched --json

@@ -100,7 +100,7 @@ def station_facts(
 
 
 def _share(part: int, whole: int) -> float:
-    """Return a part of a whole, rounded as tables are read; 0 where there is nothing."""
+    """Return a part of a whole, rounded as tables are read; 0 of an empty whole."""
     return round(part / whole, 6) if whole else 0.0
 
 
