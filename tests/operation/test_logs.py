@@ -29,15 +29,18 @@ def test_colours_that_the_environment_asks_for_make_no_bars(capsys, monkeypatch)
     assert capsys.readouterr().err == "stations: 1 of 2\n"
 
 
-def test_a_log_file_has_one_object_per_event_and_the_error_that_ends(tmp_path):
-    file = tmp_path / "logs" / "run.jsonl"
-    with (
-        pytest.raises(CatalogError),
-        logged(file, LogFormat.json, quiet=True) as progress,
-    ):
+def fail_after_two_events(file):
+    """Log a step and a warning with secrets, then fail."""
+    with logged(file, LogFormat.json, quiet=True) as progress:
         progress("stations", 1, 2)
         log.warning("line 1\nline 2 https://me:geheim@host/?token=geheim&a=1")
         raise CatalogError("run.toml", "wrong")
+
+
+def test_a_log_file_has_one_object_per_event_and_the_error_that_ends(tmp_path):
+    file = tmp_path / "logs" / "run.jsonl"
+    with pytest.raises(CatalogError):
+        fail_after_two_events(file)
     events = [json.loads(line) for line in file.read_text().splitlines()]
     assert [event["level"] for event in events] == ["info", "warning", "error"]
     assert (events[0]["stage"], events[0]["done"], events[0]["total"]) == ("stations", 1, 2)
