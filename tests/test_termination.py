@@ -102,6 +102,23 @@ def test_a_signal_is_an_exception_once_and_the_handler_before_returns():
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+def interrupted_while_held(done):
+    """Send a signal to this process while it holds it back, and note what was done after it."""
+    with termination.ending_in_time():
+        with termination.held():
+            with termination.held():
+                os.kill(os.getpid(), signal.SIGINT)
+            done.append("inside")
+        done.append("outside")
+
+
+def test_a_signal_that_is_held_back_waits():
+    done = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_while_held(done)
+    assert done == ["inside"]
+
+
 def smoke_run(output):
     """Start the smoke run on two processes."""
     command = [sys.executable, "-m", "per_obspy", "run", "workflows/smoke.toml", "-o", str(output)]
