@@ -84,3 +84,15 @@ def test_a_file_in_no_folder_is_refused(tmp_path):
         logged(tmp_path / "file" / "log", LogFormat.text, quiet=True),
     ):
         pass
+
+
+def test_a_quiet_command_prints_only_what_is_wrong(call, tmp_path):
+    (tmp_path / "text.mseed").write_text("no record")
+    file = tmp_path / "log"
+    options = ("--quiet", "--log", file, "--log-format", "json")
+    code, out, err = call("process", tmp_path / "text.mseed", "-o", tmp_path / "out", *options)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    (event,) = map(json.loads, file.read_text().splitlines())
+    assert event["level"] == "error"
+    assert f"per-obspy: {event['event']}" == err.strip()
