@@ -19,7 +19,7 @@ from contextlib import contextmanager
 INTERRUPTED, TERMINATED = 130, 143
 
 #: s, from a signal to the end of the program at the latest.
-LIMIT = 8.0
+LIMIT = 5.0
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _request = threading.Event()

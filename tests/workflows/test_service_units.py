@@ -36,7 +36,7 @@ def test_services_are_hardened_and_end_in_time(unit):
     keys = dict(re.findall(r"(?m)^(\w+)=(.*)$", unit.read_text()))
     assert HARDENED.items() <= keys.items()
     assert {"MemoryMax", "SystemCallFilter", "TasksMax"} <= keys.keys()
-    # a watcher ends 8 s after SIGTERM at the latest
+    # a watcher ends 5 s after SIGTERM at the latest
     assert int(keys["TimeoutStopSec"].removesuffix("s")) > 10
     assert keys["ExecStart"].startswith(f"{PROGRAM} watch ")
 
