@@ -20,14 +20,12 @@ CHECKOUT = Path(__file__).parents[1]
 
 #: Main thread in compiled code, which no exception of Python interrupts.
 IN_COMPILED_CODE = """
-import ctypes
+import hashlib
 from per_obspy import termination
 termination.LIMIT = 1.0
 with termination.ending_in_time():
     print("ready", flush=True)
-    # Sleep of C that the signal interrupts begins again before Python sees the signal
-    sleep = ctypes.CDLL(None).sleep
-    list(map(sleep, [1000] * 10))
+    hashlib.pbkdf2_hmac("sha256", b"a", b"b", 2_000_000_000)
 """
 
 #: The signal is lost in a destructor, as exceptions there are.
