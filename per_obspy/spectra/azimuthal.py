@@ -24,7 +24,7 @@ from per_obspy.spectra.trace_arguments import takes_traces
 
 #: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times
 #: the pass over them.
-LONGEST_PHASE = 0.5
+LONGEST_PHASE = 1.0
 #: A step is cut into 64 parts at most (T = dt / 3.6); shorter periods are exact as well, only
 #: slower.
 MOST_DOUBLINGS = 6
@@ -201,13 +201,16 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return directions and edges of groups of ascending azimuths (rad) for the kernels."""
     # The last azimuth fills up the last group
     whole = np.pad(angles, (0, -angles.size % kernels.GROUP), mode="edge")
-    directions = np.stack([np.cos(whole), np.sin(whole), np.cos(2.0 * whole), np.sin(2.0 * whole)])
+    firsts, lasts = whole[:: kernels.GROUP], whole[kernels.GROUP - 1 :: kernels.GROUP]
+    widths = np.repeat(lasts - firsts, kernels.GROUP)
+    places = (whole - np.repeat(firsts, kernels.GROUP)) / np.where(widths > 0.0, widths, 1.0)
+    twice = 2.0 * whole
+    directions = np.stack([np.cos(whole), np.sin(whole), np.cos(twice), np.sin(twice), places])
 
     # Edges of a group: twice the angle of its first and last azimuth, and the rise between them
-    firsts = slice(None, None, kernels.GROUP)
-    lasts = slice(kernels.GROUP - 1, None, kernels.GROUP)
-    rise = 1.0 - np.cos(whole[lasts] - whole[firsts])
-    edges = np.concatenate([directions[2:, firsts], directions[2:, lasts], rise[np.newaxis]])
+    ends = [2.0 * firsts, 2.0 * lasts]
+    rise = 1.0 - np.cos(lasts - firsts)
+    edges = np.stack([turn(end) for end in ends for turn in (np.cos, np.sin)] + [rise])
     return directions, np.pad(edges, ((0, 0), (0, -rise.size % kernels.GROUP)))
 
 
