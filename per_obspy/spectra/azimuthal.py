@@ -22,8 +22,8 @@ from per_obspy.spectra.oscillator_blocks import (
 )
 from per_obspy.spectra.trace_arguments import takes_traces
 
-#: Phase of a step above which it is cut: at T = 5 dt the search between samples took fifty times
-#: the pass over them.
+#: Phase of a step above which it is cut. Uncut steps spare passes over the samples; but on white
+#: noise at T = 2.5 dt the search takes 3 to 15 times as long with 2 as with 1.
 LONGEST_PHASE = 1.0
 #: A step is cut into 64 parts at most (T = dt / 3.6); shorter periods are exact as well, only
 #: slower.
