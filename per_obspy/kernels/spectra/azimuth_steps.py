@@ -70,9 +70,7 @@ def _fill_bulges(states, north, east, oscillator, bulges):
         # Largest u, z and a over the step: ends, and how far a curve leaves its chord
         u = math.sqrt(max(un * un + ue * ue, un1 * un1 + ue1 * ue1)) + sag * rate
         z = math.sqrt(max(zn * zn + ze * ze, zn1 * zn1 + ze1 * ze1)) + sag * rate
-        ground = math.sqrt(
-            max(north[i] ** 2 + east[i] ** 2, north[i + 1] ** 2 + east[i + 1] ** 2)
-        )
+        ground = math.sqrt(max(north[i] ** 2 + east[i] ** 2, north[i + 1] ** 2 + east[i + 1] ** 2))
         change = math.sqrt(pn * pn + pe * pe)
         # Fourth derivatives over 2
         of_radius = third * (ground + 2.0 * viscosity * z) + 3.0 * (change + 2.0 * viscosity * rate)
