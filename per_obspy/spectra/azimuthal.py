@@ -201,16 +201,17 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return directions and edges of groups of ascending azimuths (rad) for the kernels."""
     # The last azimuth fills up the last group
     whole = np.pad(angles, (0, -angles.size % kernels.GROUP), mode="edge")
-    firsts, lasts = whole[:: kernels.GROUP], whole[kernels.GROUP - 1 :: kernels.GROUP]
-    widths = np.repeat(lasts - firsts, kernels.GROUP)
-    places = (whole - np.repeat(firsts, kernels.GROUP)) / np.where(widths > 0.0, widths, 1.0)
-    twice = 2.0 * whole
-    directions = np.stack([np.cos(whole), np.sin(whole), np.cos(twice), np.sin(twice), places])
+    groups = whole.reshape(-1, kernels.GROUP)
+    firsts, lasts = groups[:, 0], groups[:, -1]
+    widths = np.where(lasts > firsts, lasts - firsts, 1.0)
+    places = ((groups.T - firsts) / widths).T.ravel()
+    turned = [np.cos(whole), np.sin(whole), np.cos(2.0 * whole), np.sin(2.0 * whole)]
+    directions = np.stack([*turned, places])
 
     # Edges of a group: twice the angle of its first and last azimuth, and the rise between them
-    ends = [2.0 * firsts, 2.0 * lasts]
     rise = 1.0 - np.cos(lasts - firsts)
-    edges = np.stack([turn(end) for end in ends for turn in (np.cos, np.sin)] + [rise])
+    ends = [row[start :: kernels.GROUP] for start in (0, kernels.GROUP - 1) for row in turned[2:]]
+    edges = np.stack([*ends, rise])
     return directions, np.pad(edges, ((0, 0), (0, -rise.size % kernels.GROUP)))
 
 

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import inlined, kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.oscillator.within_step import radius_bound, rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
@@ -45,6 +45,14 @@ def _slack(radius, peak, jump, oscillator):
     return 0.125 * phase * square
 
 
+@inlined
+def _squared_rate(u, z, acceleration, rate, viscosity):
+    """Return ``z'² + z''²`` at a state, the squared radius of their free vibration."""
+    first = -(viscosity * z + u + acceleration)
+    second = -(viscosity * first + z + rate)
+    return first * first + second * second
+
+
 @kernel
 def _fill_bulges(states, north, east, oscillator, bulges):
     """
@@ -62,19 +70,21 @@ def _fill_bulges(states, north, east, oscillator, bulges):
     for i in range(TILE):
         un, zn, ue, ze = states[0, i], states[1, i], states[2, i], states[3, i]
         un1, zn1, ue1, ze1 = states[0, i + 1], states[1, i + 1], states[2, i + 1], states[3, i + 1]
-        # z' and z'' at the start
-        pn, pe = (north[i + 1] - north[i]) / phase, (east[i + 1] - east[i]) / phase
-        qn, qe = -(viscosity * zn + un + north[i]), -(viscosity * ze + ue + east[i])
-        sn, se = -(viscosity * qn + zn + pn), -(viscosity * qe + ze + pe)
-        rate = math.sqrt(qn * qn + qe * qe + sn * sn + se * se)
+        # Accelerations at both ends, their rates, and Q
+        n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
+        pn, pe = (n1 - n0) / phase, (e1 - e0) / phase
+        rate = math.sqrt(
+            _squared_rate(un, zn, n0, pn, viscosity) + _squared_rate(ue, ze, e0, pe, viscosity)
+        )
         # Largest u, z and a over the step: ends, and how far a curve leaves its chord
         u = math.sqrt(max(un * un + ue * ue, un1 * un1 + ue1 * ue1)) + sag * rate
         z = math.sqrt(max(zn * zn + ze * ze, zn1 * zn1 + ze1 * ze1)) + sag * rate
-        ground = math.sqrt(max(north[i] ** 2 + east[i] ** 2, north[i + 1] ** 2 + east[i + 1] ** 2))
+        ground = math.sqrt(max(n0 * n0 + e0 * e0, n1 * n1 + e1 * e1))
         change = math.sqrt(pn * pn + pe * pe)
         # Fourth derivatives over 2
         of_radius = third * (ground + 2.0 * viscosity * z) + 3.0 * (change + 2.0 * viscosity * rate)
         of_displacement = third * u + 4.0 * z + 3.0 * rate
+        # Times Q and the fourth power of the phase of a step
         bulges[i] = size * rate * (share * of_radius + (1.0 - share) * of_displacement)
 
 
@@ -217,6 +227,7 @@ def _mark_groups(step, edges, floors, marks):
     size_0 = math.sqrt(d0 * d0 + p0 * p0)
     size_1 = math.sqrt(d1 * d1 + p1 * p1)
     size_2 = math.sqrt(d2 * d2 + p2 * p2)
+    # Groups next to each other
     count = 0
     for j in range(edges.shape[1]):
         c0, s0, c1, s1, rise = edges[0, j], edges[1, j], edges[2, j], edges[3, j], edges[4, j]

@@ -64,6 +64,7 @@ def _raise_to_pieces(problems, phase, damping, share, squares, doubts):
     roots, piece = np.empty(LANES), problems.copy()
     for lane in range(LANES):
         piece[3, lane] = piece[2, lane] + (piece[3, lane] - piece[2, lane]) / pieces
+    # At the roots of both conditions, piece by piece
     for number in range(pieces):
         if number > 0:
             _advance(displacement, span, piece)
@@ -79,6 +80,7 @@ def _advance(displacement, span, piece):
     """Move the problems to the next piece of their step: state, and accelerations at its ends."""
     spans, u, z = np.full(LANES, span), np.empty(LANES), np.empty(LANES)
     _evaluate(displacement, spans, u, z)
+    # The acceleration goes on along its straight line
     for lane in range(LANES):
         piece[0, lane], piece[1, lane] = u[lane], z[lane]
         change = piece[3, lane] - piece[2, lane]
