@@ -17,6 +17,8 @@ from per_obspy.spectra.storage import read_spectra
 
 from .small_run import SPECTRA, InProcess, write_configuration
 
+pytestmark = pytest.mark.usefixtures("plain_figures")
+
 RESULTS = (
     *("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv"),
     *("rows.parquet", "buildings.parquet", "buildings.csv"),
