@@ -48,8 +48,10 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-COMMANDS = (run, init, warm_up, simulate, process, spectra, screen, report, show, plan, events)
-COMMANDS += (fetch, info)
+COMMANDS = (
+    *(run, init, warm_up, simulate, process, spectra, screen),
+    *(report, show, plan, events, fetch, info),
+)
 for command in COMMANDS:
     app.command()(command)
 

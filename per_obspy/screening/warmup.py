@@ -67,6 +67,7 @@ def _yielding() -> None:
 
 def _rows() -> None:
     """Compile histories of rows of buildings."""
+    # Three buildings in touch that yield
     ones = np.ones(3)
     row = BuildingRows(
         first=np.array([0, 3]),

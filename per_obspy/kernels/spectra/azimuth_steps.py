@@ -81,11 +81,15 @@ def _fill_bulges(states, north, east, oscillator, bulges):
         z = math.sqrt(max(zn * zn + ze * ze, zn1 * zn1 + ze1 * ze1)) + sag * rate
         ground = math.sqrt(max(n0 * n0 + e0 * e0, n1 * n1 + e1 * e1))
         change = math.sqrt(pn * pn + pe * pe)
-        # Fourth derivatives over 2
-        of_radius = third * (ground + 2.0 * viscosity * z) + 3.0 * (change + 2.0 * viscosity * rate)
-        of_displacement = third * u + 4.0 * z + 3.0 * rate
+        # Fourth derivative over 2 Q
+        if share == 0.0:
+            fourth = third * u + 4.0 * z + 3.0 * rate
+        else:
+            fourth = third * (ground + 2.0 * viscosity * z) + 3.0 * (
+                change + 2.0 * viscosity * rate
+            )
         # Times Q and the fourth power of the phase of a step
-        bulges[i] = size * rate * (share * of_radius + (1.0 - share) * of_displacement)
+        bulges[i] = size * rate * fourth
 
 
 @kernel
