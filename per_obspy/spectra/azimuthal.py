@@ -203,8 +203,7 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     whole = np.pad(angles, (0, -angles.size % kernels.GROUP), mode="edge")
     groups = whole.reshape(-1, kernels.GROUP)
     firsts, lasts = groups[:, 0], groups[:, -1]
-    widths = np.where(lasts > firsts, lasts - firsts, 1.0)
-    places = ((groups.T - firsts) / widths).T.ravel()
+    places = _places(groups)
     turned = [np.cos(whole), np.sin(whole), np.cos(2.0 * whole), np.sin(2.0 * whole)]
     directions = np.stack([*turned, places])
 
@@ -213,6 +212,13 @@ def _fan(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     ends = [row[start :: kernels.GROUP] for start in (0, kernels.GROUP - 1) for row in turned[2:]]
     edges = np.stack([*ends, rise])
     return directions, np.pad(edges, ((0, 0), (0, -rise.size % kernels.GROUP)))
+
+
+def _places(groups: FloatArray) -> FloatArray:
+    """Return the places of azimuths between the first and the last of their group, 0 to 1."""
+    firsts, lasts = groups[:, :1], groups[:, -1:]
+    places: FloatArray = (groups - firsts) / np.where(lasts > firsts, lasts - firsts, 1.0)
+    return places.ravel()
 
 
 def _block_squares(

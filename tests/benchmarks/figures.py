@@ -115,18 +115,22 @@ def read(path: Path) -> list[Figure]:
     return figures
 
 
+def digits(value: float) -> str:
+    """Return three digits of a number, without an exponent where it is large."""
+    return f"{float(f'{value:.3g}'):.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+
+
 def table(figures: list[Figure], script: str) -> str:
     """Return the figures of a script as a table, after machine, date and versions."""
     own = [figure for figure in figures if figure["script"] == script]
     if not own:
         return "*Not measured in this run.*"
     values = {figure["name"]: figure["value"] for figure in own}
-    rows = ["| figure | value | times ours | remark |", "|---|---|---|---|"]
+    rows = ["| figure | value | relative to ours | remark |", "|---|---|---|---|"]
     for one in own:
-        times = f"{one['value'] / values[one['of']]:.3g}" if one["of"] in values else ""
-        rows.append(
-            f"| {one['name']} | {one['value']:.3g} {one['unit']} | {times} | {one['remark']} |"
-        )
+        ratio = digits(one["value"] / values[one["of"]]) if one["of"] in values else ""
+        value = f"{digits(one['value'])} {one['unit']}"
+        rows.append(f"| {one['name']} | {value} | {ratio} | {one['remark']} |")
     peers = sorted({f"{one['peer']} {one['peer_version']}" for one in own if one["peer"]})
     first = own[0]
     state = f"{first['machine']}; {first['date']}, revision {first['revision']}, "

@@ -53,6 +53,13 @@ def _squared_rate(u, z, acceleration, rate, viscosity):
     return first * first + second * second
 
 
+@inlined
+def _longer(north, east, next_north, next_east):
+    """Return the length of the longer one of two vectors."""
+    squared = max(north * north + east * east, next_north * next_north + next_east * next_east)
+    return math.sqrt(squared)
+
+
 @kernel
 def _fill_bulges(states, north, east, oscillator, bulges):
     """
@@ -68,6 +75,7 @@ def _fill_bulges(states, north, east, oscillator, bulges):
     viscosity, third = 2.0 * damping, math.sqrt(1.0 + 4.0 * damping * damping)
     sag, size = 0.125 * phase * phase, phase * phase * phase * phase / 72.0
     for i in range(TILE):
+        # States at both ends
         un, zn, ue, ze = states[0, i], states[1, i], states[2, i], states[3, i]
         un1, zn1, ue1, ze1 = states[0, i + 1], states[1, i + 1], states[2, i + 1], states[3, i + 1]
         # Accelerations at both ends, their rates, and Q
@@ -77,17 +85,14 @@ def _fill_bulges(states, north, east, oscillator, bulges):
             _squared_rate(un, zn, n0, pn, viscosity) + _squared_rate(ue, ze, e0, pe, viscosity)
         )
         # Largest u, z and a over the step: ends, and how far a curve leaves its chord
-        u = math.sqrt(max(un * un + ue * ue, un1 * un1 + ue1 * ue1)) + sag * rate
-        z = math.sqrt(max(zn * zn + ze * ze, zn1 * zn1 + ze1 * ze1)) + sag * rate
-        ground = math.sqrt(max(n0 * n0 + e0 * e0, n1 * n1 + e1 * e1))
-        change = math.sqrt(pn * pn + pe * pe)
+        z = _longer(zn, ze, zn1, ze1) + sag * rate
         # Fourth derivative over 2 Q
         if share == 0.0:
+            u = _longer(un, ue, un1, ue1) + sag * rate
             fourth = third * u + 4.0 * z + 3.0 * rate
         else:
-            fourth = third * (ground + 2.0 * viscosity * z) + 3.0 * (
-                change + 2.0 * viscosity * rate
-            )
+            fourth = third * (_longer(n0, e0, n1, e1) + 2.0 * viscosity * z)
+            fourth += 3.0 * (math.sqrt(pn * pn + pe * pe) + 2.0 * viscosity * rate)
         # Times Q and the fourth power of the phase of a step
         bulges[i] = size * rate * fourth
 
