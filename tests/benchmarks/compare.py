@@ -3,7 +3,7 @@ Name the figures that became worse by more than a tenth from one file of benchma
 
     python tests/benchmarks/compare.py OLD NEW
 
-Exit code 1 if there are any, 2 if nothing can be compared. Peers are left out. Only files of one
+Exit code 1 if there are any, 2 if no figure can be compared. Peers are left out. Only files of one
 machine in the same state compare: the load before each script is printed with its figures.
 """
 
