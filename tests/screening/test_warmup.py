@@ -1,5 +1,7 @@
 """Warming up reaches the kernels: it would be pointless if its pairs were rejected."""
 
+import pytest
+
 import per_obspy.screening.warmup as warmup
 
 
@@ -10,3 +12,9 @@ def test_every_pair_is_judged(monkeypatch):
     warmup.compile_screening()
     assert sorted(tables[0]["demand_rule"]) == ["exact", "exact", "srss"]
     assert tables[0]["impacts"].min() >= 1
+
+
+@pytest.mark.parametrize("name", sorted(warmup.PARTS))
+def test_every_part_compiles(name):
+    # catches arguments that a function refuses: the part would then end in an error
+    assert warmup.compile_part(name) == name
