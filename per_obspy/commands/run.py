@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Dask,
     Language,
     Strict,
     named_path,
@@ -83,6 +84,7 @@ def run(
     ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     changes: Changes = None,
+    dask: Dask = None,
     language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
@@ -98,6 +100,7 @@ def run(
 
     Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
+    from per_obspy.pipeline.executor import dask_executor
     from per_obspy.pipeline.inputs.arguments import requested_run
     from per_obspy.pipeline.run import run as whole_run
 
@@ -108,8 +111,8 @@ def run(
     asked = requested_run(first, second, output, [*(changes or ()), *spoken])
     if asked.line:
         print(printable(asked.line), file=sys.stderr)
-    with shown_progress() as progress:
-        result = whole_run(asked.configuration, output, progress=progress)
+    with shown_progress() as progress, dask_executor(dask) as executor:
+        result = whole_run(asked.configuration, output, executor, progress)
     print_and_end(result, as_json, print_result, strict)
 
 
@@ -171,6 +174,7 @@ def spectra(
         float,
         typer.Option(min=0.01, max=100.0, help="Of the oscillator in the state-space figure, s."),
     ] = 1.0,
+    dask: Dask = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -179,6 +183,7 @@ def spectra(
     Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
     """
     from per_obspy.config import Processing, Spectra, checked
+    from per_obspy.pipeline.executor import dask_executor
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
     # The grid, checked as in a configuration
@@ -188,10 +193,9 @@ def spectra(
     grid = checked(Spectra, given)
 
     # Spectra of all stations, and figures of each on request
-    with shown_progress() as progress:
-        done, rejected = spectra_of(
-            sources, output, Processing(), grid, usable_processors(), progress
-        )
+    with shown_progress() as progress, dask_executor(dask) as executor:
+        where = (usable_processors(), executor, progress)
+        done, rejected = spectra_of(sources, output, Processing(), grid, where)
     shards = [station.shard for station in done if station.shard]
     files = [str(output)] if shards else []
     for shard in shards if plot else []:
@@ -226,6 +230,7 @@ def process(
     report: Annotated[
         bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")
     ] = False,
+    dask: Dask = None,
     as_json: AsJson = False,
 ) -> None:
     """
@@ -234,14 +239,14 @@ def process(
     Example: per-obspy process shared/records -o processed --report
     """
     from per_obspy.config import Processing, load
+    from per_obspy.pipeline.executor import dask_executor
     from per_obspy.pipeline.process import process_records
 
     # Process every station
     chosen = load(settings, Processing) if settings else Processing()
-    with shown_progress() as progress:
-        result = process_records(
-            sources, output, chosen, event, report, (usable_processors(), progress)
-        )
+    with shown_progress() as progress, dask_executor(dask) as executor:
+        where = (usable_processors(), executor, progress)
+        result = process_records(sources, output, chosen, event, report, where)
 
     # Print counts and files, for machines or people
     stations = sum(station.shard is not None for station in result.done)

@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Dask,
     Strict,
     output_option,
     print_and_end,
@@ -56,6 +57,7 @@ def screen(
         Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")
     ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    dask: Dask = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
@@ -73,20 +75,29 @@ def screen(
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
     if kind is Design:
+        if dask is not None:
+            raise typer.BadParameter("a design spectrum needs no cluster", param_hint="--dask")
         _screen_by_spectrum(configuration, output, as_json)
-    elif kind is Ensemble:
-        _screen_ensemble(configuration, output, as_json)
     else:
-        _screen_again(configuration, output, strict, as_json)
+        _screen_by_records(configuration, output, (dask, strict, as_json), kind is Ensemble)
 
 
-def _screen_again(configuration: Path, output: Path | None, strict: bool, as_json: bool) -> None:
-    """Screen the pairs of a run again with the stations that it left."""
+def _screen_by_records(
+    configuration: Path,
+    output: Path | None,
+    options: tuple[str | None, bool, bool],
+    of_scenarios: bool,
+) -> None:
+    """Screen pairs in every scenario, or again with the stations that a run left."""
+    from per_obspy.pipeline.ensemble import screen_scenarios
+    from per_obspy.pipeline.executor import dask_executor
     from per_obspy.pipeline.run import screen as screen_again
 
-    with shown_progress() as progress:
-        result = screen_again(configuration, output, progress=progress)
-    print_and_end(result, as_json, print_result, strict)
+    dask, strict, as_json = options
+    work = screen_scenarios if of_scenarios else screen_again
+    with shown_progress() as progress, dask_executor(dask) as executor:
+        result = work(configuration, output, executor, progress)
+    print_and_end(result, as_json, _print_ensemble if of_scenarios else print_result, strict)
 
 
 def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
@@ -150,15 +161,6 @@ def _print_spectrum_result(
     )
     _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
     print(*files, sep="\n")
-
-
-def _screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> None:
-    """Screen pairs in every scenario and print their joint probabilities."""
-    from per_obspy.pipeline.ensemble import screen_scenarios
-
-    with shown_progress() as progress:
-        result = screen_scenarios(configuration, output, progress=progress)
-    print_and_end(result, as_json, _print_ensemble)
 
 
 def _print_ensemble(result: "Result") -> None:

@@ -9,6 +9,7 @@ from pydantic import (
 )
 
 from per_obspy.config.building_rows import Rows
+from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
@@ -47,6 +48,7 @@ class Run(Section):
     totals: Totals = Totals()
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
+    engine: Engine = Engine()
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
     )

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from per_obspy.config import Run, load
+from per_obspy.config import Engine, Run, load
 from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
@@ -71,8 +71,9 @@ class RunSettings:
             path: hashes.get(path) or hash_if_readable(path)
             for path in _input_files(self.settings, fetched)
         }
-        # The number of processes changes no result
-        placed = self.settings.model_copy(update={"output": self.folder, "workers": 0})
+        # Where the work is done, and in how many processes, changes no result
+        anywhere = {"output": self.folder, "workers": 0, "engine": Engine()}
+        placed = self.settings.model_copy(update=anywhere)
         content = {
             "version": version("per_obspy"),
             "configuration": _values(placed, self.folder),

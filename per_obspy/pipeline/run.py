@@ -23,6 +23,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
+from per_obspy.pipeline.executor import engine_facts, noted_engine, opened_executor
 from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs
@@ -114,7 +115,8 @@ def run(
         with timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or asked.head(fetched, found.hashes)
-        record = _all_stages(settings, folder, found, executor, progress)
+        with opened_executor(settings.engine, executor, folder) as used:
+            record = _all_stages(settings, folder, found, used, progress)
         record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
@@ -145,8 +147,8 @@ def screen(
         head = asked.head(None, {})
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
-        with compiling(progress):
-            record = _later_stages(settings, folder, stations, rejected, executor, progress)
+        with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
+            record = _later_stages(settings, folder, stations, rejected, used, progress)
         record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
@@ -188,8 +190,8 @@ def _all_stages(
     progress: Progress,
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
-    seconds = dict[str, float]()
-    with timed(seconds, "stations"), compiling(progress):
+    seconds, noted = dict[str, float](), noted_engine(folder / RECORD, executor)
+    with timed(seconds, "stations"), compiling(progress), noted:
         progress("stations", 0, len(found.jobs))
         stations = finished_stations(found.jobs, settings.workers, executor, progress)
     _begun(folder, settings, SCREENING, found.earthquakes)
@@ -266,7 +268,7 @@ def _later_stages(
     """Do the stages after the stations and return their part of ``run.json``."""
     seconds, usable = dict[str, float](), _usable(stations)
     # The risk table, then everything that is read from it
-    with timed(seconds, "screening"):
+    with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with timed(seconds, "report"):
@@ -280,6 +282,7 @@ def _later_stages(
         # A picture or layer that failed is made by the next run
         "failed": outcome["failed"] or bool(made.faults),
         "faults": made.faults,
+        **engine_facts(executor),
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},

@@ -1,0 +1,77 @@
+"""Where the work of a run is done: processes of this machine, or workers of a Dask cluster."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, ValidationInfo
+
+from per_obspy.config.section import Section
+
+#: Name of a cluster that is started on this machine for one command.
+LOCAL = "local"
+
+#: Most workers of such a cluster.
+MOST_LOCAL = 1024
+
+
+def local_workers(address: str) -> int | None:
+    """
+    Return the number of workers of a cluster of this machine; None for any other address.
+
+    Examples
+    --------
+    >>> local_workers("local:4"), local_workers("local"), local_workers("tcp://10.0.0.1:8786")
+    (4, 0, None)
+    """
+    name, _, count = address.partition(":")
+    if name != LOCAL:
+        return None
+    return int(count) if count else 0
+
+
+def checked_address(address: str, info: ValidationInfo | None = None) -> str:
+    """
+    Return the address of a cluster as it is used; a scheduler file has an absolute path.
+
+    Parameters
+    ----------
+    address : str
+        ``local``, ``local:N``, ``PROTOCOL://HOST:PORT``, ``HOST:PORT``, or a scheduler file.
+    info : ValidationInfo, optional
+        With the folder from which paths are seen; the current folder if not given.
+
+    Raises
+    ------
+    ValueError
+        If it is none of them.
+    """
+    given = address.strip()
+    name, colon, port = given.rpartition(":")
+    if given == LOCAL or "://" in given:
+        return given
+    if name == LOCAL and port.isdecimal() and 1 <= int(port) <= MOST_LOCAL:
+        return given
+    if colon and name and name != LOCAL and port.isdecimal() and 0 < int(port) < 65536:
+        return f"tcp://{given}"
+    folder = info.context["folder"] if info is not None and info.context else Path.cwd()
+    if given and given != "." and given.endswith(".json"):
+        return str((Path(folder) / given).absolute())
+    raise ValueError(
+        f"{address!r} is no scheduler: local, local:4, tcp://HOST:PORT, or a scheduler file (.json)"
+    )
+
+
+class Engine(Section):
+    """Where stations, chunks of pairs and rows of buildings are computed (docs/cluster.md)."""
+
+    dask: Annotated[str, AfterValidator(checked_address)] | None = Field(
+        None,
+        description="Dask scheduler: local, local:4, tcp://HOST:PORT or a scheduler file (.json); "
+        "not given: processes of this machine; needs per_obspy[dask]",
+    )
+    retries: int = Field(
+        3, ge=0, le=100, description="times that a task is tried again after a fault of a worker"
+    )
+    wait: float = Field(
+        300.0, ge=1, description="s, longest time without any usable worker before the run stops"
+    )
