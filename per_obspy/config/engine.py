@@ -29,7 +29,7 @@ def local_workers(address: str) -> int | None:
     return int(count) if count else 0
 
 
-def checked_address(address: str, info: ValidationInfo | None = None) -> str:
+def checked_address(address: str, folder: Path) -> str:
     """
     Return the address of a cluster as it is used; a scheduler file has an absolute path.
 
@@ -37,8 +37,8 @@ def checked_address(address: str, info: ValidationInfo | None = None) -> str:
     ----------
     address : str
         ``local``, ``local:N``, ``PROTOCOL://HOST:PORT``, ``HOST:PORT``, or a scheduler file.
-    info : ValidationInfo, optional
-        With the folder from which paths are seen; the current folder if not given.
+    folder : Path
+        From which a scheduler file is seen.
 
     Raises
     ------
@@ -46,6 +46,7 @@ def checked_address(address: str, info: ValidationInfo | None = None) -> str:
         If it is none of them.
     """
     given = address.strip()
+    # Clusters of this machine, and addresses with and without a protocol
     name, colon, port = given.rpartition(":")
     if given == LOCAL or "://" in given:
         return given
@@ -53,18 +54,22 @@ def checked_address(address: str, info: ValidationInfo | None = None) -> str:
         return given
     if colon and name and name != LOCAL and port.isdecimal() and 0 < int(port) < 65536:
         return f"tcp://{given}"
-    folder = info.context["folder"] if info is not None and info.context else Path.cwd()
     if given and given != "." and given.endswith(".json"):
-        return str((Path(folder) / given).absolute())
+        return str((folder / given).absolute())
     raise ValueError(
         f"{address!r} is no scheduler: local, local:4, tcp://HOST:PORT, or a scheduler file (.json)"
     )
 
 
+def _from_configuration(address: str, info: ValidationInfo) -> str:
+    """Return an address as a configuration in its folder means it."""
+    return checked_address(address, info.context["folder"] if info.context else Path.cwd())
+
+
 class Engine(Section):
     """Where stations, chunks of pairs and rows of buildings are computed (docs/cluster.md)."""
 
-    dask: Annotated[str, AfterValidator(checked_address)] | None = Field(
+    dask: Annotated[str, AfterValidator(_from_configuration)] | None = Field(
         None,
         description="Dask scheduler: local, local:4, tcp://HOST:PORT or a scheduler file (.json); "
         "not given: processes of this machine; needs per_obspy[dask]",

@@ -72,6 +72,11 @@ AHEAD = 2
 AHEAD_ELSEWHERE = 64
 
 
+def _ahead_elsewhere() -> int:
+    """Return how many tasks are kept ahead of the results of an executor of unknown size."""
+    return AHEAD_ELSEWHERE
+
+
 class ElasticExecutor(Executor):
     """Executor whose number of workers changes while the work goes on."""
 
@@ -121,8 +126,7 @@ def _all_results(
 ) -> Iterator[Result]:
     """Yield the results of all tasks in which the machine does not fail."""
     if executor is not None:
-        elastic = isinstance(executor, ElasticExecutor)
-        ahead = executor.ahead if elastic else lambda: AHEAD_ELSEWHERE
+        ahead = executor.ahead if isinstance(executor, ElasticExecutor) else _ahead_elsewhere
         for task in (yield from _on(executor, tasks, watched, ahead)):
             watched.note(task, watched.broken or DIED)
         return

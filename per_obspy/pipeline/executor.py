@@ -37,7 +37,7 @@ def dask_executor(address: str | None) -> Iterator[Executor | None]:
         yield None
         return
     try:
-        checked = checked_address(address)
+        checked = checked_address(address, Path.cwd())
     except ValueError as error:
         raise CatalogError("--dask", str(error)) from error
     from per_obspy.jobs.cluster.dask_executor import DaskExecutor

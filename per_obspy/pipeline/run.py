@@ -115,8 +115,7 @@ def run(
         with timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or asked.head(fetched, found.hashes)
-        with opened_executor(settings.engine, executor, folder) as used:
-            record = _all_stages(settings, folder, found, used, progress)
+        record = _all_stages(settings, folder, found, executor, progress)
         record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
@@ -190,14 +189,16 @@ def _all_stages(
     progress: Progress,
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
-    seconds, noted = dict[str, float](), noted_engine(folder / RECORD, executor)
-    with timed(seconds, "stations"), compiling(progress), noted:
-        progress("stations", 0, len(found.jobs))
-        stations = finished_stations(found.jobs, settings.workers, executor, progress)
-    _begun(folder, settings, SCREENING, found.earthquakes)
-    # From here on no record is needed
-    rejected = all_rejections(found.rejected, stations)
-    record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    seconds = dict[str, float]()
+    with opened_executor(settings.engine, executor, folder) as used:
+        noted = noted_engine(folder / RECORD, used)
+        with timed(seconds, "stations"), compiling(progress), noted:
+            progress("stations", 0, len(found.jobs))
+            stations = finished_stations(found.jobs, settings.workers, used, progress)
+        _begun(folder, settings, SCREENING, found.earthquakes)
+        # From here on no record is needed
+        rejected = all_rejections(found.rejected, stations)
+        record = _later_stages(settings, folder, stations, rejected, used, progress)
     record["earthquakes"] = found.earthquakes
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}

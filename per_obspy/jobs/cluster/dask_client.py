@@ -4,6 +4,7 @@ import json
 import logging
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ def connected_client(address: str) -> Iterator[Any]:
         If no scheduler answers there.
     """
     require_extra("dask", "distributed")
-    from distributed import Client
+    library = import_module("distributed")  # its classes have no complete types
 
     with ExitStack() as stack:
         place: Any = address
@@ -46,7 +47,7 @@ def connected_client(address: str) -> Iterator[Any]:
         elif address.endswith(".json") and "://" not in address:
             place = _address_in(Path(address))
         try:
-            client = Client(place, timeout=ANSWER, set_as_default=False)
+            client = library.Client(place, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError) as error:
             reason = printable(str(error)) or type(error).__name__
             raise ServiceError(f"{address}: no scheduler answers: {reason}") from error
@@ -61,6 +62,7 @@ def _address_in(file: Path) -> str:
     except (OSError, ValueError) as error:
         reason = f"no scheduler file that can be read: {reason_of(error)}"
         raise ServiceError(f"{file}: {reason}; has the scheduler started?") from error
+    # It also names the workers, which the scheduler knows better
     address = known.get("address") if isinstance(known, dict) else None
     if not isinstance(address, str) or "://" not in address:
         raise CatalogError(str(file), "no scheduler file: it has no address of a scheduler")
@@ -69,10 +71,10 @@ def _address_in(file: Path) -> str:
 
 def _local_cluster(address: str) -> Any:
     """Return a cluster of this machine, one process per worker, closed to other machines."""
-    from distributed import LocalCluster
+    library = import_module("distributed")  # its classes have no complete types
 
     # Faults of workers are logged once, by their client
-    return LocalCluster(
+    return library.LocalCluster(
         n_workers=local_workers(address) or usable_processors(),
         threads_per_worker=1,
         processes=True,

@@ -41,6 +41,9 @@ LOG = logging.getLogger("per_obspy.cluster")
 #: Seconds between two looks at the workers, and before a task is tried again (times the attempt).
 LOOK, PAUSE = 1.0, 0.5
 
+#: Unfit workers that one task may meet.
+MOST_REFUSALS = 100
+
 #: Tasks ahead while no worker has come yet.
 FEWEST_AHEAD = 4
 
@@ -54,6 +57,7 @@ class _Sent:
     def __init__(self, task: SentTask) -> None:
         self.task = task
         self.attempts = 0
+        self.refusals = 0
         self.result: Future[Any] = Future()
 
 
@@ -174,6 +178,7 @@ class DaskExecutor(ElasticExecutor):
             if isinstance(found, str):
                 self.workers.refuse(address, found)
                 continue
+            # Tasks are refused by a worker of another version too, if it came since the last look
             host, versions = found
             self.workers.known_as(address, host)
             if difference := versions.difference(own_versions()):
@@ -234,6 +239,9 @@ class DaskExecutor(ElasticExecutor):
         self.workers.did(outcome.worker, outcome.host, outcome.seconds)
         if outcome.refusal:
             self.workers.refuse(outcome.worker, outcome.refusal)
+            # The fault is the worker's alone while there are others
+            if self.workers.fit() and sent.refusals < MOST_REFUSALS:
+                sent.refusals, sent.attempts = sent.refusals + 1, sent.attempts - 1
             where = f"{outcome.host} ({outcome.worker})"
             self._try_again(sent, MachineFault(f"{where} {outcome.refusal}"))
         elif isinstance(outcome.error, TryLater):
@@ -245,7 +253,7 @@ class DaskExecutor(ElasticExecutor):
     def _try_again(self, sent: _Sent, error: Exception) -> None:
         """Try a task once more, a little later, unless it was tried often enough."""
         if sent.attempts <= self._engine.retries and not self._closed.is_set():
-            timer = Timer(PAUSE * sent.attempts, self._try, [sent])
+            timer = Timer(PAUSE * max(1, sent.attempts), self._try, [sent])
             timer.daemon = True
             timer.start()
             return

@@ -130,6 +130,7 @@ def own_versions() -> Versions:
     for path in sorted(root.rglob("*")):
         if path.suffix in _SOURCES:
             digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    # Results depend on these libraries beyond the last digit
     libraries = [version(name) for name in ("per_obspy", "numpy", "numba")]
     package, numpy, numba = libraries
     return Versions(package, platform.python_version(), numpy, numba, digest.hexdigest()[:12])

@@ -45,6 +45,7 @@ class Workers:
             self._present = {address: threads for address, (_, threads) in present.items()}
             for address in new:
                 self._hosts.setdefault(address, present[address][0])
+        # Logging may take its time
         for address in sorted(lost):
             self._note(address, "is gone: killed, preempted or cut off; its tasks are done again")
         return new
@@ -86,6 +87,7 @@ class Workers:
     def facts(self) -> dict[str, Any]:
         """Return every worker with its work, and all events, as plain values."""
         with self._lock:
+            # Workers that are gone have done their part as well
             names = sorted({*self._present, *self._work})
             rows = [(name, *self._work.get(name, (0, 0.0))) for name in names]
             workers = [
@@ -99,6 +101,7 @@ class Workers:
         """Keep and log one event."""
         host, at = self._hosts.get(address, "unknown"), datetime.now(UTC)
         event = {"at": at.isoformat(timespec="seconds"), "worker": address, "host": host}
+        # A cluster may lose workers all day
         with self._lock:
             if len(self._events) < EVENTS_KEPT:
                 self._events.append({**event, "reason": printable(reason)})

@@ -182,17 +182,15 @@ def test_no_scheduler_is_no_wrong_input(tmp_path):
         done(executor, tmp_path, ["1"])
 
 
-def test_a_scheduler_that_ends_leaves_tasks_for_the_next_run(tmp_path):
-    # in threads of this process, so that it starts at once
-    place = {"n_workers": 1, "processes": False, "dashboard_address": None, "silence_logs": 50}
+def test_a_scheduler_that_ends_leaves_tasks_for_the_next_run(cluster, tmp_path):
+    # the last test of the module: the cluster is no more afterwards
+    tasks = ["1", *["__import__('time').sleep(1)"] * 9]
     with (
-        distributed.LocalCluster(**place) as own,
-        DaskExecutor(own.scheduler_address) as executor,
+        DaskExecutor(cluster.scheduler_address) as executor,
         executor.sharing(tmp_path, Engine(wait=1)),
     ):
-        tasks = ["1", *["__import__('time').sleep(1)"] * 9]
         found = results(tasks, Work(eval, failed), 1, executor)
         next(found)
-        own.close()
+        cluster.close()
         with pytest.raises(Unfinished, match=r"is gone|no usable worker"):
             list(found)
