@@ -100,7 +100,7 @@ def run(
 
     Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
-    from per_obspy.pipeline.executor import dask_executor
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.inputs.arguments import requested_run
     from per_obspy.pipeline.run import run as whole_run
 
@@ -183,7 +183,7 @@ def spectra(
     Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
     """
     from per_obspy.config import Processing, Spectra, checked
-    from per_obspy.pipeline.executor import dask_executor
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
     # The grid, checked as in a configuration
@@ -239,7 +239,7 @@ def process(
     Example: per-obspy process shared/records -o processed --report
     """
     from per_obspy.config import Processing, load
-    from per_obspy.pipeline.executor import dask_executor
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.process import process_records
 
     # Process every station

@@ -89,8 +89,8 @@ def _screen_by_records(
     of_scenarios: bool,
 ) -> None:
     """Screen pairs in every scenario, or again with the stations that a run left."""
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.ensemble import screen_scenarios
-    from per_obspy.pipeline.executor import dask_executor
     from per_obspy.pipeline.run import screen as screen_again
 
     dask, strict, as_json = options

@@ -12,8 +12,8 @@ from obspy.core.event import Event
 from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_dead_parts, remove_file
+from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
-from per_obspy.pipeline.executor import opened_executor
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
 from per_obspy.processing.notes import taken

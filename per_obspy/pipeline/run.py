@@ -14,6 +14,7 @@ from typing import Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, is_part, remove_file
+from per_obspy.jobs.executor import engine_facts, noted_engine, opened_executor
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -23,7 +24,6 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.executor import engine_facts, noted_engine, opened_executor
 from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
 from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs

@@ -7,8 +7,8 @@ from pathlib import Path
 from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_dead_parts
+from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.executor import opened_executor
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.progress import Progress
 from per_obspy.records.sources import find_path_sources

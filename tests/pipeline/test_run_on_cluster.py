@@ -1,4 +1,4 @@
-"""A run on a cluster: the bytes of one machine, and a record that names the workers."""
+"""A run by per_obspy.jobs.executor: the bytes of one machine, and a record that names workers."""
 
 import errno
 import json
@@ -9,8 +9,8 @@ import pytest
 
 from per_obspy.errors import CatalogError, Unfinished
 from per_obspy.jobs import chunk
+from per_obspy.jobs.executor import dask_executor
 from per_obspy.pipeline import report
-from per_obspy.pipeline.executor import dask_executor
 from per_obspy.pipeline.run import run
 
 from .small_run import InProcess, plain_figure, write_smallest_configuration
