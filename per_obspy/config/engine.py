@@ -1,4 +1,4 @@
-"""Where the work of a run is done: processes of this machine, or workers of a Dask cluster."""
+"""Place of the work of a run: processes of this machine, or workers of a Dask cluster."""
 
 from pathlib import Path
 from typing import Annotated
@@ -67,7 +67,7 @@ def _from_configuration(address: str, info: ValidationInfo) -> str:
 
 
 class Engine(Section):
-    """Where stations, chunks of pairs and rows of buildings are computed (docs/cluster.md)."""
+    """Place of the work on stations, chunks of pairs and rows of buildings (docs/cluster.md)."""
 
     dask: Annotated[str, AfterValidator(_from_configuration)] | None = Field(
         None,

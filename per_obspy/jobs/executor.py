@@ -14,7 +14,7 @@ from per_obspy.resume import StatusError, read_status, write_status
 @contextmanager
 def dask_executor(address: str | None) -> Iterator[Executor | None]:
     """
-    Give the executor of a Dask cluster for one command; None without an address.
+    Yield the executor of a Dask cluster for one command; None without an address.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def opened_executor(
     engine: Engine, given: Executor | None, folder: Path
 ) -> Iterator[Executor | None]:
     """
-    Give the executor of a run while its folder is shared with the workers.
+    Yield the executor of a run while its folder is shared with the workers.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def opened_executor(
 
 
 def engine_facts(executor: Executor | None) -> dict[str, Any]:
-    """Return workers and events of a cluster for ``run.json``; nothing of other executors."""
+    """Return workers and events of a cluster for ``run.json``; empty for other executors."""
     facts = getattr(executor, "facts", None)
     return {"engine": facts()} if facts else {}
 

@@ -155,12 +155,14 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
 def _merged_groups(parts: Sequence[Path], schema: pa.Schema, room: Path) -> list[Path]:
     """Merge many parts to fewer and longer ones in a folder of their own."""
     room.mkdir()
+    # Columns of the order are needed once more, with the number of the longer part
     keys = [pq.read_schema(parts[0].absolute()).field(name) for name in KEYS]
     kept, merged = pa.schema([*schema, *keys]), []
     whole = kept.append(pa.field(_PART, pa.int64()))
     for number, first in enumerate(range(0, len(parts), MOST_PARTS)):
         merged.append(room / f"{number:06}.parquet")
         with pq.ParquetWriter(merged[-1], whole, use_dictionary=text_columns(whole)) as writer:
+            # As a part of a chunk: in its order, a few thousand rows per group
             for rows in _merged(parts[first : first + MOST_PARTS], kept, TOGETHER):
                 numbers = pa.array(np.full(rows.num_rows, number))
                 writer.write_table(rows.append_column(whole.field(_PART), numbers))

@@ -23,7 +23,7 @@ LARGEST_FILE = 10_000_000
 @contextmanager
 def connected_client(address: str) -> Iterator[Any]:
     """
-    Give a client of a cluster, which is started first if it is one of this machine.
+    Yield a client of a cluster, which is started first if it is one of this machine.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def present_workers(client: Any) -> Mapping[str, tuple[str, int]]:
 
 def fit_identities(client: Any, new: Collection[str]) -> dict[str, tuple[str, Versions] | str]:
     """
-    Return machine and versions of workers, or why a worker does not tell them.
+    Return machine and versions of workers, or why a worker gives no answer.
 
     Parameters
     ----------
