@@ -50,7 +50,10 @@ def main(count: int) -> None:
         configuration.write_text(RECORDS + PAIRS.format(exact="false"))
         print(HEADER)
         for workers in WORKERS:
-            shutil.rmtree(output / "chunks")
+            # A finished run is not done again, however many workers there are
+            (output / "run.json").unlink()
+            for name in ("chunks", "rows"):
+                shutil.rmtree(output / name, ignore_errors=True)
             print(measured(configuration, workers, output), flush=True)
 
 
