@@ -47,7 +47,7 @@ def started(folder, *options):
 
 def said(process):
     """Return the output of a workflow that ends well."""
-    output, _ = process.communicate(timeout=600)
+    output, _ = process.communicate(timeout=900)
     assert process.returncode == 0, output
     return output
 
