@@ -10,6 +10,7 @@ import typer
 from per_obspy.commands.endings import (
     AsJson,
     Dask,
+    Language,
     Strict,
     output_option,
     print_and_end,
@@ -58,6 +59,7 @@ def screen(
     ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     dask: Dask = None,
+    language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
@@ -74,42 +76,50 @@ def screen(
     kind = screening_kind(configuration)
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
+    # A spectrum, scenarios, or a run
     if kind is Design:
         if dask is not None:
             raise typer.BadParameter("a design spectrum needs no cluster", param_hint="--dask")
-        _screen_by_spectrum(configuration, output, as_json)
+        _screen_by_spectrum(configuration, output, language, as_json)
+    elif kind is Ensemble:
+        _screen_ensemble(configuration, output, dask, language, as_json)
     else:
-        _screen_by_records(configuration, output, (dask, strict, as_json), kind is Ensemble)
+        _screen_again(configuration, output, dask, language, (strict, as_json))
 
 
-def _screen_by_records(
+def _screen_again(
     configuration: Path,
     output: Path | None,
-    options: tuple[str | None, bool, bool],
-    of_scenarios: bool,
+    dask: Dask,
+    language: Language,
+    ending: tuple[bool, bool],
 ) -> None:
-    """Screen pairs in every scenario, or again with the stations that a run left."""
+    """Screen the pairs of a run again with the stations that it left."""
+    from per_obspy.config import Run, in_language, load
     from per_obspy.jobs.executor import dask_executor
-    from per_obspy.pipeline.ensemble import screen_scenarios
     from per_obspy.pipeline.run import screen as screen_again
 
-    dask, strict, as_json = options
-    work = screen_scenarios if of_scenarios else screen_again
+    settings: Path | Run = configuration
+    if language is not None:
+        settings = in_language(load(configuration, Run), language)
+    strict, as_json = ending
     with shown_progress() as progress, dask_executor(dask) as executor:
-        result = work(configuration, output, executor, progress)
-    print_and_end(result, as_json, _print_ensemble if of_scenarios else print_result, strict)
+        result = screen_again(settings, output, executor, progress)
+    print_and_end(result, as_json, print_result, strict)
 
 
-def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
+def _screen_by_spectrum(
+    configuration: Path, output: Path | None, language: Language, as_json: bool
+) -> None:
     """Screen pairs by a design or user spectrum instead of a record, and print the result."""
-    from per_obspy.config import Design, load
+    from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.preflight import require_extras
     from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
     from per_obspy.screening.by_spectrum.design_table import design_table
 
     # Screen
-    settings = load(configuration, Design)
+    settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
@@ -161,6 +171,18 @@ def _print_spectrum_result(
     )
     _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
     print(*files, sep="\n")
+
+
+def _screen_ensemble(
+    configuration: Path, output: Path | None, dask: Dask, language: Language, as_json: bool
+) -> None:
+    """Screen pairs in every scenario and print their joint probabilities."""
+    from per_obspy.jobs.executor import dask_executor
+    from per_obspy.pipeline.ensemble import screen_scenarios
+
+    with shown_progress() as progress, dask_executor(dask) as executor:
+        result = screen_scenarios(configuration, output, executor, progress, language)
+    print_and_end(result, as_json, _print_ensemble)
 
 
 def _print_ensemble(result: "Result") -> None:

@@ -12,7 +12,15 @@ from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
 from per_obspy.config.run import Design, Run, screening_kind
-from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
+from per_obspy.config.screening import (
+    Building,
+    Codes,
+    Interpolation,
+    Screening,
+    States,
+    Totals,
+    in_language,
+)
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
 
@@ -48,6 +56,7 @@ __all__ = [
     "Totals",
     "Window",
     "checked",
+    "in_language",
     "load",
     "screening_kind",
 ]
