@@ -6,6 +6,7 @@ or one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.building_rows import Rows
+from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.operation.notify import Notify
 from per_obspy.config.pairs import Pairs, TableForm
@@ -33,6 +34,7 @@ __all__ = [
     "Codes",
     "Columns",
     "Design",
+    "Engine",
     "Ensemble",
     "EnsembleScenario",
     "Fdsn",

@@ -9,6 +9,7 @@ from pydantic import (
 )
 
 from per_obspy.config.building_rows import Rows
+from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.operation.notify import Notify
 from per_obspy.config.pairs import Pairs
@@ -39,6 +40,7 @@ class Run(Section):
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
     notify: Notify = Notify()
+    engine: Engine = Engine()
     csv_rows: int = Field(
         100_000,
         ge=1,

@@ -14,6 +14,7 @@ from typing import Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, is_part, remove_file
+from per_obspy.jobs.executor import engine_facts, noted_engine, opened_executor
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -151,8 +152,9 @@ def screen(
         head = asked.head(None, {})
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
-        with compiling(progress):
-            record = _later_stages(settings, folder, stations, rejected, executor, progress)
+        # On a cluster the folder is shared until the report is written
+        with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
+            record = _later_stages(settings, folder, stations, rejected, used, progress)
         record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
         _add_stations(record, known)
         return _finished_record(settings, folder, record, head, earlier_rows)
@@ -205,13 +207,15 @@ def _all_stages(
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
     seconds = dict[str, float]()
-    with timed(seconds, "stations"), compiling(progress):
-        progress("stations", 0, len(found.jobs))
-        stations = finished_stations(found.jobs, settings.workers, executor, progress)
-    _begun(folder, settings, SCREENING, found.earthquakes)
-    # From here on no record is needed
-    rejected = all_rejections(found.rejected, stations)
-    record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    with opened_executor(settings.engine, executor, folder) as used:
+        noted = noted_engine(folder / RECORD, used)
+        with timed(seconds, "stations"), compiling(progress), noted:
+            progress("stations", 0, len(found.jobs))
+            stations = finished_stations(found.jobs, settings.workers, used, progress)
+        _begun(folder, settings, SCREENING, found.earthquakes)
+        # From here on no record is needed
+        rejected = all_rejections(found.rejected, stations)
+        record = _later_stages(settings, folder, stations, rejected, used, progress)
     record["earthquakes"] = found.earthquakes
     _add_stations(record, found.known)
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
@@ -281,7 +285,7 @@ def _later_stages(
     """Do the stages after the stations and return their part of ``run.json``."""
     seconds, usable = dict[str, float](), _usable(stations)
     # The risk table, then everything that is read from it
-    with timed(seconds, "screening"):
+    with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with timed(seconds, "report"):
@@ -297,6 +301,7 @@ def _later_stages(
         "faults": made.faults,
         "used": _names_of(usable, found),
         "served": found.served,
+        **engine_facts(executor),
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
