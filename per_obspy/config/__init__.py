@@ -14,6 +14,7 @@ from per_obspy.config.run import Design, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
+from per_obspy.config.watch import Reach, Watch
 
 __all__ = [
     "Archives",
@@ -30,6 +31,7 @@ __all__ = [
     "Interpolation",
     "Pairs",
     "Processing",
+    "Reach",
     "Records",
     "RelativePath",
     "Rows",
@@ -44,6 +46,7 @@ __all__ = [
     "States",
     "TableForm",
     "Totals",
+    "Watch",
     "Window",
     "checked",
     "load",

@@ -150,6 +150,14 @@ class Fdsn(Window):
         ge=0,
         description="s; the second retry waits twice as long, and so on; Retry-After counts",
     )
+    longest_pause: float | None = Field(
+        None,
+        ge=0,
+        description=(
+            "s; a service that demands a longer pause (Retry-After) is left for another time; not "
+            "given: it is asked again after at most 600 s"
+        ),
+    )
     connections: int = Field(3, ge=1, le=16, description="stations asked for at the same time")
 
     @property

@@ -71,8 +71,9 @@ class RunSettings:
             path: hashes.get(path) or hash_if_readable(path)
             for path in _input_files(self.settings, fetched)
         }
-        # The number of processes changes no result
-        placed = self.settings.model_copy(update={"output": self.folder, "workers": 0})
+        # The number of processes changes no result, nor does who watches
+        unused = {"workers": 0, "watch": None}
+        placed = self.settings.model_copy(update={"output": self.folder, **unused})
         content = {
             "version": version("per_obspy"),
             "configuration": _values(placed, self.folder),

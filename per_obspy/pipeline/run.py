@@ -62,6 +62,7 @@ def run(
     output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
+    facts: Mapping[str, object] | None = None,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -76,6 +77,8 @@ def run(
         Where stations are processed; processes of this machine if not given.
     progress : callable
         Called for every stage: name, done, total.
+    facts : mapping, optional
+        Plain values for ``run.json`` that change no result, such as the number of a revision.
 
     Returns
     -------
@@ -109,12 +112,14 @@ def run(
         # Otherwise they are hashed while their headers are read
         drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
-        earlier_rows = _begun(folder, settings, STATIONS)
+        given = dict(facts or {})
+        earlier_rows = _begun(folder, settings, STATIONS, facts=given)
         seconds, started = dict[str, float](), now()
         with timed(seconds, "records"):
             found = find_station_jobs(settings, folder, fetched, progress)
             head = head or asked.head(fetched, found.hashes)
-        record = _all_stages(settings, folder, found, executor, progress)
+        means = (executor, progress)
+        record = given | _all_stages(settings, folder, found, means, given)
         record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
         return _finished_record(settings, folder, record, head, earlier_rows)
 
@@ -184,15 +189,16 @@ def _all_stages(
     settings: Run,
     folder: Path,
     found: FoundStations,
-    executor: Executor | None,
-    progress: Progress,
+    means: tuple[Executor | None, Progress],
+    facts: Mapping[str, object],
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
+    executor, progress = means
     seconds = dict[str, float]()
     with timed(seconds, "stations"), compiling(progress):
         progress("stations", 0, len(found.jobs))
         stations = finished_stations(found.jobs, settings.workers, executor, progress)
-    _begun(folder, settings, SCREENING, found.earthquakes)
+    _begun(folder, settings, SCREENING, found.earthquakes, facts)
     # From here on no record is needed
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
@@ -210,10 +216,17 @@ def _earlier_earthquakes(folder: Path) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
+def _begun(
+    folder: Path,
+    settings: Run,
+    stage: str,
+    earthquakes: Sequence[Any] = (),
+    facts: Mapping[str, object] | None = None,
+) -> int | None:
     """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
     begun: dict[str, Any] = {
+        **(facts or {}),
         "name": settings.name,
         "state": UNFINISHED,
         "stage": stage,

@@ -64,12 +64,15 @@ class Fetched(NamedTuple):
         Circle, window and channels of the request.
     rejected : tuple of Rejection
         Stations and services that failed, with every reason.
+    is_complete : bool
+        Whether every service and station answered, with records or that there are none.
     """
 
     folder: Path
     event: EventFile | None
     wanted: Wanted
     rejected: tuple[Rejection, ...]
+    is_complete: bool = True
 
 
 def fetch(
@@ -119,7 +122,7 @@ def fetch(
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
         write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
-    fetched = fetched._replace(rejected=tuple(rejected))
+    fetched = fetched._replace(rejected=tuple(rejected), is_complete=complete)
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
@@ -128,7 +131,9 @@ def fetch(
 def _pool(request: config.Fdsn) -> WebPool:
     """Return connections with the patience of a request."""
     limits = (request.longest_answer, request.largest_answer)
-    return web_pool(request.timeout, request.retries, request.wait, *limits)
+    pool = web_pool(request.timeout, request.retries, request.wait, *limits)
+    pause = request.longest_pause
+    return pool if pause is None else pool._replace(longest_pause=pause)
 
 
 def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetched:
