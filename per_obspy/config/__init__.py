@@ -7,6 +7,8 @@ or one section. Paths in a configuration are relative to the folder of its file.
 
 from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
+from per_obspy.config.operation.notify import Notify
+from per_obspy.config.operation.watch import Reach, Watch
 from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
@@ -14,7 +16,6 @@ from per_obspy.config.run import Design, Run, screening_kind
 from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
-from per_obspy.config.watch import Reach, Watch
 
 __all__ = [
     "Archives",
@@ -29,6 +30,7 @@ __all__ = [
     "EnsembleScenario",
     "Fdsn",
     "Interpolation",
+    "Notify",
     "Pairs",
     "Processing",
     "Reach",

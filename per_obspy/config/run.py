@@ -10,12 +10,13 @@ from pydantic import (
 
 from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble
+from per_obspy.config.operation.notify import Notify
+from per_obspy.config.operation.watch import Watch
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
 from per_obspy.config.screening import Building, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
-from per_obspy.config.watch import Watch
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.errors import CatalogError
 
@@ -48,6 +49,7 @@ class Run(Section):
     totals: Totals = Totals()
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
+    notify: Notify = Notify()
     watch: Watch | None = Field(None, description="earthquakes that `per-obspy watch` looks for")
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"

@@ -1,1 +1,1 @@
-"""Work without a user: watch for earthquakes, keep revisions, report the state, notify people."""
+"""Operation: watch for earthquakes, keep revisions, report status, notify."""

@@ -39,6 +39,7 @@ from per_obspy.pipeline.stations import (
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent, timed
+from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records
 from per_obspy.resume import (
     StatusError,
@@ -109,19 +110,30 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
-        # Otherwise they are hashed while their headers are read
-        drawn = write_drawn_pairs(settings, folder, progress)
-        check_inputs(settings, folder)
-        given = dict(facts or {})
-        earlier_rows = _begun(folder, settings, STATIONS, facts=given)
-        seconds, started = dict[str, float](), now()
-        with timed(seconds, "records"):
-            found = find_station_jobs(settings, folder, fetched, progress)
-            head = head or asked.head(fetched, found.hashes)
         means = (executor, progress)
-        record = given | _all_stages(settings, folder, found, means, given)
-        record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
-        return _finished_record(settings, folder, record, head, earlier_rows)
+        return _new_run(asked, fetched, head, means, dict(facts or {}))
+
+
+def _new_run(
+    asked: RunSettings,
+    fetched: Fetched | None,
+    head: dict[str, Any] | None,
+    means: tuple[Executor | None, Progress],
+    facts: dict[str, Any],
+) -> Result:
+    """Do a run that was not done before; inputs without a hash are hashed as they are read."""
+    settings, folder, progress = asked.settings, asked.folder, means[1]
+    drawn = write_drawn_pairs(settings, folder, progress)
+    check_inputs(settings, folder)
+    earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
+    seconds, started = dict[str, float](), now()
+    with timed(seconds, "records"):
+        found = find_station_jobs(settings, folder, fetched, progress)
+        head = head or asked.head(fetched, found.hashes)
+    # From here on the folder describes an unfinished run
+    record = facts | _all_stages(settings, folder, found, means, facts)
+    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
+    return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def screen(

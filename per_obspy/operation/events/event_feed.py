@@ -4,28 +4,23 @@ import logging
 import time
 from collections.abc import Mapping
 from datetime import datetime, timedelta
-from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
-
-import obspy
-from obspy.core.event import Catalog, Event, Magnitude, Origin, ResourceIdentifier
+from typing import Any, NamedTuple
 
 from per_obspy.config import Watch
-from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, shortened
+from per_obspy.errors import CatalogError, RecordRejected, ServiceError, reason_of, shortened
 from per_obspy.files import is_part
 from per_obspy.names import public_url
 from per_obspy.operation.events.relevance import Circle
 from per_obspy.operation.events.state import WatchState, iso, moment
-from per_obspy.records.fdsn.event_list import (
-    EventRow,
-    event_content,
-    file_name,
-    listed_events,
-    quakeml_row,
+from per_obspy.records.earthquakes.quakeml_events import (
+    events_of,
+    plain_quakeml,
+    quakeml_rows,
+    read_quakeml,
 )
+from per_obspy.records.fdsn.event_list import EventRow, event_content, listed_events, quakeml_row
 from per_obspy.records.fdsn.web import WebPool, web_pool
-from per_obspy.records.obspy_readers import read_bytes_with_obspy
 
 log = logging.getLogger(__name__)
 
@@ -40,9 +35,6 @@ OVERLAP = 600.0
 
 #: Suffixes of QuakeML files.
 SUFFIXES = (".xml", ".quakeml")
-
-#: Bytes of the largest QuakeML file that is read.
-LARGEST_FILE = 64 * 2**20
 
 #: Age of a file that cannot be read before it counts as wrong, s: it may be half written.
 SETTLED = 10.0
@@ -200,58 +192,55 @@ def row_problem(row: EventRow) -> str:
 
 def _folder_feed(folder: Path, seen: Mapping[str, tuple[int, int]]) -> Feed:
     """Return the earthquakes of the files of a folder that are new or have changed."""
-    rows, files, problems = dict[str, EventRow](), dict[str, str](), list[str]()
-    found = dict[str, tuple[int, int]]()
-    try:
-        paths = sorted(folder.iterdir())
-    except OSError as error:
-        raise CatalogError(str(folder), f"cannot be read: {error.strerror}") from error
-    for path in paths:
-        if path.suffix.lower() not in SUFFIXES or is_part(path):
-            continue
+    feed = Feed({}, {}, (), {})
+    problems = list[str]()
+    for path in _quakeml_files(folder):
         # A file that vanishes in between is that of a deleted earthquake
         try:
             facts = path.stat()
-            mark = (facts.st_size, facts.st_mtime_ns)
-            if seen.get(path.name) != mark:
-                found_rows = {row.event_id: row for row in map(quakeml_row, read_events(path))}
-                rows |= found_rows
-                files |= dict.fromkeys(found_rows, path.name)
-            found[path.name] = mark
-        except FileNotFoundError:
+        except OSError:
             continue
-        except (PerError, OSError, ValueError) as error:
+        mark = (facts.st_size, facts.st_mtime_ns)
+        try:
+            rows = quakeml_rows(path) if seen.get(path.name) != mark else {}
+        except CatalogError as error:
+            # One that is being written is read at the next poll
             if time.time() - facts.st_mtime >= SETTLED:
-                problems.append(str(error))
-    usable, unusable = _usable_rows(list(rows.values()))
-    return Feed(usable, files, (*problems, *unusable), found)
+                problems.append(f"{path.name}: {error.problem}")
+            continue
+        feed.rows.update(rows)
+        feed.files.update(dict.fromkeys(rows, path.name))
+        feed.seen[path.name] = mark
+    usable, unusable = _usable_rows(list(feed.rows.values()))
+    return feed._replace(rows=usable, problems=(*problems, *unusable))
 
 
-def read_events(path: Path) -> list[Event]:
-    """
-    Read the earthquakes of a QuakeML file.
-
-    Raises
-    ------
-    CatalogError
-        If it cannot be read, is too large, or no QuakeML.
-    """
+def _quakeml_files(folder: Path) -> list[Path]:
+    """Return the QuakeML files of a folder, sorted; raise ``CatalogError`` if it cannot be read."""
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise CatalogError(str(path), f"is larger than {LARGEST_FILE} bytes")
-        return _events(path.read_bytes(), str(path))
-    except RecordRejected as error:
-        raise CatalogError(str(path), f"is no QuakeML: {'; '.join(error.reasons)}") from error
+        paths = sorted(folder.iterdir())
     except OSError as error:
-        raise CatalogError(str(path), f"cannot be read: {error.strerror}") from error
+        raise CatalogError(str(folder), f"cannot be read: {reason_of(error)}") from error
+    return [path for path in paths if path.suffix.lower() in SUFFIXES and not is_part(path)]
 
 
-def _events(content: bytes, source: str) -> list[Event]:
-    """Return the earthquakes of QuakeML; raise ``RecordRejected`` if it is none."""
-    return list(read_bytes_with_obspy(obspy.read_events, content, source, format="QUAKEML"))
+class PresentEvent(NamedTuple):
+    """
+    An earthquake as its service or file has it now.
+
+    Attributes
+    ----------
+    row : EventRow
+        Its facts.
+    quakeml : bytes
+        QuakeML with time, place and magnitude alone.
+    """
+
+    row: EventRow
+    quakeml: bytes
 
 
-def current_event(watch: Watch, event_id: str, file: str) -> Event | None:
+def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None:
     """
     Return an earthquake as its service or file has it now, None if it has been deleted.
 
@@ -267,67 +256,37 @@ def current_event(watch: Watch, event_id: str, file: str) -> Event | None:
     Raises
     ------
     CatalogError
-        If the file is no QuakeML.
+        If the file is no QuakeML, or the facts cannot be true.
     ServiceError
         If the service does not answer, or with something else than the earthquake.
     """
-    if watch.folder is not None:
+    # A service is asked by the identifier, a file may hold several
+    if watch.folder is None:
+        event = _event_of_service(watch.service or "", event_id)
+    else:
         path = watch.folder / file
-        events = read_events(path) if path.is_file() else []
-        return next((event for event in events if quakeml_row(event).event_id == event_id), None)
-    assert watch.service is not None
-    content = event_content(_pool(), watch.service, event_id)
+        event = read_quakeml(path).get(event_id) if path.is_file() else None
+    if event is None:
+        return None
+    row = quakeml_row(event)._replace(event_id=event_id)
+    if problem := row_problem(row):
+        raise CatalogError(shortened(event_id, 80), problem)
+    return PresentEvent(row, plain_quakeml(event, event_id))
+
+
+def _event_of_service(service: str, event_id: str) -> Any:
+    """Return an earthquake as its service sends it, None if it has no such earthquake."""
+    content = event_content(_pool(), service, event_id)
     if not content:
         return None
-    source = public_url(watch.service)
+    source = public_url(service)
     try:
-        (event,) = _events(content, source)
+        (event,) = events_of(content, source)
         quakeml_row(event)
     except (RecordRejected, ValueError) as error:
         reason = f"{source}: answers with something else than the earthquake {event_id}: {error}"
         raise ServiceError(reason) from error
     return event
-
-
-def plain_quakeml(event: Event, event_id: str) -> bytes:
-    """
-    Return the preferred origin and magnitude of an earthquake as QuakeML.
-
-    The bytes depend on time, place and magnitude alone, so that nothing is computed again when a
-    service changes other facts.
-
-    Parameters
-    ----------
-    event : Event
-        With an origin.
-    event_id : str
-        For its resource identifier.
-    """
-    name = f"smi:local/{file_name(event_id)}"
-    found = event.preferred_origin() or event.origins[0]
-    origin = Origin(
-        resource_id=ResourceIdentifier(f"{name}/origin"),
-        time=found.time,
-        latitude=found.latitude,
-        longitude=found.longitude,
-        depth=found.depth,
-    )
-    size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
-    magnitudes = [] if size is None else [_plain_magnitude(size, name)]
-    plain = Event(
-        resource_id=ResourceIdentifier(f"{name}/event"), origins=[origin], magnitudes=magnitudes
-    )
-    # One file per earthquake, written in memory as ObsPy's writers ignore errors of the disk
-    catalog = Catalog([plain], resource_id=ResourceIdentifier(f"{name}/catalog"))
-    content = BytesIO()
-    catalog.write(content, format="QUAKEML")
-    return content.getvalue()
-
-
-def _plain_magnitude(size: Magnitude, name: str) -> Magnitude:
-    """Return value and type of a magnitude."""
-    identifier = ResourceIdentifier(f"{name}/magnitude")
-    return Magnitude(resource_id=identifier, mag=size.mag, magnitude_type=size.magnitude_type)
 
 
 def noted_poll(state: WatchState, feed: Feed, now: datetime) -> WatchState:
@@ -337,6 +296,7 @@ def noted_poll(state: WatchState, feed: Feed, now: datetime) -> WatchState:
         "since": iso(now),
         "failures": 0,
         "not_before": None,
+        "last_error": None,
         "seen": feed.seen,
     }
     return state.model_copy(update=update)

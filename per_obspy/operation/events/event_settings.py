@@ -1,15 +1,13 @@
 """Settings of a watcher, and those of the run of one earthquake that they make."""
 
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from obspy import UTCDateTime
-from obspy.core.event import Event
-
-from per_obspy.config import Fdsn, Records, Run, Sds, checked
+from per_obspy.config import Fdsn, Records, Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
-from per_obspy.operation.events.state import EventState
+from per_obspy.operation.events.state import EventState, moment
 from per_obspy.records.fdsn.providers import base_url
 
 #: Windows of records begin at multiples of this, s, so that a small change of the origin time
@@ -18,6 +16,9 @@ STEP = 10.0
 
 #: Retries of a request for records; what still fails is asked for by the next run.
 RETRIES, LONGEST_PAUSE = 2, 5.0
+
+#: Age from which a record file of a watched folder counts as finished, s.
+SETTLE = 10.0
 
 #: Keys of one earthquake, which a watcher sets itself.
 OF_ONE_EVENT = ("event", "time")
@@ -44,6 +45,9 @@ def read_settings(file: Path) -> Run:
     placed = {**records, "event": "event.xml"}
     if isinstance(records.get("fdsn"), dict):
         placed["fdsn"] = {"cache": "records", **records["fdsn"]}
+    # A folder that is watched grows: half-written files wait
+    if "folder" in records:
+        placed["settle"] = records.get("settle", SETTLE)
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
     # An unknown service is a mistake at the start, not a failure of every poll
@@ -54,7 +58,9 @@ def read_settings(file: Path) -> Run:
 
 def _refuse_one_event(file: Path, records: dict[str, Any]) -> None:
     """Raise ``CatalogError`` if records are configured for one earthquake."""
+    sections: dict[str, tuple[dict[str, Any], tuple[str, ...]]]
     sections = {"records": (records, OF_ONE_EVENT)}
+    # Keys of windows may be in two sections
     for name in ("fdsn", "sds"):
         if isinstance(records.get(name), dict):
             sections[f"records.{name}"] = (records[name], OF_ONE_WINDOW)
@@ -65,7 +71,13 @@ def _refuse_one_event(file: Path, records: dict[str, Any]) -> None:
                 raise CatalogError(str(file), problem)
 
 
-def settings_of_event(settings: Run, folder: Path, state: EventState, event: Event, delay: float) -> Run:
+def watch_of(settings: Run) -> Watch:
+    """Return the section of the watcher, which :func:`read_settings` demands."""
+    assert settings.watch is not None
+    return settings.watch
+
+
+def settings_of_event(settings: Run, folder: Path, state: EventState, delay: float) -> Run:
     """
     Return the settings of the run of an earthquake.
 
@@ -79,20 +91,18 @@ def settings_of_event(settings: Run, folder: Path, state: EventState, event: Eve
         Of the earthquake.
     state : EventState
         Of the earthquake.
-    event : Event
-        With an origin.
     delay : float
         Of the run, s after the origin time.
     """
-    assert settings.watch is not None
     assert settings.records is not None
-    records = settings.records
-    ends = delay - settings.watch.latency
+    records, ends = settings.records, delay - watch_of(settings).latency
+    # Windows end where records may end by now
+    origin = _rounded(state)
     changes: dict[str, object] = {"event": folder / "event.xml"}
     if records.fdsn is not None:
-        changes["fdsn"] = _placed_fdsn(records.fdsn, folder, event, ends)
+        changes["fdsn"] = _placed_fdsn(records.fdsn, folder, origin, ends)
     if records.sds is not None:
-        changes["sds"] = _placed_sds(records.sds, event, ends)
+        changes["sds"] = records.sds.model_copy(update=_window(records.sds, origin, ends))
     update = {
         "name": f"{settings.name}: {state.event_id}",
         "output": folder / "work",
@@ -102,31 +112,25 @@ def settings_of_event(settings: Run, folder: Path, state: EventState, event: Eve
     return settings.model_copy(update=update)
 
 
-def _placed_fdsn(fdsn: Fdsn, folder: Path, event: Event, ends: float) -> Fdsn:
+def _rounded(state: EventState) -> datetime:
+    """Return the origin time, rounded down to a multiple of :data:`STEP`."""
+    origin = moment(state.time)
+    return origin - timedelta(seconds=origin.timestamp() % STEP)
+
+
+def _placed_fdsn(fdsn: Fdsn, folder: Path, origin: datetime, ends: float) -> Fdsn:
     """Return the request for the records of an earthquake."""
-    start, end = _window(fdsn.before, fdsn.after, event, ends)
     pause = LONGEST_PAUSE if fdsn.longest_pause is None else fdsn.longest_pause
-    update = {
-        "cache": folder / "records",
-        "start": start,
-        "end": end,
-        "retries": min(fdsn.retries, RETRIES),
-        "longest_pause": pause,
-    }
-    return fdsn.model_copy(update=update)
+    patience = {"retries": min(fdsn.retries, RETRIES), "longest_pause": pause}
+    place = {"cache": folder / "records"}
+    return fdsn.model_copy(update={**place, **patience, **_window(fdsn, origin, ends)})
 
 
-def _placed_sds(sds: Sds, event: Event, ends: float) -> Sds:
-    """Return the window of an archive for an earthquake."""
-    start, end = _window(sds.before, sds.after, event, ends)
-    return sds.model_copy(update={"start": start, "end": end})
-
-
-def _window(before: float, after: float, event: Event, ends: float) -> tuple[str, str]:
-    """Return start and end of the window of records, which ends where records may end by now."""
-    origin = event.preferred_origin() or event.origins[0]
-    rounded = UTCDateTime(origin.time.timestamp // STEP * STEP)
-    return str(rounded - before), str(rounded + min(after, ends))
+def _window(window: Window, origin: datetime, ends: float) -> dict[str, str]:
+    """Return start and end of the window of records."""
+    start = origin - timedelta(seconds=window.before)
+    end = origin + timedelta(seconds=min(window.after, ends))
+    return {"start": f"{start:%Y-%m-%dT%H:%M:%S.%f}", "end": f"{end:%Y-%m-%dT%H:%M:%S.%f}"}
 
 
 def has_other_sources(records: Records) -> bool:

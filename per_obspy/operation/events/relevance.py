@@ -81,7 +81,9 @@ def inventory_places(settings: Run, folder: Path) -> Places:
         return _kept_places(pairs.file, settings, folder)
     if pairs is not None and pairs.catalog is not None:
         stored = stored_inventories(pairs.catalog)
-        boxes = [entry.bounding_box for entry in stored if entry.name in (pairs.names or [entry.name])]
+        boxes = [
+            entry.bounding_box for entry in stored if entry.name in (pairs.names or [entry.name])
+        ]
         return _places_of_boxes(boxes, pairs.catalog)
     problem = "the places of these pairs are not known before their run: give watch.region"
     raise CatalogError("watch", problem)
@@ -95,6 +97,7 @@ def _kept_places(file: Path, settings: Run, folder: Path) -> Places:
         facts = file.stat()
     except OSError as error:
         raise CatalogError(str(file), f"cannot be read: {error.strerror}") from error
+    # The table is read again if it has changed
     key = [str(file), facts.st_size, facts.st_mtime_ns, form.model_dump_json()]
     kept = folder / PLACES
     known = _read_places(kept, key)
@@ -132,26 +135,29 @@ def _places_of_table(file: Path, settings: Run) -> Places:
         known = position[np.isfinite(position).all(axis=1)]
         numbers = np.floor(known / CELL).astype(np.int64)
         cells = np.unique(np.concatenate([cells, numbers]), axis=0)
+    # Pairs without a place are found by no distance
     if not len(cells):
         raise CatalogError(str(file), "no pair has a place: give watch.region")
-    centres = (cells + 0.5) * CELL
+    centres = (cells.astype(np.float64) + 0.5) * np.float64(CELL)
     return Places(centres[:, 0], centres[:, 1], _radius())
 
 
 def _places_of_boxes(boxes: Sequence[Box], catalog: Path) -> Places:
     """Return a grid of places in the boxes of stored inventories."""
-    longitude, latitude, radius = [], [], 0.0
-    for box in boxes:
-        # West of a box across the date line is larger than its east
-        east = box.east if box.east >= box.west else box.east + 360.0
-        steps = ((east - box.west) / STEPS, (box.north - box.south) / STEPS)
-        centres = np.arange(STEPS) + 0.5
-        grid = np.meshgrid(box.west + centres * steps[0], box.south + centres * steps[1])
-        longitude.append(grid[0].ravel())
-        latitude.append(grid[1].ravel())
-        radius = max(radius, float(np.hypot(*steps)) / 2 * METRES_PER_DEGREE)
     if not boxes:
         raise CatalogError(str(catalog), "holds no inventory to watch for: give watch.region")
+    centres: FloatArray = (np.arange(STEPS) + 0.5) / STEPS
+    longitude, latitude, radius = list[FloatArray](), list[FloatArray](), 0.0
+    # Middles of equal cells of each box
+    for box in boxes:
+        # West of a box across the date line is larger than its east
+        width = (box.east - box.west) % 360.0
+        height = box.north - box.south
+        grid = np.meshgrid(box.west + centres * width, box.south + centres * height)
+        longitude.append(grid[0].ravel())
+        latitude.append(grid[1].ravel())
+        diagonal = float(np.hypot(width, height)) / STEPS
+        radius = max(radius, diagonal / 2 * METRES_PER_DEGREE)
     return Places(np.concatenate(longitude), np.concatenate(latitude), radius)
 
 
@@ -172,6 +178,7 @@ def distances(places: Places, longitude: FloatArray, latitude: FloatArray) -> Fl
         m, along the great circle; 0 inside the circle of a place.
     """
     nearest = np.empty(len(longitude))
+    # Piece by piece, so that many earthquakes need little memory
     size = max(1, AT_ONCE // len(places.longitude))
     for start in range(0, len(longitude), size):
         some = slice(start, start + size)
@@ -184,6 +191,7 @@ def _angles(places: Places, longitude: FloatArray, latitude: FloatArray) -> Floa
     """Compute angles between epicentres and places by the haversine formula, radians."""
     east = np.deg2rad(longitude - places.longitude)
     north, other = np.deg2rad(latitude), np.deg2rad(places.latitude)
+    # Accurate for small angles as well
     half = np.sin((north - other) / 2) ** 2 + np.cos(north) * np.cos(other) * np.sin(east / 2) ** 2
     angles: FloatArray = 2 * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0)))
     return angles
@@ -203,10 +211,13 @@ def circle_around(places: Places, reach: float) -> Circle:
     # The centre is the mean of the places as directions
     east, north = np.deg2rad(places.longitude), np.deg2rad(places.latitude)
     x, y = np.cos(north) * np.cos(east), np.cos(north) * np.sin(east)
-    mean = [float(part.mean()) for part in (x, y, np.sin(north))]
-    longitude = float(np.rad2deg(np.arctan2(mean[1], mean[0])))
-    latitude = float(np.rad2deg(np.arctan2(mean[2], np.hypot(*mean[:2]))))
-    farthest = float(np.rad2deg(_angles(places, np.array([[longitude]]), np.array([[latitude]])).max()))
+    x_mean, y_mean, z_mean = (float(part.mean()) for part in (x, y, np.sin(north)))
+    longitude = float(np.rad2deg(np.arctan2(y_mean, x_mean)))
+    latitude = float(np.rad2deg(np.arctan2(z_mean, np.hypot(x_mean, y_mean))))
+    farthest = float(
+        np.rad2deg(_angles(places, np.array([[longitude]]), np.array([[latitude]])).max())
+    )
+    # Wider by a thousandth for what numbers of a query lose
     radius = farthest + (places.radius + reach) / METRES_PER_DEGREE
     return Circle(longitude, latitude, min(radius * 1.001, 180.0))
 

@@ -59,6 +59,7 @@ def _all_changes(before: Path | None, after: Path, facts: Mapping[str, Any]) -> 
     """Yield the changes of the earthquake, of stations, of pairs and of buildings."""
     yield from event_changes(facts.get("event_before") or {}, facts.get("event") or {})
     yield from _station_changes(before, after)
+    # All pairs of a first result are new
     if before is None:
         return
     for kind, (name, identifier, quantities) in TABLES.items():

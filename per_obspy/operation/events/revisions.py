@@ -102,31 +102,41 @@ def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[
     CatalogError
         If a result has changed since its run, or a revision of the number is there.
     """
-    target, work = revision_folder(event, number), event / "work"
-    before = revision_folder(event, newest_revision(event))
-    target.parent.mkdir(parents=True, exist_ok=True)
+    target, newest = revision_folder(event, number), newest_revision(event)
+    before = revision_folder(event, newest) if newest else None
     if target.exists():
         raise CatalogError(str(target), "this revision is there already")
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    # Made next to its place: a killed watcher leaves nothing that bears a number
     with temporary_folder(target.parent) as room:
         made = room / target.name
-        made.mkdir()
-        outputs = dict(record["outputs"])
-        known = _known_files(before)
-        for name, digest in sorted(outputs.items()):
-            _share(inside(work, name), inside(made, name), digest, known.get(digest))
-        # Files that no run lists
-        for file in (work / RECORD, work / CONFIGURATION, event / "event.xml"):
-            digest = file_hash(file)
-            _share(file, made / file.name, digest, known.get(digest))
-            outputs[file.name] = digest
-        write_changes(before if known else None, made, facts)
+        # The description comes last, as it holds the hash of everything else
+        outputs = _shared_files(event, made, record["outputs"], before)
+        write_changes(before, made, facts)
         outputs[CHANGES] = file_hash(made / CHANGES)
         write_status(made / REVISION, content_of(record, outputs["event.xml"]), outputs, facts, 1)
         _sync_folders(made)
         with writing(target):
             made.rename(target)
+            _sync_folders(target.parent)
     point_latest(event)
     return target
+
+
+def _shared_files(
+    event: Path, made: Path, outputs: Mapping[str, str], before: Path | None
+) -> dict[str, str]:
+    """Put the results of a run into a revision that is made, and return the hash of each."""
+    known = _known_files(before) if before else {}
+    work, hashes = event / "work", dict(outputs)
+    for name, digest in sorted(outputs.items()):
+        _share(inside(work, name), inside(made, name), digest, known.get(digest))
+    # Files that no run lists
+    for file in (work / RECORD, work / CONFIGURATION, event / "event.xml"):
+        hashes[file.name] = file_hash(file)
+        _share(file, made / file.name, hashes[file.name], known.get(hashes[file.name]))
+    return hashes
 
 
 def _known_files(revision: Path) -> dict[str, Path]:
@@ -168,6 +178,7 @@ def _sync_folders(folder: Path) -> None:
     if os.name != "posix":
         return
     for parent, _, _ in os.walk(folder):
+        # As files.written_whole does for one file
         handle = os.open(parent, os.O_RDONLY)
         try:
             os.fsync(handle)
@@ -184,6 +195,7 @@ def point_latest(event: Path) -> None:
     number = newest_revision(event)
     if not number:
         return
+    # Seen from its own folder, so that the results can be moved
     link, goal = event / LATEST, f"{REVISIONS}/{number:04d}"
     with writing(link):
         if link.is_symlink() and str(link.readlink()) == goal:

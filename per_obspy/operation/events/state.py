@@ -76,8 +76,6 @@ class EventState(_State):
         Hash of the names, sizes and times of the record files at its latest run.
     revision : int
         Number of its newest revision, 0 if there is none.
-    notified : int
-        Number of the newest revision of which people were notified.
     failures : int
         Number of failures in succession.
     not_before : str or None
@@ -101,12 +99,11 @@ class EventState(_State):
     file: str = ""
     listed: str = ""
     confirmed: Moment
-    done: dict[str, Moment] = {}
+    done: dict[str, Moment] = Field(default_factory=dict)
     changed: bool = True
     complete: bool = True
     arrivals: str = ""
     revision: int = Field(0, ge=0)
-    notified: int = Field(0, ge=0)
     failures: int = Field(0, ge=0)
     not_before: Moment | None = None
     last_error: str | None = None
@@ -132,6 +129,8 @@ class WatchState(_State):
         Number of looks in succession that failed.
     not_before : str or None
         Time before which the list is not asked for again.
+    last_error : str or None
+        Why the latest look failed.
     seen : dict
         File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
     """
@@ -140,7 +139,8 @@ class WatchState(_State):
     since: Moment | None = None
     failures: int = Field(0, ge=0)
     not_before: Moment | None = None
-    seen: dict[str, tuple[int, int]] = {}
+    last_error: str | None = None
+    seen: dict[str, tuple[int, int]] = Field(default_factory=dict)
 
 
 def moment(text: str) -> datetime:
@@ -214,9 +214,9 @@ def read_event_states(folder: Path) -> tuple[dict[str, EventState], list[str]]:
     return states, problems
 
 
-def changed(state: EventState, **values: Any) -> EventState:
+def changed(known: EventState, /, **values: Any) -> EventState:
     """Return a state with other values, which are checked."""
-    return EventState(**{**state.model_dump(), **values})
+    return EventState(**{**known.model_dump(), **values})
 
 
 def _write(file: Path, state: _State) -> None:
@@ -228,6 +228,7 @@ def _write(file: Path, state: _State) -> None:
 
 def _read(file: Path, kind: type[StateType]) -> StateType:
     """Return a state from its file; raise ``CatalogError`` if it cannot be read."""
+    # A file of another program may be of any size
     try:
         with file.open(encoding="utf-8") as text:
             return kind.model_validate_json(text.read(LARGEST))

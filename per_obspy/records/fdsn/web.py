@@ -41,7 +41,7 @@ _PIECE, _PAGE = 2**16, 2**12
 
 
 class NotFound(ServiceError):
-    """A service lacks the subject of a request or has deleted it, or does not exist (404, 409, 410)."""
+    """A service lacks or has deleted a subject, or does not exist (404, 409, 410)."""
 
 
 class RequestTooLarge(ServiceError):

@@ -12,7 +12,9 @@ class Reach(Section):
     """One line of the table of magnitudes: how strong an earthquake within a distance must be."""
 
     distance: float = Field(
-        gt=0, le=20_000_000, description="m, from the epicentre to the nearest pair of the inventory"
+        gt=0,
+        le=20_000_000,
+        description="m, from the epicentre to the nearest pair of the inventory",
     )
     magnitude: float = Field(
         ge=-2, le=10, description="smallest magnitude of an earthquake that matters within it"
@@ -88,7 +90,9 @@ class Watch(Section):
         description="s since the origin time after which an earthquake is not opened or polled",
     )
     most_events: int = Field(
-        20_000, ge=1, description="largest number of earthquakes that a service is asked for at once"
+        20_000,
+        ge=1,
+        description="largest number of earthquakes that a service is asked for at once",
     )
     updatedafter: bool = Field(
         True, description="ask a service only for what changed since the last poll"

@@ -1,0 +1,100 @@
+"""A small simulated city for a watcher, and a service on loopback with its earthquake."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+from fdsn_server import FdsnServer
+from obspy.core.event import Event, Magnitude, Origin
+
+from per_obspy.config import Run, Scenario
+from per_obspy.inventory.files.writing import write_pairs
+from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.operation.events.event_settings import read_settings
+from per_obspy.operation.watch import Clock
+from per_obspy.records.simulation.earthquake import Simulation, simulate
+
+ORIGIN = datetime(2000, 1, 1, tzinfo=UTC)
+
+#: Runs of the tests, s after the origin time.
+DELAYS = (60, 300, 900)
+
+CONFIGURATION = """\
+name = "city"
+output = "out"
+workers = 1
+[records.fdsn]
+providers = ["{url}"]
+retries = 0
+before = 20
+after = 120
+wait = 0.01
+[pairs]
+file = "pairs.csv"
+[spectra]
+count = 12
+dampings = [0.05]
+azimuth_step = 30
+[watch]
+service = "{url}"
+delays = {delays}
+latency = 10
+poll = 30
+{watch}
+"""
+
+
+class FakeClock:
+    """A clock that stands still until it is moved; waiting moves it."""
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self.time = ORIGIN + timedelta(seconds=seconds)
+        self.waits: list[float] = []
+
+    def now(self) -> datetime:
+        return self.time
+
+    def at(self, seconds: float) -> Clock:
+        """Return the clock, moved to so many seconds after the origin time."""
+        self.time = ORIGIN + timedelta(seconds=seconds)
+        return Clock(self.now, self.wait)
+
+    def wait(self, seconds: float) -> bool:
+        self.waits.append(seconds)
+        self.time += timedelta(seconds=seconds)
+        return False
+
+
+def city_earthquake(stations: int = 3, magnitude: float = 6.5) -> Simulation:
+    """Return the earthquake of the city, at the same moment always."""
+    return simulate(Scenario(stations=stations, magnitude=magnitude, dt=0.02))
+
+
+def write_city(
+    folder: Path, server: FdsnServer, watch: str = "", delays: Sequence[float] = DELAYS
+) -> Path:
+    """Write the inventory and the configuration of the watcher, and return the configuration."""
+    places = [(station.longitude, station.latitude) for station in server.inventory[0]]
+    longitude, latitude = np.array(places).T
+    pairs = simulated_pairs(longitude, latitude, count=30, seed=1, radius=2000.0, touching=0.5)
+    write_pairs(pairs, folder / "pairs.csv")
+    text = CONFIGURATION.format(url=server.url, watch=watch, delays=list(delays))
+    (folder / "city.toml").write_text(text)
+    return folder / "city.toml"
+
+
+def settings_of(file: Path, **watch: object) -> Run:
+    """Return the settings of a watcher, with other values in its section."""
+    settings = read_settings(file)
+    return settings.model_copy(update={"watch": settings.watch.model_copy(update=watch)})
+
+
+def other_event(
+    seconds: float = 0.0, magnitude: float | None = 6.5, longitude: float = 0.0
+) -> Event:
+    """Return another earthquake, so many seconds after that of the city."""
+    time = (ORIGIN + timedelta(seconds=seconds)).replace(tzinfo=None)
+    origin = Origin(time=time, latitude=0.0, longitude=longitude, depth=15_000.0)
+    sizes = [] if magnitude is None else [Magnitude(mag=magnitude, magnitude_type="Mw")]
+    return Event(origins=[origin], magnitudes=sizes)
