@@ -193,9 +193,10 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
 
 def _is_over(watcher: Watcher, state: WatchState) -> bool:
     """Return whether the time between two polls has passed, or the clock was put back."""
-    if state.last_poll is None:
+    now = watcher.now()
+    if state.last_poll is None or is_paused(now, state.not_before):
         return False
-    elapsed = (watcher.now() - moment(state.last_poll)).total_seconds()
+    elapsed = (now - moment(state.last_poll)).total_seconds()
     return not 0.0 <= elapsed < _poll(watcher.settings)
 
 
@@ -261,7 +262,8 @@ def _after(now: datetime, failures: int, fault: PerError | None) -> str:
 
 def _fault(error: Exception) -> PerError:
     """Return an error that a user can meet for any error; one of the program is logged whole."""
-    fault = machine_fault(error)
+    # A missing file of the configuration is a wrong name, as for other commands
+    fault = machine_fault(error, missing=not isinstance(error, PerError))
     if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):
         return error
     if fault is not None:
