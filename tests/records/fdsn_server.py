@@ -103,9 +103,12 @@ def serving(simulation: Simulation) -> Iterator[FdsnServer]:
     with FdsnServer(simulation) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
-        yield server
-        server.shutdown()
-        thread.join()
+        # Also after an error, so that no thread keeps the program
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 class _Handler(BaseHTTPRequestHandler):
