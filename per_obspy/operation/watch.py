@@ -86,7 +86,7 @@ class Pass(NamedTuple):
     open_events : int
         Number of earthquakes with runs to come.
     next_due : datetime
-        Time at which there is something to do again.
+        Time of the next poll or run.
     """
 
     errors: tuple[PerError, ...]

@@ -19,16 +19,17 @@ import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve()
-sys.path[:0] = [str(HERE.parent), *(str(HERE.parents[1] / room) for room in ("records", "pipeline"))]
+ROOMS = (HERE.parent, HERE.parents[1] / "records", HERE.parents[1] / "pipeline")
+sys.path[:0] = list(map(str, ROOMS))
 
-from fdsn_server import serving
-from small_run import InProcess, plain_figure
-from watched_city import FakeClock, city_earthquake, settings_of, write_city
+from fdsn_server import serving  # noqa: E402 - after the path
+from small_run import InProcess, plain_figure  # noqa: E402 - after the path
+from watched_city import FakeClock, city_earthquake, settings_of, write_city  # noqa: E402 - after the path
 
-from per_obspy.files import is_part
-from per_obspy.operation.watch import watch_once
-from per_obspy.pipeline import report
-from per_obspy.records.simulation.earthquake import Simulation
+from per_obspy.files import is_part  # noqa: E402 - after the path
+from per_obspy.operation.watch import watch_once  # noqa: E402 - after the path
+from per_obspy.pipeline import report  # noqa: E402 - after the path
+from per_obspy.records.simulation.earthquake import Simulation  # noqa: E402 - after the path
 
 #: Tables that must be the same to the byte.
 TABLES = ("risk.parquet", "stations.csv", "rejected.csv", "rows.parquet", "buildings.parquet")
@@ -111,9 +112,11 @@ def faults_of(city: Path, expected: Path, revisions: list[str]) -> list[str]:
     """Return what differs from the city of an undisturbed watcher."""
     names = sorted(path.name for path in (city / LATEST).parent.glob("revisions/*"))
     faults = [] if names == revisions else [f"revisions {names}, expected {revisions}"]
-    for name in TABLES:
-        if (city / LATEST / name).read_bytes() != (expected / LATEST / name).read_bytes():
-            faults.append(f"{name} differs")
+    faults += [
+        f"{name} differs"
+        for name in TABLES
+        if (city / LATEST / name).read_bytes() != (expected / LATEST / name).read_bytes()
+    ]
     return faults + [f"{path.name} is left" for path in city.rglob("*") if is_part(path)]
 
 

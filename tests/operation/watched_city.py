@@ -103,11 +103,9 @@ def other_event(
     return Event(origins=[origin], magnitudes=sizes)
 
 
-def quick_run(
-    settings: Run, output: None, executor: None, progress: object, facts: dict[str, object]
-) -> Result:
+def quick_run(settings: Run, *others: object) -> Result:
     """Stand in for a whole run: tables that depend on event and records, as those of a run do."""
-    folder = settings.output
+    folder, facts = settings.output, others[-1]
     (folder / "stations").mkdir(parents=True, exist_ok=True)
     records = fetched_files(settings)
     magnitude = (settings.records.event or folder).read_text().partition("<mag>")[2][:60]

@@ -1,4 +1,4 @@
-"""How earthquakes are watched: where they are listed, which matter, and when their runs are due."""
+"""Settings of the watcher: list of earthquakes, magnitudes that matter, times of runs."""
 
 from typing import Self
 
@@ -22,7 +22,7 @@ class Reach(Section):
 
 
 class Region(Section):
-    """Circle that stands for the inventory where its pairs are not in a table or catalogue."""
+    """Circle in place of the inventory, where its pairs are not in a table or catalogue."""
 
     latitude: float = Field(ge=-90, le=90, description="centre, degrees north")
     longitude: float = Field(ge=-180, le=180, description="centre, degrees east")

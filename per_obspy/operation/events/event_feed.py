@@ -82,7 +82,7 @@ def read_feed(watch: Watch, state: WatchState, circle: Circle, now: datetime) ->
     CatalogError
         If the service is unknown or the folder cannot be read.
     ServiceError
-        If the service does not answer, or with something else than a list.
+        If the service does not answer, or its answer is no list.
     """
     if watch.folder is not None:
         return _folder_feed(watch.folder, state.seen)
@@ -111,7 +111,7 @@ def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
         "orderby": "time",
         "limit": f"{watch.most_events}",
     }
-    # A circle of the whole Earth excludes nothing
+    # A circle of the whole Earth excludes no event
     if circle.radius < 180.0:
         place = {"latitude": circle.latitude, "longitude": circle.longitude}
         query |= {name: f"{value:.4f}" for name, value in place.items()}
@@ -258,7 +258,7 @@ def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None
     CatalogError
         If the file is no QuakeML, or the facts cannot be true.
     ServiceError
-        If the service does not answer, or with something else than the earthquake.
+        If the service does not answer, or its answer is not the earthquake.
     """
     # A service is asked by the identifier, a file may hold several
     if watch.folder is None:
@@ -284,7 +284,7 @@ def _event_of_service(service: str, event_id: str) -> Any:
         (event,) = events_of(content, source)
         quakeml_row(event)
     except (RecordRejected, ValueError) as error:
-        reason = f"{source}: answers with something else than the earthquake {event_id}: {error}"
+        reason = f"{source}: answer is not the earthquake {event_id}: {error}"
         raise ServiceError(reason) from error
     return event
 

@@ -190,7 +190,7 @@ def _published(folder: Path, state: EventState, result: Result, occasion: tuple[
     record, newest = result.record, newest_revision(folder)
     if "risk.parquet" not in record["outputs"]:
         return Done(state, "no pair could be screened: see work/rejected.csv", result)
-    # Nothing new is no new revision
+    # Unchanged results are no new revision
     shown = content_of(record, file_hash(folder / "event.xml"))
     if newest and shown_content(folder, newest) == shown:
         point_latest(folder)

@@ -36,10 +36,10 @@ def read_settings(file: Path) -> Run:
     """
     content: dict[str, Any] = read_toml(file)
     if "watch" not in content:
-        raise CatalogError(str(file), "has no section [watch], which says what is watched")
+        raise CatalogError(str(file), "has no section [watch]")
     records = content.get("records")
     if not isinstance(records, dict):
-        raise CatalogError(str(file), "has no section [records], which says where records are")
+        raise CatalogError(str(file), "has no section [records]")
     _refuse_one_event(file, records)
     # The watcher gives every run its earthquake and its folder of fetched records
     placed = {**records, "event": "event.xml"}

@@ -130,7 +130,7 @@ def _opened(watch: Watch, listed: Listed, now: datetime) -> EventState | None:
 
 
 def _updated(known: EventState, listed: Listed, now: datetime) -> EventState | None:
-    """Return the new state of a known earthquake, None if nothing has changed."""
+    """Return the new state of a known earthquake, None if it has not changed."""
     digest = _digest(listed.row)
     if known.state != "closed" and digest == known.listed:
         return None
@@ -176,7 +176,7 @@ def present_state(watch: Watch, places: Places, state: EventState, now: datetime
     Raises
     ------
     PerError
-        If the service does not answer, or with something else than the earthquake.
+        If the service does not answer, or its answer is not the earthquake.
     """
     present = present_event(watch, state.event_id, state.file)
     if present is None:

@@ -1,4 +1,4 @@
-"""Which earthquakes matter: their magnitude by the distance from epicentre to inventory."""
+"""Relevance of earthquakes: their magnitude by the distance from epicentre to inventory."""
 
 import json
 from collections.abc import Sequence

@@ -108,7 +108,7 @@ def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[
         raise CatalogError(str(target), "this revision is there already")
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-    # Made next to its place: a killed watcher leaves nothing that bears a number
+    # Made next to its place: a killed watcher leaves no folder that bears a number
     with temporary_folder(target.parent) as room:
         made = room / target.name
         # The description comes last, as it holds the hash of everything else

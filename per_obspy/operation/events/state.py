@@ -79,7 +79,7 @@ class EventState(_State):
     failures : int
         Number of failures in succession.
     not_before : str or None
-        Time before which nothing is tried again.
+        Time before which no run is tried again.
     last_error : str or None
         Reason of the latest failure.
     """
@@ -185,7 +185,7 @@ def write_watch_state(folder: Path, state: WatchState) -> None:
 
 def read_watch_state(folder: Path) -> WatchState:
     """Return the state of a watched folder; an empty one if there is none or it is damaged."""
-    # Without it everything is asked for again, and nothing is lost
+    # Without it everything is asked for again
     try:
         return _read(folder / WATCH, WatchState)
     except CatalogError:

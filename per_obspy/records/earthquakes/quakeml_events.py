@@ -49,8 +49,8 @@ def plain_quakeml(event: Event, event_id: str) -> bytes:
     """
     Return the preferred origin and magnitude of an earthquake as QuakeML.
 
-    The bytes depend on time, place and magnitude alone, so that nothing is computed again when a
-    service changes other facts.
+    The bytes depend on time, place and magnitude alone, so that no station is computed again when
+    a service changes other facts.
 
     Parameters
     ----------

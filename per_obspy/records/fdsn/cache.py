@@ -192,12 +192,13 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
     A station whose files are not as they were fetched is a rejection.
     """
     # A station has records, or a status whose records are gone
-    names = {path.stem for path in fetched.folder.glob("*.mseed") if not is_part(path)}
-    names |= {path.stem for path in fetched.folder.glob("*.json") if not is_part(path)}
+    names_with_records = _stems(fetched.folder, "*.mseed")
+    names = names_with_records | _stems(fetched.folder, "*.json")
     damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
     rejected = (*fetched.rejected, *damaged)
     broken = {row.name for row in damaged}
-    if not names - broken:
+    # Metadata alone are no station
+    if names_with_records <= broken:
         return SourceContents({}, None, rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
@@ -208,6 +209,11 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
         if whole and name in inside and name not in broken:
             stations[name] = whole
     return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _stems(folder: Path, pattern: str) -> set[str]:
+    """Return the names of stations that have a whole file of a kind in a folder."""
+    return {path.stem for path in folder.glob(pattern) if not is_part(path)}
 
 
 def _damage(folder: Path, name: str) -> Rejection | None:

@@ -127,7 +127,7 @@ def listed_events(
     CatalogError
         If the service is unknown.
     ServiceError
-        If the service does not answer, or with something else than a list.
+        If the service does not answer, or its answer is no list.
     """
     url = f"{base_url(provider)}/fdsnws/event/1/query"
     try:

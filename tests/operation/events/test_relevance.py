@@ -27,9 +27,7 @@ def settings(folder, **watch) -> Run:
 
 
 def write_table(folder, places):
-    rows = [
-        f"P{number},0.05,{x},{y},12,{x},{y},15\n" for number, (x, y) in enumerate(places)
-    ]
+    rows = [f"P{number},0.05,{x},{y},12,{x},{y},15\n" for number, (x, y) in enumerate(places)]
     (folder / "pairs.csv").write_text(HEADER + "".join(rows))
 
 

@@ -71,7 +71,7 @@ def test_changes_of_pairs_stations_and_the_earthquake(event):
     ]
 
 
-def test_names_are_no_formulas_to_a_spreadsheet(event, tmp_path):
+def test_names_are_no_formulas_to_a_spreadsheet(tmp_path):
     before, after = tmp_path / "before", tmp_path / "after"
     for folder, state in ((before, "no"), (after, "yes")):
         folder.mkdir()
@@ -116,9 +116,7 @@ def test_the_room_of_ten_revisions_is_that_of_what_changed(event):
     for number in range(1, 11):
         (event / "event.xml").write_text(f"<event number='{number}'/>")
         publish(event, number, record_of(event), {})
-    sizes = {
-        path.stat().st_ino: path.stat().st_size for path in (event / "revisions").rglob("*.*")
-    }
+    sizes = {path.stat().st_ino: path.stat().st_size for path in (event / "revisions").rglob("*.*")}
     assert sum(sizes.values()) < 1.2e6
 
 
