@@ -18,6 +18,7 @@ import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init
+from per_obspy.commands.operation.status import status
 from per_obspy.commands.operation.watch import watch
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
@@ -56,19 +57,8 @@ app = typer.Typer(
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
-    run,
-    init,
-    simulate,
-    process,
-    spectra,
-    screen,
-    report,
-    show,
-    plan,
-    events,
-    fetch,
-    watch,
-    info,
+    *(run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info),
+    *(watch, status),
 )
 for command in COMMANDS:
     app.command()(command)

@@ -25,6 +25,16 @@ _ENDING = (signal.SIGINT, signal.SIGTERM)
 _request = threading.Event()
 
 
+class _Hold:
+    """Whether signals wait, and the one that does."""
+
+    depth = 0
+    waiting: int | None = None
+
+
+_hold = _Hold()
+
+
 class Terminated(SystemExit):
     """The program was asked to end by SIGTERM; raised in the main thread."""
 
@@ -48,29 +58,53 @@ def ending_in_time() -> Iterator[None]:
     End the program by SIGTERM and SIGINT within :data:`LIMIT` seconds, whatever the block does.
 
     SIGTERM raises :class:`Terminated`, and SIGINT ``KeyboardInterrupt``. Outside the main thread
-    and on systems without these signals nothing changes.
+    and on systems without these signals the block runs as it is.
     """
     if os.name != "posix" or threading.current_thread() is not threading.main_thread():
         yield
         return
     _request.clear()
+    _hold.depth, _hold.waiting = 0, None
     # The number of every signal is written at once, also while compiled code works
     read, write = os.pipe()
     os.set_blocking(write, False)
     earlier_fd = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
-    earlier = signal.signal(signal.SIGTERM, _terminate)
+    earlier = [signal.signal(number, _end) for number in _ENDING]
     threading.Thread(target=_watch, args=(read,), daemon=True, name="termination").start()
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, earlier)
+        for number, handler in zip(_ENDING, earlier, strict=True):
+            signal.signal(number, handler)
         signal.set_wakeup_fd(earlier_fd)
         os.close(write)
 
 
-def _terminate(*_: object) -> None:
-    """Raise :class:`Terminated`; a second signal does not disturb the clearing up."""
-    if not _request.is_set():
+@contextmanager
+def held() -> Iterator[None]:
+    """
+    Let the exceptions of both signals wait until the block has ended.
+
+    Masks of signals are those of one thread, and any other thread takes the signal then.
+    """
+    _hold.depth += 1
+    try:
+        yield
+    finally:
+        _hold.depth -= 1
+    number = _hold.waiting
+    if number is not None and not _hold.depth:
+        _hold.waiting = None
+        _end(number)
+
+
+def _end(number: int, *_: object) -> None:
+    """Raise the exception of a signal; a second SIGTERM does not disturb the clearing up."""
+    if _hold.depth:
+        _hold.waiting = number
+    elif number == signal.SIGINT:
+        raise KeyboardInterrupt
+    elif not _request.is_set():
         _request.set()
         raise Terminated
 

@@ -15,8 +15,16 @@ from per_obspy.commands.endings import (
     stop_if_nothing,
     why_nothing,
 )
-from per_obspy.commands.printing import print_table, shown_progress, state_texts
-from per_obspy.commands.run import print_result
+from per_obspy.commands.operation.logged import (
+    LogFile,
+    LogForm,
+    LogFormat,
+    Quiet,
+    log_ending,
+    logged,
+)
+from per_obspy.commands.printing import print_table, state_texts
+from per_obspy.commands.run import print_nothing, print_result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +66,9 @@ def screen(
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     strict: Strict = False,
     as_json: AsJson = False,
+    log: LogFile = None,
+    log_format: LogForm = LogFormat.text,
+    quiet: Quiet = False,
 ) -> None:
     """
     Screen pairs: in an ensemble of scenarios, by a design spectrum, or again with a run's stations.
@@ -68,29 +79,33 @@ def screen(
     Example: per-obspy screen workflows/ensemble.toml
     """
     from per_obspy.config import Design, Ensemble, screening_kind
+    from per_obspy.pipeline.ensemble import screen_scenarios
+    from per_obspy.pipeline.run import screen as screen_again
 
     kind = screening_kind(configuration)
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
+    with logged(log, log_format, quiet) as progress:
+        if kind is Design:
+            design = _screened_by_spectrum(configuration, output)
+        elif kind is Ensemble:
+            result = screen_scenarios(configuration, output, progress=progress)
+            log_ending(result.record)
+        else:
+            result = screen_again(configuration, output, progress=progress)
+            log_ending(result.record)
+    # Results are printed when no line of the log can come between
     if kind is Design:
-        _screen_by_spectrum(configuration, output, as_json)
-    elif kind is Ensemble:
-        _screen_ensemble(configuration, output, as_json)
+        _end_design(design, as_json, quiet)
     else:
-        _screen_again(configuration, output, strict, as_json)
+        shown = _print_ensemble if kind is Ensemble else print_result
+        print_and_end(result, as_json, print_nothing if quiet else shown, strict)
 
 
-def _screen_again(configuration: Path, output: Path | None, strict: bool, as_json: bool) -> None:
-    """Screen the pairs of a run again with the stations that it left."""
-    from per_obspy.pipeline.run import screen as screen_again
-
-    with shown_progress() as progress:
-        result = screen_again(configuration, output, progress=progress)
-    print_and_end(result, as_json, print_result, strict)
-
-
-def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
-    """Screen pairs by a design or user spectrum instead of a record, and print the result."""
+def _screened_by_spectrum(
+    configuration: Path, output: Path | None
+) -> "tuple[pd.DataFrame, list[Path]]":
+    """Screen pairs by a design or user spectrum instead of a record; return table and files."""
     from per_obspy.config import Design, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.preflight import require_extras
@@ -107,14 +122,19 @@ def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool)
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
+    return table, files
 
+
+def _end_design(design: "tuple[pd.DataFrame, list[Path]]", as_json: bool, quiet: bool) -> None:
+    """Print the result of a screening by a spectrum, and stop where nothing was usable."""
+    table, files = design
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)
     rejected = len(table.attrs["rejected"])
     if as_json:
         names = [str(path) for path in files]
         print(json.dumps({"pairs": len(table), **counts, "rejected": rejected, "files": names}))
-    else:
+    elif not quiet:
         _print_spectrum_result(table, counts, rejected, files)
     if table.empty:
         stop_if_nothing(0, why_nothing(files[-1]))
@@ -150,15 +170,6 @@ def _print_spectrum_result(
     )
     _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
     print(*files, sep="\n")
-
-
-def _screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> None:
-    """Screen pairs in every scenario and print their joint probabilities."""
-    from per_obspy.pipeline.ensemble import screen_scenarios
-
-    with shown_progress() as progress:
-        result = screen_scenarios(configuration, output, progress=progress)
-    print_and_end(result, as_json, _print_ensemble)
 
 
 def _print_ensemble(result: "Result") -> None:

@@ -31,6 +31,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
 from per_obspy.machine import machine_fault, raise_machine_fault
+from per_obspy.termination import held
 from per_obspy.threads import use_one_thread
 
 Task = TypeVar("Task")
@@ -302,11 +303,12 @@ def _signals_held() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with held():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker() -> None:

@@ -2,7 +2,7 @@
 Deliver one message by Apprise: ``python -m per_obspy.operation.apprise_delivery``.
 
 Standard input holds the number of URLs, the URLs, the title, each on a line, and the text. Prints
-nothing: addresses hold secrets.
+no word: addresses hold secrets.
 """
 
 import logging

@@ -10,7 +10,7 @@ import logging
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,13 +25,13 @@ ROOT = logging.getLogger("per_obspy")
 PROGRESS = logging.getLogger("per_obspy.progress")
 
 #: User and password of an address, and values of keys that are secrets.
-_USER = re.compile(r"(?<=://)[^\s/@]*(?:@|/[^\s@]*@)")
+_USER = re.compile(r"(?<=://)\S*@")
 _SECRET = re.compile(r"(?i)\b(token|password|passwd|secret|api_?key)(=|: ?)[^\s&;,]+")
 
 
 class LogOptions(NamedTuple):
     """
-    Where a command logs.
+    Places of the log of a command.
 
     Attributes
     ----------
@@ -65,28 +65,27 @@ def logging_to(options: LogOptions) -> Iterator[None]:
     console = logging.StreamHandler(sys.stderr)
     console.setLevel(logging.WARNING if options.quiet else logging.INFO)
     console.setFormatter(_TextLine() if options.timed else _ConsoleLine())
+    console.addFilter(_is_unprinted)
     handlers = [console, *_file_handlers(options)]
     # Handlers of other programs that use the package stay as they are
-    level, propagates = ROOT.level, ROOT.propagate
+    level = ROOT.level
     ROOT.setLevel(logging.INFO)
-    ROOT.propagate = False
     for handler in handlers:
         ROOT.addHandler(handler)
     try:
         yield
     except PerError as error:
-        _log_end(handlers[1:], str(error))
+        _log_end(str(error))
         raise
     except (KeyboardInterrupt, SystemExit) as error:
         if getattr(error, "code", 1):
-            _log_end(handlers[1:], f"ended by {type(error).__name__}")
+            _log_end(f"ended by {type(error).__name__}")
         raise
     finally:
         for handler in handlers:
             ROOT.removeHandler(handler)
             handler.close()
         ROOT.setLevel(level)
-        ROOT.propagate = propagates
 
 
 def _file_handlers(options: LogOptions) -> list[logging.Handler]:
@@ -95,16 +94,36 @@ def _file_handlers(options: LogOptions) -> list[logging.Handler]:
         return []
     with writing(options.file):
         options.file.parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(options.file, encoding="utf-8")
+        handler = _File(options.file, encoding="utf-8")
     handler.setFormatter(_JsonLine() if options.as_json else _TextLine())
     return [handler]
 
 
-def _log_end(handlers: list[logging.Handler], reason: str) -> None:
-    """Log why a block ended in the file; standard error gets the line of the command itself."""
-    record = ROOT.makeRecord(ROOT.name, logging.ERROR, "", 0, reason, (), None)
-    for handler in handlers:
-        handler.handle(record)
+def _is_unprinted(record: logging.LogRecord) -> bool:
+    """Return whether the command does not print the event itself."""
+    return not getattr(record, "printed", False)
+
+
+def _log_end(reason: str) -> None:
+    """Log why a block ended; the command prints it itself."""
+    ROOT.error("%s", reason, extra={"printed": True})
+
+
+class _File(logging.FileHandler):
+    """Log file; where it cannot be written, one line reports it and the work goes on."""
+
+    has_failed = False
+
+    @override
+    def handleError(self, record: logging.LogRecord) -> None:
+        if not self.has_failed:
+            self.has_failed = True
+            print(f"per-obspy: {self.baseFilename}: the log cannot be written", file=sys.stderr)
+
+    @override
+    def close(self) -> None:
+        with suppress(OSError):
+            super().close()
 
 
 def log_progress(stage: str, done: int, total: int) -> None:

@@ -99,7 +99,7 @@ def _body(message: Message) -> str:
 
 
 def _by_command(settings: Notify, message: Message, body: str) -> None:
-    """Start the configured command with the message; nothing where there is none."""
+    """Start the configured command with the message, if there is one."""
     if not settings.command:
         return
     known = {
@@ -117,7 +117,7 @@ def _by_command(settings: Notify, message: Message, body: str) -> None:
 
 
 def _by_apprise(settings: Notify, message: Message, body: str) -> None:
-    """Deliver a message to the services of the configured URLs; nothing where there are none."""
+    """Deliver a message to the services of the configured URLs, if there are any."""
     urls = _urls(settings)
     if not urls:
         return
@@ -149,7 +149,7 @@ def _urls(settings: Notify) -> list[str]:
 
 
 def _private_text(file: Path) -> str:
-    """Return the content of a file that nobody but its owner may read."""
+    """Return the content of a file that only its owner may read."""
     with open(file, "rb", opener=_opened_at_once) as opened:
         # The rights are those of the file that is read, whatever its name leads to later
         facts = os.fstat(opened.fileno())

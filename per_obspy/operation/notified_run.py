@@ -124,7 +124,7 @@ def _sent(
 
 
 def _latest(folder: Path) -> dict[str, Any]:
-    """Return the latest message of a folder; nothing where there is none."""
+    """Return the latest message of a folder, empty without one."""
     try:
         with (folder / LATEST).open(encoding="utf-8") as file:
             found = json.loads(file.read(LARGEST))
