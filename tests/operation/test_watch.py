@@ -215,7 +215,7 @@ def test_a_list_that_is_none_is_one_line(city, server):
     server.fail("event", "*", content(b"<html><body>busy</body></html>"))
     (error,) = city.at(61).errors
     assert isinstance(error, ServiceError)
-    assert "something else than a list of events" in str(error)
+    assert "answer is no list of events" in str(error)
     assert "\n" not in str(error)
 
 

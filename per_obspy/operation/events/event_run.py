@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.config import Run
+from per_obspy.errors import ServiceError
 from per_obspy.files import file_hash, written_whole
 from per_obspy.jobs.output_folder import Result
 from per_obspy.operation.events.due import Task
@@ -154,8 +155,12 @@ def _fetched(settings: Run, progress: Progress) -> Fetched | None:
     request, event = settings.records.fdsn, settings.records.event
     if request is None:
         return None
-    with cut_records_aside(request):
-        return fetch(request, event, progress, again=True)
+    try:
+        with cut_records_aside(request):
+            return fetch(request, event, progress, again=True)
+    except ServiceError:
+        # With the records that were set aside at their place
+        return fetch(request, event, progress)
 
 
 def _has_records(settings: Run, fetched: Fetched | None) -> bool:

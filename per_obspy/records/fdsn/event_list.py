@@ -135,7 +135,7 @@ def listed_events(
     except NotFound:
         return [], []
     except (ValueError, csv.Error) as error:
-        reason = f"answers with something else than a list of events: {_reason(error)}"
+        reason = f"answer is no list of events: {_reason(error)}"
         raise ServiceError(f"{public_url(url)}: {reason}") from error
     # Each line is read alone
     rows, problems = [], []

@@ -1,4 +1,7 @@
-"""Configuration of a watcher, and the settings of the run of one earthquake."""
+"""Configuration of a watcher, and the settings of the run of one earthquake.
+
+Tests ``per_obspy.config.operation.watch`` as well.
+"""
 
 import pytest
 
