@@ -3,8 +3,8 @@ Rehearse an earthquake: services that fail, late stations, killed processes, a n
 
 Usage: ``python workflows/rehearsal.py [FOLDER]``. Services on loopback list and record a simulated
 earthquake. The watcher runs as a process of its own for each moment, by a clock that is given, so
-that an hour is rehearsed in less than a minute. The tables at the end must be those of a watcher
-that nothing has disturbed, to the byte. Prints the time from origin to each revision: delay of the
+that a quarter of an hour is rehearsed in about a minute. The tables must be those of an undisturbed
+watcher to the byte. Prints the time from origin to each revision: delay of the
 run and seconds of work.
 """
 
