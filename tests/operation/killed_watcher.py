@@ -149,6 +149,7 @@ def main(folder: Path, count: int, seed: int) -> None:
         code = exit_code(forked(city, 902))
         faults[number] = faults_of(city, expected, revisions) if code == 0 else [f"exit {code}"]
         shutil.rmtree(city)
+        print(f"kill {number + 1} of {count}: {faults[number] or 'equal'}", file=sys.stderr)
     services.end()
     wrong = {number: found for number, found in faults.items() if found}
     print(json.dumps({"kills": count, "at_work": at_work, "faults": wrong}))
