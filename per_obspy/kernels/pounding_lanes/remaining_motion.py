@@ -90,6 +90,7 @@ def _stay_below(norms, decays, gains, limits, direction, sizes, group):
             size = direction[0] * sizes[0, k] + direction[1] * sizes[1, k]
         rise = gains[0] * size
         other_rise = gains[1] * size
+        # highest inside the group
         high = first + rise
         other_high = second + other_rise
         if high > limits[0] or other_high > limits[1]:
@@ -104,6 +105,7 @@ def _stay_below(norms, decays, gains, limits, direction, sizes, group):
 @lean
 def _touching_pair_remains_still(row, direction, sizes, duration, group):
     """Return whether a linear pair without gap changes no result any more."""
+    # norm, force over acceleration, and limits of both structures
     rate = min(row[0, DAMPING_RATE], row[1, DAMPING_RATE])
     total = force = slowness = excess = 0.0
     limit = math.inf

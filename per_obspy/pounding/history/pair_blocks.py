@@ -146,6 +146,7 @@ def pair_blocks(parts: NDArray[np.int64], rows: FloatArray) -> list[NDArray[np.i
     memory = rows[:, :, columns.DAMPING_RATE].min(axis=1)
     order = np.lexsort((memory, rows[:, 0, columns.GAP] > 0.0))
     for part in np.unique(parts):
+        # in this order
         same = order[parts[order] == part]
         blocks += [same[start : start + PAIR_LANES] for start in range(0, same.size, PAIR_LANES)]
     return blocks
