@@ -14,7 +14,7 @@ DT = 0.02
 
 def _record(rng):
     """Return strong noise that fades, and a stronger aftershock that fades, m/s²."""
-    fading = 10.0 ** -np.linspace(0.0, 5.0, 700)
+    fading = 10.0 ** -np.linspace(0.0, 5.0, 1000)
     envelope = np.concatenate([np.ones(300), fading, np.full(200, 1.2), fading])
     return 3.0 * envelope * rng.normal(size=(2, envelope.size))
 
@@ -22,17 +22,17 @@ def _record(rng):
 def _pairs(count, rng):
     """Return pairs with and without gap, linear and bilinear."""
     draws = {
-        "period_1": rng.uniform(0.2, 1.5, count),
-        "damping_1": rng.uniform(0.01, 0.15, count),
+        "period_1": rng.uniform(0.2, 0.8, count),
+        "damping_1": rng.uniform(0.05, 0.15, count),
         "mass_1": rng.uniform(0.2, 5.0, count),
-        "period_2": rng.uniform(0.2, 1.5, count),
-        "damping_2": rng.uniform(0.01, 0.15, count),
+        "period_2": rng.uniform(0.2, 0.8, count),
+        "damping_2": rng.uniform(0.05, 0.15, count),
         "mass_2": rng.uniform(0.2, 5.0, count),
         "restitution": rng.uniform(0.2, 0.9, count),
         "participation_1": rng.uniform(0.6, 1.6, count),
         "azimuth": rng.uniform(0.0, 360.0, count),
     }
-    draws["gap"] = np.where(np.arange(count) % 2, 0.0, rng.uniform(0.002, 0.1, count))
+    draws["gap"] = np.where(np.arange(count) % 2, 0.0, rng.uniform(0.002, 0.05, count))
     weak = np.arange(count) % 4 < 2
     draws["yield_displacement_1"] = np.where(weak, rng.uniform(0.02, 0.1, count), np.inf)
     return draws
