@@ -39,7 +39,7 @@ def random_pairs() -> list[tuple[list[Structure], float]]:
     pairs = []
     for _ in range(PAIRS):
         periods, masses = random.uniform(0.3, 1.2, 2), random.uniform(0.5, 2.0, 2)
-        members = [Structure(*one, mass) for one, mass in zip(((p, 0.05) for p in periods), masses)]
+        members = [Structure(periods[i], 0.05, masses[i]) for i in range(2)]
         pairs.append((members, random.uniform(0.005, 0.02)))
     return pairs
 

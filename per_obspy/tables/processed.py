@@ -17,47 +17,57 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "start": ("", "time of the first sample, UTC, pads included"),
     "delta": ("s", "sampling interval"),
     "npts": ("1", "number of samples, pads included"),
-    "latitude": ("degrees", "north"),
-    "longitude": ("degrees", "east"),
-    "elevation": ("m", "of the station"),
+    "latitude": ("degrees", "latitude of the station, north"),
+    "longitude": ("degrees", "longitude of the station, east"),
+    "elevation": ("m", "elevation of the station"),
     "coordinates_source": ("", "name of the table of stations, header or StationXML"),
     "coordinates_conflict": ("", "places of other sources more than 1 km away, with both"),
-    "site_class": ("", "of the ground; empty if unknown"),
+    "site_class": ("", "site class of the ground; empty if unknown"),
     "vs30": ("m/s", "mean shear-wave velocity of the upper 30 m; empty if unknown"),
-    "sensor_azimuth": ("degrees", "clockwise from north; empty for verticals"),
-    "sensor_dip": ("degrees", "down from horizontal; up is -90"),
-    "azimuth_source": ("", "metadata, channel code or unknown"),
-    "sensor_location": ("", "where the header puts the sensor"),
+    "sensor_azimuth": (
+        "degrees",
+        "azimuth of the sensor, clockwise from north; empty for verticals",
+    ),
+    "sensor_dip": ("degrees", "dip of the sensor, down from horizontal; up is -90"),
+    "azimuth_source": ("", "source of sensor_azimuth: metadata, channel code or unknown"),
+    "sensor_location": ("", "place of the sensor according to the header"),
     "simulated": ("", "True where the motion is simulated; empty for real records"),
-    "conversion": ("", "how counts became m/s2; empty for physical records"),
-    "onset": ("", "first wave, UTC"),
-    "onset_source": ("", "pick, travel time or configuration"),
+    "conversion": ("", "conversion of counts to m/s2; empty for physical records"),
+    "onset": ("", "time of the first wave, UTC"),
+    "onset_source": ("", "source of the onset: pick, travel time or configuration"),
     "noise": ("s", "length of the noise window, from the first sample after the pad"),
-    "signal_to_noise": ("1", "of the best octave, smoothed"),
+    "signal_to_noise": ("1", "signal-to-noise ratio of the best octave, smoothed"),
     "clear_from": ("Hz", "lowest frequency at which the signal clears the noise"),
     "clear_to": ("Hz", "highest frequency at which the signal clears the noise"),
-    "baseline": ("", "kind of baseline that was removed beside the mean"),
+    "baseline": ("", "kind of baseline that was removed in addition to the mean"),
     "residual_velocity": (
         "m/s",
-        "left at the end of the shaking before any filter: a baseline that shifted",
+        "velocity that remains at the end of the shaking before any filter, as "
+        "after a shift of the baseline",
     ),
     "certain_period": (
         "s",
         "natural period beyond which PER depends on when the baseline shifted; empty: no doubt",
     ),
-    "highpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
-    "highpass_source": ("", "why it is there; shared: the other horizontal needs it"),
-    "own_highpass": ("Hz", "what this component alone would have had"),
-    "lowest_highpass": ("Hz", "what noise and duration would have allowed"),
-    "lowest_highpass_source": ("", "which of them"),
-    "lowpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
-    "lowpass_source": ("", "why it is there"),
-    "own_lowpass": ("Hz", "what this component alone would have had"),
-    "order": ("1", "n of the Butterworth filter; empty for records that were processed already"),
-    "taper": ("1", "fraction of the record at each end"),
-    "pad_before": ("s", "zeros before the record, filtered with it"),
-    "pad_after": ("s", "zeros after the record, filtered with it"),
-    "clock_shift": ("s", "by which the samples were moved to those of the other horizontal"),
+    "highpass": ("Hz", "high-pass corner, where the amplitude is 1/sqrt(2)"),
+    "highpass_source": (
+        "",
+        "reason of the high-pass corner; shared: the other horizontal needs it",
+    ),
+    "own_highpass": ("Hz", "high-pass corner that this component alone would have"),
+    "lowest_highpass": ("Hz", "lowest high-pass corner that noise and duration allow"),
+    "lowest_highpass_source": ("", "whether noise or duration decides lowest_highpass"),
+    "lowpass": ("Hz", "low-pass corner, where the amplitude is 1/sqrt(2)"),
+    "lowpass_source": ("", "reason of the low-pass corner"),
+    "own_lowpass": ("Hz", "low-pass corner that this component alone would have"),
+    "order": (
+        "1",
+        "order n of the Butterworth filter; empty for records that were processed already",
+    ),
+    "taper": ("1", "fraction of the record that is tapered at each end"),
+    "pad_before": ("s", "length of zeros before the record, filtered with it"),
+    "pad_after": ("s", "length of zeros after the record, filtered with it"),
+    "clock_shift": ("s", "shift of the samples to those of the other horizontal"),
     "shortest_period": ("s", "shortest usable natural period"),
     "longest_period": ("s", "longest usable natural period"),
     "failed_checks": (
@@ -69,7 +79,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
         "names of the flags that pairs with this record have, separated by spaces",
     ),
     "warnings": ("", "failed checks that do not reject, with figure and threshold"),
-    "notes": ("", "the same, without consequence"),
+    "notes": ("", "failed checks without consequence, with figure and threshold"),
 }
 
 
@@ -86,7 +96,7 @@ def processed_table(descriptions: Mapping[str, Iterable[Mapping[str, Any]]]) -> 
     Returns
     -------
     DataFrame
-        With the columns of ``COLUMNS``; empty where a record has nothing.
+        With the columns of ``COLUMNS``; empty where a record has no value.
     """
     rows = [
         {**trace, **trace.get("coordinates", {}), **trace.get("per_obspy", {}), "file": name}

@@ -27,7 +27,7 @@ COLUMNS: dict[str, Column] = {
         "str",
         ("station", "", "network and station code"),
         ("state", "", "used: its record serves the pairs near it; rejected: it serves none"),
-        ("rejected", "", "what was left out of the station, with every reason"),
+        ("rejected", "", "rejected records of the station, with every reason"),
         ("flags", "", "flags that every pair of the station has, separated by spaces"),
         ("warnings", "", "failed checks of its records that do not reject, with channel"),
         ("notes", "", "failed checks of its records without consequence, with channel"),
@@ -35,29 +35,34 @@ COLUMNS: dict[str, Column] = {
     **_columns("int64", ("pairs", "1", "number of pairs for which the record is used")),
     **_columns(
         "float64",
-        ("longitude", "degrees", "of the station, east"),
-        ("latitude", "degrees", "of the station, north"),
-        ("elevation", "m", "of the station"),
+        ("longitude", "degrees", "longitude of the station, east"),
+        ("latitude", "degrees", "latitude of the station, north"),
+        ("elevation", "m", "elevation of the station"),
     ),
     **_columns(
         "str",
         ("coordinates_source", "", "name of the table of stations, header or StationXML"),
         ("coordinates_conflict", "", "places of other sources more than 1 km away, with both"),
-        ("site_class", "", "of the ground; empty if unknown"),
+        ("site_class", "", "site class of the ground; empty if unknown"),
     ),
     **_columns(
         "float64",
         ("vs30", "m/s", "mean shear-wave velocity of the upper 30 m; empty if unknown"),
-        ("epicentral_distance", "m", "along the great circle; empty without a hypocentre"),
+        (
+            "epicentral_distance",
+            "m",
+            "distance to the epicentre along the great circle; empty without a hypocentre",
+        ),
         (
             "hypocentral_distance",
             "m",
-            "straight, the Earth taken as flat; empty without a hypocentre",
+            "straight distance to the hypocentre, the Earth taken as flat; empty "
+            "without a hypocentre",
         ),
         ("pga", "m/s2", "peak ground acceleration of the processed horizontals, the larger one"),
         ("pgv", "m/s", "peak ground velocity of the processed horizontals, the larger one"),
-        ("shortest_usable_period", "s", "of both horizontals"),
-        ("longest_usable_period", "s", "of both horizontals"),
+        ("shortest_usable_period", "s", "shortest usable period of both horizontals"),
+        ("longest_usable_period", "s", "longest usable period of both horizontals"),
         ("highpass", "Hz", "corner of the horizontals, the higher one"),
         ("lowpass", "Hz", "corner of the horizontals, the lower one"),
     ),
@@ -106,7 +111,7 @@ def write_stations(
     spectra, rejected, pairs
         As for :func:`station_table`.
     folder : Path
-        Where to.
+        The file.
     """
     table = station_table(spectra, rejected, pairs)
     text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
@@ -133,7 +138,7 @@ def station_table(
         Of the stations with usable records, from :func:`per_obspy.station_spectra`; the motion is
         not needed.
     rejected : iterable of Rejection
-        What was left out; files, services and pairs among it are passed over.
+        Rejections; those of files, services and pairs are passed over.
     pairs : mapping
         Station -> number of pairs for which its record is used.
 
@@ -159,7 +164,7 @@ def _named(spectra: Iterable[xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def _reasons(rejected: Iterable[Rejection]) -> dict[str, list[str]]:
-    """Return what was left out of each station, with reasons."""
+    """Return the rejected records of each station, with reasons."""
     found: dict[str, list[str]] = {}
     for rejection in rejected:
         if rejection.kind not in ("station", "record"):

@@ -1,5 +1,5 @@
 """
-Messy tables through ``pairs check`` and ``run``: read, refused or suspected as the page says.
+Messy tables through ``pairs check`` and ``run``: read, refused or suspected as in the page.
 
 The table of ``docs/messy_tables.md`` is compared with what both commands print; where it differs,
 the new one is in ``messy_tables.md`` of the test's folder.
@@ -39,7 +39,7 @@ class Said(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What ``pairs check`` and ``run`` say of a table, and the pairs that the run judged."""
+    """Output of ``pairs check`` and ``run`` for a table, and the pairs that the run judged."""
 
     checked: Said
     ran: Said
@@ -47,7 +47,7 @@ class Outcome(NamedTuple):
 
 
 def called(*arguments: str) -> Said:
-    """Return what a command says."""
+    """Return the output of a command."""
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(sys, "argv", ["per-obspy", *arguments])
@@ -81,7 +81,7 @@ def tried(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcomes(tried):
-    """What both commands say of every kind of messy table, and of the plain one."""
+    """Output of both commands for every kind of messy table, and for the plain one."""
     tables = {"plain": plain(), **readable(), **refused(), "suspected": suspected()}
     return {kind: tried(messy) for kind, messy in tables.items()}
 
@@ -147,7 +147,7 @@ def test_the_record_of_a_run_has_what_the_console_says(tried):
 MENDS = {
     'decimal = ","\n': "`2,345` and no number that decides",
     'encoding = "cp1254"\n': "names in cp1252 or cp1254, English headings",
-    '[pairs.columns]\ngap = "distance"\n': "a heading that may mean something else",
+    '[pairs.columns]\ngap = "distance"\n': "an ambiguous heading",
     'sheet = "2026"\n': "a workbook with two pair tables",
 }
 
@@ -162,7 +162,7 @@ def test_what_is_refused_is_read_with_what_the_message_asks_for(tried, form):
 
 
 def test_the_page_has_what_the_commands_say(outcomes, tmp_path):
-    lines = ["| table | outcome | what both commands say |", "|---|---|---|"]
+    lines = ["| table | outcome | output of both commands |", "|---|---|---|"]
     lines += [f"| {kind} | read | {_cell(outcomes[kind].checked.out)} |" for kind in readable()]
     lines += [f"| {kind} | refused | {_cell(outcomes[kind].checked.err)} |" for kind in refused()]
     said = outcomes["suspected"].ran.err.partition("per-obspy: ")[2]

@@ -39,7 +39,7 @@ simulated
 header_peak
     Largest absolute value according to the header, in ``units``.
 processing
-    Notes of the reader, one line each: what was changed, what is doubtful. Later steps follow.
+    Notes of the reader, one line each: changes and doubts. Later steps follow.
 
 A word that a file does not hold is absent: never a guess, never zero. Coordinates 0, 0 are what
 files write for unknown.
@@ -212,7 +212,7 @@ def coordinates(
     Return the group of coordinates, degrees and m.
 
     It is empty where they are unknown or 0, 0. Impossible ones are unknown too, and ``problem``
-    says so; :func:`trace` turns it into a note.
+    describes that; :func:`trace` turns it into a note.
     """
     if latitude is None or longitude is None or (latitude == 0 and longitude == 0):
         return {}

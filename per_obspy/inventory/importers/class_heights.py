@@ -3,7 +3,7 @@ Heights of buildings that have none, from buildings of the same class in the sam
 
 The estimate is the median of the class, and its deviation is that of the class:
 ``height_log_std``. A class needs ``ENOUGH`` known heights; where there are none but storeys, the
-same is done with storeys. Nothing is taken from outside the layer. The known buildings are taken
+same is done with storeys. No value is taken from outside the layer. The known buildings are taken
 for a sample of the class, which they may not be: tall buildings are mapped first.
 """
 
@@ -37,7 +37,7 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
     table : DataFrame
         With ``height``, ``storeys`` or ``period``; cells that are no numbers stay as they are.
     classes : Series
-        Class of each building; a missing one is a class of its own.
+        Class of each building; missing classes form a separate class.
 
     Returns
     -------

@@ -174,7 +174,7 @@ def closing_acceleration(row, j, acceleration):
     """
     Return a bound of the acceleration at which the two sides of a touching interface close.
 
-    Each side is pushed by its own structure, or by one behind it that touches it: the acceleration
+    Each side is pushed by its structure, or by one behind it that touches it: the acceleration
     of structures that move together is a mean of theirs.
     """
     # strongest push from the left
@@ -228,7 +228,7 @@ def close_pressed_interfaces(row, acceleration, slope, duration):
 
 @lean
 def join_cluster(row, first, last):
-    """Give a cluster its common velocity, by momentum."""
+    """Set the common velocity of a cluster, by momentum."""
     common = 0.0
     for i in range(first, last + 1):
         common += mass_share(row, first, last, i) * row[i, V]

@@ -200,9 +200,7 @@ def refused() -> dict[str, Messy]:
         "names in cp1252 or cp1254, English headings": Messy(
             "pairs.csv", text_of(NAMES, named).encode("cp1254")
         ),
-        "a heading that may mean something else": Messy(
-            "pairs.csv", text_of(distance, ROWS).encode()
-        ),
+        "an ambiguous heading": Messy("pairs.csv", text_of(distance, ROWS).encode()),
         "a workbook with two pair tables": Messy(
             "pairs.xlsx", workbook_of({"2025": table, "2026": table})
         ),
@@ -216,7 +214,7 @@ def refused() -> dict[str, Messy]:
 
 
 def suspected() -> Messy:
-    """Return a table whose gaps are in centimetres, under a heading that says nothing of it."""
+    """Return a table whose gaps are in centimetres, under a heading without a unit."""
     rows = [[*row] for row in rows_of({1: 100.0})]
     return Messy("pairs.csv", text_of(NAMES, rows[:1]).encode())
 
