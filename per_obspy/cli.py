@@ -27,10 +27,14 @@ from per_obspy.commands.screen import screen
 from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
+from per_obspy.full_vectors import use_full_vectors
 from per_obspy.machine import machine_fault
 
 #: Exit code after the interrupt key, as of programs that this signal ends.
 INTERRUPTED = 130
+
+#: Commands that compute for long.
+_LONG = {"run", "process", "spectra", "screen", "warm-up"}
 
 #: Errors of writing, rather than of opening files or starting processes.
 _ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -75,6 +79,8 @@ def options(
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
     try:
+        if _LONG.intersection(sys.argv[1:2]):
+            use_full_vectors()
         code = _exit_code()
     except KeyboardInterrupt:
         code = INTERRUPTED
