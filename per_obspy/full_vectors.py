@@ -47,6 +47,7 @@ def wide_processor() -> str:
     """Return the model of an Intel processor with vectors of 512 bits, else an empty text."""
     if platform.machine() != "x86_64" or not PROCESSORS.exists():
         return ""
+    # facts of the first processor
     with PROCESSORS.open(errors="replace") as file:
         text = file.read(DESCRIPTION)
     facts = dict(line.partition(":")[::2] for line in text.split("\n\n")[0].splitlines())

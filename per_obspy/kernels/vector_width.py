@@ -22,6 +22,7 @@ def run_oscillators(steps, table):
     """Advance oscillators over so many steps; ``table`` (8, lanes) holds steps and states."""
     local = np.empty((8, LANES))
     local[:] = table
+    # one push after the other
     for step in range(steps):
         push = 1.0 if step % 8 == 0 else -0.5
         for lane in range(LANES):
@@ -37,6 +38,7 @@ def run_oscillators(steps, table):
 
 def measured_speed() -> float:
     """Return billion multiply-adds per second of processor time."""
+    # a damped oscillator
     table = np.zeros((8, LANES))
     table[0], table[1], table[2], table[3], table[7] = 0.9, 0.1, -0.1, 0.9, 0.5
     run_oscillators(8, table)

@@ -258,6 +258,7 @@ def _raise_velocities(block, checkpoints, tiles, first, windows, best):
     """
     sampled = np.zeros((3, PAIR_LANES))
     highest = np.full((2, PAIR_LANES), -1.0)
+    # What was reached before
     for lane in range(PAIR_LANES):
         sampled[0, lane], sampled[1, lane] = best[lane, 0], best[lane, 1]
     for tile in range(tiles):
