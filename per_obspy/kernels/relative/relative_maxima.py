@@ -81,7 +81,7 @@ def relative_maxima(north, east, dt, pairs, forgotten, both_sides, largest):
     best = np.empty((PAIR_LANES, 3))
     floors = np.empty((2, PAIR_LANES))
     largest[:] = 0.0
-    # Nothing exceeds a maximum that is infinite
+    # No displacement exceeds an infinite maximum
     unwanted = 0.0 if both_sides else np.inf
     largest[1] = unwanted
     pending = _unequal_pairs(pairs)

@@ -1,4 +1,4 @@
-"""The rest of a record is left out only where it changes nothing."""
+"""The rest of a record is left out only where it changes no result."""
 
 import numpy as np
 import pytest
