@@ -50,7 +50,7 @@ def test_histories_are_the_same_bits_as_through_the_whole_record(monkeypatch, wa
     def never_still(*arguments):
         """Return records of which no rest is known to be quiet."""
         found = pair_blocks_records(*arguments)
-        return {n: one._replace(sizes=np.full_like(one.sizes, np.inf)) for n, one in found.items()}
+        return {n: one._replace(sizes=np.full_like(one.sizes, 1e30)) for n, one in found.items()}
 
     pair_blocks_records = pair_blocks.records_in_steps
     monkeypatch.setattr(pair_blocks, "records_in_steps", never_still)
