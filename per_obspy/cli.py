@@ -88,8 +88,6 @@ def options(
 
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
-    if _LONG.intersection(sys.argv[1:2]):
-        use_full_vectors()
     with ending_in_time():
         code = _exit_code()
         if code in SIGNALLED:
@@ -126,6 +124,8 @@ def _failed_output(error: OSError) -> int:
 def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
+        if _LONG.intersection(sys.argv[1:2]):
+            use_full_vectors()
         app()
     except KeyboardInterrupt:
         return INTERRUPTED
