@@ -121,12 +121,17 @@ def _failed_output(error: OSError) -> int:
     return _failed(WriteError("standard output", reason), TRY_LATER)
 
 
+def _compute() -> None:
+    """Run a command, with the widest vectors that pay if it computes for long."""
+    if _LONG.intersection(sys.argv[1:2]):
+        use_full_vectors()
+    app()
+
+
 def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
-        if _LONG.intersection(sys.argv[1:2]):
-            use_full_vectors()
-        app()
+        _compute()
     except KeyboardInterrupt:
         return INTERRUPTED
     except TryLater as error:
