@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test check wheel benchmark clean
+.PHONY: demo figures test check docs wheel benchmark clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -27,6 +27,12 @@ check: .venv/check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: .venv/docs
+	@echo "== build the documentation in output/docs, offline; a warning or a link to nowhere is an error"
+	rm -rf output/docs docs/generated
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -W ignore -m sphinx -q -W --keep-going -b html docs output/docs
+	$(BIN)/python docs/extensions/check_site.py output/docs
 
 wheel: .venv/check
 	@echo "== build the wheel, install it into an empty environment, use it in an empty folder"
@@ -61,4 +67,4 @@ benchmark: .venv/benchmark
 	@touch $@
 
 clean:
-	rm -rf .venv dist output
+	rm -rf .venv dist output docs/generated
