@@ -54,9 +54,10 @@ def faults(site: Path) -> Iterator[str]:
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if not target.exists():
                 yield f"{name}: no {address}"
-            elif target in pages and parts.fragment:
-                if unquote(parts.fragment) not in pages[target].anchors:
-                    yield f"{name}: no anchor {address}"
+                continue
+            anchors = pages[target].anchors if target in pages else set()
+            if target in pages and parts.fragment and unquote(parts.fragment) not in anchors:
+                yield f"{name}: no anchor {address}"
 
 
 def main() -> None:
