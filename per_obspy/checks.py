@@ -12,7 +12,7 @@ from numpy import typing
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
-# named, so that signatures print these names instead of everything that they stand for
+# named, so that signatures print these names instead of the types that they are short for
 ArrayLike = TypeAliasType("ArrayLike", typing.ArrayLike)
 FloatArray = TypeAliasType("FloatArray", NDArray[np.float64])
 

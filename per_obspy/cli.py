@@ -98,7 +98,7 @@ def _end_interrupted() -> None:
 
 
 def _drop_output() -> None:
-    """Drop what is left of the output: the interpreter would write it at its end and complain."""
+    """Drop the rest of the output: the interpreter would write it at its end and complain."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -13,7 +13,7 @@ EARTH_RADIUS = 6_371_008.8
 #: critical.
 REFERENCE_DAMPING = 0.05
 
-#: Days on which clocks stand that were never set: ObsPy's default, and that of GPS receivers.
+#: Dates of clocks that were never set: ObsPy's default, and that of GPS receivers.
 UNSET_DAYS = frozenset({(1970, 1, 1), (1980, 1, 1), (1980, 1, 6)})
 
 #: Grid of stored spectra: dampings as fractions of critical; limits (s) and number of the periods,

@@ -68,7 +68,7 @@ class RecordRejected(PerError, ValueError):
     Parameters
     ----------
     record : str
-        What was refused: a file or the identifier of a trace.
+        Name of a refused file, or identifier of a refused trace.
     *reasons : str
         Every reason, each naming the field and the value.
     """
@@ -90,7 +90,7 @@ class CatalogError(PerError, ValueError):
     source : str
         The file or folder.
     problem : str
-        What is wrong, naming field and value.
+        The fault, naming field and value.
     """
 
     def __init__(self, source: str, problem: str) -> None:
@@ -114,7 +114,7 @@ class MissingExtra(PerError, ImportError):
     extra : str
         Name of the extra that installs them.
     modules : list of str
-        What is missing.
+        Name of the missing library.
     """
 
     def __init__(self, extra: str, modules: list[str]) -> None:
@@ -148,7 +148,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 def reason_of(error: Exception) -> str:
     """
-    Return what an error says; of an error of the operating system without its number and path.
+    Return the message of an error; for one of the operating system without its number and path.
 
     Examples
     --------
@@ -175,7 +175,7 @@ class WriteError(TryLater, OSError):
     path : str
         The file or folder.
     reason : str
-        Why, and what helps.
+        The reason, and the mend.
     """
 
     def __init__(self, path: str, reason: str) -> None:
@@ -193,7 +193,7 @@ class MachineFault(TryLater, OSError):
     Parameters
     ----------
     reason : str
-        What failed, naming the file if there is one.
+        The fault, naming the file if there is one.
     """
 
 
@@ -204,7 +204,7 @@ class Unfinished(TryLater):
     Parameters
     ----------
     *faults : str
-        Name of each task and what failed.
+        Name of each task and its fault.
     """
 
     #: Tasks that the message names.
@@ -245,7 +245,7 @@ class FolderInUse(TryLater, BlockingIOError):
 
 class Rejection(NamedTuple):
     """
-    One row of ``rejected.csv``: something that was left out, with every reason.
+    One row of ``rejected.csv``: a rejected record, pair or file, with every reason.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Atomic writes, removal of what killed processes left, file-type detection and SHA-256 hashes."""
+"""Atomic writes, removal of leftovers of killed processes, detection of file types and SHA-256."""
 
 import errno
 import hashlib
@@ -28,10 +28,10 @@ SIGNATURES = {
     b"<": "an XML or HTML document",
 }
 
-#: Errors of a name that belongs to something else: another name mends them.
+#: Errors of a name that another kind of file has: another name mends them.
 _WRONG_NAMES = {errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ENOTEMPTY}
 
-#: Errors of the machine when writing, and what helps; none is a mistake of program or input.
+#: Errors of the machine when writing, and the mend; none is a mistake of program or input.
 _ROOM = "try again when there is room"
 _RIGHT = "try again with the right to write, or write elsewhere"
 _LATER = "try again later"
@@ -79,7 +79,7 @@ def looks_like(path: Path) -> str:
 
 
 def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
-    """Return why a file is not of the expected kind: its kind, or what its reader found."""
+    """Return why a file is not of the expected kind: its kind, or the finding of its reader."""
     kind = looks_like(path)
     known = kind and expected not in kind
     reason = f"it is {kind}" if known else str(error).partition("; ")[0].rstrip(".")
@@ -89,7 +89,7 @@ def unreadable_reason(path: Path, expected: str, error: Exception) -> str:
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
     """
-    Give a temporary path that is renamed to the final one if the block succeeds, else removed.
+    Yield a temporary path that is renamed to the final one if the block succeeds, else removed.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ def written_whole(path: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        Where to write. It keeps the suffix, because many writers go by it.
+        The final path. It keeps the suffix, because many writers go by it.
 
     Raises
     ------
     CatalogError
-        If the name or its folder is that of something else.
+        If the name or its folder is that of another kind of file.
     WriteError
         If the folder cannot be made or written to, or the disk is full.
 
@@ -156,21 +156,21 @@ def _remove_part(part: Path) -> None:
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """
-    Turn a failure to write into one line that names the file, the reason and what helps.
+    Turn a failure to write into one line that names the file, the reason and the mend.
 
-    Libraries that write have errors of their own when the disk is full (HDF5 and netCDF, DuckDB,
+    Libraries that write have separate errors when the disk is full (HDF5 and netCDF, DuckDB,
     GDAL, libxml2): such an error counts as a failure to write if its message is that of the
     operating system, or if no file of some size can be written in the same folder.
 
     Parameters
     ----------
     path : Path
-        What is written.
+        The file to write.
 
     Raises
     ------
     CatalogError
-        If the name or its folder is that of something else.
+        If the name or its folder is that of another kind of file.
     WriteError
         If the machine cannot write.
     """
@@ -198,7 +198,7 @@ def _failed_write(path: Path, error: OSError) -> PerError | None:
     reason = os.strerror(error.errno) if error.errno else ""
     if error.errno in UNWRITABLE:
         return WriteError(str(path), f"{reason}; {UNWRITABLE[error.errno]}")
-    # The folder is named where its own name is the wrong one
+    # The folder is named where its name is the wrong one
     if error.errno in _WRONG_NAMES:
         place = f"{path.parent}: " if not path.parent.is_dir() else ""
         return CatalogError(str(path), f"cannot be written: {place}{reason}")

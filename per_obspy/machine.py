@@ -1,4 +1,4 @@
-"""Faults of the machine, told from faults of the data by the type of the error."""
+"""Distinguish faults of the machine from faults of the data by the type of the error."""
 
 import errno
 import math
@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from per_obspy.errors import MachineFault, TryLater
 
-#: Errors of the operating system that pass or have nothing to do with what a file holds.
+#: Errors of the operating system that pass or do not depend on the contents of a file.
 PASSING = {
     *(errno.EIO, errno.ENXIO, errno.ENODEV, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG),
     *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN, errno.EBUSY, errno.EINTR),
@@ -21,7 +21,7 @@ def machine_fault(error: BaseException, missing: bool = True) -> MachineFault | 
     Return the fault of the machine that an error is or was raised from; None if there is none.
 
     Short memory and failures of devices and services are faults of the machine, and so is a file
-    that has vanished. Memory beyond what the machine has is asked for by damaged data only.
+    that has vanished. Memory beyond that of the machine is asked for by damaged data only.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _causes(error: BaseException) -> Iterator[BaseException]:
     """Yield an error and the errors from which it was raised."""
     cause: BaseException | None = error
     while cause is not None:
-        # What passes later is known by its own class
+        # Faults that pass later have a separate class
         if isinstance(cause, TryLater) and not isinstance(cause, MachineFault):
             return
         yield cause

@@ -40,7 +40,7 @@ def code_problem(*codes: str) -> str:
     >>> code_problem("XX", "../victim")
     "station code '../victim': expected letters, digits, - and _ only"
     """
-    # Length first: nothing long is searched or shown
+    # Length first: a long text is neither searched nor shown
     for kind, code in zip(_CODES, codes, strict=False):
         if len(code) > LONGEST_CODE:
             problem = f"has {len(code)} letters, expected {LONGEST_CODE} or fewer"
@@ -59,7 +59,7 @@ def inside(folder: Path, name: str) -> Path:
     Parameters
     ----------
     folder : Path
-        Which need not exist yet.
+        The file, which need not exist yet.
     name : str
         Path seen from the folder, with ``/`` between folders.
 

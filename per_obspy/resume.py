@@ -82,7 +82,7 @@ def changed_outputs(path: Path, status: Status) -> list[Path]:
 
 
 def _is_near(path: Path, file: Path) -> bool:
-    """Return whether an output is in the folder of its status file, or in one beside it."""
+    """Return whether an output is in the folder of its status file, or in a folder next to it."""
     try:
         return file.resolve().is_relative_to(path.parent.resolve().parent)
     except (OSError, ValueError):  # a name that no file can have

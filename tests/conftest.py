@@ -1,4 +1,4 @@
-"""What several test modules share: where the real records are."""
+"""Shared by several test modules: the place of the real records."""
 
 import os
 import sys
@@ -19,7 +19,7 @@ CHECKOUT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of real records: PER_OBSPY_DATA, or ``shared/data`` beside the checkout."""
+    """Folder of real records: PER_OBSPY_DATA, or ``shared/data`` next to the checkout."""
     folder = Path(os.environ.get("PER_OBSPY_DATA", CHECKOUT.parent / "shared" / "data"))
     if not folder.is_dir():
         pytest.skip(f"real records are not at {folder}: set PER_OBSPY_DATA")

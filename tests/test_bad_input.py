@@ -1,8 +1,8 @@
 """
 Every kind of wrong file and value through the command line.
 
-What is wrong as a whole ends in exit code 2 and one line that names the file and what is wrong in
-it; a wrong row is told with its line and all its reasons, and the others go on. The rooms' own
+A fault of a whole input ends in exit code 2 and one line that names the file and the fault in
+it; a wrong row is listed with its line and all its reasons, and the others go on. The rooms'
 tests go into detail.
 """
 
@@ -208,7 +208,7 @@ WHOLE = {
     "a period twice": (
         {"code.csv": CURVE + "1.0,0.05,0.2\n"},
         "screen design.toml",
-        "period = 1, damping = 0.05 stands twice",
+        "period = 1, damping = 0.05 occurs twice",
     ),
     "PDF as spectrum": (
         {"code.csv": PDF},
@@ -299,7 +299,7 @@ WHOLE = {
 
 @pytest.fixture
 def write(tmp_path, monkeypatch):
-    """Write files into the current folder, beside those that are right."""
+    """Write files into the current folder, next to correct ones."""
     monkeypatch.chdir(tmp_path)
 
     def write(files):
@@ -361,7 +361,7 @@ ROWS = {
     ),
     "28 m floor": ({"storeys_1": 1, "height_1": 28}, "makes floors of 28 m"),
     "unknown system": ({"system_1": "paper"}, "system_1 = 'paper' is unknown"),
-    "same name": ({"pair_id": "a"}, "pair_id = 'a' stands in an earlier row"),
+    "same name": ({"pair_id": "a"}, "pair_id = 'a' occurs in an earlier row"),
     "same building": (
         {"building_id_1": "h", "building_id_2": "h"},
         "a building has no gap to itself",

@@ -1,4 +1,4 @@
-"""Errors say file and field in one line, and are the built-in errors they amount to."""
+"""Errors name file and field in one line, and are the built-in errors they amount to."""
 
 import pickle
 

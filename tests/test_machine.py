@@ -1,4 +1,4 @@
-"""Faults of the machine and of the data are told apart by the type of the error."""
+"""Faults of the machine and of the data differ by the type of the error."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""The README's Python runs, and prints what it says."""
+"""The README's Python runs, and prints the documented output."""
 
 import re
 from pathlib import Path

@@ -55,7 +55,7 @@ def work(folder):
 
 
 def is_change(event, arguments, folder):
-    """Return whether an audit event changes something in a folder."""
+    """Return whether an audit event changes a file of a folder."""
     if event not in CHANGES or not str(arguments[0]).startswith(str(folder)):
         return False
     return event != "open" or bool(set(arguments[1] or "") & set("wax+"))
@@ -75,7 +75,7 @@ def has_whole_outputs(folder):
 
 
 class Fault:
-    """An audit hook that raises at the n-th change of a folder, and later does nothing."""
+    """An audit hook that raises at the n-th change of a folder, and is silent later."""
 
     def __init__(self):
         self.folder, self.left, self.error = None, 0, None

@@ -83,7 +83,7 @@ class Network(NamedTuple):
 
 def cases(event: int, stations: int, hidden: int, count: int) -> pd.DataFrame:
     """
-    Return pairs of one earthquake: what the risk table tells of them, and whether they ``pounded``.
+    Return pairs of one earthquake: columns of the risk table, and whether they ``pounded``.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def _true_pairs(rows: pd.DataFrame, generator: np.random.Generator) -> pd.DataFr
 
 
 def _arguments(pairs: pd.DataFrame) -> Iterator[FloatArray]:
-    """Give the arguments of a pounding history in their order."""
+    """Yield the arguments of a pounding history in their order."""
     for i in (1, 2):
         yield from (values(pairs, f"{name}_{i}") for name in ("period", "damping", "contact_mass"))
     yield from (values(pairs, name) for name in ("gap", "restitution"))

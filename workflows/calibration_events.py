@@ -132,7 +132,7 @@ def _component(path: Path, row: dict[str, str], code: str, parameters: str) -> S
 
 
 def _spectra(name: str, stream: Stream) -> dict[str, xr.Dataset]:
-    """Return the spectra of two components, the shorter one with zeros at its end; or nothing."""
+    """Return the spectra of two components, the shorter one with zeros at its end; or None."""
     if len(stream) != 2:
         return {}
     longest = max(trace.stats.npts for trace in stream)

@@ -20,7 +20,7 @@ FEWEST = 30  # pairs of a bin that is drawn
 
 def draw_reliability(places: Sequence[tuple[str, pd.DataFrame]], path: Path) -> None:
     """
-    Draw share that pounded against probability, and below how often each probability was told.
+    Draw share that pounded against probability, and below how often each probability occurs.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def difference(pairs: pd.DataFrame) -> tuple[float, float]:
 
 
 def kind_table(pairs: pd.DataFrame) -> Iterator[str]:
-    """Yield one row a kind of pair."""
+    """Yield one row per kind of pair."""
     yield (
         "| pairs | number | predicted | pounded | difference "
         "| Brier score | if true | of the share | sharp |"

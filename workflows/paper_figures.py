@@ -1,8 +1,8 @@
 """
 The figures of the paper, on Mexico City 1985 (SCT, EW) and on Taft 1952, in less than a minute.
 
-Where the real records are absent (see PER_OBSPY_DATA), a simulated record on a lakebed stands in
-for them.
+Where the real records are absent (see PER_OBSPY_DATA), a simulated record on a lakebed replaces
+them.
 """
 
 import argparse

@@ -394,7 +394,7 @@ def _figure(
 
 
 def _shades(count: int) -> list[tuple[float, float, float, float]]:
-    """Return colours from dark to light that colour-blind readers tell apart."""
+    """Return colours from dark to light that colour-blind readers can distinguish."""
     return [
         (0.0, 0.2 + 0.6 * share, 0.5 + 0.2 * share, 1.0) for share in np.linspace(0.0, 1.0, count)
     ]

@@ -153,7 +153,7 @@ def drawn(station: xr.Dataset, pair: pd.Series, random: np.random.Generator) -> 
 
 
 def compared(events: tuple[str, ...]) -> pd.DataFrame:
-    """Return populations beside draws, of all pairs at all stations of some events."""
+    """Return populations next to draws, of all pairs at all stations of some events."""
     rows = []
     for event in events:
         for station in stations(event):

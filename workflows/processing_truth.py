@@ -58,7 +58,7 @@ class Outcome(NamedTuple):
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """Which periods are usable."""
+        """Mask of the usable periods."""
         return (self.shortest <= PERIODS) & (self.longest >= PERIODS)
 
 

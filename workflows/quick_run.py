@@ -3,7 +3,7 @@ From two folders to a table: a recorded session, written as docs/quick_run.md.
 
 Run it as ``python workflows/quick_run.py``; real data are those of PER_OBSPY_DATA, else of
 ``../shared/data``. The records are those of Ridgecrest 2019 (M7.1). The outlines are a quarter of
-San José that is moved to Ridgecrest, so that records and buildings meet: what comes out is said of
+San José that is moved to Ridgecrest, so that records and buildings meet: the results hold for
 no town.
 """
 

@@ -117,7 +117,7 @@ def page(groups: dict[str, list[Record]], pairs: np.ndarray) -> Iterable[str]:
 
 
 def main() -> None:
-    """Print the tables and write them into the page, below what is said there by hand."""
+    """Print the tables and write them into the page, below its text by hand."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=CHECKOUT / "docs" / "reliability.md")
     parser.add_argument(

@@ -1,5 +1,5 @@
 """
-What pairs alone miss: amplification in the row over amplification in the pair, by position.
+Ratio of the amplification in the row to that in the pair alone, by position.
 
 ``python workflows/rows_and_pairs.py [BUILDINGS] [GAP]`` draws rows of three to seven buildings
 against a made-up record. For rows of an inventory call `row_over_pair` with them and the motion of

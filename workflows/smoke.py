@@ -1,4 +1,4 @@
-"""The installed package at work in a folder that holds nothing else."""
+"""The installed package at work in an otherwise empty folder."""
 
 import numpy as np
 

@@ -3,7 +3,7 @@ Compare estimates for yielding pairs with the exact demand, in simulated motion 
 
 Run: ``python workflows/yielding_estimates.py``; prints the table of docs/screening.md: median of
 estimate / exact, sigma of its logarithm, share that is too small, and share where the linearization
-says that it found no ductility.
+found no ductility.
 """
 
 import argparse
@@ -34,7 +34,7 @@ ESTIMATES = {
 
 
 def simulated(stations: int) -> Iterator[tuple[str, xr.Dataset]]:
-    """Give the stations of the demonstration's earthquake with the name of their ground."""
+    """Yield the stations of the demonstration's earthquake with the name of their ground."""
     scenario = load(CHECKOUT / "catalogs" / "demo" / "scenario.toml", Simulation).scenario
     stream = simulate(scenario.model_copy(update={"stations": stations})).stream
     for name in sorted({trace.stats.station for trace in stream}):
@@ -43,7 +43,7 @@ def simulated(stations: int) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def mexico_city_1985() -> Iterator[tuple[str, xr.Dataset]]:
-    """Give the station SCT, if its record is at hand."""
+    """Yield the station SCT, if its record is available."""
     path = data_folder() / "records" / "mexico1985_sct" / "sct190985.txt"
     if path.exists():
         place = {"network": "MX", "station": "SCT", "latitude": 19.393, "longitude": -99.147}

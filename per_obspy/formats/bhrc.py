@@ -100,7 +100,7 @@ def _size(text: Text, first: int) -> tuple[int, float]:
     if points is None:
         refuse(text, line, "number of points", f"{quoted(text, line)} gives none")
     samples = count(text, line, "number of points", points[1])
-    # The rate has a line of its own among the numbers
+    # The rate is on a separate line among the numbers
     line = first + _RATE_LINE
     rate = finite_number(text, line, "sampling rate", text.lines[line][:_WIDTH])
     duration = float(points[2])
@@ -114,7 +114,7 @@ def _station(lines: list[str], epicentre: dict[str, Any]) -> dict[str, Any]:
     """Return code, name, coordinates, instrument and direction of a component."""
     station = _STATION.match(lines[7])
     name = station[1] if station else None
-    # The model has a line of its own
+    # The model is on a separate line
     instrument = {
         "model": lines[1].partition("=")[2].strip() or None,
         **sensor_constants(_SENSOR.match(lines[9])),

@@ -151,7 +151,7 @@ def _header(text: Text, first: int, text_lines: int) -> _Header:
     # A line announces the number of comments, which may be 0
     comments = _COMMENTS.match(line_at(text, line, "comments"))
     if comments is None:
-        problem = f"{quoted(text, line, 40)} does not say how many lines follow"
+        problem = f"{quoted(text, line, 40)} does not contain the number of lines that follow"
         refuse(text, line, "comments", problem)
     stop = line + 1 + int(comments[1])
     line_at(text, stop, "samples")
@@ -256,7 +256,7 @@ def _origin(text: Text, header: _Header) -> UTCDateTime | None:
 
 
 def _vs30(header: _Header) -> float | None:
-    """Return Vs30, m/s, where the geology of the site or a comment says it in words."""
+    """Return Vs30, m/s, from the words of the site's geology or of a comment."""
     for line in (header.text_lines[5], *header.comments):
         if found := _VS30.search(line):
             return float(found[1])

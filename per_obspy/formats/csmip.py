@@ -124,7 +124,7 @@ def _volume_2_channel(text: Text, first: int) -> tuple[Trace, int]:
     header = read_header(text, first + 1, _VOLUME_2_LINES, _VOLUME_2_REALS)
     title = line_at(text, header.next_line, "title of acceleration").upper()
     if "CM/SEC2" not in title and "CM/SEC/SEC" not in title:
-        refuse(text, header.next_line, "unit", f"{title.strip()!r} does not say cm/sec2")
+        refuse(text, header.next_line, "unit", f"{title.strip()!r} does not name cm/sec2")
     # Velocity and displacement follow the acceleration and must be whole
     values, dt, line = titled_block(text, header.next_line, "ACCEL", 8, 10)
     for kind in ("VELOC", "DISPL"):
@@ -194,7 +194,7 @@ def read_spectra(file: WaveformFile) -> tuple[OfficialSpectra, ...]:
     Raises
     ------
     RecordRejected
-        If the file is no volume 3 or lacks what its header promises.
+        If the file is not a volume 3 or lacks parts that its header announces.
     """
     text = read_text(file)
     if not text.lines[0].upper().startswith("RESPONSE AND FOURIER AMPLITUDE SPECTRA"):

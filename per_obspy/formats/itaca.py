@@ -50,7 +50,7 @@ def read_itaca(file: WaveformFile, **_unused: Any) -> Stream:
     fields = read_fields(text, _HEADER_LINES - 1)
     unit = line_at(text, _HEADER_LINES - 1, "unit")
     if "m/s/s" not in unit:
-        problem = f"{quoted(text, _HEADER_LINES - 1)} does not say m/s/s"
+        problem = f"{quoted(text, _HEADER_LINES - 1)} does not name m/s/s"
         refuse(text, _HEADER_LINES - 1, "unit", problem)
     values = _samples(text, count_field(text, fields, "Number of Data"))
     # Words of the header

@@ -100,7 +100,7 @@ def _station(text: Text, fields: Fields, epicentre: dict[str, Any]) -> dict[str,
     """Return codes, name, coordinates and instrument of the station."""
     elevation = number_field(text, fields, "STATION ALTITUDE (m)")
     angles = _angles(fields, "STATION COORDINATES")
-    # The recorder, not the sensor, is what the header names
+    # The header names the recorder, not the sensor
     recorder = {
         "model": text_field(fields, "RECORDER TYPE"),
         "serial": text_field(fields, "RECORDER SERIAL NO"),

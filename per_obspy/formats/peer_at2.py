@@ -121,7 +121,7 @@ def _corners(text: Text) -> dict[str, float]:
     for letter, corner in _POINTS.findall(text.lines[2].upper()):
         corners[{"H": "highpass", "L": "lowpass"}[letter]] = float(corner)
     for sign, poles, corner in _POLES.findall(text.lines[3].upper()):
-        # No poles: nothing was filtered here, but a low-pass corner may be that of earlier
+        # No poles: no filter was applied here, but a low-pass corner may be that of earlier
         # processing, as of digitized film; the cautious answer keeps it
         if sign == "-" and int(poles) > 0:
             corners["highpass"] = float(corner)

@@ -94,7 +94,7 @@ def _volume_2(text: Text, first: int) -> tuple[Trace, int]:
     line_at(text, line, "samples")
     words = _words(text, first + 1)
     if "CM/SEC/SEC" not in text.lines[line]:
-        refuse(text, line, "unit", f"{quoted(text, line)} does not say cm/sec/sec")
+        refuse(text, line, "unit", f"{quoted(text, line)} does not name cm/sec/sec")
     # Velocity and displacement follow the acceleration and must be whole
     values, dt, line = titled_block(text, line, "ACC", 8, 10)
     for kind in ("VEL", "DIS"):

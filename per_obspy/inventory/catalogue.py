@@ -107,7 +107,7 @@ def stored_inventories(index: str | Path) -> tuple[StoredInventory, ...]:
     names = [entry.name for entry in entries]
     for name in names:
         if names.count(name) > 1:
-            raise CatalogError(str(index), f"name = {name!r} stands more than once")
+            raise CatalogError(str(index), f"name = {name!r} occurs more than once")
     return entries
 
 

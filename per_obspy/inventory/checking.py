@@ -36,7 +36,7 @@ LONGEST_NAME = 200
 #: The only column of numbers that may hold truth values: whether pounding was seen.
 OBSERVED = "observed"
 
-#: Position of a row in the table, and what is wrong with it.
+#: Position of a row in the table, and the reason for its rejection.
 Fault = tuple[int, str]
 
 
@@ -140,7 +140,7 @@ def _check_names(names: Sequence[str], source: str) -> None:
         if any(category(letter) in ("Cc", "Cs") for letter in name):
             raise CatalogError(source, f"column {name!r} has a control character in its name")
         if counts[name] > 1:
-            raise CatalogError(source, f"column {name} stands more than once")
+            raise CatalogError(source, f"column {name} occurs more than once")
 
 
 def _converted(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -192,7 +192,7 @@ def _texts(column: Column, values: pd.Series) -> tuple[pd.Series, list[Fault]]:
 
 def _numbers(column: Column, values: pd.Series) -> tuple[FloatArray, list[Fault]]:
     """Return float64, NaN in empty cells, and the faults of cells without a number in range."""
-    # Cells that were read as numbers; what was seen may be true or false
+    # Cells that were read as numbers; `observed` may be true or false
     is_truth = pd.api.types.is_bool_dtype(values.dtype)
     if is_number(values) or (is_truth and column.name == OBSERVED):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -246,7 +246,7 @@ def _out_of_range(column: Column, number: FloatArray) -> list[Fault]:
 def _duplicates(identifiers: pd.Series, repeated: ArrayLike) -> Iterator[Fault]:
     """Yield rows whose ``pair_id`` an earlier row has."""
     for i in _rows(np.asarray(repeated) & (identifiers != "").to_numpy()):
-        yield i, f"pair_id = {identifiers.iloc[i]!r} stands in an earlier row already"
+        yield i, f"pair_id = {identifiers.iloc[i]!r} occurs in an earlier row already"
 
 
 def _sizes(pairs: pd.DataFrame) -> Iterator[Fault]:
@@ -300,7 +300,7 @@ def _separations(pairs: pd.DataFrame) -> Iterator[Fault]:
     north = latitude_2 - latitude_1
     east = (longitude_2 - longitude_1 + 180.0) % 360.0 - 180.0
     distance = METRES_PER_DEGREE * np.hypot(north, east * np.cos(np.deg2rad(latitude_1)))
-    # Positions outside the range of the schema have a fault of their own
+    # Positions outside the range of the schema are a separate fault
     in_range = [np.abs(numbers_in(pairs, name)) <= COLUMNS[name].high for name in names]
     is_far = np.all(in_range, axis=0) & (distance > LARGEST_SEPARATION)
     for i in _rows(is_far):

@@ -227,7 +227,7 @@ def _add_participation(columns: Columns, derived: Derived, pairs: pd.DataFrame, 
 
 
 def _add_floor_offset(columns: Columns, derived: Derived, pairs: pd.DataFrame) -> None:
-    """Add the floor offset, m, NaN unless heights and storeys of both buildings are given."""
+    """Add the floor offset, m; NaN unless heights and storeys of both buildings are known."""
     storeys_1, height_1, _ = _size(columns, 1)
     storeys_2, height_2, _ = _size(columns, 2)
     offset = floor_offset(height_1, storeys_1, height_2, storeys_2)
@@ -244,7 +244,7 @@ def _size(columns: Columns, i: int) -> tuple[FloatArray, FloatArray, NDArray[np.
 
 
 def _contact_on(columns: Columns, height: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
-    """Return the contact height on a building, at most its own height, m; 1 where unknown."""
+    """Return the contact height on a building, at most the height of it, m; 1 where unknown."""
     return np.where(known, np.fmin(columns["contact_height"], height), 1.0)
 
 

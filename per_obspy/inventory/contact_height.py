@@ -2,7 +2,7 @@
 The oscillator of a building: participation, generalised and effective mass, misaligned floors.
 
 Equal floor masses and a first mode that grows linearly with height are assumed; for a building with
-a model of its own use ``shear_building.equivalent_sdof``.
+a structural model use ``shear_building.equivalent_sdof``.
 """
 
 import numpy as np

@@ -11,7 +11,7 @@ GAP = "gap"
 #: Neighbours are sought within about this gap, m: if most gaps are wider, the unit is another one.
 WIDE_GAP = 3.0
 
-#: Fewest gaps of whole metres, and nothing else, that suggest centimetres: surveys in metres have
+#: Fewest gaps, all in whole metres, that suggest centimetres: surveys in metres have
 #: decimals.
 FEWEST_WHOLE = 5
 

@@ -72,7 +72,7 @@ def asce7_period(height: ArrayLike, system: ArrayLike) -> FloatArray:
     Compute the median period ``ratio * C h**x`` with the coefficients of ASCE 7.
 
     For moment frames this is the best fit of Goel & Chopra (1.25 and 1.13 times the code's lower
-    bound). For the other systems it is the code's own value, which is a lower bound
+    bound). For the other systems it is the value of the code, which is a lower bound
     (unverified as a median).
 
     Parameters

@@ -25,7 +25,7 @@ EMPTY = frozenset({"", "na", "n/a", "nan", "none", "null", "<na>", "-"})
 #: Place of the pair in its row of houses: ``end`` if either building has no further neighbour.
 POSITIONS = ("end", "inside")
 
-#: Where the deviation of a gap comes from: it is known, or a default stands in for it.
+#: Source of a gap's standard deviation: a known value or an assumed default.
 DEVIATION_SOURCES = ("given", "assumed")
 
 #: Whether both buildings are within one property.
@@ -93,7 +93,7 @@ _PAIR = (
            low=-20.0, high=20.0),
     Column("facing_length", "float64", "m", "length over which the walls face each other",
            low=0.0, high=1000.0),
-    Column("position", "str", "", "whether the pair stands at the end of its row of buildings",
+    Column("position", "str", "", "whether the pair is at the end of its row of buildings",
            choices=POSITIONS),
     Column("same_property", "str", "",
            "whether both buildings are within one property; code rules take the larger gap where "
@@ -115,7 +115,7 @@ _BUILDING = (
            hint="metres of a projection?"),
     Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
            hint="longitude and latitude swapped, or metres of a projection?"),
-    Column("position", "str", "", "whether the building stands at the end of its row of buildings",
+    Column("position", "str", "", "whether the building is at the end of its row of buildings",
            choices=POSITIONS),
     Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
            hint="metres above ground expected"),

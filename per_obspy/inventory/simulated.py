@@ -133,7 +133,7 @@ class _Rows(NamedTuple):
 
 def _rows(seed: int, count: int) -> _Rows:
     """Return which pairs go on from the one before."""
-    # Random numbers of their own: those of buildings and places stay as they were
+    # Separate random numbers, so that those of buildings and places do not change
     drawn = np.random.default_rng([seed, 1]).random(count)
     goes_on = drawn < STRAIGHT + CORNER
     goes_on[0] = False
@@ -143,7 +143,7 @@ def _rows(seed: int, count: int) -> _Rows:
 
 
 def _names(rows: _Rows) -> Columns:
-    """Return identifiers of the buildings, and whether a pair stands at the end of its row."""
+    """Return identifiers of the buildings, and whether a pair is at the end of its row."""
     # Each pair has a new building 2, and the first of a row a new building 1
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
     straight = rows.goes_on & ~rows.turns

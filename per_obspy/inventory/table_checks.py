@@ -1,7 +1,7 @@
 """
 Checks of a pair table as a whole: ranges of its columns, derived and unused columns, odd units.
 
-They find what is possible row by row but odd for the table, and change no row.
+They find rows that are possible one by one but unusual for the table, and change no row.
 """
 
 from collections import Counter

@@ -54,7 +54,7 @@ def combined_dispersion_correlation(
         Dispersion of each radius that each source alone causes, dimensionless.
     correlations : (..., n_sources) array_like
         Of each source between the two structures: shared ground motion near 1 (the correlation of
-        spectral ordinates at two periods), own periods and dampings 0; dimensionless.
+        spectral ordinates at two periods), periods and dampings of the buildings 0; dimensionless.
 
     Returns
     -------

@@ -111,8 +111,8 @@ def transfer_energies(
     -----
     With the impulse ``J = (1 + e) m1 m2/(m1 + m2) (v1 - v2)``: ``E_Tr12 = J (v1 + v1')/2`` and
     ``E_Tr21 = -J (v2 + v2')/2``. The printed (9) and (10) have the opposite sign: they are the
-    kinetic energies that the structures gain, which contradicts the paper's own energy balance (3),
-    (4).
+    kinetic energies that the structures gain, which contradicts the energy balance (3) of the
+    paper, (4).
 
     References
     ----------

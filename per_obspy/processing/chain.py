@@ -84,8 +84,8 @@ def process_station(
     Parameters
     ----------
     stream : iterable of obspy Trace
-        All channels of one station, unchanged by it. From :func:`.notes.taken`, so that nobody else
-        holds them, raw records leave memory on the way.
+        All channels of one station, unchanged by it. From :func:`.notes.taken`, so that no other
+        code holds them, raw records leave memory on the way.
     settings : Processing
         Every number of the chain.
     event : obspy Event, optional

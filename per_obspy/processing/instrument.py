@@ -36,7 +36,7 @@ def process_instrument(
     Process the components of one instrument and return a row for each that is left out.
 
     Every step is done for one component at a time, and each leaves memory when its next form is
-    there, if nobody else holds it.
+    there, if no other code holds it.
 
     Parameters
     ----------
@@ -155,13 +155,13 @@ def _filter_steps(settings: Processing) -> tuple[Step, ...]:
 
 
 def _padded_and_filtered(stream: Stream, order: int) -> Stream:
-    """Return the padded and filtered record, by its own corners."""
+    """Return the padded and filtered record, by the corners of its component."""
     highpass, lowpass = stream[0].stats.per_obspy.highpass, stream[0].stats.per_obspy.lowpass
     return filtered(padded(stream, highpass, order), highpass, lowpass, order)
 
 
 def _low_passed(stream: Stream, order: int) -> Stream:
-    """Return the record low-passed at its own corner."""
+    """Return the record low-passed at the corner of its component."""
     return filtered(stream, 0.0, stream[0].stats.per_obspy.lowpass, order)
 
 

@@ -29,7 +29,7 @@ VELOCITY_BAND, ACCELERATION_BAND = (0.005, 0.01), (-2.0, -1.0)
 NYQUIST_BAND = (0.8, 0.9)
 
 
-#: Most seconds of zeros behind a record: what the filter moves is much shorter.
+#: Most seconds of zeros behind a record: the response of the filter is much shorter.
 LONGEST_PAD = 3600.0
 
 
@@ -74,7 +74,7 @@ def in_acceleration(stream: Stream, gain_tolerance: float) -> Stream:
 
 
 def _convert(trace: Trace, tolerance: float) -> None:
-    """Convert a step's own copy from counts to m/s2."""
+    """Convert the copy of a step from counts to m/s2."""
     response = trace.stats.get("response")
     if response is None or response.instrument_sensitivity is None:
         _multiply_calibration(trace)
@@ -137,7 +137,7 @@ def _divide_sensitivity(trace: Trace, response: Response) -> None:
 def _deconvolve(trace: Trace, low: tuple[float, float]) -> None:
     """Divide by the response in the frequency domain; the pre-filter rises in a low band, Hz."""
     band = _pre_filter(low, trace.stats.sampling_rate / 2)
-    # Zeros behind the record take up what the filter moves around
+    # Zeros behind the record take up samples that the filter moves around
     count, dt = trace.stats.npts, trace.stats.delta
     length = next_fast_len(count + min(count, round(LONGEST_PAD / dt)), real=True)
     step = 1 / (length * dt)

@@ -29,7 +29,7 @@ def by_blocks(
     running: Callable[[FloatArray], FloatArray], values: FloatArray, margin: int
 ) -> FloatArray:
     """
-    Return what a running filter makes of values, block by block.
+    Return the output of a running filter, block by block.
 
     SciPy's filters hold three copies of a series.
 

@@ -23,7 +23,7 @@ def noted(trace: Trace, step: str, **numbers: Value) -> None:
     Parameters
     ----------
     trace : obspy Trace
-        Changed in place: always the step's own copy.
+        Changed in place: always the copy of the step.
     step : str
         Short description; appended to ``stats.processing``.
     **numbers : str, float or int
@@ -34,7 +34,7 @@ def noted(trace: Trace, step: str, **numbers: Value) -> None:
 
 
 def remembered(trace: Trace, **numbers: Value) -> None:
-    """Store numbers of a record in ``stats.per_obspy`` of a step's own copy; see `noted`."""
+    """Store numbers of a record in ``stats.per_obspy`` of the copy of a step; see `noted`."""
     trace.stats.setdefault("per_obspy", AttribDict()).update(numbers)
 
 
@@ -50,7 +50,7 @@ def is_processed(trace: Trace) -> bool:
 
 def copied(stream: Iterable[Trace]) -> Stream:
     """
-    Return traces with notes of their own that share samples and ``stats.response`` with the others.
+    Return traces with separate notes that share samples and ``stats.response`` with the others.
 
     Neither is ever changed in place: a step that changes samples assigns new ones. Copies of a day
     of three components took gigabytes, those of the response a quarter of the whole chain.
@@ -80,8 +80,8 @@ def taken(stream: Stream) -> Iterator[Trace]:
     """
     Yield the traces of a stream while taking them out of it.
 
-    Whoever is given them is their only owner, so that a record of a day leaves memory as soon as
-    its next form is there.
+    The caller that receives them is their only owner, so that a record of a day leaves memory as
+    soon as its next form is there.
     """
     while stream:
         yield stream.pop(0)

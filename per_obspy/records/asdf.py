@@ -165,7 +165,7 @@ def _opened(path: Path) -> Iterator[netCDF4.Dataset]:
 
 
 def _damage(error: Exception) -> str:
-    """Return what is wrong with a file on one line."""
+    """Return the fault of a file on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -38,14 +38,14 @@ class Place(NamedTuple):
 
 
 def table_of(station: Station) -> str:
-    """Return the name of the table from which a description of a station was made, else nothing."""
+    """Return the name of the table that describes a station, or an empty text."""
     names = (str(comment.value or "").partition(SOURCE) for comment in station.comments)
     return next((name for before, mark, name in names if mark and not before), "")
 
 
 def place_noted(trace: Trace, places: Sequence[Place]) -> None:
     """
-    Give a trace the coordinates of the first source that knows them.
+    Set the coordinates of a trace from the first source that has them.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def place_noted(trace: Trace, places: Sequence[Place]) -> None:
     """
     stats = trace.stats
     header = stats.pop("coordinates", None)
-    # A record that this package processed says itself where its coordinates came from
+    # A record that this package processed contains the source of its coordinates
     source = stats.pop("coordinates_source", HEADER)
     earlier = stats.pop("coordinates_conflict", "")
     known = [place for place in places if place.source != STATIONXML]

@@ -66,7 +66,7 @@ def portable(file: EventFile) -> EventFile:
     Return an event file whose event can be sent to other processes.
 
     Its event holds one origin and at most one magnitude, the preferred ones: ObsPy keeps which are
-    preferred in a table of its own process, so that a pickled event may lack them.
+    preferred in a table of the process, so that a pickled event may lack them.
     """
     event = file.event
     origin = event.preferred_origin() or event.origins[0]

@@ -84,7 +84,7 @@ def find_stations(
         A StationXML file, or a folder of them, in addition. FDSN station text or a table of
         stations (CSV) does where only coordinates are missing.
     limits : Archives
-        What archives may unpack to.
+        Limits of unpacking.
 
     Raises
     ------
@@ -218,7 +218,7 @@ def read_station(
     start, end : UTCDateTime, optional
         Read only this window, for files that hold a day.
     limits : Archives
-        What archives may unpack to.
+        Limits of unpacking.
 
     Returns
     -------

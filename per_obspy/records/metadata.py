@@ -61,7 +61,7 @@ def with_metadata(trace: Trace, inventory: Inventory | None) -> Trace:
     if channel is not None:
         _describe(result, channel)
     elif "units" not in result.stats:
-        problem = f"{_missing(trace, inventory)}, so what its samples measure is unknown"
+        problem = f"{_missing(trace, inventory)}, so the unit of its samples is unknown"
         raise RecordRejected(trace.id, problem)
     # Place and ground belong to the station, which may be known without the channel
     place_noted(result, _places(result, inventory, channel))
@@ -203,7 +203,7 @@ def _quantity(trace: Trace, unit: str | None) -> str:
     """Return the quantity that an instrument measures, from the input unit of its response."""
     if str(unit).upper() not in _QUANTITIES:
         raise RecordRejected(
-            trace.id, f"StationXML says that the instrument measures {unit!r}, not ground motion"
+            trace.id, f"the instrument measures {unit!r} by its StationXML, not ground motion"
         )
     return _QUANTITIES[str(unit).upper()]
 
@@ -242,9 +242,7 @@ def _ground(trace: Trace, inventory: Inventory | None) -> dict[str, str | float]
     if "vs30" in words:
         vs30 = words["vs30"]
         if not vs30.replace(".", "", 1).isdecimal() or not float(vs30):
-            raise RecordRejected(
-                trace.id, f"StationXML says vs30={vs30}, which is no velocity in m/s"
-            )
+            raise RecordRejected(trace.id, f"vs30={vs30} in StationXML is not a velocity in m/s")
         ground["vs30"] = float(vs30)
     return ground
 

@@ -1,7 +1,7 @@
 """
 The one place where ObsPy reads files: allowed formats only, and every error is a rejection.
 
-ObsPy would unpickle a Stream, fetch what looks like an address, follow names of files that a file
+ObsPy would unpickle a Stream, fetch texts that look like a URL, follow names of files that a file
 holds, and unpack archives without a limit. Formats are therefore found among those listed here, and
 files are handed over as bytes.
 """
@@ -47,10 +47,10 @@ FORMATS = {kind: frozenset(names.split()) for kind, names in _FORMATS.items()}
 #: name of a reader of ObsPy -> kind of its plugins
 _KINDS = {"read": "waveform", "read_events": "event", "read_inventory": "inventory"}
 
-#: Formats whose samples are in a file of the same name beside.
+#: Formats whose samples are in a second file of the same name.
 _TWO_FILES = ("Q",)
 
-#: first bytes of a packed file -> what unpacks it
+#: first bytes of a packed file -> its decompressor
 _UNPACKERS: dict[bytes, Callable[..., Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open}
 
 #: Largest size of an unpacked file: a day of three components at 200 Hz as text has 400 MB.
@@ -150,12 +150,12 @@ def _called(
     beside = isinstance(source, Path) and source.is_file()
     try:
         name = options.pop("format", None) or _format(kind, content)
-        # Samples beside a file are found by its path only
+        # Samples in a second file are found by the path of the first only
         if name is None and beside:
             name = _detected(kind, str(source), _TWO_FILES)
         if name not in FORMATS[kind]:
             raise RecordRejected(str(source), _unknown(content))
-        # What ObsPy would not notice, or not survive
+        # Faults that ObsPy would not notice, or not survive
         if name == "KNET":
             require_whole_numbers(content, str(source))
         if name == "SAC":

@@ -154,7 +154,7 @@ def described(stream: Stream, path: Path, content: bytes | None = None) -> Strea
     descriptions = read_descriptions(path, content)
     if descriptions is None:
         return stream
-    # Its words are as this package wrote them, unless somebody else did
+    # Words are as this package wrote them, unless the file was edited
     try:
         _require_same_lengths(stream, descriptions, path)
         return _with_words(stream, descriptions)

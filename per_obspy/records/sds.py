@@ -37,7 +37,7 @@ def find_sds_stations(
     ValueError
         If the window is empty.
     CatalogError
-        If the archive is missing or has nothing in the window, or the StationXML cannot be read.
+        If the archive is missing or has no record in the window, or the StationXML cannot be read.
     """
     if end <= start:
         raise ValueError(f"end must be later than start, got {start} to {end}")
@@ -77,7 +77,7 @@ def _day_files(
 
 
 def _listed(folders: list[Path], pattern: str, unlisted: dict[Path, Rejection]) -> list[Path]:
-    """Return what folders hold under a pattern; those that cannot be listed are noted."""
+    """Return the files of folders that match a pattern; those that cannot be listed are noted."""
     paths: list[Path] = []
     for folder in folders:
         try:

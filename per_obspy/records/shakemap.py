@@ -100,7 +100,7 @@ def read_shakemap(path: Path, uncertainty: Path | None = None) -> xr.Dataset:
     psa = [_values(grid, name, "acceleration", LARGEST_ACCELERATION) for name in names]
     meaning = "pseudo-spectral acceleration at 5 % damping"
     variables = {"psa": _variable(_SPECTRAL, np.stack(psa), "m s-2", meaning)}
-    # Its deviation, from a file of its own or from the grid
+    # The deviation, from a separate file or from the grid
     deviations = _read(uncertainty) if uncertainty else grid
     if uncertainty or all(f"STD{name}" in grid.columns for name in names):
         _require_same_axes(grid, deviations)
@@ -230,7 +230,7 @@ def _text(path: Path) -> str:
     if len(content) > LARGEST_FILE:
         raise CatalogError(str(path), f"has more than {LARGEST_FILE} bytes")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        problem = "has a document type of its own (DOCTYPE), which no ShakeMap has: refused"
+        problem = "contains a document type (DOCTYPE), which no ShakeMap has: refused"
         raise CatalogError(str(path), problem)
     return text
 
@@ -279,7 +279,7 @@ def _field_units(source: str, root: ElementTree.Element) -> dict[str, str]:
         )
     except (KeyError, ValueError) as error:
         raise CatalogError(source, f"has a grid_field without index or name: {error}") from error
-    # Columns have no names of their own: no index may be missing or repeated
+    # Columns are known by index only: none may be missing or repeated
     units = {name: unit for _, name, unit in numbered}
     if [index for index, _, _ in numbered] != list(range(1, len(units) + 1)):
         raise CatalogError(
@@ -296,7 +296,7 @@ def _size(source: str, root: ElementTree.Element) -> tuple[int, int]:
         size = (int(numbers["nlat"]), int(numbers["nlon"]))
     except (KeyError, ValueError) as error:
         raise CatalogError(
-            source, f"its grid_specification tells no nlat and nlon: {error}"
+            source, f"its grid_specification has no nlat and nlon: {error}"
         ) from error
     # Interpolation needs two nodes in each direction
     if min(size) < 2:
@@ -321,7 +321,7 @@ def _rows(
     if rows.shape != (size[0] * size[1], columns):
         header = f"{size[0]} x {size[1]} nodes of {columns} fields"
         table = f"grid_data has {rows.shape[0]} rows of {rows.shape[1]}"
-        raise CatalogError(source, f"{table}, the head tells {header}")
+        raise CatalogError(source, f"{table}, its head has {header}")
     return rows
 
 

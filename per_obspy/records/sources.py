@@ -70,7 +70,7 @@ class Sources(NamedTuple):
     event : EventFile or None
         QuakeML file or ASDF workspace with the event.
     rejected : tuple of Rejection
-        What cannot be used, with every reason.
+        Rejected records, with every reason.
     hashes : dict
         Hash of every file that was read on the way.
     earthquakes : list of dict
@@ -148,7 +148,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
     _warn_of_several_earthquakes(groups)
     reader = _path_reader(groups)
 
-    # Metadata beside one of the paths serves stations of all
+    # Metadata in one of the paths serves stations of all
     inventories = [contents.inventory for contents in found if contents.inventory]
     inventory = reduce(add, inventories) if inventories else None
     stations = {
@@ -273,7 +273,7 @@ def _contents(
         yield from folder.contents
     if records.sds:
         yield _sds(records, records.sds, event)
-    # What others processed, and what services have, comes last
+    # Records processed by others and by services come last
     if records.asdf:
         found = find_asdf_stations(records.asdf.file, records.asdf.tag)
         yield found, partial(read_asdf_station, tag=records.asdf.tag)

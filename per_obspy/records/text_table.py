@@ -80,7 +80,7 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
     layout : str, optional
         ``columns``: one row per sample, one column per channel. ``rows``: samples of the only
         channel, packed several to a row and read one row after the other; the last row may be
-        shorter, ``channels`` names column 0 and ``dt`` is given. Not given: ``columns``, unless
+        shorter, ``channels`` names column 0 and ``dt`` is set. Not set: ``columns``, unless
         both would fit.
 
     Returns
@@ -98,7 +98,7 @@ def read_columns(  # noqa: PLR0913 - a table without a header leaves all of thes
         If a row has more or fewer values than the first one, lacks a column, holds no number or
         breaks the spacing; or if ``layout`` is not given and both layouts fit.
     """
-    # Check what does not depend on the file
+    # Check the settings that do not depend on the file
     _check_units_and_interval(units, time_column, dt)
     _check_layout(layout, channels, time_column)
     site = _site(latitude, longitude)
@@ -138,7 +138,7 @@ def _check_layout(layout: str | None, channels: Mapping[str, int], time_column: 
 
 
 def _check_units_and_interval(units: str, time_column: int | None, dt: float | None) -> None:
-    """Refuse a unit that is unknown, and an interval that is given twice or not at all."""
+    """Refuse an unknown unit, and an interval that is set twice or not at all."""
     if units not in TABLE_UNITS:
         raise ValueError(f"units must be one of {', '.join(TABLE_UNITS)}, got {units!r}")
     if (time_column is None) == (dt is None):
@@ -169,7 +169,7 @@ def _directions(
         raise ValueError(f"azimuths must belong to channels, got {sorted(unknown)}")
     if unclear := [code for code in channels if code not in azimuths and code[-1:] not in _LETTERS]:
         raise ValueError(
-            f"azimuths must tell the direction of {unclear}, whose codes do not end in N, E or Z"
+            f"azimuths must contain the direction of {unclear}, whose codes do not end in N, E or Z"
         )
     # An azimuth comes before the letter
     given = {code: horizontal(float(azimuth)) for code, azimuth in azimuths.items()}

@@ -34,7 +34,7 @@ GB_FACTOR = {
     "ebf_brbf": 1.5,
 }
 
-#: Storeys up to which a share of the height may stand for the displacement (Iran 2800).
+#: Storeys up to which a share of the height may replace the displacement (Iran 2800).
 IRAN_STOREYS = 8.0
 
 #: Gap per storey of the shorter building, m, by seismicity (FEMA P-154, level 1; unverified).
@@ -79,7 +79,7 @@ def by_property(pair: RuleInputs) -> FloatArray:
 
 
 def ec8(pair: RuleInputs) -> FloatArray:
-    """Return the gap of EN 1998-1, 4.4.2.7: 0.7 of that by property where floors align."""
+    """Return the gap of EN 1998-1, 4.4.2.7: 0.7 of the gap by property where floors align."""
     return np.where(pair.aligned, 0.7, 1.0) * by_property(pair)
 
 

@@ -3,7 +3,7 @@ Gaps required by building codes and screening procedures, for comparison with th
 
 ``code_rules.csv`` lists clause, edition, inputs and source of every rule, and whether its form was
 verified against a page that quotes it; the names of the others end in ``_unverified``. No rule
-here was compared with the code's own printed text. A code means its own inelastic design
+here was compared with the printed text of the code. A code means its inelastic design
 displacement; a column that uses the displacement of an event's elastic spectrum instead has
 ``event_based`` in its name. A cell is empty where the rule lacks an input.
 """

@@ -3,7 +3,7 @@ Measures that would have kept a pair from pounding or from harm: gap, damping, o
 
 Where the exact demand decides, exact displacements with the added damping do so too. Elsewhere
 added damping is an estimate: the critical gap, eq. (15) and (16), follows it on the station's
-stored spectra, scaled to the pair's own radii, and above the stored dampings on their last slope;
+stored spectra, scaled to the radii of the pair, and above the stored dampings on their last slope;
 it is scaled to the demand that decides, so that a pair whose gap is enough needs no measure. A
 bumper is always an estimate, by the single hit. Where the gap of equivalent linear buildings
 governs, these take the place of the elastic ones; their periods and dampings are not followed as

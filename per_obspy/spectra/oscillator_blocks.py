@@ -28,8 +28,7 @@ class TiledRecord(NamedTuple):
     Two components of a record, or of a stretch of it, ready for the kernels.
 
     A whole number of tiles and one sample; ``peaks`` and ``jumps`` (component, tile) are the
-    largest acceleration and the largest change over a step; ``scale`` is what the samples were
-    divided by.
+    largest acceleration and the largest change over a step; samples were divided by ``scale``.
     """
 
     north: FloatArray

@@ -1,4 +1,4 @@
-"""Largest radius and displacement of many oscillators, each with its own period and damping."""
+"""Largest radius and displacement of many oscillators of different periods and dampings."""
 
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ def azimuth_maxima(
     azimuths: ArrayLike,
 ) -> OscillatorMaxima:
     """
-    Compute largest radius and displacement of oscillators, each along its own azimuth.
+    Compute largest radius and displacement of oscillators, each along a separate azimuth.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ def record_facts(stream: Stream, horizontals: list[Trace]) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Scalar texts without control characters, empty where nothing is known.
+        Scalar texts without control characters, empty where unknown.
     """
     # Level and files as they were read
     is_final = any(PASSED_THROUGH in step for step in horizontals[0].stats.get("processing", []))

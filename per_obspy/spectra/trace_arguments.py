@@ -1,7 +1,7 @@
 """
 Accept ObsPy Traces where a function takes samples of acceleration and their interval.
 
-A Trace brings its own interval, so that all other arguments are given by keyword. It is recognised
+A Trace contains its interval, so that all other arguments are given by keyword. It is recognised
 by its samples and header: ObsPy is not imported.
 """
 

@@ -43,7 +43,7 @@ def write_rows(parts: Sequence[Path], folder: Path, facts: Mapping[str, str]) ->
     parts : sequence of Path
         From :func:`write_rows_part`, in their order.
     folder : Path
-        Where to.
+        Folder of the files.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
     """

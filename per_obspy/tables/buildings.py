@@ -66,7 +66,7 @@ _ORDER = (
 
 class BuildingWays(NamedTuple):
     """
-    How buildings are classed, counted and placed.
+    Settings of classes, counts and places of buildings.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def write_buildings(
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
     csv_rows : int
-        How many buildings ``buildings.csv`` holds, the worst ones.
+        Number of buildings in ``buildings.csv``, the worst ones.
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
@@ -147,7 +147,7 @@ def _sides(rows: pd.DataFrame, totals: Totals) -> pd.DataFrame:
 
 def _sides_query(database: duckdb.DuckDBPyConnection, risk: Dataset, totals: Totals) -> str:
     """Register the risk table, and return the query of all sides, ordered by their buildings."""
-    # What the sides need of the pairs, and which of it there is
+    # Columns of the pairs that the sides need, as far as they exist
     known = risk.schema.names
     wanted = {name: name for name in OF_PAIRS} | ({_AREA: totals.area} if totals.area else {})
     present = {name: column for name, column in wanted.items() if column in known}

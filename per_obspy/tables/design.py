@@ -23,12 +23,12 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
     table : DataFrame
         From :func:`per_obspy.screening.by_spectrum.design_table.design_table`.
     folder : Path
-        Where to: ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
+        Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
     write_csv(rounded_table(table), text)
     write_parquet(table, whole)
-    # Columns of the pair table that nothing here computes are carried through
+    # Columns of the pair table that are not computed here are carried through
     known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
     described = (known.get(name, carried)._replace(name=name) for name in map(str, table))

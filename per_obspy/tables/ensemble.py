@@ -33,7 +33,7 @@ class Scenarios(NamedTuple):
     Attributes
     ----------
     tables : dict
-        Risk table of each, Parquet; None where nothing usable was left.
+        Risk table of each, Parquet; None for a scenario without a usable pair.
     weights : dict
         Weight of each, or its rate (1/year).
     yearly : bool
@@ -67,13 +67,13 @@ def write_ensemble(
     Parameters
     ----------
     scenarios : Scenarios
-        What was run.
+        The scenarios.
     folder : Path
-        Where to.
+        Folder of the files.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states.
     csv_rows : int
-        How many rows ``ensemble.csv`` holds, the worst ones.
+        Number of rows of ``ensemble.csv``, the worst ones.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def _join_query(tables: list[Path | None]) -> str:
         for number, table in enumerate(tables)
         if table
     ]
-    # Columns of probability and severity per scenario, extremes of what should be the same
+    # Columns of probability and severity per scenario, extremes of columns that should be equal
     columns = [
         f"max({name}) FILTER (scenario = {number}) AS {name}_{number}"
         for number in range(len(tables))

@@ -2,9 +2,9 @@
 Parts of the risk table on disk, each in its order, and their rows joined in the order of the whole.
 
 Only the columns of the order are sorted as a whole, by DuckDB, whose memory is bounded and which
-leaves to the disk what does not fit. As every part is in that order already, the next rows of the
-whole are always the next rows of the parts: they are read once, and only some thousands of each
-part at a time.
+leaves to the disk rows that do not fit. As every part is in that order already, the next rows of
+the whole are always the next rows of the parts: they are read once, and only some thousands of
+each part at a time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ def some_columns(table: Dataset, names: Sequence[str]) -> Dataset:
 @contextmanager
 def bounded_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     """
-    Give a database of bounded memory, which leaves the rest to a temporary folder inside.
+    Yield a database of bounded memory, which leaves the rest to a temporary folder inside.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
     number : int
         Of the part, another one for each.
     path : Path
-        Where to.
+        The file.
     """
     table = as_arrow(rows.assign(**{_PART: number}))
     dictionaries = text_columns(table.schema)
@@ -138,7 +138,7 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
     schema : Schema
         From :func:`joined_schema`; columns that a part lacks are empty.
     size : int
-        How many rows.
+        Number of rows.
     """
     # Order of the whole: for each row the part in which it is the next one
     with bounded_database(parts[0].parent) as database:

@@ -36,7 +36,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "signal_to_noise": ("1", "of the best octave, smoothed"),
     "clear_from": ("Hz", "lowest frequency at which the signal clears the noise"),
     "clear_to": ("Hz", "highest frequency at which the signal clears the noise"),
-    "baseline": ("", "kind of baseline that was removed beside the mean"),
+    "baseline": ("", "kind of baseline that was removed in addition to the mean"),
     "residual_velocity": (
         "m/s",
         "left at the end of the shaking before any filter: a baseline that shifted",
@@ -47,12 +47,12 @@ COLUMNS: dict[str, tuple[str, str]] = {
     ),
     "highpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
     "highpass_source": ("", "why it is there; shared: the other horizontal needs it"),
-    "own_highpass": ("Hz", "what this component alone would have had"),
-    "lowest_highpass": ("Hz", "what noise and duration would have allowed"),
+    "own_highpass": ("Hz", "high-pass corner that this component alone would have"),
+    "lowest_highpass": ("Hz", "lowest high-pass corner that noise and duration allow"),
     "lowest_highpass_source": ("", "which of them"),
     "lowpass": ("Hz", "corner, amplitude 1/sqrt(2)"),
     "lowpass_source": ("", "why it is there"),
-    "own_lowpass": ("Hz", "what this component alone would have had"),
+    "own_lowpass": ("Hz", "low-pass corner that this component alone would have"),
     "order": ("1", "n of the Butterworth filter; empty for records that were processed already"),
     "taper": ("1", "fraction of the record at each end"),
     "pad_before": ("s", "zeros before the record, filtered with it"),
@@ -86,7 +86,7 @@ def processed_table(descriptions: Mapping[str, Iterable[Mapping[str, Any]]]) -> 
     Returns
     -------
     DataFrame
-        With the columns of ``COLUMNS``; empty where a record has nothing.
+        With the columns of ``COLUMNS``; empty where a record has no value.
     """
     rows = [
         {**trace, **trace.get("coordinates", {}), **trace.get("per_obspy", {}), "file": name}

@@ -102,12 +102,12 @@ def write_risk(
     parts : sequence of Path
         From :func:`~per_obspy.tables.parts.write_part`, at least one.
     folder : Path
-        Where to.
+        Folder of the files.
     facts : mapping of str to str
         Facts of the whole table that the Parquet file states, for example whether the motion is
         simulated.
     csv_rows : int
-        How many rows ``risk.csv`` holds, the worst ones.
+        Number of rows of ``risk.csv``, the worst ones.
     """
     names = ("risk.parquet", "risk.csv", "risk.columns.csv")
     table, text, columns = files = [folder / name for name in names]
@@ -158,7 +158,7 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
     numbered = arrow_cells(rounded_arrow(rows)).rename_columns(
         [f"c{i}" for i in range(rows.num_columns)]
     )
-    # It writes a file of its own, which is appended to the others
+    # It writes a separate file, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", numbered)
     try:

@@ -27,7 +27,7 @@ COLUMNS: dict[str, Column] = {
         "str",
         ("station", "", "network and station code"),
         ("state", "", "used: its record serves the pairs near it; rejected: it serves none"),
-        ("rejected", "", "what was left out of the station, with every reason"),
+        ("rejected", "", "rejected records of the station, with every reason"),
         ("flags", "", "flags that every pair of the station has, separated by spaces"),
         ("warnings", "", "failed checks of its records that do not reject, with channel"),
         ("notes", "", "failed checks of its records without consequence, with channel"),
@@ -106,7 +106,7 @@ def write_stations(
     spectra, rejected, pairs
         As for :func:`station_table`.
     folder : Path
-        Where to.
+        The file.
     """
     table = station_table(spectra, rejected, pairs)
     text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
@@ -133,7 +133,7 @@ def station_table(
         Of the stations with usable records, from :func:`per_obspy.station_spectra`; the motion is
         not needed.
     rejected : iterable of Rejection
-        What was left out; files, services and pairs among it are passed over.
+        Rejections; those of files, services and pairs are passed over.
     pairs : mapping
         Station -> number of pairs for which its record is used.
 
@@ -159,7 +159,7 @@ def _named(spectra: Iterable[xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def _reasons(rejected: Iterable[Rejection]) -> dict[str, list[str]]:
-    """Return what was left out of each station, with reasons."""
+    """Return the rejected records of each station, with reasons."""
     found: dict[str, list[str]] = {}
     for rejection in rejected:
         if rejection.kind not in ("station", "record"):

@@ -1,4 +1,4 @@
-"""Tables as files: types of their columns, meanings of their columns, and what was left out."""
+"""Tables as files: types and meanings of their columns, and the table of rejections."""
 
 import csv
 from collections import Counter
@@ -25,7 +25,7 @@ def as_arrow(table: pd.DataFrame) -> pa.Table:
 
 
 def _plain(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table without its attributes, such as rejections, which have a file of their own."""
+    """Return a table without its attributes, such as rejections, which have a separate file."""
     plain = table.copy(deep=False)
     plain.attrs = {}
     return plain
@@ -65,14 +65,14 @@ def write_described(columns: Iterable[Column], path: Path) -> None:
 
 def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:
     """
-    Write what was left out, one row per thing, its reasons separated by semicolons.
+    Write rejections, one row per rejected thing, its reasons separated by semicolons.
 
     Parameters
     ----------
     rejected : iterable of Rejection
         Taken one by one.
     path : Path
-        Where to.
+        The file.
 
     Returns
     -------

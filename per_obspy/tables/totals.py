@@ -106,7 +106,7 @@ def areas_of(piece: pd.DataFrame, settings: Totals, column: str) -> NDArray[np.o
     settings : Totals
         Kind of areas.
     column : str
-        Which column names the area, for named areas.
+        Column that contains the area, for named areas.
     """
     if settings.area:
         return np.asarray(piece[column].fillna("").astype(str), dtype=object)
@@ -137,7 +137,7 @@ def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
         return table
     names = ["area", "building_id", "impacts", "probability_common", "probability_independent"]
     found = pq.read_table(buildings.absolute(), columns=names, use_threads=False).to_pandas()
-    # The worst building stands first
+    # The worst building comes first
     groups = found.assign(hit=found["impacts"].fillna(0) > 0).groupby("area", sort=True)
     counted = pd.DataFrame(
         {
@@ -148,7 +148,7 @@ def with_buildings(table: pd.DataFrame, buildings: Path) -> pd.DataFrame:
             "worst_building": groups["building_id"].first(),
         }
     ).reindex(table["area"])
-    # An area whose pairs are all repeated elsewhere has no building of its own
+    # An area whose pairs are all repeated elsewhere has no building
     numbers = counted.columns.drop("worst_building")
     counted[numbers] = counted[numbers].fillna(0)
     counted = counted.astype({"buildings": np.int64, "buildings_hit": np.int64})

@@ -1,5 +1,5 @@
 """
-Speed of what is estimated for a pair, beside plain NumPy and pandas in one process on one core.
+Speed of the estimates of a pair, next to plain NumPy and pandas in one process on one core.
 
     python tests/benchmarks/pair_estimates.py
 

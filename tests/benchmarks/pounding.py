@@ -1,5 +1,5 @@
 """
-Pairs a second of ``pounding_histories`` on one core, beside OpenSeesPy on the same pairs.
+Pairs per second of ``pounding_histories`` on one core, next to OpenSeesPy on the same pairs.
 
 Run as ``python tests/benchmarks/pounding.py``. OpenSees integrates with the record's own step,
 contact by a stiff no-tension gap; its cost is what is compared, not its accuracy. On a busy machine

@@ -186,7 +186,7 @@ def one_component() -> None:
 
 
 def share_of_peak(samples: int) -> None:
-    """What the core can do, and what the PER of whole blocks of oscillators makes of it."""
+    """Measure the peak of the core, and the share of it that PER of whole blocks reaches."""
     periods, motion = np.geomspace(0.05, 10.0, 128), ground_motion(samples)
     rounds = best(lambda: multiply_add(PEAK_ROUNDS))[0].processor
     seconds, _ = best(lambda: sampled_per_spectrum(motion, DT, periods))
@@ -284,7 +284,7 @@ def azimuths() -> None:
 
 
 def scaling() -> None:
-    """How times grow with samples, oscillators, azimuths and threads."""
+    """Measure the growth of times with samples, oscillators, azimuths and threads."""
     print("\nScaling of PER exact between samples")
     for samples in (3_000, 12_000, 48_000, 192_000):
         motion = ground_motion(samples)

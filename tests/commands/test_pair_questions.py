@@ -24,7 +24,7 @@ def answering(monkeypatch):
 
 @pytest.fixture
 def table(tmp_path):
-    """A table whose gaps are in cm under a heading that may mean something else."""
+    """A table whose gaps are in cm under an ambiguous heading."""
     rows = [[*row] for row in ROWS]
     for row in rows:
         row[1] *= 100.0

@@ -299,7 +299,7 @@ def _processed(folder: Path) -> None:
 
 
 def _description() -> bytes:
-    """Return the JSON beside a processed record."""
+    """Return the JSON file of a processed record."""
     with TemporaryDirectory() as folder:
         _processed(Path(folder))
         return Path(folder, "record.json").read_bytes()
@@ -344,7 +344,7 @@ def _workbook() -> bytes:
 
 
 def _pairs_beside(path: Path) -> Iterable[object]:
-    """Read a good pair table with the file as what is said about it."""
+    """Read a good pair table with the file as its configured form."""
     table = path.with_suffix("")
     table.write_bytes(_pairs_csv())
     return _pairs(table)
@@ -479,7 +479,7 @@ def _event(path: Path) -> Iterable[object]:
 
 
 def _packets() -> bytes:
-    """Return what a SeedLink server says, from its greeting to its end."""
+    """Return all bytes of a SeedLink server, from its greeting to its end."""
     records = _written("MSEED")[:4096]
     packets = [b"SL%06X" % n + records[512 * n : 512 * n + 512] for n in range(len(records) // 512)]
     return b"SeedLink v3.1\r\nfuzz\r\nOK\r\nOK\r\nOK\r\n" + b"".join(packets) + b"END"

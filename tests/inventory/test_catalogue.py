@@ -140,7 +140,7 @@ def test_entries_that_cannot_be(index, tmp_path):
     ("old", "new", "message"),
     [
         ('licence = "CC0-1.0"\n', "", "licence: Field required"),
-        ('name = "old town"', 'name = "Neustadt ü"', "name = 'Neustadt ü' stands more than once"),
+        ('name = "old town"', 'name = "Neustadt ü"', "name = 'Neustadt ü' occurs more than once"),
         ("pairs = 20", "pairs = 0", r"pairs: Input should be greater than or equal to 1 \(got 0\)"),
         ("pairs = 20", "pears = 20", "pears: unknown key"),
         ("[[inventory]]", "[[inventory]", "cannot be read as TOML"),

@@ -145,7 +145,7 @@ def test_duplicates_after_the_first_are_rejected():
     assert pairs["gap"].tolist() == [0.1, 0.1]
     # lines of the file: the header is line 1
     assert [rejection.row for rejection in pairs.attrs["rejected"]] == [4, 5]
-    assert pairs.attrs["rejected"][0].reasons == ("pair_id = 'a' stands in an earlier row already",)
+    assert pairs.attrs["rejected"][0].reasons == ("pair_id = 'a' occurs in an earlier row already",)
 
 
 def test_good_rows_survive_bad_ones():
@@ -208,7 +208,7 @@ def test_rejections_are_shared_by_every_copy_of_the_table():
         ),
         ("a\x07b", r"column 'a\\x07b' has a control character in its name"),
         ("a\nb", "has a control character"),
-        ("gap", "column gap stands more than once"),
+        ("gap", "column gap occurs more than once"),
     ],
 )
 def test_names_of_columns_that_no_file_should_have(name, problem):

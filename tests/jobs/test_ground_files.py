@@ -37,7 +37,7 @@ def stream(longitude, seed):
 
 @pytest.fixture
 def stations(tmp_path):
-    """Three finished stations with their shards; nothing is known of the place of the last."""
+    """Three finished stations with their shards; the place of the last is unknown."""
     finished = []
     for seed, longitude in enumerate((0.1, 0.2, np.nan), start=1):
         dataset = station_spectra(stream(longitude, seed), PERIODS, (0.05,), 30)

@@ -1,4 +1,4 @@
-"""Fetching alone: the cache of a configuration is filled, and nothing else happens."""
+"""Fetching alone: the cache of a configuration is filled, without any other file."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 """
-Messy tables through ``pairs check`` and ``run``: read, refused or suspected as the page says.
+Messy tables through ``pairs check`` and ``run``: read, refused or suspected as in the page.
 
 The table of ``docs/messy_tables.md`` is compared with what both commands print; where it differs,
 the new one is in ``messy_tables.md`` of the test's folder.
@@ -39,7 +39,7 @@ class Said(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What ``pairs check`` and ``run`` say of a table, and the pairs that the run judged."""
+    """Output of ``pairs check`` and ``run`` for a table, and the pairs that the run judged."""
 
     checked: Said
     ran: Said
@@ -47,7 +47,7 @@ class Outcome(NamedTuple):
 
 
 def called(*arguments: str) -> Said:
-    """Return what a command says."""
+    """Return the output of a command."""
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(sys, "argv", ["per-obspy", *arguments])
@@ -81,7 +81,7 @@ def tried(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outcomes(tried):
-    """What both commands say of every kind of messy table, and of the plain one."""
+    """Output of both commands for every kind of messy table, and for the plain one."""
     tables = {"plain": plain(), **readable(), **refused(), "suspected": suspected()}
     return {kind: tried(messy) for kind, messy in tables.items()}
 

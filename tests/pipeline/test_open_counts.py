@@ -31,7 +31,7 @@ file = "out/pairs.csv"
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory):
-    """Records and event of a small earthquake, as if somebody had given them."""
+    """Records and event of a small earthquake, in a folder as a user has them."""
     folder = tmp_path_factory.mktemp("counted")
     run(write_configuration(folder), executor=InProcess())
     shutil.copytree(folder / "out" / "simulated", folder / "records")

@@ -1,4 +1,4 @@
-"""Where the pairs of a run come from: a table, stored inventories, or simulated around stations."""
+"""Pairs of a run: from a table, stored inventories, or simulated around stations."""
 
 import datetime
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is wrong with later stages stops a run before its first record is read."""
+"""Faults of later stages stop a run before its first record is read."""
 
 import datetime
 import shutil

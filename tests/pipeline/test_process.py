@@ -35,7 +35,7 @@ def motion(seed):
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
-    """A folder with one simulated station, counts with StationXML and QuakeML beside."""
+    """A folder with one simulated station, counts with StationXML and QuakeML."""
     folder = tmp_path_factory.mktemp("records")
     write_simulation(simulate(Scenario(stations=1, dt=0.02, lakebed_radius=0)), folder)
     return folder

@@ -1,4 +1,4 @@
-"""The effective configuration of a run stands in its output folder and runs again."""
+"""The effective configuration of a run is in its output folder and runs again."""
 
 import json
 import shutil

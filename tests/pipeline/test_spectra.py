@@ -1,4 +1,4 @@
-"""Spectra alone: one file of all stations, nothing done twice, figures."""
+"""Spectra alone: one file of all stations, no work done twice, figures."""
 
 import numpy as np
 import pandas as pd

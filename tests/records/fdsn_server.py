@@ -91,7 +91,7 @@ class FdsnServer(ThreadingHTTPServer):
 
 @contextmanager
 def serving(simulation: Simulation) -> Iterator[FdsnServer]:
-    """Give a running server."""
+    """Yield a running server."""
     with FdsnServer(simulation) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
@@ -211,7 +211,7 @@ def mseed(stream: Stream) -> bytes:
 
 
 def whole(handler: _Handler, body: bytes) -> None:
-    """Answer as it should be: 200, or 204 if there is nothing."""
+    """Answer as it should be: 200, or 204 without data."""
     handler.reply(200 if body else 204, body)
 
 
@@ -269,7 +269,7 @@ def shortened(handler: _Handler, body: bytes) -> None:
 
 
 def content(wrong: bytes) -> Fault:
-    """Answer 200 with something else."""
+    """Answer 200 with a web page."""
     return lambda handler, _: handler.reply(200, wrong)
 
 

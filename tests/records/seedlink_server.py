@@ -40,7 +40,7 @@ class SeedlinkServer(socketserver.ThreadingTCPServer):
 
 @contextmanager
 def seedlink(stream: Stream) -> Iterator[SeedlinkServer]:
-    """Give a running server."""
+    """Yield a running server."""
     with SeedlinkServer(stream) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()

@@ -61,14 +61,14 @@ def test_a_vs30_that_is_no_velocity_is_a_reason(folder: Path, velocity: str):
     write_inventory(commented(f"vs30={velocity}"), folder)
     traces, reasons = read_all(folder)
     assert not traces
-    assert set(reasons) == {f"StationXML says vs30={velocity}, which is no velocity in m/s"}
+    assert set(reasons) == {f"vs30={velocity} in StationXML is not a velocity in m/s"}
 
 
 def test_without_stationxml_raw_records_are_rejected_with_a_reason(folder: Path):
     (folder / "station.xml").unlink()
     traces, reasons = read_all(folder)
     assert not traces
-    assert set(reasons) == {"there is no StationXML, so what its samples measure is unknown"}
+    assert set(reasons) == {"there is no StationXML, so the unit of its samples is unknown"}
 
 
 def test_a_channel_that_stationxml_lacks_is_one_rejection(folder: Path):
@@ -103,7 +103,7 @@ def test_the_same_stationxml_twice_is_no_contradiction(folder: Path):
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (response("PA"), "StationXML says that the instrument measures 'PA', not ground motion"),
+        (response("PA"), "the instrument measures 'PA' by its StationXML, not ground motion"),
         (Response(), "StationXML gives no sensitivity at 2020"),
     ],
 )

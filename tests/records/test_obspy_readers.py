@@ -1,4 +1,4 @@
-"""What ObsPy may read, and its errors, which become rejections of the file."""
+"""Formats that ObsPy may read, and its errors, which become rejections of the file."""
 
 import bz2
 import gzip

@@ -145,7 +145,7 @@ WRONG = {
     "a bomb": (grid_xml(FIELDS, make_rows(), (2, 3), BOMB), "DOCTYPE"),
     "fewer rows": (
         grid_xml(FIELDS, make_rows()[:-1], (2, 3)),
-        "grid_data has 5 rows of 9, the head tells 2 x 3 nodes",
+        "grid_data has 5 rows of 9, its head has 2 x 3 nodes",
     ),
     "another shape": (grid_xml(FIELDS, make_rows(), (3, 2)), "not those of a grid"),
     "a shorter row": (
@@ -153,7 +153,7 @@ WRONG = {
         "grid_data: .*columns changed",
     ),
     "no rows": (grid_xml(FIELDS, [], (2, 3)), "has no grid_data"),
-    "no size": (grid_xml(FIELDS, make_rows(), ("two", 3)), "tells no nlat and nlon"),
+    "no size": (grid_xml(FIELDS, make_rows(), ("two", 3)), "has no nlat and nlon"),
     "one latitude": (grid_xml(FIELDS, make_rows()[:3], (1, 3)), "needs two latitudes"),
     "no spectra": (
         grid_xml(FIELDS[:5], [row[:5] for row in make_rows()], (2, 3)),

@@ -113,7 +113,7 @@ def test_faults_of_the_file_name_line_and_channel(table: Path, old: str, new: st
         ({"time_column": None, "dt": -1.0}, "dt must be positive, got -1"),
         ({"latitude": 91}, "latitude must be between -90 and 90, got 91"),
         ({"channels": {}}, "channels must name at least one column"),
-        ({"channels": {"HN1": 1}}, r"azimuths must tell the direction of \['HN1'\]"),
+        ({"channels": {"HN1": 1}}, r"azimuths must contain the direction of \['HN1'\]"),
         ({"layout": "packed"}, "layout must be one of columns, rows, got 'packed'"),
         ({"layout": "rows"}, "layout = rows needs dt and no time_column, got column 0"),
         (

@@ -1,4 +1,4 @@
-"""Flags: raised where their condition is met, and by nothing else."""
+"""Flags: raised exactly where their condition is met."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Records and oscillators as the kernels take them: nothing is lost, scaled or mixed up."""
+"""Records and oscillators as the kernels take them: complete, unscaled and in order."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""ObsPy Traces as arguments: the same numbers as their samples, and nothing but m/s2."""
+"""ObsPy Traces as arguments: the same numbers as their samples, and only m/s2."""
 
 import inspect
 

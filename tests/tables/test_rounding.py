@@ -1,4 +1,4 @@
-"""Numbers in texts: five digits, exact decimals, and nothing of the user's own is touched."""
+"""Numbers in texts: five digits, exact decimals, and columns of the user unchanged."""
 
 import numpy as np
 import pandas as pd

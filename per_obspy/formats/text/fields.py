@@ -16,7 +16,7 @@ class HeaderField(NamedTuple):
 
 Fields = Mapping[str, HeaderField]
 
-#: values that stand for an unknown number
+#: values that mark an unknown number
 _UNKNOWN = ("", "none", "unknown", "-", "n/a")
 
 

@@ -1,8 +1,8 @@
 """
 Metadata file of ITACA 2009 (``.metadata``): the event, the station and its ground, in CSV.
 
-It lies beside the records, whose headers hold neither coordinates nor ground. One line names the
-fields, one line holds their values.
+It is in the folder of the records, whose headers hold neither coordinates nor ground. One line
+names the fields, one line holds their values.
 """
 
 import csv

@@ -78,7 +78,7 @@ def read_text(file: WaveformFile) -> Text:
 
 def is_ended(content: bytes) -> bool:
     r"""
-    Check whether something ends the last word of a file; zeros may fill a place that was never cut.
+    Check whether a byte ends the last word of a file; zeros may fill a place that was never cut.
 
     >>> is_ended(b"0.12\r\n"), is_ended(b"0.1"), is_ended(b"0.1\0\0")
     (True, False, False)
@@ -184,7 +184,7 @@ def _columns(rows: list[str], samples: int, width: int, full: int) -> FloatArray
     # Pad every line to its full length, so that number i begins at character i * width
     block = "".join([row.ljust(full) for row in rows]).encode("latin-1")
     values = _floats(np.frombuffer(block, dtype=f"S{width}")[:samples])
-    # Only blanks may follow the last number, and only letters of numbers may stand anywhere
+    # Only blanks may follow the last number, and only letters of numbers may occur anywhere
     surplus = block[samples * width :].strip()
     return None if surplus or block.translate(None, _NUMBER_LETTERS) else values
 

@@ -95,7 +95,7 @@ def station_place(
             degrees = _near(angle.degrees, epicentre.get(axis[0]))
             problems.append(_problem(axis, angle, degrees))
         signed.append(degrees)
-    # A place out of range has a problem of its own
+    # A place out of range is a separate problem
     place = coordinates(signed[0], signed[1], elevation)
     return place | {"problem": "; ".join(problems)} if problems else place
 

@@ -123,7 +123,7 @@ def read_station_table(name: str, content: bytes) -> tuple[StationRow, ...]:
 
 
 def _line_fields(name: str, number: int, line: str, header: str | None = None) -> list[str]:
-    """Return the fields of a numbered line; what cannot be divided is refused."""
+    """Return the fields of a numbered line; refuse lines that cannot be divided."""
     try:
         return _fields(line, header)
     except csv.Error as error:

@@ -1,8 +1,9 @@
 """
 Rows of buildings: chains of joined contacts, cut where they close, bend, or are too long.
 
-Every pair is in exactly one row. A row that is cut at a gap leaves the pair of that gap as a row of
-its own, so that no contact is lost; one that is cut at a bend has the building there in both parts.
+Every pair is in exactly one row. A row that is cut at a gap leaves the pair of that gap as a
+separate row, so that no contact is lost; one that is cut at a bend has the building there in
+both parts.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,14 +27,14 @@ Link = tuple[int, bool]
 ROW_FLAGS: dict[str, str] = {
     "ring": "the buildings close a ring, which is cut at its widest gap",
     "cut": "longer than the configured number of buildings, or next to such a cut: the pair of the "
-    "widest gap is a row of its own, and hits do not travel across it",
+    "widest gap is a separate row, and hits do not travel across it",
     "bent": "the axes of a longer chain turn by more than the configured angle: cut at the bend",
     "fork": "a building has more neighbours on a side than a row can have: the row follows the "
-    "narrowest gaps, the others are rows of their own",
+    "narrowest gaps, the others are separate rows",
     "contradictory": "pairs contradict each other about a building: cut there, see rejected.csv",
-    "no_building_id": "the pair names no building: a row of two buildings of its own",
-    "ambiguous_id": "an identifier stands for buildings at different places, or for too many: each "
-    "pair is a row of its own there",
+    "no_building_id": "the pair has no building identifiers: a separate row of two buildings",
+    "ambiguous_id": "an identifier belongs to buildings at different places, or to too many: each "
+    "pair is a separate row there",
     "unknown_gap": "the pair table gives no gap: a row of two without a history, or with the gap "
     "that the configuration assumes",
     "unknown_azimuth": "the axis is not given: a row of two along the worst azimuth",
@@ -49,7 +50,7 @@ class Chains(NamedTuple):
     pair : (n_contacts,) ndarray of int
         Pairs in the order of the rows, and within each along its axis.
     turned : (n_contacts,) ndarray of bool
-        Whether building 2 of the pair stands before building 1 along the axis.
+        Whether building 2 of the pair comes before building 1 along the axis.
     first : (n_rows + 1,) ndarray of int
         Place of the first contact of each row, and the end.
     azimuth : (n_rows,) ndarray
@@ -130,7 +131,7 @@ def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
     joined = joints.joined.tolist()
     done = contacts.repeated.tolist()
     by_name = np.argsort(contacts.order, kind="stable").tolist()
-    # Chains begin at an end that is free; what is left afterwards are rings
+    # Chains begin at a free end; the contacts that remain afterwards are rings
     for pair in by_name:
         for end in (2 * pair, 2 * pair + 1):
             if not done[pair] and joined[end] < 0:
@@ -179,7 +180,7 @@ class _Cutter:
             return None
         if length > HALVED:
             return self._at_gap(row.flagged("cut"), length // 3, 2 * length // 3)
-        # A row that comes back to a building is a ring, whether its axes tell so or not
+        # A row that comes back to a building is a ring, whether its axes show it or not
         repetition = self._repetition(row.links)
         if repetition is not None:
             return self._at_gap(row.flagged("ring"), *repetition)
@@ -219,7 +220,7 @@ class _Cutter:
         links = row.links
         place = max(range(first, last), key=lambda k: (self._gap[links[k][0]], -abs(k - middle)))
         before, cut, behind = links[:place], links[place : place + 1], links[place + 1 :]
-        # What is left of a ring is one row
+        # The rest of a ring is one row
         parts = [behind + before, cut] if row.closed else [before, cut, behind]
         return [row._replace(links=part, closed=False) for part in parts]
 
@@ -231,7 +232,7 @@ def _axes(azimuth: FloatArray, first: IntArray) -> tuple[FloatArray, BoolArray]:
     angle = np.radians(azimuth)
     north, east = (np.add.reduceat(part(angle), first[:-1]) for part in (np.cos, np.sin))
     mean = np.degrees(np.arctan2(east, north))
-    # One contact has its own azimuth, to the last digit
+    # A single contact keeps the azimuth of its pair, to the last digit
     single = np.diff(first) == 1
     mean = np.where(single, azimuth[first[:-1]], mean) % 360.0
     backwards = mean >= 180.0

@@ -1,8 +1,8 @@
 """
 Contacts between numbered buildings, from the pairs of a table.
 
-A building is known by its identifier. Pairs without identifiers have two buildings of their own,
-and so have pairs whose identifier stands for buildings at different places.
+A building is known by its identifier. Pairs without identifiers have two separate buildings,
+and so have pairs whose identifier belongs to buildings at different places.
 """
 
 from typing import NamedTuple
@@ -36,7 +36,7 @@ class Contacts(NamedTuple):
     names : (n_buildings,) ndarray of str
         Identifier of each building; ``PAIR#1`` and ``PAIR#2`` are those of a pair without.
     named : (n_buildings,) ndarray of bool
-        Whether the identifier is that of the table.
+        Whether the identifier is in the table.
     azimuth : (n_pairs,) ndarray
         From building 1 to 2, degrees; NaN if unknown.
     gap, facing_length : (n_pairs,) ndarray
@@ -50,7 +50,7 @@ class Contacts(NamedTuple):
     repeated : (n_pairs,) ndarray of bool
         Whether another pair describes the same contact.
     ambiguous : (n_pairs,) ndarray of bool
-        Whether an identifier of the pair stands for buildings at different places.
+        Whether an identifier of the pair belongs to buildings at different places.
     rejected : tuple of Rejection
         One for each repeated contact and each ambiguous identifier.
     """
@@ -71,7 +71,7 @@ class Contacts(NamedTuple):
 
 def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     """
-    Give the buildings of a pair table numbers, and find contacts that are described twice.
+    Return the contacts of a pair table with numbered buildings, without repeated descriptions.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def _numbered(
 ) -> tuple[IntArray, NDArray[np.object_]]:
     """Return the numbers of the buildings of each pair, and the names of all buildings."""
     own = (codes < 0) | is_ambiguous[codes]
-    # Buildings of their own are numbered after those with an identifier
+    # Separate buildings are numbered after those with an identifier
     buildings = codes.copy()
     buildings[own] = len(identifiers) + np.arange(int(own.sum()))
     return buildings, np.concatenate([identifiers, _own_names(pair_id, own)])
@@ -152,7 +152,7 @@ def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
 def _ambiguous(
     pairs: pd.DataFrame, codes: IntArray, identifiers: NDArray[np.object_]
 ) -> tuple[BoolArray, tuple[Rejection, ...]]:
-    """Return which identifiers stand for several places, with one entry more, and why."""
+    """Return the identifiers of several places, with one entry more, and the reasons."""
     # One entry more, which is that of the code -1
     spread = np.zeros(len(identifiers) + 1)
     if len(identifiers):
@@ -163,7 +163,7 @@ def _ambiguous(
         reason = (
             f"building_id = {identifiers[code]!r}: its pairs place it up to {spread[code]:.0f} m "
             f"apart, at most {SAME_PLACE:g} m are taken for one building: each pair has a "
-            "building of its own"
+            "separate building"
         )
         reasons.append(Rejection("building", identifiers[code], "", None, (reason,)))
     return ambiguous, tuple(reasons)
@@ -208,7 +208,7 @@ def _repeated(
     same = (ends[1:] == ends[:-1]).all(axis=1)
     repeated = np.zeros(gap.size, dtype=bool)
     reasons, kept = [], list[int]()
-    # The narrowest gap stands first; only few pairs have the buildings of another
+    # The narrowest gap comes first; only few pairs have the buildings of another
     for place in np.flatnonzero(same).tolist():
         # A new group of pairs of the same buildings, or one more of it
         before, row = int(order[place]), int(order[place + 1])

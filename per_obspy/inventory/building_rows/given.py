@@ -1,4 +1,4 @@
-"""What a completed pair table gives of its buildings, without what was derived or assumed."""
+"""Values of buildings that a completed pair table contains, without derived or assumed ones."""
 
 from typing import Any
 

@@ -67,7 +67,7 @@ def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float)
     contacts : Contacts
         Of numbered buildings.
     given : mapping of str to (n_pairs, 2) ndarray
-        What the table gives of buildings 1 and 2, in any unit; NaN where it does not. Two pairs
+        Values of buildings 1 and 2 in the table, in any unit; NaN where missing. Two pairs
         that differ by more than 1 % about their building contradict each other.
     angle : float
         Largest angle between the axes of two joined contacts, degrees.
@@ -100,7 +100,7 @@ def _candidates(contacts: Contacts, angle: float) -> tuple[_Candidates, BoolArra
     usable = np.isfinite(directions) & np.repeat(joinable, 2)
     number = np.bincount(building[usable], minlength=contacts.names.size)
     crowded = number > MOST_CONTACTS
-    # Ends in the order of their buildings: those of one building stand together
+    # Sort ends by building, so that those of one building are adjacent
     ends = np.flatnonzero(usable & ~crowded[building])
     ends = ends[np.lexsort([np.repeat(contacts.order, 2)[ends], building[ends]])]
     first, second = _at_one_building(ends, building)
@@ -131,7 +131,7 @@ def _agreement(
     rejected = []
     for name, values in given.items():
         first, second = values.ravel()[found.first], values.ravel()[found.second]
-        # NaN, which is unknown, contradicts nothing
+        # NaN means unknown and contradicts no value
         limit = AGREEMENT * np.maximum(np.abs(first), np.abs(second))
         differs = np.abs(first - second) > limit
         for row in np.flatnonzero(differs).tolist():
@@ -201,7 +201,7 @@ def _at_buildings(contacts: Contacts, found: _Candidates, count: int) -> BoolArr
 def _crowd(name: str) -> Rejection:
     """Return the rejection of a building with too many contacts."""
     reason = (
-        f"building_id = {name!r} stands in more than {MOST_CONTACTS} pairs, which no building "
+        f"building_id = {name!r} occurs in more than {MOST_CONTACTS} pairs, which no building "
         "does: its pairs are not joined to rows there"
     )
     return Rejection("building", name, "", None, (reason,))

@@ -33,7 +33,7 @@ LONGEST_NAME = 80
 OPEN = "a quotation mark is not closed"
 AFTER = "text follows a closing quotation mark"
 
-# Text inside of quotation marks, in which two of them stand for one
+# Text inside quotation marks, in which a doubled mark represents one mark
 _INSIDE = rb'(?:[^"]|"")*+'
 
 
@@ -59,7 +59,7 @@ class _Patterns(NamedTuple):
 def _patterns(separator: str) -> _Patterns:
     """Return the patterns of lines whose cells are separated by a sign."""
     sign = re.escape(separator).encode()
-    # Cells, and what may follow them
+    # Cells, and the characters that may follow them
     cell = rb'(?:"%b"|[^"%b][^%b]*+|)' % (_INSIDE, sign, sign)
     cells = rb"(?:%b%b)*+" % (sign, cell)
     return _Patterns(
@@ -91,7 +91,7 @@ class RowLines(NamedTuple):
 
 class Layout(NamedTuple):
     """
-    Where the rows of a text file are.
+    Positions of the rows of a text file.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ class _Scanner:
         return len(lines), ""
 
     def _is_row(self, line: bytes) -> bool:
-        """Return whether a line inside a quotation is a row by itself, by what its gap is."""
+        """Return whether a line inside quotation marks is a row by itself, judged by its gap."""
         if line.count(self._separator.encode()) < len(self._names) - 1:
             return False
         cells = dict(zip(self._names, _cells(line, self._separator), strict=False))

@@ -39,7 +39,7 @@ from per_obspy.inventory.recognition.table_form import text_form
 from per_obspy.inventory.recognition.unit_columns import converted, converted_texts
 from per_obspy.inventory.schema import COLUMNS, EMPTY
 
-#: Nothing is said about the form of a table.
+#: The default: the form of a table is recognised, not configured.
 PLAIN = TableForm()
 
 
@@ -54,7 +54,7 @@ class CsvFile:
     file : Path
         Text of any form that :func:`~.table_form.text_form` recognises.
     given : TableForm
-        What the user says about its form.
+        Form of the table as configured by the user.
     """
 
     def __init__(self, file: Path, given: TableForm = PLAIN) -> None:
@@ -76,7 +76,7 @@ class CsvFile:
 
     @property
     def recognised(self) -> str:
-        """What is not plain about the file, empty if nothing is; reads the whole file."""
+        """Recognised peculiarities of the file, empty if there are none; reads the whole file."""
         return "; ".join(text for text in (self._form.sentence(), self.recognised_numbers) if text)
 
     @property
@@ -124,7 +124,7 @@ class CsvFile:
         if self._given.decimal:
             commas = [name for name, found in evidence.items() if found.has_commas]
             return dict.fromkeys(commas, self._given.decimal)
-        # What no number decides, the user has to
+        # The user has to decide if no number in the file does
         marks, doubtful = marks_of(evidence)
         if doubtful:
             raise CatalogError(str(self.file), two_readings(*next(iter(doubtful.items()))))

@@ -53,7 +53,7 @@ class ParquetFile:
         return self.meanings.sentence()
 
     def check_cells(self) -> None:
-        """Do nothing: numbers of a Parquet file can be read in one way only."""
+        """Return without a change: numbers of a Parquet file can be read in one way only."""
 
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
@@ -82,7 +82,7 @@ class ParquetFile:
                 line += batch.num_rows
 
     def _in_units(self, table: pa.Table) -> pa.Table:
-        """Return a table in the units of the schema; what is no number stays as it is."""
+        """Return a table in the units of the schema; cells that are not numbers are unchanged."""
         for name, unit in self.meanings.units.items():
             # Truth values and dates stay, and are rejected as such
             place, column = table.column_names.index(name), table[name]
@@ -144,9 +144,9 @@ def pair_file(path: Path, given: TableForm | None = None) -> PairFile:
     Parameters
     ----------
     path : Path
-        The file; another one beside it may say how it is written (:mod:`~.side_file`).
+        The file; a side file next to it may describe its form (:mod:`~.side_file`).
     given : TableForm, optional
-        How it is written, from a configuration.
+        Form of the file, from a configuration.
 
     Raises
     ------

@@ -56,11 +56,11 @@ class PairFile(Protocol):
 
     @property
     def meanings(self) -> Meanings:
-        """What the headings mean."""
+        """Meanings of the headings."""
 
     @property
     def recognised(self) -> str:
-        """What is not plain about the file, empty if nothing is."""
+        """Recognised peculiarities of the file as text, empty if there are none."""
 
     def check_cells(self) -> None:
         """Raise CatalogError if a number or letter of a known column can be read in two ways."""

@@ -51,7 +51,7 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
         ``per_obspy.inventory.schema.COLUMNS``; further columns are carried through. Text that is
         not plain (UTF-8, commas, the names of the schema) is recognised where it is unambiguous.
     form : TableForm, optional
-        How the file is written, where that is not recognised: encoding, separator, decimal mark,
+        Form of the file, where it cannot be recognised: encoding, separator, decimal mark,
         sheet, names and units of columns.
 
     Returns
@@ -60,7 +60,7 @@ def read_pairs(path: str | Path | pd.DataFrame, form: TableForm | None = None) -
         Accepted rows in file order: numbers as float64 in SI (NaN where empty), text as str (""
         where empty). ``pairs.attrs["rejected"]`` is a tuple of
         :class:`~per_obspy.errors.Rejection`, one for each other row, with every reason;
-        ``pairs.attrs["recognised"]`` says what is not plain about the file, empty if nothing is.
+        ``pairs.attrs["recognised"]`` lists recognised peculiarities of the file, empty without any.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class PairInventory:
         As :func:`read_pairs`. Besides a chunk, memory holds 8 bytes per row to find repeated
         identifiers.
     form : TableForm, optional
-        How the files are written.
+        Form of the files.
 
     Attributes
     ----------
@@ -194,7 +194,7 @@ class PairInventory:
 
 
 def recognised_line(path: Path, recognised: str) -> str:
-    """Return the line that says how a table is read, with the name of its file."""
+    """Return the line that describes how a table is read, with the name of its file."""
     return printable(f"{path.name}: read as {recognised}")
 
 

@@ -33,7 +33,7 @@ from per_obspy.inventory.recognition.workbook import (
 
 
 class _Found:
-    """A sheet with the row of its header and what its cells mean."""
+    """A sheet with the row of its header and the meanings of its columns."""
 
     def __init__(self, sheet: str, header: int, meanings: Meanings) -> None:
         self.sheet, self.header, self.meanings = sheet, header, meanings
@@ -104,7 +104,7 @@ class WorkbookFile:
     def _table(self) -> CsvFile:
         """The sheet as a plain table, whose lines are the rows of the sheet."""
         self._check_values()
-        # What stands above the header becomes blank lines
+        # Rows above the header become blank lines
         path = self._path
         names, header = self.meanings.names, self._found.header
         rows = sheet_rows(self.file, self._found.sheet, len(names))
@@ -121,7 +121,7 @@ class WorkbookFile:
 
     @property
     def _mark(self) -> dict[str, str]:
-        """The decimal mark of numbers that are text, if it is given."""
+        """The decimal mark of numbers that are text, if it is configured."""
         return {"decimal": self._given.decimal} if self._given.decimal else {}
 
     def _check_values(self) -> None:
@@ -170,7 +170,7 @@ def _found_sheet(file: Path, given: TableForm) -> _Found:
         tables = sheet_list(sheet.sheet for sheet in whole)
         mend = f'give sheet = "{whole[0].sheet}" or another one in [pairs]'
         raise CatalogError(str(file), f"{len(whole)} sheets have a pair table, {tables}: {mend}")
-    # Of none, that with most columns, whose lack is told later
+    # Without a suitable sheet take that with most columns; missing ones are reported later
     return max(whole or found, key=lambda sheet: len(sheet.names))
 
 

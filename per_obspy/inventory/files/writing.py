@@ -33,5 +33,5 @@ def write_pairs(pairs: pd.DataFrame, path: str | Path) -> None:
             cells(pairs).to_csv(part, index=False)
         else:
             plain = pairs.copy(deep=False)
-            plain.attrs = {}  # rejected rows have a file of their own
+            plain.attrs = {}  # rejected rows are written to a separate file
             plain.to_parquet(part, index=False)

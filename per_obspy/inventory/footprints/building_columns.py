@@ -79,7 +79,7 @@ def building_columns(
     Raises
     ------
     CatalogError
-        If a named column is missing, or no column tells a height, storeys or a period.
+        If a named column is missing, or no column contains a height, storeys or a period.
     ValueError
         If a name is none of ``GIVEN``.
     """
@@ -152,7 +152,7 @@ def _is_same(original: pd.Series, known: pd.Series) -> bool:
     """Return whether a column of the schema has what the column of its name in the layer has."""
     if is_number(original) and is_number(known):
         return bool(np.array_equal(original, known, equal_nan=True))
-    # Text that was read as a number is kept beside it
+    # Text that was read as a number is kept in an additional column
     if is_number(original) or is_number(known):
         return False
     return bool((_texts(original) == _texts(known)).all())

@@ -125,7 +125,7 @@ def _columns(file: Path, names: Sequence[str]) -> dict[str, str]:
     """Return the columns of the file that make outlines, by their names here."""
     repeated = sorted({name for name in names if list(names).count(name) > 1})
     if repeated:
-        raise CatalogError(str(file), f"column {repeated[0]} stands more than once")
+        raise CatalogError(str(file), f"column {repeated[0]} occurs more than once")
     # The first name of each that the file has, whatever the case of its letters
     by_lower = {name.lower(): name for name in reversed(names)}
     found = {}
@@ -139,7 +139,7 @@ def _columns(file: Path, names: Sequence[str]) -> dict[str, str]:
 
 
 def _missing(names: Sequence[str], found: Mapping[str, str]) -> str:
-    """Return what is missing for outlines."""
+    """Return the columns that are missing for outlines."""
     if "pair_id" in names:
         return "a table of pairs already, not of buildings: per-obspy pairs check checks it"
     missing = [name for name in RECTANGLE if name not in found]
@@ -148,7 +148,7 @@ def _missing(names: Sequence[str], found: Mapping[str, str]) -> str:
     if {"longitude", "latitude"} & set(missing):
         columns = ", ".join(names)
         return f"no outlines of buildings: {wanted} ({units}; columns found: {columns:.200})"
-    # Points, and what does not help either
+    # Points, and columns that do not help either
     area = f", and an area ({found['area']}) does not place these" if "area" in found else ""
     return f"points have no walls, and a gap is a distance between walls{area}: {wanted} ({units})"
 

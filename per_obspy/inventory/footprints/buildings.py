@@ -1,5 +1,5 @@
 """
-Buildings of a layer: their outlines, columns, places and areas, and the file beside the pairs.
+Buildings of a layer: outlines, columns, places and areas, and the file that goes with the pairs.
 
 Pairs refer to it by ``building_id_1`` and ``building_id_2``.
 """
@@ -96,7 +96,7 @@ def without_repetitions(
         if same_shape[i]:
             reasons.append("the polygon repeats an earlier one")
         if same_name[i]:
-            reasons.append(f"building_id = {name!r} stands in an earlier feature already")
+            reasons.append(f"building_id = {name!r} occurs in an earlier feature already")
         rejected.append(Rejection("building", name, source, number, tuple(reasons)))
     good = ~(same_shape | same_name)
     kept = outlines.filter(pa.array(good)) if rejected else outlines

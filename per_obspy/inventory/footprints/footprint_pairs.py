@@ -16,7 +16,7 @@ from per_obspy.inventory.footprints.layers import read_layer
 from per_obspy.inventory.footprints.neighbours import neighbours
 from per_obspy.inventory.schema import COLUMNS
 
-#: Standard deviation of a gap between drawn outlines where none is given, m: 0.2 mm, about the
+#: Standard deviation of a gap between drawn outlines without a known one, m: 0.2 mm, about the
 #: finest that a plan shows, at a scale of 1:500. It is assumed, not measured.
 DRAWN = 0.1
 

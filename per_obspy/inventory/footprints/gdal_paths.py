@@ -11,7 +11,7 @@ from pyogrio.util import vsi_path
 @contextmanager
 def literal_path(path: Path) -> Iterator[Path]:
     """
-    Give a path by which GDAL reads or writes this very file.
+    Return a path by which GDAL reads or writes exactly this file.
 
     pyogrio takes some names for archives or addresses (``a!b``, ``zip:x``) and drops line breaks.
     Such a file is reached by a link with a plain name, and so are the files that belong to it.
@@ -19,7 +19,7 @@ def literal_path(path: Path) -> Iterator[Path]:
     Parameters
     ----------
     path : Path
-        A file, or what is to be one.
+        A file that exists or is to be written.
 
     Yields
     ------

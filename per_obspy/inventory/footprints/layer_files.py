@@ -35,7 +35,7 @@ JSON_SUFFIXES = (".geojson", ".json")
 PARQUET_SUFFIXES = (".parquet", ".geoparquet")
 LIST_SUFFIXES = (".csv",)
 
-#: Longest beginning of a GeoJSON file in which its own members are sought, bytes.
+#: Longest beginning of a GeoJSON file in which members of the collection are sought, bytes.
 HEAD = 1 << 20
 
 
@@ -81,7 +81,7 @@ def read_raw_layer(file: Path, layer: str | None) -> RawLayer:
     Raises
     ------
     CatalogError
-        If there is no such file, or it cannot be read as what its suffix says.
+        If the file is missing, or cannot be read as its suffix indicates.
     """
     suffix = file.suffix.lower()
     if not file.exists():
@@ -120,7 +120,7 @@ def _read_gdal(file: Path, layer: str | None) -> RawLayer:
         UnicodeDecodeError,
     ) as error:
         raise CatalogError(str(file), unreadable_reason(file, kind, error)) from error
-    # What GDAL found, but for a reference system that it does not know
+    # Messages of GDAL, except for a reference system that it does not know
     is_json = file.suffix.lower() in JSON_SUFFIXES
     crs = (_declared_system(file) if is_json else None) or meta["crs"]
     geometry = table.column_names[-1]
@@ -144,11 +144,11 @@ def raw_features(buildings: ImportedLayer) -> RawLayer:
 
 
 def _raw_layer(file: Path, wkb: pa.ChunkedArray, attributes: pa.Table, crs: Any) -> RawLayer:
-    """Return a layer whose attributes are plain columns, each of its own name."""
+    """Return a layer whose attributes are plain columns with unique names."""
     names = attributes.column_names
     repeated = [name for name in names if names.count(name) > 1]
     if repeated:
-        raise CatalogError(str(file), f"column {repeated[0]} stands more than once")
+        raise CatalogError(str(file), f"column {repeated[0]} occurs more than once")
     # Text that is not UTF-8 is refused
     plain, faults = plain_columns(attributes.replace_schema_metadata(None))
     for row, fault in faults.items():

@@ -50,7 +50,7 @@ def read_asset_json(file: Path, source: str) -> RawLayer:
     geometries, cells, faults = list[Any](), list[dict[str, object]](), dict[int, str]()
     for row, asset in enumerate(_assets(content)):
         properties = _properties(asset)
-        # Outline, or position, or what is wrong with it
+        # Outline, or position, or the reason for the rejection
         try:
             geometry = _geometry(asset, properties)
         except ValueError as error:
@@ -97,7 +97,7 @@ def _member(content: object, name: str) -> Any:
 
 
 def _properties(asset: dict[str, Any]) -> dict[str, Any]:
-    """Return what an asset says of its building."""
+    """Return the attributes of a building from its asset."""
     properties = _member(asset, "properties") or asset
     general = _member(properties, _GENERAL) or properties
     found = dict(general) if isinstance(general, dict) else {}
@@ -135,7 +135,7 @@ def _geometry(asset: dict[str, Any], properties: dict[str, Any]) -> Any:
 
 def footprint_of(cell: object) -> Any:
     """
-    Return an outline that stands as text of GeoJSON in a cell.
+    Return an outline from a cell that contains GeoJSON as text.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """
 Buildings in CityGML 1.0 and 2.0, LOD 0 to 2: outlines, heights, storeys, use and address.
 
-The file is read building by building. Entities are not resolved, nothing is fetched, a document
+The file is read building by building. Entities are not resolved, no URL is fetched, a document
 with a type definition is refused, and the limits of libxml2 on depth and text hold.
 
 Source: OGC 12-019, City Geography Markup Language 2.0; OGC 08-038r7 on the order of axes.
@@ -112,7 +112,7 @@ def _elements(file: Path, source: str, systems: list[str]) -> Iterator[Any]:
 
 
 def _forget(element: Any) -> None:
-    """Free the memory of a building and of what stands before it."""
+    """Free the memory of a building and of all elements before it."""
     element.clear()
     member = element.getparent()
     while member is not None and member.getprevious() is not None:
@@ -135,7 +135,7 @@ def _reference_system(names: list[str], source: str) -> tuple[pyproj.CRS, bool]:
     except pyproj.exceptions.CRSError as error:
         problem = f"unknown coordinate reference system {name!r:.80}"
         raise CatalogError(source, problem) from error
-    # Heights are a system of their own
+    # Heights use a separate reference system
     horizontal = crs.sub_crs_list[0] if crs.is_compound else crs.to_2d()
     is_short = name.upper().startswith("EPSG:")
     directions = [axis.direction for axis in horizontal.axis_info]
@@ -154,7 +154,7 @@ def _building(element: Any) -> _Building:
 
 
 def _attributes(element: Any) -> tuple[dict[str, object], str]:
-    """Return the attributes of a building, and what is wrong with its unit of height."""
+    """Return the attributes of a building, and the fault of its unit of height if there is one."""
     space = etree.QName(element).namespace
     height, unit = _text(element, space, "measuredHeight")
     # Units may be names in a dictionary, such as urn:ogc:def:uom:UCUM::m or #m
@@ -239,7 +239,7 @@ def _ring(element: Any) -> Any:
 
 
 def _dimension(element: Any) -> int:
-    """Return the numbers per corner: 2 if the nearest declaration says so, else 3."""
+    """Return the numbers per corner: 2 if the nearest declaration gives 2 dimensions, else 3."""
     declared = next(element.iterfind(".//{*}posList[@srsDimension]"), None)
     if declared is not None:
         return 2 if declared.get("srsDimension") == "2" else 3

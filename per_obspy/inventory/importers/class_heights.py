@@ -37,7 +37,7 @@ def with_class_heights(table: pd.DataFrame, classes: pd.Series) -> pd.DataFrame:
     table : DataFrame
         With ``height``, ``storeys`` or ``period``; cells that are no numbers stay as they are.
     classes : Series
-        Class of each building; a missing one is a class of its own.
+        Class of each building; missing classes form a separate class.
 
     Returns
     -------

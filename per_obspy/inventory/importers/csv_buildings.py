@@ -51,7 +51,7 @@ def read_csv_buildings(file: Path, source: str) -> RawLayer | None:
     ----------
     file : Path
         UTF-8, comma separated, one header line, WGS 84. A row with another number of cells is
-        a fault of its own, after the good ones.
+        a separate fault, after the good ones.
     source : str
         Name of the file, for messages.
 
@@ -84,10 +84,10 @@ def _read(
     file: Path, source: str, names: list[str], layer: Callable[[pd.DataFrame], RawLayer]
 ) -> RawLayer:
     """Read a file block by block, so that the text of outlines is forgotten."""
-    # Text, and columns that can be told apart
+    # Text, and columns that differ in name
     _require_utf_8(file, source)
     if repeated := next((name for name in names if names.count(name) > 1), None):
-        raise CatalogError(source, f"column {repeated[:200]} stands more than once")
+        raise CatalogError(source, f"column {repeated[:200]} occurs more than once")
     broken, found = list[str](), list[RawLayer]()
     for block in _blocks(file, source, names, broken):
         found.append(layer(block))
@@ -148,7 +148,7 @@ def _require_utf_8(file: Path, source: str) -> None:
 def _blocks(
     file: Path, source: str, names: Sequence[str], broken: list[str]
 ) -> Iterator[pd.DataFrame]:
-    """Yield the blocks of a file as tables of text, and add what is wrong with broken rows."""
+    """Yield the blocks of a file as tables of text, and add the faults of broken rows."""
 
     def is_skipped(row: pa.csv.InvalidRow) -> str:
         cells = f"{row.actual_columns} cells instead of {row.expected_columns}"

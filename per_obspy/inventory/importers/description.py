@@ -1,4 +1,4 @@
-"""What a file of buildings is: its source, number, columns used and bounds."""
+"""Description of a file of buildings: its source, number, columns used and bounds."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -82,7 +82,7 @@ def _places(file: Path, features: RawLayer) -> tuple[int, tuple[float, float, fl
         found = polygons(features.wkb.slice(start, BLOCK))
         outlines += int(np.isin(shapely.get_type_id(found), _POLYGONAL).sum())
         degrees = in_degrees(found, transformer)
-        # Without what a wrong reference system throws off
+        # Leave out positions that a wrong reference system moves away
         box = shapely.bounds(degrees)
         boxes.append(box[(np.abs(box) <= [180.0, 90.0, 180.0, 90.0]).all(axis=1)])
     every = np.concatenate(boxes)

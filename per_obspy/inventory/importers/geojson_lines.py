@@ -30,7 +30,7 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
     ----------
     file : Path
         UTF-8, WGS 84 as RFC 7946 demands. It is read line by line; a line that is no feature is a
-        fault of its own.
+        separate fault.
     source : str
         Name of the file, for messages.
 
@@ -44,7 +44,7 @@ def read_geojson_lines(file: Path, source: str) -> RawLayer:
     for row, line in enumerate(_lines(file)):
         if row >= MOST_LINES:
             raise CatalogError(source, f"it has more than {MOST_LINES} features: split the file")
-        # What is no feature loses its own building
+        # A line that is not a feature loses only one building
         try:
             geometry, properties = feature_of(line)
         except ValueError as error:
@@ -63,7 +63,7 @@ def _lines(file: Path) -> Iterator[bytes]:
     """Yield the lines of a file that are not blank, each cut beyond its longest length."""
     with file.open("rb") as opened:
         while line := opened.readline(LONGEST_LINE + 2):
-            # The rest of a line that is too long is no line of its own
+            # The rest of a line that is too long is not a line of the file
             while not line.endswith(b"\n") and (rest := opened.readline(LONGEST_LINE)):
                 line = line[: LONGEST_LINE + 1] + rest[-1:]
             if text := line.strip(b"\x1e\xef\xbb\xbf \t\r\n"):

@@ -1,4 +1,4 @@
-"""What an importer knows of its source, and buildings as a file has them."""
+"""Description of an importer's source, and buildings as they are in a file."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType

@@ -90,7 +90,7 @@ def imported(
     if "system" not in table and (systems := _systems(adapted, importer)) is not None:
         table["system"] = systems
     table["building_id"] = _identifiers(table)
-    # Missing heights by the layer's own classes
+    # Missing heights from the classes of the layer
     if importer.class_column is not None:
         unknown = pd.Series("", adapted.index)
         table = with_class_heights(table, adapted.get(importer.class_column, unknown))

@@ -1,4 +1,4 @@
-"""Columns of the schema in a table: by the names that are given, else by its headings."""
+"""Find the columns of the schema in a table, by configured names or by its headings."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Meanings(NamedTuple):
     cells : tuple of str
         The header.
     columns : dict
-        Place in the header -> what it means.
+        Position in the header -> meaning of the column.
     units : dict
         Column of the schema -> its unit, where that is not the schema's.
     """
@@ -77,7 +77,7 @@ class Meanings(NamedTuple):
         return headings
 
     def asked(self) -> str:
-        """Return what mends missing columns, as the end of a message; empty if nothing is known."""
+        """Return the mend of missing columns, as the end of a message; empty if none is known."""
         if is_building_list(self.cells):
             return (
                 "; it is a list of buildings: a pair table has the gap and both buildings in each "
@@ -107,7 +107,7 @@ def meanings_of(
     source : str
         The file, for messages.
     must_have : bool
-        Whether every column and unit that is given must be in the table.
+        Whether every configured column and unit must be in the table.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def meanings_of(
     """
     known = _given_places(cells, given, source, must_have)
     found = recognised(cells, known)
-    # Units of the headings, and those that are given
+    # Units from the headings, and configured ones
     units = {means.column: means.unit for means in found.values() if means.unit is not None}
     for name, text in given.units.items():
         unit = unit_of(text, name) if name in COLUMNS else None
@@ -126,7 +126,7 @@ def meanings_of(
     absent = set(given.units) - {means.column for means in found.values()}
     if absent and must_have:
         raise CatalogError(source, f"[pairs.units] {min(absent)}: the table has no such column")
-    # A unit that is the schema's own changes nothing
+    # The unit of the schema needs no conversion
     others = {name: unit for name, unit in units.items() if unit.numerator != unit.denominator}
     return Meanings(tuple(cells), found, others)
 

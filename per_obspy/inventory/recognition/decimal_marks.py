@@ -30,7 +30,7 @@ _THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:(?:,\d{3})+\.\d*|(?:,\d{3}){2,})\s*$"
 #: Numbers whose comma may be either.
 _EITHER = r"^\s*[+-]?[1-9]\d{0,2},\d{3}\s*$"
 
-#: Numbers with a decimal point that can be nothing else.
+#: Numbers whose mark can only be a decimal point.
 _DECIMAL_POINT = (
     r"^\s*[+-]?(?:\d*\.\d{1,2}|\d*\.\d{4,}|0*\.\d+|0\d*\.\d+|\d{4,}\.\d+)(?:[eE][+-]?\d+)?\s*$"
 )
@@ -38,7 +38,7 @@ _DECIMAL_POINT = (
 #: In the order of :class:`Evidence`.
 _KINDS = (_DECIMAL, _THOUSANDS, _EITHER, _DECIMAL_POINT)
 
-#: What becomes a plain number in a column of decimal commas; of these, what is in groups.
+#: Characters to replace in a column of decimal commas; groups of digits among them.
 _WITH_COMMA = (
     rf"^\s*[+-]?(?:\d*|[1-9]\d{{0,2}}(?:(?:\.|{_GROUPS})\d{{3}})+),\d*(?:[eE][+-]?\d+)?\s*$"
 )
@@ -47,7 +47,7 @@ _GROUPED = rf"^\s*[+-]?[1-9]\d{{0,2}}(?:(?:\.\d{{3}}){{2,}}|(?:{_GROUPS}\d{{3}})
 #: In such a column, a number whose point may be either.
 _POINT = r"^\s*[+-]?[1-9]\d{0,2}\.\d{3}\s*$"
 
-#: What becomes a plain number in a column with commas between thousands.
+#: Characters to replace in a column with commas between thousands.
 _WITH_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?\s*$"
 
 
@@ -58,12 +58,12 @@ _QUOTED = re.compile(rb"\"\s{0,8}[+-]?[\d.'\xc2\xa0 ]{0,40},\d")
 
 class Evidence(NamedTuple):
     """
-    What the numbers of a column say about their commas.
+    Evidence in the numbers of a column about the meaning of their commas.
 
     Attributes
     ----------
     decimal, thousands, either, point : int
-        Number of cells of each kind; ``point`` are decimal points that can be nothing else.
+        Number of cells of each kind; ``point`` are marks that can only be decimal points.
     example : str
         The first cell that may be either.
     line : int
@@ -84,7 +84,7 @@ class Evidence(NamedTuple):
 
 
 def has_quoted_commas(file: Path, encoding: str) -> bool:
-    """Return whether a text has a number with a comma in quotation marks, or what looks like it."""
+    """Return whether a text has a number, or a similar text, with a comma in quotation marks."""
     last = b""
     for block in text_blocks(file, encoding):
         text = last + block
@@ -107,7 +107,7 @@ def _more(known: Evidence, cells: pa.ChunkedArray, lines: Sequence[int]) -> Evid
     """Return the evidence with that of further cells."""
     matches = [pc.match_substring_regex(cells, kind) for kind in _KINDS]
     counts = [pc.sum(match).as_py() or 0 for match in matches]
-    # The first one that may be either is what a message names
+    # Messages name the first ambiguous number
     example, line = known.example, known.line
     place = pc.index(matches[2], value=True).as_py()
     if not example and place >= 0:
@@ -124,7 +124,7 @@ def _more(known: Evidence, cells: pa.ChunkedArray, lines: Sequence[int]) -> Evid
 
 def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str, Evidence]]:
     """
-    Return the decimal mark of each column that has commas, and the columns that nothing decides.
+    Return the decimal mark of each column that has commas, and the columns that remain undecided.
 
     A column whose numbers contradict each other keeps its text, so that rows with a comma in it are
     rejected.
@@ -133,11 +133,11 @@ def marks_of(evidence: Mapping[str, Evidence]) -> tuple[dict[str, str], dict[str
     has_points = any(column.point for column in columns)
     has_decimals = any(column.decimal for column in columns)
     has_thousands = any(column.thousands for column in columns)
-    # What decides for numbers that may be either: the only kind of commas in the table
+    # Ambiguous numbers are decided by the only kind of commas in the table
     others = "," if has_decimals and not has_points else "." if has_thousands else ""
     marks, doubtful = dict[str, str](), dict[str, Evidence]()
     for name, column in evidence.items():
-        # Its own numbers decide, else those of the others
+        # The numbers of the column decide, else those of the other columns
         kinds = (column.decimal > 0, column.thousands > 0, column.point > 0)
         if kinds == (True, False, False):
             marks[name] = ","
@@ -181,7 +181,7 @@ def with_points(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
 
 
 def two_readings(name: str, found: Evidence) -> str:
-    """Return what is doubtful about the commas of a column, and the mend."""
+    """Return the doubt about the commas of a column, and the mend."""
     comma, none = found.example.replace(",", "."), found.example.replace(",", "")
     reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
     return f'{reason}, and no other number decides: give decimal = "," or "." in [pairs]'

@@ -50,7 +50,7 @@ def possible_encodings(file: Path, given: str | None = None) -> dict[str, int | 
     Raises
     ------
     CatalogError
-        If it is in none, or not in the one that is given.
+        If it is in none, or not in the configured one.
     """
     if given is not None:
         name = _named(file, given)
@@ -72,7 +72,7 @@ def possible_encodings(file: Path, given: str | None = None) -> dict[str, int | 
 
 
 def _named(file: Path, given: str) -> str:
-    """Return the encoding of a name that is given."""
+    """Return the encoding for a configured name."""
     try:
         name = codecs.lookup(given).name
     except (LookupError, ValueError):
@@ -116,7 +116,7 @@ def _decoding(
 
 
 def two_pages(name: str, text: str) -> str:
-    """Return what is doubtful about the letters of a text of the western page, and the mend."""
+    """Return the doubt about the letters of a text of the western page, and the mend."""
     turkish = text.encode("cp1252").decode("cp1254")
     reason = f"{name} = {text!r:.40} in cp1252, {turkish!r:.40} in cp1254"
     return f'{reason}, and no heading decides: give encoding = "cp1252" or "cp1254" in [pairs]'

@@ -21,7 +21,7 @@ from per_obspy.inventory.schema import COLUMNS, ONE_OF
 #: Most headings, and longest one, in which words are sought.
 MOST_HEADINGS, LONGEST_HEADING = 1000, 200
 
-#: Words of headings that say nothing about their column.
+#: Words of headings without a meaning for their column.
 _FILLERS = frozenset(
     (
         *("id", "no", "nr", "num", "number", "numero", "nombre", "n", "of", "the", "between"),
@@ -44,7 +44,7 @@ _LETTERS = {"a": 1, "b": 2}
 
 class Heading(NamedTuple):
     """
-    What a heading means.
+    Meaning of a heading.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Heading(NamedTuple):
         Of the word: ``"en"``, ``"es"``, ...; empty for names of the schema and words of several
         languages.
     is_sure : bool
-        Whether the word means nothing else in a pair table.
+        Whether the word has no other meaning in a pair table.
     """
 
     column: str
@@ -76,7 +76,7 @@ class _Word(NamedTuple):
     language : str
         Empty if the word is one of several languages.
     is_sure : bool
-        Whether it means nothing else in a pair table.
+        Whether it has no other meaning in a pair table.
     """
 
     column: str
@@ -97,7 +97,7 @@ def _words() -> dict[str, _Word]:
     for text, same in found.items():
         columns = {row["column"] for row in same}
         if len(columns) == 1:
-            # No language of its own if several have the word
+            # No particular language if several have the word
             languages = {row["language"] for row in same}
             language = languages.pop() if len(languages) == 1 else ""
             is_sure = all(row["sure"] == "yes" for row in same)
@@ -128,7 +128,7 @@ def plain_heading(text: str) -> str:
 
 
 def _tokens(text: str) -> list[str]:
-    """Return the words and numbers of a heading, without those that say nothing."""
+    """Return the words and numbers of a heading, without those that have no meaning."""
     found = re.findall(r"[^\W\d_]+|\d+", plain_heading(text))
     return [token for token in found if token not in _FILLERS] or found[:1]
 
@@ -140,7 +140,7 @@ def _joined(tokens: Sequence[str]) -> str:
 
 def meaning(heading: str) -> Heading | None:
     """
-    Return what a single heading means; None if it means nothing in the schema.
+    Return the meaning of a single heading; None if it has none in the schema.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def _column_of(tokens: list[str]) -> Heading | None:
     without = [token for token in rest if token not in _BUILDINGS]
     for words in (rest, without):
         text = _joined(words)
-        # The schema's own names come before the words of a language
+        # Names of the schema come before the words of a language
         bare = _bare_names().get(text)
         word = _Word(bare, "", True) if bare else _words().get(text)
         name = "" if word is None else f"{word.column}_{indices[0]}" if indices else word.column
@@ -233,7 +233,7 @@ def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Head
     headings : sequence of str
         The header of a table.
     known : dict
-        Place -> column of the schema, where the user says so.
+        Place -> column of the schema, where the user has configured it.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def recognised(headings: Sequence[str], known: dict[int, str]) -> dict[int, Head
         Place -> meaning. If the names of the schema and those known make a whole table, other
         headings are left as they are; if two headings mean the same, neither is taken.
     """
-    # Names that are given, and those of the schema
+    # Configured names, and those of the schema
     found = {place: Heading(column) for place, column in known.items()}
     for place, heading in enumerate(headings):
         if heading in COLUMNS and heading not in known.values():

@@ -43,7 +43,7 @@ def proposed_units(table: pd.DataFrame, gaps_are_odd: bool) -> dict[str, str]:
     table : DataFrame
         Before rows are rejected; numbers may be text.
     gaps_are_odd : bool
-        Whether the gaps look like centimetres although each may be in metres.
+        Whether the gaps resemble centimetres although each may be in metres.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """
-The form of a table in a small file beside it: ``pairs.xlsx.toml`` for ``pairs.xlsx``.
+The form of a table in a small file next to it: ``pairs.xlsx.toml`` for ``pairs.xlsx``.
 
 ``per-obspy pairs check --write`` writes it, every reader of the table takes it into account, and
-what a configuration says in ``[pairs]`` comes before it.
+the section ``[pairs]`` of a configuration comes before it.
 """
 
 import json
@@ -11,21 +11,21 @@ from pathlib import Path
 from per_obspy.config import TableForm, load
 from per_obspy.files import written_whole
 
-#: What the file says about itself.
+#: Comment at the head of the side file.
 _HEAD = """\
-# How per-obspy reads {name}, the table beside this file; written by per-obspy pairs check --write.
+# How per-obspy reads {name}, the table next to this file; written by per-obspy pairs check --write.
 # Columns of the pair table = "heading"; units. The same keys may be in [pairs] of a configuration.
 """
 
 
 def side_file(table: Path) -> Path:
-    """Return the path of the file beside a table, which need not exist."""
+    """Return the path of the side file of a table, which need not exist."""
     return table.with_name(f"{table.name}.toml")
 
 
 def form_of(table: Path, given: TableForm | None = None) -> TableForm:
     """
-    Return the form of a table that is given beside it or in a configuration.
+    Return the form of a table from its side file or a configuration.
 
     Parameters
     ----------
@@ -37,13 +37,13 @@ def form_of(table: Path, given: TableForm | None = None) -> TableForm:
     Raises
     ------
     CatalogError
-        If the file beside the table is wrong.
+        If the side file of the table is wrong.
     """
     beside = side_file(table)
     form = load(beside, TableForm) if beside.is_file() else TableForm()
     if given is None:
         return form
-    # Keys that are given, and of names and units those that are not
+    # Configured keys, and those names and units that are not configured
     changes = {name: getattr(given, name) for name in given.model_fields_set}
     for name in ("columns", "units"):
         changes[name] = {**getattr(form, name), **getattr(given, name)}
@@ -51,7 +51,7 @@ def form_of(table: Path, given: TableForm | None = None) -> TableForm:
 
 
 def write_form(table: Path, form: TableForm) -> Path:
-    """Write the form of a table beside it, and return the path."""
+    """Write the form of a table next to it, and return the path."""
     path = side_file(table)
     with written_whole(path) as part:
         text = _HEAD.format(name=json.dumps(table.name, ensure_ascii=False)) + form_as_toml(form)
@@ -61,7 +61,7 @@ def write_form(table: Path, form: TableForm) -> Path:
 
 def form_as_toml(form: TableForm, section: str = "") -> str:
     """
-    Return what is given of a form as TOML.
+    Return the known parts of a form as TOML.
 
     Parameters
     ----------

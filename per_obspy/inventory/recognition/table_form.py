@@ -1,5 +1,5 @@
 """
-The form of a text table: encoding, separator, line of the header, and what its headings mean.
+The form of a text table: encoding, separator, line of the header, and meanings of its headings.
 
 A plain table (UTF-8, commas, header first, the names of the schema) is taken as it is. Of another
 one every form that can be is tried, and the one whose headings mean most columns is taken.
@@ -27,7 +27,7 @@ from per_obspy.inventory.recognition.encodings import (
 from per_obspy.inventory.recognition.headings import is_complete
 from per_obspy.inventory.schema import COLUMNS
 
-#: Lines among which the header is sought: titles and blank lines may stand above it.
+#: Lines among which the header is sought: titles and blank lines may precede it.
 HEADER_LINES = 20
 
 #: Bytes of the file among which the header is sought.
@@ -39,7 +39,7 @@ _FEWEST = 3
 
 class TextForm(NamedTuple):
     """
-    How a text table is written.
+    Form of a text table.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ class TextForm(NamedTuple):
     is_doubtful: bool = False
 
     def sentence(self) -> str:
-        """Return what is not plain about the form as one text, empty if nothing is."""
+        """Return the peculiarities of the form as one text, empty if there are none."""
         texts = []
-        # Only what differs from a plain table
+        # Only differences from a plain table
         if self.encoding not in ("utf-8", "ascii"):
             texts.append(f"text in {self.encoding}")
         if self.separator in OTHER_SEPARATORS:
@@ -94,14 +94,14 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     if not found:
         check_text(file)  # names the line that is not UTF-8
         raise CatalogError(str(file), "line 1: no header can be read")
-    # A plain table, else the form with most columns that mean something
+    # A plain table, else the form with most columns that have a meaning
     plain = next((form for form in found if _is_plain(form)), None)
     best = plain or max(found, key=_rank)
     if len(best.meanings.columns) < _FEWEST:
         # Nothing is recognised: the first line, in most cells
         first = [form for form in found if form.header == 1]
         best = max(first, key=lambda form: (len(form.meanings.columns), len(form.cells)))
-    # Now every column that is given must be there
+    # Now every configured column must be there
     meanings = meanings_of(best.cells, given, str(file))
     lines = encodings[best.encoding] or check_text(file, best.encoding)
     is_western = best.encoding == "cp1252" and TURKISH_PAGE in encodings
@@ -115,7 +115,7 @@ def _is_plain(form: TextForm) -> bool:
 
 
 def _rank(form: TextForm) -> tuple[int, bool]:
-    """Return what decides between forms: columns, and Turkish words in the Turkish code page."""
+    """Return the criteria between forms: columns, and Turkish words in the Turkish code page."""
     is_turkish = form.encoding == TURKISH_PAGE and _language(form.meanings) == "tr"
     return len(form.meanings.columns), is_turkish
 
@@ -136,7 +136,7 @@ def _possible_forms(file: Path, given: TableForm, encodings: Sequence[str]) -> I
             for number, cells in _headers(head, separator):
                 found = meanings_of(cells, given, str(file), must_have=False)
                 form = TextForm(encoding, separator, number, tuple(cells), found)
-                # Any bytes may be Japanese: only a heading tells
+                # Any bytes may be Japanese: only a heading decides
                 if encoding != JAPANESE or given.encoding or found.has_language("ja"):
                     yield form
 

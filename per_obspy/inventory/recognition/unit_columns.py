@@ -21,7 +21,7 @@ def converted(numbers: pa.ChunkedArray, unit: Unit) -> pa.ChunkedArray:
 
 def converted_texts(cells: pa.ChunkedArray, unit: Unit) -> pa.ChunkedArray:
     """
-    Return text with its numbers in the unit of the schema; what is no number stays as it is.
+    Return text with its numbers in the unit of the schema; other cells are unchanged.
 
     Examples
     --------

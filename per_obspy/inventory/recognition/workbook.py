@@ -29,7 +29,7 @@ LONGEST_ROW, MOST_ROWS, MOST_SHEETS = 2 << 20, 1 << 20, 100
 #: Most columns that are read.
 MOST_COLUMNS = 1000
 
-#: What stands for the names of sheets in messages.
+#: Replacement for the names of sheets in messages.
 _LONGEST_LIST = 200
 
 _ROW = re.compile(rb"<(?:\w+:)?row[\s/>]")
@@ -178,7 +178,7 @@ def _check_parts(file: Path) -> None:
             name = PurePosixPath(part.filename)
             if name.suffix not in (".xml", ".rels") or name.name.startswith("externalLink"):
                 continue
-            # A sheet may have any name: what is large is one, or is not read
+            # A sheet may have any name: a large part is a sheet, or is not read
             if "sharedstrings" in name.name.lower():
                 limit = LARGEST_TEXTS
             else:
@@ -209,7 +209,7 @@ def _row_texts(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> I
     rest = b""
     with archive.open(part) as stream:
         while block := stream.read(1 << 18):
-            # What follows the last whole row waits for its end
+            # Text after the last whole row waits for its end
             rest += block
             ends = [end.end() for end in _ROW_END.finditer(rest)]
             if ends:

@@ -79,7 +79,7 @@ def run_strides(stride, north, east, begin, starts, table, checkpoints):
 def _open_tile(north, east, tile, starts, t, checkpoint):
     """Store the states before a tile and start its largest values with theirs."""
     for lane in range(MAXIMA_LANES):
-        # Denormal states, and those before the oscillator's own start, become zero
+        # Denormal states, and those before the start of the oscillator, become zero
         u = t[0, lane] if abs(t[0, lane]) > SMALLEST_STATE and tile > starts[lane] else 0.0
         z = t[1, lane] if abs(t[1, lane]) > SMALLEST_STATE and tile > starts[lane] else 0.0
         t[0, lane], t[1, lane], t[2, lane] = u, z, t[3, lane] * north + t[4, lane] * east

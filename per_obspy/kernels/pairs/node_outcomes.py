@@ -157,7 +157,7 @@ def _chance(demands, gap, deviation, work, integers):
         above += demands[node] > gap
     if gap <= 0.0 or largest <= 0.0:
         return above / demands.size
-    # nodes are smoothed as far as nothing else is uncertain
+    # nodes are smoothed as far as no other value is uncertain
     smoothing = _smoothing(demands, largest, deviation, work[0], work[1], integers)
     dispersion = max(deviation, smoothing)
     if dispersion <= 0.0:

@@ -276,7 +276,7 @@ def _largest_radius(arguments, body, first, pairs, bounds):
 
     For every contact displacement x one of the two velocity signs of equal direction closes the
     gap, and so does that of opposite direction: the largest |v'| is the sum of both contributions.
-    What remains is a maximum over x, with at most two peaks in all cases tried: the two highest of
+    The rest is a maximum over x, with at most two peaks in all cases tried: the two highest of
     a scan are refined.
     """
     constants, peaks = np.zeros((7, PAIRS)), np.zeros((4, PAIRS))

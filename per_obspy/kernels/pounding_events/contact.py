@@ -174,7 +174,7 @@ def closing_acceleration(row, j, acceleration):
     """
     Return a bound of the acceleration at which the two sides of a touching interface close.
 
-    Each side is pushed by its own structure, or by one behind it that touches it: the acceleration
+    Each side is pushed by its structure, or by one behind it that touches it: the acceleration
     of structures that move together is a mean of theirs.
     """
     # strongest push from the left

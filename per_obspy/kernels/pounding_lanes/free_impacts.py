@@ -70,7 +70,7 @@ def clearance_trend(pair, left, right, next_left, next_right, share):
 
     The piece is this share of the step, between two pairs of states. The clearance's rate leaves
     its chord by ``error`` at most; the rate falls all through (the clearance is concave) or grows
-    (convex) where the bounds of its own rate have one sign.
+    (convex) where the bounds of its rate have one sign.
     """
     second = STRUCTURE_ROWS
     omega = pair[OMEGA]

@@ -110,7 +110,7 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine,
     Returns
     -------
     bool
-        Whether all pairs got through: no step had too many events.
+        Whether all pairs reached the end: no step had too many events.
     """
     prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
     # the record

@@ -129,7 +129,7 @@ def _run_block(ground, dt, block, count, inputs, bounds, floors, checkpoints, be
     for lane in range(PAIR_LANES):
         pack_pair(block[lane], dt, table, lane)
     find_pair_windows(GROUP * TILE * dt, block, bounds, floors, windows)
-    # From groups to tiles; of copies nothing counts
+    # From groups to tiles; copies are not counted
     windows[0] *= GROUP
     windows[1] = np.minimum((windows[1] + 1) * GROUP, inputs.shape[0]) - 1
     windows[1, count:] = -1

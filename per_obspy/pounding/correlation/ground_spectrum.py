@@ -88,7 +88,7 @@ def _table(psd: ArrayLike, frequencies: ArrayLike) -> tuple[FloatArray, FloatArr
         fallen = frequencies[int(np.argmin(steps)) + 1]
         raise ValueError(f"frequencies must increase, got {fallen}")
     if not density.any():
-        raise ValueError("psd is 0 everywhere: nothing moves")
+        raise ValueError("psd is 0 everywhere: there is no motion")
     return density, frequencies
 
 

@@ -26,7 +26,7 @@ class HertzHistory(NamedTuple):
     displacement, velocity : (2, n_samples) ndarray
         At contact level, relative to the ground, m and m/s.
     contacts : int
-        How often the structures met.
+        Number of contacts.
     force_maximum : float
         Largest contact force at the instants that the integration visited, N.
     """

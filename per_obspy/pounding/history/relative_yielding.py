@@ -156,7 +156,7 @@ def _run(components: FloatArray, dt: float, fields: dict[str, FloatArray]) -> Fl
     rows = row_at_rest(table, fields["gap"][:, np.newaxis], np.zeros((len(table), 1)))
     parts, free_steps = refinements(table, dt), free_vibration_steps(fields, dt)
 
-    # Pairs without contact have kernels of their own
+    # Pairs without contact have separate kernels
     angles = np.radians(fields["azimuth"])
     run_blocks(
         run_without_contact,

@@ -78,7 +78,7 @@ def row_maxima(
     """
     Compute the maxima of the exact pounding histories of rows of buildings.
 
-    The physics is that of `pounding_history`, with a contact height of its own for every interface:
+    The physics is that of `pounding_history`, with a separate contact height for every interface:
     an impulse ``J`` at the interface after building k changes its modal velocity by ``-a J / m``
     and that of its neighbour by ``b J / m``, with the participations ``a`` (right) and ``b``
     (left). Bouncing ends in contact when a bounce would last less than a thousandth of a sampling
@@ -141,7 +141,7 @@ def _free_radius(
     sizes = np.diff(rows.first)
     azimuth = np.repeat(rows.azimuth, sizes)
     radius = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth).per
-    # A building that may yield is a row of its own
+    # A building that may yield is a separate row
     yielding = np.flatnonzero(np.isfinite(rows.yield_displacement))
     if yielding.size:
         fields = {

@@ -82,7 +82,7 @@ def _kasai(ductility: float, hardening: float) -> tuple[float, float]:
     return 1.0 + 0.18 * (ductility - 1.0), 0.16 * (ductility - 1.0) ** 0.9
 
 
-#: Methods by their authors. ``gulkan_sozen`` includes 2 % of damping of its own, so the structure's
+#: Methods by their authors. ``gulkan_sozen`` includes 2 % of viscous damping, so the structure's
 #: is not added.
 METHODS: dict[str, Formula] = {
     "rosenblueth_herrera": _rosenblueth_herrera,

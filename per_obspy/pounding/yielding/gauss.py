@@ -134,7 +134,7 @@ def _response(covariance: FloatArray) -> _Response:
 
 
 def _own(covariance: FloatArray, systems: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the covariance of each structure's own states."""
+    """Return the covariance of the states of each structure."""
     second, end = len(systems[0]), len(systems[0]) + len(systems[1])
     return covariance[:second, :second], covariance[second:end, second:end]
 

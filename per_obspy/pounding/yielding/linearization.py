@@ -17,7 +17,7 @@ from per_obspy.pounding.yielding.estimate import LinearizedEstimate
 from per_obspy.pounding.yielding.gauss import gauss_3
 from per_obspy.pounding.yielding.krylov import krylov_bogoliubov, prescribed_ductility
 
-#: Vanmarcke bandwidth below which a ground motion counts as narrow: our own threshold,
+#: Vanmarcke bandwidth below which a ground motion counts as narrow: a threshold of this package,
 #: dimensionless
 NARROW = 0.35
 #: The moments end where this share of the power is reached: those of filtered white noise do not

@@ -222,7 +222,7 @@ def _other_baselines(stream: Stream) -> Iterator[tuple[str, Stream]]:
 
 
 def _noise_findings(spectra: NoiseSpectra | None, settings: Processing) -> Iterator[Finding]:
-    """Yield a finding if the signal clears the noise nowhere, or not in the required band."""
+    """Yield a finding if the signal never exceeds the noise, or not in the required band."""
     if spectra is None:
         return
     checks = settings.checks

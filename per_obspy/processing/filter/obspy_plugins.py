@@ -54,7 +54,7 @@ def acausal_butterworth(  # noqa: PLR0913 - a corner has two names
     Raises
     ------
     ValueError
-        If no corner is given, one is given twice, is not positive or is above the Nyquist
+        If no corner is set, one is set twice, is not positive or is above the Nyquist
         frequency, or if the low-pass corner is not above the high-pass corner.
     """
     # Corners under either name

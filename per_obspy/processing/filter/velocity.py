@@ -28,7 +28,7 @@ def boore_segments(data: FloatArray, dt: float, first: float, second: float) -> 
     Remove two baseline shifts from acceleration, one during the shaking and one from then on.
 
     A line is fitted to the velocity after the shaking; its slope is the shift there, and the shift
-    during the shaking is what brings the velocity from zero onto that line:
+    during the shaking is the part that brings the velocity from zero onto that line:
 
     .. math:: v_f(t) = v_0 + a_f t, \quad t \ge t_2, \qquad a_m = v_f(t_2) / (t_2 - t_1)
 

@@ -55,7 +55,7 @@ def picked_onset(trace: Trace, clearest: float = 3.0) -> tuple[float, float] | N
     if not found:
         return None
     onset = int(median(found))
-    # The wave must be larger than what precedes it
+    # The wave must be larger than the samples before it
     if not _is_clear(samples, onset, round(CLEAR_WINDOW / dt), clearest):
         return None
     return onset * dt, (found[-1] - found[0]) * dt

@@ -120,7 +120,7 @@ def surviving(
     accepted, rejected = Stream(), []
     remaining = Stream(list(stream))
     while remaining:
-        # The step is given the only reference to the trace
+        # The step receives the only reference to the trace
         row = rejection(remaining[0])
         try:
             accepted += step(Stream([remaining.pop(0)]))

@@ -126,7 +126,7 @@ def paired(instrument: Stream, overlap: float) -> tuple[Stream, tuple[Rejection,
     verticals = [trace for trace in instrument if not is_horizontal(trace)]
     verticals.sort(key=lambda trace: trace.id)
     rejected = [
-        rejection(trace, f"a second vertical beside {verticals[0].id}") for trace in verticals[1:]
+        rejection(trace, f"a second vertical besides {verticals[0].id}") for trace in verticals[1:]
     ]
     # The first horizontal that fits the longest one joins it
     pair = Stream(horizontals[:1])
@@ -167,7 +167,7 @@ def _conflicts(pair: Stream, trace: Trace, overlap: float) -> list[str]:
     """Return the reasons for which a horizontal cannot join the first one."""
     partner = pair[0]
     if len(pair) > 1:
-        return [f"a third horizontal beside {pair[0].id} and {pair[1].id}"]
+        return [f"a third horizontal besides {pair[0].id} and {pair[1].id}"]
     reasons = []
     own, other = trace.stats.delta, partner.stats.delta
     if not np.isclose(own, other, rtol=SAMPLING_TOLERANCE):

@@ -1,4 +1,4 @@
-"""Components of digitised film, each with its own mean interval, on one interval."""
+"""Resample components of digitised film with different mean intervals to one interval."""
 
 import numpy as np
 from obspy import Stream
@@ -10,7 +10,7 @@ def at_one_interval(stream: Stream) -> Stream:
     """
     Return traces of an instrument whose digitised ones share the smallest of their intervals.
 
-    Every component of a film is digitised on its own, so that mean intervals differ by some parts
+    Every component of a film is digitised separately, so that mean intervals differ by some parts
     in a hundred thousand, or more where operators chose the points. Those with a longer interval
     are interpolated linearly; all else stays as it is.
 

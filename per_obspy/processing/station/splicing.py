@@ -19,7 +19,7 @@ def spliced(pieces: Stream) -> Trace | None:
     """
     Join pieces that overlap in time and contradict each other, if they agree at another overlap.
 
-    Recorders that wrote a long record to several files gave each the whole second of their own
+    Recorders that wrote a long record to several files gave each the whole second of its
     clock, off by seconds. The overlap with the highest correlation is used; inside it one piece
     fades into the other.
 

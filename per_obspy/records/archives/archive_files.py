@@ -34,7 +34,7 @@ def archive_files(archive: Path, limits: Archives = LIMITS) -> tuple[list[Path],
     archive : Path
         Zip or tar.
     limits : Archives
-        What it may unpack to.
+        Limits of unpacking.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every kind of archive has in common: members in their order, and their bytes."""
+"""Common part of all kinds of archives: members in their order, and their bytes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator

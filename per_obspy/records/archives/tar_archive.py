@@ -54,7 +54,7 @@ class PackedTar(Packed):
 
 
 def _unpacker(file: IO[bytes]) -> Any:
-    """Return what unpacks a compressed tar, by its first bytes; None if it is not compressed."""
+    """Return the decompressor of a compressed tar, by its first bytes; None if not compressed."""
     head = file.read(max(map(len, _UNPACKERS)))
     file.seek(0)
     found = (opened for mark, opened in _UNPACKERS.items() if head.startswith(mark))

@@ -41,7 +41,7 @@ DAMAGES = (
     struct.error,
 )
 
-#: Size of an archive below which its ratio of unpacked to packed bytes says nothing.
+#: Size of an archive below which its ratio of unpacked to packed bytes is not checked.
 _SMALL = 64 * 2**20
 
 _REPEATED = "another member of this name comes later in the archive"
@@ -87,7 +87,7 @@ class Allowance:
             raise self._too_large(f"unpacks to more than {limit} bytes")
         if total > max(limits.largest_ratio * self.size, _SMALL):
             limit = f"records.archives.largest_ratio = {limits.largest_ratio:g}"
-            raise self._too_large(f"unpacks to more than {limit} times its own size")
+            raise self._too_large(f"unpacks to more than {limit} times its packed size")
 
     def _too_large(self, problem: str) -> "BeyondLimits":
         """Return the error of an archive beyond a limit."""
@@ -99,7 +99,7 @@ class BeyondLimits(RecordRejected):
 
 
 class _Inside(NamedTuple):
-    """Place of a file in an archive inside an archive: names of that archive and of the file."""
+    """Path of a file in an archive inside an archive: names of that archive and of the file."""
 
     archive: str
     name: str
@@ -112,18 +112,18 @@ class WalkedArchive:
     Parameters
     ----------
     name : str
-        Path for messages; its end says of which kind the archive is.
+        Path for messages; it ends with the kind of the archive.
     file : file object
         The archive.
     allowance : Allowance
-        What it may unpack to.
+        Limits of unpacking.
     level : int
         1 for the outermost archive, 2 for one inside it, and so on.
 
     Attributes
     ----------
     members : dict
-        Name -> member; files of archives inside have the name of their archive before their own.
+        Name -> member; names of files in inner archives begin with the name of their archive.
     rejected : list of Rejection
         Members that are not read, each with its reason.
     """

@@ -21,7 +21,7 @@ def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
     """
     Return the files below a folder, sorted, and whatever else is there that cannot be read.
 
-    Folders that cannot be listed, links that lead nowhere or to a folder, pipes, sockets and
+    Folders that cannot be listed, links without a target or to a folder, pipes, sockets and
     devices are rejections; the rest goes on. Part files of this package are passed over.
 
     Raises
@@ -50,12 +50,12 @@ def files_below(folder: Path) -> tuple[list[Path], list[Rejection]]:
 
 
 def _problem(path: Path) -> str:
-    """Return why something in a folder is neither a file nor a folder; empty if it is one."""
+    """Return why an entry of a folder is neither a file nor a folder; empty if it is one."""
     try:
         kind = path.stat().st_mode
     except OSError as error:
         if path.is_symlink():
-            return f"is a link that leads nowhere: {reason_of(error)}"
+            return f"is a link without a target: {reason_of(error)}"
         return f"cannot be read: {reason_of(error)}"
     # Folders behind links could hold each other
     if stat.S_ISDIR(kind):
@@ -66,7 +66,7 @@ def _problem(path: Path) -> str:
 
 def is_document(path: Path) -> bool:
     """
-    Check from its name whether a file is for people: what agencies pack beside records.
+    Check from its name whether a file is for people: documents that agencies pack with records.
 
     >>> is_document(Path("a.zip/README.TXT")), is_document(Path("plot.pdf"))
     (True, True)
@@ -74,6 +74,6 @@ def is_document(path: Path) -> bool:
     False
     """
     name = path.name.lower()
-    # A Mac packs a file of its own beside each file
+    # macOS packs an additional file with each file
     is_hidden = name.startswith("._") or name in _HIDDEN
     return is_hidden or name.startswith(_TITLES) or name.endswith(_SUFFIXES)

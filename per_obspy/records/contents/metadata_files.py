@@ -53,7 +53,7 @@ def kind_of(path: Path, content: bytes) -> str:
 
 
 def _has_data(content: bytes) -> bool:
-    """Return whether a volume of SEED holds records of data beside its headers."""
+    """Return whether a volume of SEED holds records of data in addition to its headers."""
     starts = range(0, len(content), _LOGICAL_RECORD)
     return any(_DATA.match(content, start) for start in starts)
 
@@ -107,7 +107,7 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
         If there is none, or one cannot be read.
     """
     paths = [stationxml]
-    # What cannot be read is tried again below, for its reason
+    # Unreadable files are tried again below, for the reason
     if stationxml.is_dir():
         files, unread = files_below(stationxml)
         paths = [path for path in files if path.suffix == ".xml"]
@@ -123,5 +123,5 @@ def read_inventories(stationxml: Path) -> list[Inventory]:
 
 
 def _is_needed(rejection: Rejection) -> bool:
-    """Return whether something that cannot be read may hold StationXML."""
+    """Return whether an unreadable file may hold StationXML."""
     return rejection.source.endswith(".xml") or "cannot be listed" in rejection.reasons[0]

@@ -1,4 +1,4 @@
-"""One series of each channel: without integrals and doubles of what is read already."""
+"""Select one series of each channel: no integrals, no second copies of a series."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ def without_integrals(stream: Stream) -> tuple[Stream, list[Rejection]]:
     """
     Return a stream without series of velocity and displacement whose acceleration it holds too.
 
-    Agencies write the integrals of a record beside it, under the same codes.
+    Agencies write the integrals of a record to the same folder, under the same codes.
     """
     accelerations = {trace.id for trace in stream if trace.stats.get("units") == "m/s2"}
     # Integrals without their acceleration stay
@@ -40,7 +40,7 @@ def without_doubles(stream: Stream) -> tuple[Stream, list[Rejection]]:
     """
     Return a stream with one form of every record that agencies give in several.
 
-    A record may lie beside itself as counts and as acceleration (V0 and V1), or in two formats (SMC
+    A folder may hold a record as counts and as acceleration (V0 and V1), or in two formats (SMC
     and RAW). Of the forms of one channel and state (raw or processed) that overlap in time, the
     longest stays (in steps of 10 s), of several one in physical units, of these the first by format
     and file. A form that does not overlap, in time or by its channel code, is another record.

@@ -1,4 +1,4 @@
-"""The one earthquake of a folder that is screened: its stations and files, and what is left out."""
+"""Choose the one earthquake of a folder that is screened, and reject the records of others."""
 
 import logging
 from collections.abc import Container, Iterable
@@ -126,7 +126,7 @@ def _contents(
     found: SourceContents, group: EventGroup, mixed: Container[Path], reader: Reader
 ) -> tuple[tuple[SourceContents, Reader], ...]:
     """Return the stations of a group with their readers; the first contents have rejections."""
-    # Stations of which only a window is read have a reader of their own
+    # Stations of which only a window is read have a separate reader
     whole, windows = dict[str, tuple[Path, ...]](), list[tuple[SourceContents, Reader]]()
     for station, paths in station_files(group.records).items():
         limits = _station_limits(station, group, mixed)
@@ -146,7 +146,7 @@ def _station_limits(
     # Hours of record are cut to the time of the triggered records of all stations
     if any(record.end - record.start > HOURS for record in own):
         return _limits(group)
-    # A file with records of other earthquakes is cut to its own
+    # A file with records of several earthquakes is cut to the chosen one
     if any(record.path in mixed for record in own):
         return {
             "start": min(record.start for record in own),

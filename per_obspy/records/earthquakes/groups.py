@@ -10,7 +10,7 @@ one:
 * records whose header has a date but no time start at midnight: they join the largest group that
   starts from half a day before to one and a half days after it, in whichever zone the date is;
 * records without a date (film, or a clock that was never set: 1970 or 1980) join the group of the
-  other records of their folder, and in a folder of their own every group.
+  other records of their folder; if these form no group, every group of the folder is taken.
 """
 
 from collections import Counter, defaultdict
@@ -127,7 +127,7 @@ def record_span(trace: Trace, path: Path) -> RecordSpan:
     pads = stats.get("per_obspy", {})
     start = stats.starttime + (pads.get("pad_before") or 0.0)
     end = stats.endtime - (pads.get("pad_after") or 0.0)
-    # ObsPy's own reader keeps the header of K-NET apart
+    # The K-NET reader of ObsPy keeps the header apart
     event = header_event(knet_event(trace) if "knet" in stats else stats.get("event"))
     return RecordSpan(trace.id, f"{stats.network}.{stats.station}", path, start, end, event)
 
@@ -159,7 +159,7 @@ def event_groups(records: Iterable[RecordSpan], gap: float = GAP) -> tuple[Event
     known = sorted(records, key=lambda record: (record.start.ns, record.record, str(record.path)))
     triggered = [record for record in known if record.has_time and not record.is_continuous]
     groups = _started_together(triggered, gap)
-    # Records that cannot found a group of their own where there is one to join
+    # Records that cannot found a separate group where there is one to join
     continuous = [record for record in known if record.is_dated and record.is_continuous]
     groups += _overlapping_together(_without_group(groups, continuous, _overlapping))
     days = [record for record in known if record.is_dated and not record.has_time]
@@ -187,7 +187,7 @@ def chosen_group(
         Origin time of the earthquake, or another time within its records. Without it the group of
         most stations is taken, of these the one of the largest motion, of these the latest.
     source : str
-        Where the time comes from, for the error.
+        Source of the time, for the error.
     motion : callable
         Returns the largest motion of a group; called only if several have as many stations.
     gap : float
@@ -268,7 +268,7 @@ def _join_folders(groups: list[list[RecordSpan]], undated: Sequence[RecordSpan])
     counts = list(map(_folder_counts, groups))
     for record in undated:
         in_folder = [count[record.path.parent] for count in counts]
-        # In a folder of their own they go with whichever group is screened
+        # Without a located group in their folder they join whichever group is screened
         most = max(in_folder, default=0)
         for count, group in zip(in_folder, groups, strict=True):
             # The first of those that have most; all where none has any

@@ -1,5 +1,5 @@
 """
-The earthquake by the headers of its records: what most stations say.
+Read the earthquake from the headers of its records: the values of most stations.
 
 Headers give the origin time, the hypocentre and the magnitude that an agency knew when it wrote the
 record. Each station has one vote. Two agree if their times are within a minute, to which some
@@ -29,7 +29,7 @@ _RANGES = {
 
 class HeaderEvent(NamedTuple):
     """
-    An earthquake as a header describes it; what is unknown is None.
+    An earthquake as a header describes it; unknown values are None.
 
     Attributes
     ----------

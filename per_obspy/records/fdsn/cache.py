@@ -4,9 +4,9 @@ Records from FDSN web services, kept in a folder that any later run reads withou
 A cache holds ``event-ID.xml`` and one folder for each window and choice of channels, with
 ``NET.STA.mseed`` and ``NET.STA.xml`` of every station, and ``NET.STA.json`` with their hashes and
 the channels asked for. Files appear whole or not at all and are asked for again only if they have
-changed, so that a killed fetch goes on where it stopped; what it left half written (``.….part.…``)
+changed, so that a killed fetch resumes; half-written files (``.….part.…``)
 is passed over and removed. ``complete-….json``, a status file of :mod:`per_obspy.resume`, is
-written when a request has nothing left to ask for.
+written when a request is complete.
 """
 
 from collections import defaultdict
@@ -79,7 +79,7 @@ def fetch(
     again: bool = False,
 ) -> Fetched:
     """
-    Bring into the cache what it lacks of a request; nothing is asked for if it lacks nothing.
+    Download the missing parts of a request into the cache; ask for none if it is complete.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def fetch(
     progress : callable
         Called for every station: stage, done, total.
     again : bool
-        Whether to ask again for stations of which every service had no data.
+        Whether to ask again for stations without data at every service.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def fetch(
         write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
     fetched = fetched._replace(rejected=tuple(rejected))
     if not complete and not fetched_stations(fetched).stations:
-        raise ServiceError(f"nothing could be fetched; {'; '.join(rejected[0].reasons)}")
+        raise ServiceError(f"no station could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
 
 
@@ -132,7 +132,7 @@ def _pool(request: config.Fdsn) -> WebPool:
 
 
 def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetched:
-    """Return the place of a request in the cache, with its event and nothing rejected yet."""
+    """Return the place of a request in the cache, with its event and without rejections."""
     if event is None and request.event_id:
         event = fetched_event(pool, request.event_provider, request.event_id, request.cache)
     file = read_event_file(event) if event else None
@@ -143,7 +143,7 @@ def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetch
 def _fetch_missing(
     pool: WebPool, request: config.Fdsn, fetched: Fetched, progress: Progress
 ) -> tuple[list[Rejection], bool]:
-    """Fetch what the cache lacks; return what failed, and whether nothing is left to ask for."""
+    """Fetch missing parts; return the failures, and whether the request is complete."""
     wanted = fetched.wanted
     bases, rejected = base_urls(pool, request.providers, station_parameters(wanted))
     offers, unlisted, unusable = _offers(pool, bases, wanted)
@@ -228,7 +228,7 @@ def _offers(
     rejected, unusable = [], []
     for base in bases:
         url = f"{base}/fdsnws/station/1/query"
-        # A service that fails costs its own stations only
+        # A service that fails affects only its stations
         try:
             listed = _listed(pool, url, wanted)
         except (ServiceError, RecordRejected) as fault:

@@ -99,7 +99,7 @@ def fetch_station(
             lasting = False
         else:
             return Outcome(station, (), lasting=True)
-    # Minutes after an earthquake archives may not have what servers of real-time data have
+    # Minutes after an earthquake archives may lack data that servers of real-time data have
     for server, offer in product(live, offers):
         try:
             _fetch_live(pool, wanted, inside(folder, f"{station}.mseed"), offer, server)
@@ -133,7 +133,7 @@ def _fetch_records(pool: WebPool, wanted: Wanted, path: Path, offer: Offer) -> N
         if codes not in found:
             alone = _framed(pool, url, parameters | _selected(codes))
             if alone and codes not in _channels(alone, url, path.stem):
-                problem = f"answers with something else than channel {'.'.join(codes)}"
+                problem = f"answers with data other than channel {'.'.join(codes)}"
                 raise RecordRejected(public_url(url), problem)
             content += alone
     _write(path, content, wanted, offer)
@@ -221,7 +221,7 @@ def _check(url: str, station: str, found: set[str]) -> None:
     """Refuse an answer that does not hold exactly the station of the request."""
     if found != {station}:
         raise RecordRejected(
-            url, f"answers with {', '.join(sorted(found)) or 'nothing'} instead of {station}"
+            url, f"answers with {', '.join(sorted(found)) or 'no data'} instead of {station}"
         )
 
 

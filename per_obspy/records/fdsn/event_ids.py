@@ -1,7 +1,7 @@
 """
 Identifiers of earthquakes: which service knows them, by their form or by a name before them.
 
-Each service takes its own identifier as parameter ``eventid`` of the FDSN event service:
+Each service accepts its identifiers as parameter ``eventid`` of the FDSN event service:
 the USGS (https://earthquake.usgs.gov/fdsnws/event/1), GeoNet (``publicID``,
 https://service.geonet.org.nz/fdsnws/event/1), EMSC (https://www.seismicportal.eu/fdsnws/event/1)
 and INGV (https://webservices.ingv.it/fdsnws/event/1).
@@ -16,7 +16,7 @@ from per_obspy.records.fdsn.providers import base_url
 
 #: form of an identifier -> provider that writes it so
 _FORMS = {
-    # Code of a network and its own number: us7000abcd, ci38457511, official20110311054624120_30
+    # Code of a network and its number: us7000abcd, ci38457511, official20110311054624120_30
     r"[a-z]{2}\d[a-z0-9]{5,12}|us[a-z]000[a-z0-9]{4}|(iscgem|official)\d[a-z0-9_]{3,30}": "USGS",
     # Year, letter p and part of the year: 2016p858000
     r"\d{4}p\d{6}": "GEONET",

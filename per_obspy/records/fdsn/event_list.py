@@ -81,7 +81,7 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     CatalogError
         If the file is no list of events, the source is unknown, or a parameter is wrong.
     ServiceError
-        If the service does not answer, or with something else.
+        If the service does not answer, or its answer is not an event list.
     """
     if Path(source).is_file():
         select = selection(source, query)
@@ -175,7 +175,7 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     CatalogError
         If the service has no such event.
     ServiceError
-        If the service does not answer, or with something else.
+        If the service does not answer, or its answer is not the event.
     """
     path = inside(cache, f"event-{_file_name(event_id)}.xml")
     status_file = path.with_suffix(".json")
@@ -195,14 +195,14 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
         try:
             read_event(part)
         except CatalogError as error:
-            reason = f"answers with something else than the event: {error.problem}"
+            reason = f"answers with data other than the event: {error.problem}"
             raise ServiceError(f"{public_url(url)}: {reason}") from error
     write_status(status_file, digest(event_id), {path.name: bytes_hash(content)}, {})
     return path
 
 
 def _file_name(event_id: str) -> str:
-    """Return the part of a file's name that is an event's own, whatever letters it has."""
+    """Return the file name of an event, safe for any letters in its identifier."""
     if not code_problem("", event_id):
         return event_id
     # Identifiers that differ in other letters only must not share a file
@@ -229,12 +229,12 @@ def _rows_of_answer(
     try:
         return rows(content)
     except (ValueError, KeyError, TypeError, IndexError) as error:
-        reason = f"answers with something else than a list of events: {_reason(error)}"
+        reason = f"answers with data other than a list of events: {_reason(error)}"
         raise ServiceError(f"{public_url(url)}: {reason}") from error
 
 
 def _reason(error: Exception) -> str:
-    """Return the message of an error, of one of Python's own with its class."""
+    """Return the message of an error, with its class if it is one of Python."""
     return str(error) if isinstance(error, PerError) else f"{type(error).__name__}: {error}"
 
 
@@ -247,7 +247,7 @@ def _feed_row(feature: dict[str, Any]) -> EventRow:
     """Return one earthquake of a GeoJSON feed, depth in m."""
     properties = feature["properties"]
     longitude, latitude, *depth = feature["geometry"]["coordinates"]
-    # A feed leaves out or nulls what its network does not know
+    # A feed leaves out or nulls values that its network does not know
     return EventRow(
         event_id=feature["id"],
         time=_iso(UTCDateTime(properties["time"] / 1000)),

@@ -184,7 +184,7 @@ def _attempt(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
         try:
             return _read(pool, response, shown, until)
         finally:
-            # What is left of an answer is not read
+            # The rest of an answer is not read
             response.close()
     except urllib3.exceptions.LocationValueError as error:
         raise ServiceError(f"{shown}: is no address") from error
@@ -197,7 +197,7 @@ def _redirected(pool: WebPool, url: str, parameters: Mapping[str, str]) -> urlli
     """Return the response at the end of the redirections."""
     fields: dict[str, str] | None = dict(parameters)
     target = url
-    # Each step is a request of its own, apart from the retries
+    # Each step is a separate request, apart from the retries
     for _ in range(_MOST_REDIRECTIONS + 1):
         address, headers = _address(pool, target, url)
         response = pool.connections.request(

@@ -62,7 +62,7 @@ def seedlink_window(
     Raises
     ------
     ServiceError
-        If there is no connection, the server refuses a command, answers with something else, or is
+        If there is no connection, the server refuses a command, answers without SeedLink, or is
         beyond a limit.
     """
     shown = f"seedlink://{server}"
@@ -109,7 +109,7 @@ class Conversation:
         self._send("HELLO")
         hello, _ = self._line(), self._line()
         if not hello.upper().startswith(b"SEEDLINK"):
-            raise ServiceError(f"{self.shown}: is no SeedLink server, it says {_shown(hello)}")
+            raise ServiceError(f"{self.shown}: not a SeedLink server, it answers {_shown(hello)}")
         if not self._accepts(f"STATION {code} {network}"):
             return False
         # A location of two blanks is written as dashes; D are data records
@@ -133,7 +133,7 @@ class Conversation:
             if not head:
                 return
             if not _PACKET.fullmatch(head) and not head.startswith(_INFORMATION):
-                raise ServiceError(f"{self.shown}: answers with something else, {_shown(head)}")
+                raise ServiceError(f"{self.shown}: answers without a SeedLink head, {_shown(head)}")
             # A packet that is cut is no record
             record = self._exactly(_RECORD)
             if len(record) < _RECORD:

@@ -4,7 +4,7 @@ A simulated earthquake as a network would deliver it: counts, station metadata a
 All files are marked as simulated: network ``XX``, comments in StationXML and QuakeML. The two
 horizontals are correlated with the configured coefficient; the vertical is independent of them.
 Samples are whole counts, as a digitiser of 24 bits gives them (the step, 5e-6 m/s2, lies below the
-background noise), which MiniSEED stores without loss. Each station has random numbers of its own,
+background noise), which MiniSEED stores without loss. Each station has separate random numbers,
 so that no other station changes a sample of it.
 """
 
@@ -117,7 +117,7 @@ def write_simulation(simulation: Simulation, folder: str | Path) -> None:
 
 
 def _catalog_id(event: Event) -> ResourceIdentifier:
-    """Return an identifier that depends on the event alone, where ObsPy's own would be random."""
+    """Return an identifier that depends on the event alone, where ObsPy's would be random."""
     return ResourceIdentifier(f"{event.resource_id.id}/catalog")
 
 
@@ -199,7 +199,7 @@ def _acceleration(
     n_padded = fft.next_fast_len(2 * n_samples, real=True)
     spectra = _spectra(scenario, station, distance, n_padded)
     window = stochastic.saragoni_hart_window(n_padded, scenario.dt, shaking)
-    # Background noise, then the two waves, each from noise of its own
+    # Background noise, then the two waves, each from separate noise
     generator = _random(scenario, number, 1)
     motion = scenario.noise * generator.standard_normal((3, n_samples))
     for arrival, amplitude in ((scenario.pre_event, P_AMPLITUDE), (s_wave, 1.0)):

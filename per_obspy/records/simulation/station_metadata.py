@@ -102,7 +102,7 @@ def _response() -> Response:
 
 
 def scenario_event(scenario: config.Scenario) -> Event:
-    """Return the event; its identifiers depend on the seed, where ObsPy's own would be random."""
+    """Return the event; its identifiers depend on the seed, where ObsPy's would be random."""
     base = f"smi:local/per_obspy/simulated/{scenario.seed}"
     created = CreationInfo(
         agency_id="per_obspy", author="simulated", creation_time=UTCDateTime(scenario.origin_time)

@@ -5,6 +5,7 @@ It is shaped noise with the spectrum of an omega-squared point source. Every fun
 site; numbers are SI. Reference for all: Boore (2003), Pure Appl. Geophys. 160, 635-676.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -87,7 +88,7 @@ def source_spectrum(
     Reference: Boore (2003), eq. 3, 5 and 6; shape of Atkinson & Silva (2000).
     """
     constant = RADIATION * FREE_SURFACE * PARTITION / (4.0 * np.pi * density * shear_velocity**3)
-    # each part of the moment has a corner of its own
+    # each part of the moment has a separate corner
     source = source_of(magnitude)
     low = (1.0 - source.high_share) / (1.0 + (frequency / source.low_corner) ** 2)
     high = source.high_share / (1.0 + (frequency / source.high_corner) ** 2)
@@ -147,7 +148,7 @@ def saragoni_hart_window(n_samples: int, dt: float, shaking: float) -> FloatArra
     """Compute the Saragoni-Hart window of a duration in s; its maximum is 1."""
     power = -WINDOW_PEAK * np.log(WINDOW_END) / (1.0 + WINDOW_PEAK * (np.log(WINDOW_PEAK) - 1.0))
     time = np.arange(n_samples) * dt / (WINDOW_STRETCH * shaking)
-    shape: FloatArray = (np.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time)
+    shape: FloatArray = (math.e / WINDOW_PEAK * time) ** power * np.exp(-power / WINDOW_PEAK * time)
     return shape
 
 

@@ -75,7 +75,7 @@ def _classes(severity: FloatArray, classes: Mapping[str, float]) -> NDArray[np.o
 
 
 def _severity(sides: pd.DataFrame) -> FloatArray:
-    """Return the expected impact velocity with what the row adds to that of the pair, m/s."""
+    """Return the expected impact velocity with the addition of the row to that of the pair, m/s."""
     added = values(sides, "impact_velocity") - values(sides, "impact_velocity_alone")
     # A row that softens a hit once does not so in the next earthquake
     more: FloatArray = np.nan_to_num(np.maximum(added, 0.0))
@@ -100,7 +100,7 @@ def _chances(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray]:
 
 
 def _position(sides: pd.DataFrame, groups: Groups, angle: float) -> NDArray[np.object_]:
-    """Return where each building stands among its neighbours."""
+    """Return the position of each building among its neighbours."""
     known = ~np.isnan(values(sides, "direction"))
     axis = np.where(known, values(sides, "azimuth"), np.nan)
     # Azimuths from 0 and from 90 degrees: axes that are near each other are so in one of them
@@ -163,7 +163,7 @@ def _rows(
 
 
 def _flags(sides: pd.DataFrame, groups: Groups) -> NDArray[np.object_]:
-    """Return the flags of the rows of each building, and its own."""
+    """Return the flags of the rows of each building, and those of the building."""
     # Many rows share few texts
     codes, texts = pd.factorize(sides["flags"])
     words = [str(text).split(" ") for text in texts]

@@ -2,7 +2,7 @@
 Exact histories of rows of buildings under the record of their station.
 
 Every contact is followed twice: in its row, and as a pair of the same two buildings alone under the
-same motion, so that their difference is what the other neighbours do.
+same motion, so that their difference is the effect of the other neighbours.
 """
 
 import numpy as np

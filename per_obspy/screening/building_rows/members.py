@@ -1,7 +1,7 @@
 """
 Buildings of a row, each of which is described by the pair on its left and by that on its right.
 
-The two may differ in what was derived, or rounded: a given value goes before a derived one, and of
+The two may differ in derived or rounded values: a known value goes before a derived one, and of
 two alike the mean is taken, so that a row read backwards is the same row.
 """
 
@@ -52,7 +52,7 @@ class Members(NamedTuple):
     left, right : (n_contacts,) ndarray of int
         Numbers of the buildings on both sides of each contact.
     reconciled : (n_contacts,) ndarray of bool
-        Whether two descriptions of a building beside the contact differ.
+        Whether two descriptions of a building next to the contact differ.
     """
 
     rows: BuildingRows
@@ -69,7 +69,7 @@ def members_of(contacts: Table, first: IntArray, azimuth: FloatArray) -> Members
     ----------
     contacts : Table
         Columns ``NEEDED`` of completed pairs, row after row along the axis of each, and
-        ``turned``: whether building 2 stands before building 1.
+        ``turned``: whether building 2 comes before building 1.
     first : (n_rows + 1,) ndarray of int
         Place of the first contact of each row, and the end.
     azimuth : (n_rows,) ndarray
@@ -121,7 +121,7 @@ def _modal_masses(contacts: Table) -> tuple[FloatArray, FloatArray]:
 
 def alone(rows: BuildingRows, left: IntArray, azimuth: FloatArray) -> BuildingRows:
     """
-    Return some interfaces as rows of their own two buildings.
+    Return some interfaces as rows of two buildings.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class _Joined(NamedTuple):
 
 
 class _Layout(NamedTuple):
-    """Buildings on both sides of each contact, whether its pair is turned, and what is derived."""
+    """Buildings on both sides of each contact, whether its pair is turned, and derived values."""
 
     left: IntArray
     right: IntArray
@@ -169,7 +169,7 @@ class _Layout(NamedTuple):
 
     def joined(self, pair: tuple[FloatArray, FloatArray], name: str) -> _Joined:
         """Return one value per building from the pairs on both sides of it."""
-        # 1 where a value is given, else 0
+        # 1 where a value is known, else 0
         known = [_is_given(self.derived, f"{name}_{i}", side) for i, side in enumerate(pair, 1)]
         left, right = self.sides(*pair)
         left_known, right_known = self.sides(*known)
@@ -193,7 +193,7 @@ def _layout(contacts: Table, first: IntArray) -> _Layout:
 
 
 def _is_given(derived: Any, name: str, found: FloatArray) -> FloatArray:
-    """Return 1 where a value is given, 0 where it is derived or infinite."""
+    """Return 1 where a value is known, 0 where it is derived or infinite."""
     return np.asarray(np.isfinite(found) & ~is_derived(derived, name), dtype=np.float64)
 
 

@@ -35,7 +35,7 @@ class PlacedRows(NamedTuple):
 
 def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     """
-    Give every row a station, and put whole rows of one station together into chunks.
+    Assign a station to every row, and put whole rows of one station together into chunks.
 
     The station is the one that serves most pairs of the row; of several that serve equally many it
     is the one nearer to its pairs, then the first by name. It is empty where most pairs have none.
@@ -70,7 +70,7 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
 
 
 def _azimuths(chains: Chains, pairs: pd.DataFrame) -> FloatArray:
-    """Return the azimuth of each row, degrees; the worst one of a pair whose own is unknown."""
+    """Return the azimuth of each row, degrees; the worst one of a pair without an azimuth."""
     first = chains.first[:-1]
     used = pairs["azimuth_used"].to_numpy(np.float64)[chains.pair[first]]
     used = (used + 180.0 * chains.turned[first]) % 360.0

@@ -58,7 +58,7 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
 def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the columns of the pair, and those of the building itself."""
     columns: dict[str, Any] = {}
-    # Building 1 stands on the left of a pair that is not turned
+    # Building 1 is on the left of a pair that is not turned
     is_first = at_left ^ interfaces["turned"].to_numpy(bool)
     for name in map(str, interfaces):
         stem, _, end = name.rpartition("_")
@@ -86,7 +86,7 @@ class Groups:
         self.sizes = np.diff(self.starts, append=number.size)
 
     def sum(self, values: NDArray[Any]) -> FloatArray:
-        """Return the sum of each group; NaN counts as 0, and is the sum of nothing else."""
+        """Return the sum of each group; NaN counts as 0, unless a group has only NaN."""
         numbers = np.asarray(values, dtype=np.float64)
         known = np.add.reduceat(~np.isnan(numbers), self.starts, dtype=np.int64)
         total = np.add.reduceat(np.nan_to_num(numbers), self.starts)

@@ -126,7 +126,7 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     table : Table
         Completed pairs with their radii along the azimuth, and ``azimuth_used``.
     azimuth : (n_pairs,) ndarray
-        Of the axis from 1 to 2, degrees; 0 where the station has one horizontal. Pairs whose own
+        Of the axis from 1 to 2, degrees; 0 where the station has one horizontal. Pairs without
         azimuth is unknown are turned by 180 degrees where the demand is larger there.
 
     Returns

@@ -1,7 +1,7 @@
 """
 Radii of both buildings of a pair along common azimuths, and the correlation of their responses.
 
-Every array has the shape (n_pairs, n_azimuths): one azimuth where the pair's is given or the
+Every array has the shape (n_pairs, n_azimuths): one azimuth where the pair's is known or the
 station has a single horizontal, else every degree of the half circle, from which the pair's worst
 is chosen by its demand. Both buildings are always driven along the same azimuth.
 """

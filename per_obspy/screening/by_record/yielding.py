@@ -2,10 +2,10 @@
 Estimated demand of pairs in which a building yields, by equivalent linear buildings.
 
 A building whose displacement exceeds its yield displacement is replaced by an equivalent linear one
-(Iwan 1980) at its own ductility. This is the largest ductility up to 40 at which the equivalent
+(Iwan 1980) at its ductility. This is the largest ductility up to 40 at which the equivalent
 building's displacement is that many yield displacements: on a lakebed a stiff, weak building has
 several, and the first one is far too small where yielding takes its period into the resonance of
-the ground. It is found on the station's stored spectra, scaled to the building's own SD,
+the ground. It is found on the station's stored spectra, scaled to the SD of the building,
 interpolated in period and damping. PER at the equivalent period and damping, from the stored
 spectra too, and eq. (16) at the equivalent properties give the critical gap. Yielding raises the
 correlation under broad ground motion; under narrow one eq. (16) then overestimates it, so that the
@@ -38,7 +38,7 @@ PARTS: FloatArray = np.linspace(0.0, 1.0, 33)
 #: than the critical damping.
 LARGEST_DAMPING = 0.99
 
-#: Properties of a building that its equivalent linear one has of its own.
+#: Properties that the equivalent linear building does not share with the given one.
 EQUIVALENT = ("period", "damping", "per")
 
 

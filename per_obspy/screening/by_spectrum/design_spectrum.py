@@ -130,7 +130,7 @@ def _on_grid(rows: pd.DataFrame, quantity: str, source: str) -> DesignSpectrum:
     if len(repeated):
         first = repeated.iloc[0]
         place = f"period = {first['period']:g}, damping = {first['damping']:g}"
-        raise CatalogError(source, f"{place} stands twice")
+        raise CatalogError(source, f"{place} occurs twice")
     grid = rows.pivot(index="damping", columns="period", values=quantity)
     if grid.isna().any(axis=None) or grid.shape[1] < 2:
         raise CatalogError(source, "every damping needs the same periods, at least two")

@@ -4,7 +4,7 @@ Table of a screening by a design or user spectrum: demands and code rules withou
 There is neither a record's correlation nor an exact history, and no PER: the radius is the spectral
 displacement. On broad-band records the gap from SD and eq. (16) has a median of 0.97 of the exact
 one, a log-standard deviation of 0.14, and is too small in two of three cases. A gap below it is a
-finding of the demand only; state, class and rank follow from the population, which knows of that
+finding of the demand only; state, class and rank follow from the population, which includes that
 error and resamples uncertain periods and dampings.
 """
 

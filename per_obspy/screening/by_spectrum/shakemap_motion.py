@@ -183,7 +183,7 @@ def uncertain_map_motion(
     _, pair_log_std = pair_motion(
         (first.radius, second.radius), ratios, log_stds, (period_1, period_2)
     )
-    # every pair has a spectrum of its own
+    # every pair has a separate spectrum
     uncertain = UncertainMotion(
         first,
         second,

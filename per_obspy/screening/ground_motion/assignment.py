@@ -69,7 +69,7 @@ def assigned(
     """
     Assign a station to each pair: index, name and distance; reject pairs without one in reach.
 
-    The station is the nearest one of the pair's own site class; where none of these is in reach, or
+    The station is the nearest one of the pair's site class; where none of these is in reach, or
     the class of the pair is unknown, the nearest of all. ``other_site_class`` is true where both
     classes are known and differ.
 
@@ -153,7 +153,7 @@ def _serving_station(
 ) -> tuple[NDArray[np.intp], FloatArray]:
     """Return the index of the station that serves each place, and the distance to it."""
     index, distance = nearest_station(longitude, latitude, stations.longitude, stations.latitude)
-    # A station of the place's own class goes before a nearer one if it is in reach
+    # A station of the same class goes before a nearer one if it is in reach
     common = set(site_class.tolist()) & set(stations.site_class.tolist()) - {""}
     for name in common:
         alike = np.flatnonzero(stations.site_class == name)
@@ -188,7 +188,7 @@ def nearest_station(
     station : (n_places,) ndarray of int
         Index of the station.
     distance : (n_places,) ndarray
-        Distance on the sphere, m, within 0.6 % of that on the ellipsoid.
+        Distance on the sphere, m, within 0.6 % of the distance on the ellipsoid.
 
     Examples
     --------

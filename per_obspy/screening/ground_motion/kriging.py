@@ -4,7 +4,7 @@ Ground motion between stations: an attenuation trend and kriging of the residual
 Within each site class and at each period, ln PER is a trend fitted by generalised least squares
 plus a residual whose spatial correlation is that of Jayaram & Baker (2009), published for spectral
 acceleration and used here for PER. Median and log-standard deviation are those of universal
-kriging: at a station its own value and no deviation, far from every station the trend, the whole
+kriging: at a station its value and no deviation, far from every station the trend, the whole
 deviation and the uncertainty of the trend. The trend uses every station, the residual of a place
 its nearest ones. Numbers of a place depend on no other place.
 """
@@ -52,7 +52,7 @@ class MotionField(NamedTuple):
 
 class InterpolatedMotion(NamedTuple):
     """
-    Motion at places without a station, each at its own period.
+    Motion at places without a station, each at a different period.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ def fitted_field(
     -----
     The trend is a mean, with a slope in the logarithm of the distance to the source and one in that
     of Vs30 where enough stations differ enough in it; a place whose value is unknown takes the
-    stations' mean. The deviation joins the stations' own with the assumed one ``s0``, which counts
+    mean of stations. The deviation joins those of the stations with the assumed ``s0``, counted
     as ``w`` stations: ``s² = (w s0² + e' C^-1 e) / (w + n - p)``.
 
     References
@@ -123,7 +123,7 @@ def fitted_field(
                 stations.at(rows), values[rows], limits[rows], grid, settings
             )
 
-    # All stations together serve the places that no group of their own class serves
+    # All stations together serve the places that no group of the same class serves
     if len(names) == 1:
         groups[None] = groups[names[0]]
     else:
@@ -164,7 +164,7 @@ def motion_at(field: MotionField, places: Sites, period: ArrayLike) -> Interpola
 
     Notes
     -----
-    Stations of a place's own site class serve it. Where there is none that supports the period, or
+    Stations of a place's site class serve it. Where there is none that supports the period, or
     the class of the place is unknown while that of a station is known, all stations do and
     ``fallback`` is true.
     """
@@ -173,7 +173,7 @@ def motion_at(field: MotionField, places: Sites, period: ArrayLike) -> Interpola
         np.broadcast_to(checks.positive("period", period), places.longitude.shape)
     )
 
-    # Stations of the place's own site class
+    # Stations of the same site class
     motion = np.full((target.size, 2), np.nan)
     for rows, group in _places_by_class(field, places):
         motion[rows] = _kriged(field, group, places.at(rows), target[rows])

@@ -179,7 +179,7 @@ def motion_at_pairs(
     -------
     dict
         ``ln_per_ratio_i``: ln(PER at the site / PER of the record) at the period of building i;
-        ``ln_per_std_i``: its log-standard deviation; both 0 at the station's own place where the
+        ``ln_per_std_i``: its log-standard deviation; both 0 at the place of the station where the
         record supports the period, both NaN where no station does.
         ``motion_from_other_site_class``: whether stations of another or of an unknown site class
         had to serve.
@@ -196,7 +196,7 @@ def motion_at_pairs(
 
     columns: dict[str, NDArray[np.generic]] = {}
     fallback = np.zeros(len(pairs), dtype=bool)
-    # Both buildings share one place, but each has its own period
+    # Both buildings share one place, but have different periods
     for i in (1, 2):
         period = values(pairs, f"period_{i}")
         motion = motion_at(prepared.field, places, period)

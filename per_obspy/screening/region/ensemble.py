@@ -142,7 +142,7 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
     scenarios = ", ".join(f"{name} ({weight:g}{unit})" for name, weight in weights.items())
     chance = f"of pounding, given that one of these happens: {scenarios}"
     columns = [*JOINED[:2], Column("probability", "float64", "1", chance), *JOINED[2:]]
-    # The scenarios' own columns follow the joined ones
+    # Columns of the scenarios follow the joined ones
     for name in weights:
         meaning = f"of pounding in scenario {name}"
         columns.append(Column(f"probability_{name}", "float64", "1", meaning))
@@ -214,7 +214,7 @@ def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> I
                 "unknown"
             )
 
-        # Smallest and largest value of what must be the same
+        # Smallest and largest value of columns that must be the same
         for name, unit in SAME.items():
             smallest, largest = row[name], row[f"{name}_largest"]
             # An unknown gap is NaN in all of them

@@ -273,7 +273,7 @@ def _worst_of(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 def _expected(pieces: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """Return the expected number of pounding pairs of every area that has a probability."""
-    # Pieces have their own categories of areas
+    # Pieces have different categories of areas
     area = union_categoricals([piece["area"] for piece in pieces])
     probability = np.concatenate([piece["probability"] for piece in pieces])
     table = pd.DataFrame({"area": area, "probability": probability})

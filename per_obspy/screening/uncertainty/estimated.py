@@ -1,10 +1,10 @@
 """
 Population of pairs whose demand is an estimate: radii of a spectrum, eq. (15) and (16).
 
-The motion is given by what it does to the pairs (:class:`UncertainMotion`), whether it comes from a
-record, a ShakeMap or a design spectrum. Periods and dampings are resampled, both buildings on their
-own, with radii from spectra scaled to the median radius. So two buildings of equal height are never
-certain to move as one.
+The motion is given by its effect on the pairs (:class:`UncertainMotion`), whether it comes from a
+record, a ShakeMap or a design spectrum. Periods and dampings are resampled for each building
+separately, with radii from spectra scaled to the median radius. So two buildings of equal height
+are never certain to move as one.
 """
 
 from typing import NamedTuple

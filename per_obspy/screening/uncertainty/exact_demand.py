@@ -17,7 +17,7 @@ nodes    32    64   128   256
 error  .069  .035  .021  .015
 ===== ===== ===== ===== =====
 
-Where the first nodes leave no doubt about contact the others are spared.
+Where the first nodes leave no doubt about contact the others are left out.
 ``workflows/population_accuracy.py`` compares populations with draws of exact histories.
 """
 
@@ -82,7 +82,7 @@ NEGLIGIBLE = 1e-4
 #: Demand / sum of the radii below which two oscillators move as one.
 ROUND_OFF = 1e-12
 
-#: Exact impact velocity at the medians / that of ``severity.py``: limits of what is believed.
+#: Exact impact velocity at the medians / that of ``severity.py``: limits of plausible ratios.
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.4, 2.5
 
 #: Columns of a pair from which its demand at the site and its history follow.
@@ -203,7 +203,7 @@ def _of_certain_buildings(block: _Block) -> Columns:
     table, site = block.table, block.site
     moving, factor = _at_the_medians(block)
     result = population(Uncertain(moving, site.log_std, factor), table, NODES)
-    # nothing uncertain: the exact history itself
+    # no uncertainty: the exact history itself
     at_record = (site.log_std == 0.0) & (site.ln_ratio == 0.0) & (site.weight == 1.0)
     certain = at_record & (gap_dispersion(table) == 0.0)
     velocity = np.nan_to_num(values(table, "impact_velocity_exact"))
@@ -264,7 +264,7 @@ def _node_motion(block: _Block, nodes: FloatArray) -> RelativeMotion:
     # equal motions leave the round-off of their difference
     moves_apart = demand > ROUND_OFF * values(block.table, "absolute_gap")[:, None]
     demand = np.where(moves_apart, demand, 0.0)
-    # what the motion between the stations lets expect of the same buildings
+    # expected motion between the stations of the same buildings
     ln_field = ln_field_demand(block.station, sample, block.screening).reshape(demand.shape)
     return _at_site(block, nodes, demand, velocity, ln_field)
 

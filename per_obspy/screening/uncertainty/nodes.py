@@ -1,7 +1,7 @@
 """
-Quasi-random nodes of what is uncertain about a pair: buildings, motion, estimate and gap.
+Quasi-random nodes of the uncertain values of a pair: buildings, motion, estimate and gap.
 
-Periods and dampings are lognormal, each of both buildings on its own. One node serves all pairs
+Periods and dampings are lognormal, independent in both buildings. One node serves all pairs
 alike, so that a row does not depend on the other pairs.
 """
 

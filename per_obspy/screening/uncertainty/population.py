@@ -6,7 +6,7 @@ of the demand (motion at the site, error of an estimate), and the gap. Every nod
 an impact velocity. The probability is the mean over the buildings of the nodes of the chance that a
 lognormal demand exceeds a lognormal gap; expected values and the quantile are those of all nodes,
 with 0 where there is no contact, the quantile being that of 84 in 100: one standard deviation above
-the median of a normal variable. Where nothing is uncertain all nodes are one.
+the median of a normal variable. Without uncertainty all nodes are one.
 
 A node is as uncertain as everything but the buildings is, or as the spread of the nodes over the
 root of their number where that is more. The spread is the smaller one of the standard deviation and
@@ -40,7 +40,7 @@ COLUMNS = (
 
 class Uncertain(NamedTuple):
     """
-    Motion of pairs without contact at the nodes of their buildings, and what else is uncertain.
+    Motion of pairs without contact at the nodes of their buildings, and other uncertain values.
 
     Attributes
     ----------

@@ -2,9 +2,10 @@
 Demand of pairs at their sites, from the demand of their records and the motion between stations.
 
 A record makes an exact demand of a pair; it differs from the demand that its PER lets expect by
-what is special in that record: phases, correlation of both responses, direction of shaking. Part of
-this belongs to the pair and is found at every place, the rest fades with the distance from the
-record. So the demand at the site lies between that of the record, scaled with the motion, and the
+the part that is particular to that record: phases, correlation of both responses, direction of
+shaking. Part of this belongs to the pair and is found at every place, the rest fades with the
+distance from the record. So the demand at the site lies between that of the record, scaled with
+the motion, and the
 estimate from the motion between the stations. Constants are those of leave-one-out on real records
 (docs/calibration.md).
 """
@@ -29,7 +30,7 @@ class SiteDemand(NamedTuple):
     """
     Exact demand of pairs at their sites, as uncertain as the motion there is; each (n_pairs,).
 
-    At the distance h of site and record the correlation of what is special in their demands is
+    At the distance h of site and record the correlation of the particular part of their demands is
     ``c(h) = p + (1 - p) exp(-h / L)``. The logarithm of the demand is normal, with the median
 
         ``weight * (ln(demand of the record) + ln_ratio) + (1 - weight) * ln_field``
@@ -48,7 +49,7 @@ class SiteDemand(NamedTuple):
     ln_field : ndarray
         ln of the demand in m that the motion between the stations lets expect: critical gap by PER
         and eq. (16) at the site over ``model_median``. Radii are RotD50 where the azimuth of the
-        pair is given, because directions of shaking change from place to place, else those along
+        pair is known, because directions of shaking change from place to place, else those along
         the worst azimuth of the record.
     field_log_std : ndarray
         Part of the deviation: of the pair's ln PER at the site, with Student's factor.
@@ -114,18 +115,18 @@ def median_at_site(
     """
     moves = demand > 0
     record = np.log(np.where(moves, demand, 1.0)) + ln_ratio
-    # at the record the field counts nothing, even that of equal buildings, whose gap is 0
+    # at the record the field has no effect, even for equal buildings, whose gap is 0
     field = np.where(np.isfinite(ln_field), ln_field, record)
     median: FloatArray = np.where(moves, np.exp(weight * record + (1.0 - weight) * field), 0.0)
     return median
 
 
 def demand_correlation(table: Table, settings: Interpolation) -> FloatArray:
-    """Return the correlation c(h) of what is special in the demands of record and site."""
+    """Return the correlation c(h) of the particular part of the demands of record and site."""
     if "ln_per_ratio_1" not in table:
         return np.ones_like(values(table, "gap"))
     persistence, length = settings.demand_persistence, settings.demand_length
-    # from 1 at the record to the part that persists; where nothing is known the record counts
+    # from 1 at the record to the part that persists; without other knowledge the record counts
     correlation = persistence + (1.0 - persistence) * np.exp(-values(table, "distance") / length)
     known = np.isfinite(np.stack(both(table, "ln_per_ratio"))).all(axis=0)
     return np.where(known, correlation, 1.0)

@@ -64,7 +64,7 @@ def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
 
 def without_gap(table: pd.DataFrame) -> pd.DataFrame:
     """
-    Return rows of a risk table, empty in what depends on an unknown gap, without ``MARKS``.
+    Return rows of a risk table, empty in columns that depend on an unknown gap, without ``MARKS``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a table gives of its buildings: neither derived nor infinite values."""
+"""Values of buildings in a table: neither derived nor infinite ones."""
 
 import numpy as np
 import pandas as pd

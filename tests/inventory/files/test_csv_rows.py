@@ -167,7 +167,7 @@ def test_a_name_in_two_files_is_repeated_in_the_second(csv, tmp_path):
     other.write_text("\n".join([HEADER, _row("a"), _row("z")]))
     _, rejected = _in_chunks([csv, other], 2)
     assert rejected[-1].source == str(other)
-    assert rejected[-1].reasons == ("pair_id = 'a' stands in an earlier row already",)
+    assert rejected[-1].reasons == ("pair_id = 'a' occurs in an earlier row already",)
 
 
 def test_numbers_of_carried_columns_are_numbers_in_every_chunk(tmp_path):

@@ -128,7 +128,7 @@ WRONG_CSV = [
     (f"{HEADER}\n\n\n", "the table has no rows"),
     (ROW.replace("gap,", "").replace("0.05,", ""), "missing column gap "),
     (ROW.replace("height_2", "hoehe_2"), "missing column height_2 or storeys_2 or period_2 "),
-    (f"{HEADER},gap\n{GOOD},0.1\n", "column gap stands more than once"),
+    (f"{HEADER},gap\n{GOOD},0.1\n", "column gap occurs more than once"),
     (
         ROW.replace("shop", "caf").encode() + b"\xe9 \xc3\xa9\n",
         "line 3 is not UTF-8 .byte 0xe9 at position 1",

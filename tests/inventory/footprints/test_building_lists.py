@@ -109,7 +109,7 @@ MISSING = {
     "lon,lat,width,length": r"add a column wkt \(outlines in degrees\), or azimuth \(",
     "name,height": r"no outlines of buildings: .*longitude, latitude, width.*found: name, height",
     "pair_id,gap": r"a table of pairs already, not of buildings: per-obspy pairs check",
-    "wkt,a,a": "column a stands more than once",
+    "wkt,a,a": "column a occurs more than once",
 }
 
 

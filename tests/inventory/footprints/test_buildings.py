@@ -1,4 +1,4 @@
-"""Buildings beside the pairs, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
+"""Buildings of a layer, and rows of pairs (per_obspy.inventory.footprints.footprint_rows)."""
 
 import numpy as np
 import pandas as pd
@@ -100,4 +100,4 @@ def test_names_of_pairs_that_repeat_in_another_block_are_rejected(tmp_path, monk
     pairs = pairs_from_footprints(path)
     assert pairs["pair_id"].tolist() == ["a/b/c"]
     (rejection,) = pairs.attrs["rejected"]
-    assert "stands in an earlier row already" in rejection.reasons[0]
+    assert "occurs in an earlier row already" in rejection.reasons[0]

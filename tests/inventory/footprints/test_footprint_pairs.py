@@ -215,7 +215,7 @@ def test_repeated_identifiers(write):
     assert pairs["pair_id"].tolist() == ["7/8"]
     (rejection,) = pairs.attrs["rejected"]
     assert rejection[:2] == ("building", "8")
-    assert rejection.reasons == ("building_id = '8' stands in an earlier feature already",)
+    assert rejection.reasons == ("building_id = '8' occurs in an earlier feature already",)
 
 
 def test_an_overlap_is_a_reason_and_no_gap(write):

@@ -216,7 +216,7 @@ def refused() -> dict[str, Messy]:
 
 
 def suspected() -> Messy:
-    """Return a table whose gaps are in centimetres, under a heading that says nothing of it."""
+    """Return a table whose gaps are in centimetres, under a heading without a unit."""
     rows = [[*row] for row in rows_of({1: 100.0})]
     return Messy("pairs.csv", text_of(NAMES, rows[:1]).encode())
 

@@ -1,5 +1,5 @@
 """
-The form of text tables: encodings, and files beside them.
+The form of text tables: encodings, and side files.
 
 Also of per_obspy.inventory.recognition.encodings, per_obspy.inventory.recognition.side_file,
 per_obspy.inventory.recognition.proposals, per_obspy.inventory.gap_units,

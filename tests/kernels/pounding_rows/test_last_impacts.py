@@ -1,4 +1,4 @@
-"""The end of free vibration: nothing that counts may come after it."""
+"""The end of free vibration: no impact that counts may come after it."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 """
-What ``per-obspy run A B`` is taken for, and what is said where something is missing.
+Interpretation of ``per-obspy run A B``, and messages where an input is missing.
 
 Covers ``per_obspy.pipeline.inputs.event_section``.
 """

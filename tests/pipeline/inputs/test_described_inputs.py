@@ -1,5 +1,5 @@
 """
-What ``per-obspy info`` says of every kind of input and result.
+Descriptions by ``per-obspy info`` of every kind of input and result.
 
 Covers ``per_obspy.pipeline.inputs.described_tables``,
 ``per_obspy.pipeline.inputs.described_motion``, ``per_obspy.pipeline.inputs.described_runs`` and

@@ -1,4 +1,4 @@
-"""A first configuration holds what was found, and says what is missing."""
+"""A first configuration holds the inputs that were found, and names the missing ones."""
 
 import tomllib
 

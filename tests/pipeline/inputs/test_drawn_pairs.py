@@ -1,4 +1,4 @@
-"""Pairs of footprints are found once, written beside the results, and again after a change."""
+"""Pairs of footprints are found once, written next to the results, and again after a change."""
 
 import json
 import shutil

@@ -209,7 +209,7 @@ def test_encrypted_and_unknown_packing_are_rows(tmp_path: Path):
 
 
 class Zeros:
-    """A file of zeros as long as wanted, of which nothing is in memory."""
+    """A file of zeros of any length, of which no byte is in memory."""
 
     def __init__(self, size: int) -> None:
         self.left = size
@@ -258,7 +258,7 @@ def test_a_bomb_is_one_row_and_takes_no_memory(tmp_path: Path, write):
     assert peak < 32 * 2**20
     assert list(found.stations) == [".SOMESCHOOL"]
     (row,) = found.rejected
-    assert "records.archives.largest_ratio = 200 times its own size" in row.reasons[0]
+    assert "records.archives.largest_ratio = 200 times its packed size" in row.reasons[0]
 
 
 @pytest.mark.parametrize(("key", "value"), [("largest_total", 8000), ("most_members", 2)])

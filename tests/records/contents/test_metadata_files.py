@@ -1,4 +1,4 @@
-"""Kinds of files beside records."""
+"""Kinds of files that accompany records."""
 
 from pathlib import Path
 

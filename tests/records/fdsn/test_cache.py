@@ -349,14 +349,14 @@ def test_unknown_providers_and_events_are_wrong_input(ask: Ask):
 
 def test_an_event_that_is_none_is_not_kept(server: FdsnServer, ask: Ask):
     server.fail("event", "*", content(b"<html>"))
-    with pytest.raises(ServiceError, match="something else than the event"):
+    with pytest.raises(ServiceError, match="data other than the event"):
         ask()
     assert names(ask()) == STATIONS
 
 
 def test_services_that_fail_altogether_are_unavailable(server: FdsnServer, ask: Ask):
     server.fail("station", "*", *[status(503)] * 2)
-    with pytest.raises(ServiceError, match=r"nothing could be fetched; .*HTTP 503"):
+    with pytest.raises(ServiceError, match=r"no station could be fetched; .*HTTP 503"):
         ask(retries=1)
 
 

@@ -133,7 +133,7 @@ def test_an_origin_without_time_is_refused(tmp_path: Path):
 )
 def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wrong: bytes):
     server.fail("event", "*", content(wrong))
-    with pytest.raises(ServiceError, match="something else than a list of events"):
+    with pytest.raises(ServiceError, match="data other than a list of events"):
         find_events(server.url, {})
 
 

@@ -1,4 +1,4 @@
-"""Outlines from the table beside pairs of footprints."""
+"""Outlines from the table of buildings that footprints write with their pairs."""
 
 import pyarrow as pa
 import pyarrow.parquet as pq

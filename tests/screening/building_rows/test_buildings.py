@@ -1,5 +1,5 @@
 """
-One row per building: what its sides and their pairs tell of it.
+One row per building, from its sides and their pairs.
 
 Tested here as well: per_obspy.screening.building_rows.sides,
 per_obspy.screening.building_rows.prevention and per_obspy.screening.building_rows.row_columns.

@@ -89,7 +89,7 @@ FAULTS = {
     ),
     "a row twice": (
         "period,damping,sd\n1,0.05,0.1\n1,0.05,0.2\n",
-        "period = 1, damping = 0.05 stands twice",
+        "period = 1, damping = 0.05 occurs twice",
     ),
     "a hole": (
         "period,damping,sd\n1,0.05,0.1\n2,0.05,0.2\n1,0.02,0.1\n",

@@ -82,7 +82,7 @@ def test_the_deviation_is_that_of_the_error_where_few_stations_share_the_prior()
 
 
 def _fitted(count, log_std=0.6, log_std_weight=5.0, usable=(0.0, np.inf), scatter=1.0):
-    """Fit stations so far from each other that nothing correlates, at two periods."""
+    """Fit stations so far from each other that they are uncorrelated, at two periods."""
     values = -3.0 + scatter * np.random.default_rng(1).normal(size=(count, 2))
     settings = Interpolation(log_std=log_std, log_std_weight=log_std_weight)
     # a thousand kilometres from each other

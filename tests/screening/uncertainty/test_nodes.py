@@ -1,4 +1,4 @@
-"""Nodes of what is uncertain: moments, and medians where nothing is."""
+"""Nodes of uncertain values: moments, and medians without uncertainty."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pairs of unknown gap: their demand is that of any gap, and nothing else is claimed."""
+"""Pairs of unknown gap: only values that hold for any gap are filled."""
 
 import numpy as np
 import pandas as pd

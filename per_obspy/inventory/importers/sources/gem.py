@@ -2,7 +2,7 @@
 GEM exposure: buildings whose column ``taxonomy`` has a string of the GEM Building Taxonomy.
 
 A string has attributes separated by ``/`` and details of one attribute by ``+``; attributes of
-version 2.0 stand in a fixed order, those of 3.x do not, so that each is known by its code. Storeys
+version 2.0 are in a fixed order, those of 3.x are not, so that each is known by its code. Storeys
 above ground are ``HEX:4`` (exact), ``HAPP:4`` (approximate), ``HBET:6,3`` (range, upper bound
 first), and in 3.x ``H:4`` and ``HBET:3-6``. Storeys in a range have the geometric mean of its ends
 and the logarithmic deviation of an even distribution between them.
@@ -46,7 +46,7 @@ OTHER = ("MUR", "MCF", "MR", "M99", "W", "EU", "ER", "E99")
 
 class Taxonomy(NamedTuple):
     """
-    What a taxonomy string says of a building.
+    Attributes of a building in a taxonomy string.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Taxonomy(NamedTuple):
 
 def parsed(text: object) -> Taxonomy:
     """
-    Take a taxonomy string apart; what is not understood is unknown.
+    Take a taxonomy string apart; attributes that are not understood are unknown.
 
     Examples
     --------

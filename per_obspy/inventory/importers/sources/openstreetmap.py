@@ -50,7 +50,7 @@ def tags_of(cell: object) -> dict[str, object]:
 def adapted(attributes: pd.DataFrame) -> pd.DataFrame:
     """Return the attributes with the known tags as columns, and one identifier."""
     table = attributes.copy()
-    # Tags that stand together in one column
+    # Tags that are together in one column
     for column in TAG_COLUMNS:
         if column in table:
             cells = [tags_of(cell) for cell in table[column]]

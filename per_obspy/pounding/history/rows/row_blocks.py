@@ -34,7 +34,7 @@ def packed_rows(first: IntArray, parts: IntArray) -> list[IntArray]:
     Returns
     -------
     list of ndarray of int
-        Numbers of the rows; a row of more than 32 buildings is a block of its own.
+        Numbers of the rows; a row of more than 32 buildings is a separate block.
     """
     sizes = np.diff(first)
     blocks = []

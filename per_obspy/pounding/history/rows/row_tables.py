@@ -2,7 +2,7 @@
 Rows of buildings that touch each other at different heights, as tables for the kernels.
 
 The clearance of an interface, ``gap + b u_right - a u_left`` with a participation for each side, is
-only ever compared with zero, so that it may be measured in a unit of its own. If the clearance of
+only ever compared with zero, so that it may be measured in any unit. If the clearance of
 interface k is multiplied by ``c_k`` with ``c_k a_k = s_k`` and ``c_k b_(k+1) = s_(k+1)``, and the
 displacement of building k by ``s_k``, both participations are 1: the row is one of plain structures
 with the masses ``m_k / s_k²``, driven by ``s_k`` times the ground acceleration. The chain of these
@@ -98,7 +98,7 @@ def checked_rows(rows: BuildingRows) -> BuildingRows:
         if values.shape != (expected,):
             raise ValueError(f"{name} must have the shape ({expected},), got {values.shape}")
 
-    # What has no neighbour has no meaning
+    # Terms of missing neighbours are not used
     fields["participation_left"] = _replaced(fields["participation_left"], first[:-1])
     for name in ("participation_right", "gap", "restitution"):
         fields[name] = _replaced(fields[name], first[1:] - 1)
@@ -155,7 +155,7 @@ def _refuse_pressed_walls(rows: BuildingRows) -> None:
 
 
 class RowScales(NamedTuple):
-    """Displacement of building k, and clearance after it, in the table over its own, (n,)."""
+    """Displacement of building k, and clearance after it, in the units of the table, (n,)."""
 
     displacement: FloatArray
     clearance: FloatArray
