@@ -51,6 +51,8 @@ SESSION = (
 
 HEAD = """# A quick run
 
+<!-- no block is run: workflows/quick_run.py records this page from real records in five minutes -->
+
 From two folders to a table, as it was typed and printed; `python workflows/quick_run.py` records it
 again. The records are real (Ridgecrest 2019, M7.1, eleven stations). The outlines are a quarter of
 San José, **moved** to Ridgecrest so that records and buildings meet: the numbers are said of no

@@ -23,20 +23,24 @@ ROOMS = {
 }
 
 
-def write(folder: Path) -> None:
-    """Write ``api.rst`` to the folder."""
+def public_names() -> list[tuple[str, str]]:
+    """Return room and name of every public name, in the order of the rooms."""
     stub = (Path(per_obspy.__file__).parent / "__init__.pyi").read_text(encoding="utf-8")
     found = re.findall(r"^from \.([\w.]+) import (\w+) as \w+$", stub, re.MULTILINE)
     rooms = list(ROOMS)
-    names = sorted(((_room(module), name) for module, name in found), key=lambda one: (
-        rooms.index(one[0]), one[1]))  # fmt: skip
+    names = [(_room(module), name) for module, name in found]
+    return sorted(names, key=lambda one: (rooms.index(one[0]), one[1]))
+
+
+def write(folder: Path) -> None:
+    """Write ``api.rst`` to the folder."""
     parts = [
         "Python interface\n================",
         "Every public name. ``import per_obspy`` is enough: each is imported when it is first "
         "used. Units are SI; the examples run as tests.",
         ".. currentmodule:: per_obspy",
     ]
-    for room, group in groupby(names, key=lambda one: one[0]):
+    for room, group in groupby(public_names(), key=lambda one: one[0]):
         listed = "\n".join(f"   {name}" for _, name in group)
         heading = ROOMS[room]
         parts.append(f"{heading}\n{'-' * len(heading)}")
