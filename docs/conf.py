@@ -35,6 +35,7 @@ suppress_warnings = ["config.cache"]  # functions of the gallery's configuration
 numpydoc_show_class_members = False
 autosummary_generate = True
 autodoc_typehints = "none"  # numpydoc lists the types with shapes and units
+autodoc_preserve_defaults = True
 math_renderer = "mathml"
 
 html_theme = "sphinx_book_theme"

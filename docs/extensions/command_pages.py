@@ -42,7 +42,8 @@ def commands() -> Iterator[tuple[str, Any]]:
 def _help(command: Any) -> str:
     """Return the help of a command as Markdown."""
     text = inspect.cleandoc(command.help or "").replace("\b", "").replace("\f", "")
-    return re.sub(r"(?<!`)(--[a-z][\w-]*)", r"`\1`", text).replace("*", r"\*")
+    text = re.sub(r"^Example: (.*)$", r"Example: `\1`", text, flags=re.MULTILINE)
+    return text if "`" in text else text.replace("*", r"\*")
 
 
 def _parameters(command: Any) -> Iterator[str]:

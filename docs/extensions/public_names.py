@@ -12,9 +12,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from api_pages import ROOMS, public_names  # noqa: E402
+from api_pages import ROOMS, public_names
 
-import per_obspy  # noqa: E402
+import per_obspy
 
 MODULE = Path(per_obspy.__file__)
 

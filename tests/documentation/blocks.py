@@ -5,7 +5,7 @@ A comment ``<!-- ... -->`` on the line before a block is one of
 
 * ``file: NAME``: the block is the content of this file;
 * ``with: WORD=VALUE ...``: the block runs with these words replaced;
-* ``not run: REASON``: the block cannot run here. ``no block is run: REASON`` is that of a whole page.
+* ``not run: REASON``: the block cannot run here; ``no block is run: REASON``: none of the page.
 
 Any other block of a shell or of Python runs as it is. The blocks of a page run one after another.
 """
