@@ -1,7 +1,7 @@
 """
 Command line: each command parses its arguments, calls one function and prints.
 
-Exit codes: 0 done, 2 wrong input (one line with the reason), 3 nothing usable was left, 75 try
+Exit codes: 0 done, 2 wrong input (one line with the reason), 3 no usable record or pair, 75 try
 later: a service is unavailable, another run holds the output folder, a file cannot be written, or
 the machine failed otherwise, 130 interrupted.
 """

@@ -236,7 +236,7 @@ def remove_file(path: Path) -> None:
 
 @contextmanager
 def temporary_folder(parent: Path) -> Iterator[Path]:
-    """Give a folder that is removed afterwards, or by a later run if this process is killed."""
+    """Yield a folder that is removed afterwards, or by a later run if this process is killed."""
     with writing(parent):
         folder = TemporaryDirectory(dir=parent.absolute(), prefix=".", suffix=_part_name("", ""))
     # A failure is looked into while the disk is still as full as it was

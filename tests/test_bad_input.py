@@ -145,7 +145,7 @@ WHOLE = {
     "millimetres": (
         {"run.toml": f"{RUN}[building]\nstorey_height = 3000\n"},
         "run run.toml",
-        "(got 3000), expected: m",
+        "(got 3000), expected: height of a storey",
     ),
     "text for a number": (
         {"run.toml": f"{RUN}[spectra]\ncount = 'many'\n"},

@@ -54,7 +54,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, 
 
 
 def stop_if_nothing(usable: int, reason: str = "") -> None:
-    """Stop with the exit code for nothing usable if ``usable`` is 0; print the reason if given."""
+    """Stop with exit code 3 if ``usable`` is 0, after the reason if there is one."""
     if usable:
         return
     if reason:
@@ -66,7 +66,7 @@ def print_and_end(
     result: "Result", as_json: bool, show: "Callable[[Result], None]", strict: bool = False
 ) -> None:
     """
-    Print the result of a run or of several, and stop where nothing usable was left.
+    Print the result of a run or of several, and stop without a usable record or pair.
 
     Lost rows are printed on standard error; with ``strict`` they stop too.
     """
@@ -81,7 +81,7 @@ def print_and_end(
     notes = result.record.get("pair_tables", {})
     for sentence in (*notes.get("recognised", ()), *notes.get("suspicions", ())):
         print(printable(f"per-obspy: {sentence}"), file=sys.stderr)
-    # Losses are for people and for jobs that nobody watches
+    # Losses are for people and for unattended jobs
     lost = result.record.get("losses", [])
     for sentence in lost:
         print(f"per-obspy: {sentence}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``per-obspy info``: say what an input or a result is, on one screen."""
+"""``per-obspy info``: describe an input or a result on one screen."""
 
 import json
 import sys
@@ -52,7 +52,7 @@ def info(
         ),
     ],
     stationxml: Annotated[
-        Path | None, typer.Option(help="StationXML file or folder, if not beside the records.")
+        Path | None, typer.Option(help="StationXML file or folder, if not with the records.")
     ] = None,
     everything: Annotated[
         bool, typer.Option("--all", help="List every record and every rejection.")
@@ -60,7 +60,7 @@ def info(
     as_json: AsJson = False,
 ) -> None:
     """
-    Say what an input or a result is, on one screen, with a map of its places.
+    Describe an input or a result on one screen, with a map of its places.
 
     Example: per-obspy info records
     """
@@ -93,7 +93,7 @@ def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
     found : Facts
         The description.
     taken : int
-        Lines of the screen that are needed for something else.
+        Lines of the screen that are needed for other text.
     """
     from per_obspy.commands.text_map import text_map
 

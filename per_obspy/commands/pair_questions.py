@@ -46,7 +46,7 @@ def asked_columns(path: "Path", form: "TableForm") -> "TableForm":
 
 
 def _unused(file: "PairFile", columns: "Mapping[str, str]") -> list[str]:
-    """Return headings of a file that mean nothing yet."""
+    """Return headings of a file without a known meaning."""
     used = {file.meanings.cells[place] for place in file.meanings.columns}
     return [cell for cell in file.meanings.cells if cell not in used | set(columns.values())]
 

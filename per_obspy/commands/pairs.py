@@ -83,7 +83,7 @@ def find_pairs(
     as_json: AsJson = False,
 ) -> None:
     """
-    Find neighbouring buildings in footprints; their outlines are kept beside the pairs.
+    Find neighbouring buildings in footprints; their outlines are kept next to the pairs.
 
     Example: per-obspy pairs town.gpkg -o pairs.parquet
     """
@@ -138,7 +138,7 @@ def _print_footprint_pairs(table: "pd.DataFrame", places: dict[str, Path], as_js
         return
     counted = f"{len(table)} pairs, {touching} of them touching, {len(rejected)} rejected"
     print(f"{counted}: {places['output']}")
-    # What lies beside the pairs, what was assumed, why rows were rejected
+    # Further files, assumptions, and reasons of rejected rows
     print(f"  outlines and columns of all buildings: {places['buildings']}")
     if "assumed" in table["gap_std_source"].to_numpy():
         print(f"  gaps are assumed to be drawn with a deviation of {table['gap_std'].iloc[0]:g} m")
@@ -152,14 +152,12 @@ def check_pairs(
     file: Annotated[Path, typer.Argument(help="Pair table: .csv, .tsv, .txt, .parquet, .xlsx.")],
     write: Annotated[
         bool,
-        typer.Option(
-            "--write", help="Write names and units of its columns to FILE.toml beside it."
-        ),
+        typer.Option("--write", help="Write names and units of its columns to FILE.toml."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
     """
-    Check a pair table and say what it gives; in a terminal, ask for headings and units.
+    Check a pair table and describe it; in a terminal, ask for headings and units.
 
     Example: per-obspy pairs check pairs.xlsx --write
     """
@@ -192,7 +190,7 @@ def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
     from per_obspy.inventory.files.reading import recognised_line
     from per_obspy.inventory.table_checks import suspicions
 
-    # Counts, and what is said about the table as a whole
+    # Counts, and findings about the table as a whole
     counts = {"pairs": len(table), "touching": int((table["gap"] == 0.0).sum())}
     rejected, odd = table.attrs["rejected"], suspicions(table)
     found = {name: table.attrs[name] for name in ("recognised", "proposed_units")}

@@ -88,7 +88,7 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """
-    Fetch the records of a run, or of one earthquake, and nothing else; what is there stays.
+    Fetch the records of a run, or of one earthquake, into the cache.
 
     Example: per-obspy fetch us7000abcd -o records
     """

@@ -1,4 +1,4 @@
-"""How rows of neighbouring buildings are found and followed."""
+"""Settings of rows of neighbouring buildings."""
 
 from pydantic import Field
 
@@ -9,22 +9,30 @@ MOST_BUILDINGS = 200
 
 
 class Rows(Section):
-    """How pairs join to rows of buildings (docs/rows.md)."""
+    """Settings of joining pairs to rows of buildings (docs/rows.md)."""
 
     enabled: bool | None = Field(
         None,
-        description="write rows.parquet and buildings.*; not given: where the pair table has "
-        "building_id_1 and building_id_2",
+        description=(
+            "write rows.parquet and buildings.*; if not set: where the pair table has "
+            "building_id_1 and building_id_2"
+        ),
     )
     exact: bool | None = Field(
-        None, description="exact history of every row; not given: as screening.exact"
+        None, description="exact history of every row of buildings; if not set: as screening.exact"
     )
     angle: float = Field(
-        30.0, gt=0, lt=90, description="degrees, largest between the axes of two pairs of a row"
+        30.0,
+        gt=0,
+        lt=90,
+        description="largest angle between the axes of two pairs of a row, degrees",
     )
     longest: int = Field(
         30,
         ge=3,
         le=MOST_BUILDINGS,
-        description="buildings; a longer row is cut at its widest gap, and flagged",
+        description=(
+            "largest number of buildings of a row; a longer one is cut at its widest gap, "
+            "and flagged"
+        ),
     )

@@ -13,7 +13,7 @@ from per_obspy.config.section import Section, sections_of
 #: Columns of a comment.
 WIDTH = 96
 
-#: What stands for a value that has no default.
+#: Placeholder of a value that has no default.
 OPEN = "..."
 
 
@@ -112,7 +112,7 @@ def _model(field: FieldInfo) -> type[Section] | None:
 
 
 def _has_default(field: FieldInfo, model: type[Section]) -> bool:
-    """Return whether a table exists without being given, so that its header changes nothing."""
+    """Return whether a table exists without its header, so that the header has no effect."""
     return isinstance(field.default, Section) and _all_default(model)
 
 
@@ -127,7 +127,7 @@ def _is_repeated(field: FieldInfo) -> bool:
 
 
 def _default(field: FieldInfo) -> str:
-    """Return the default of a key as TOML, or what stands for none."""
+    """Return the default of a key as TOML, or the placeholder if it has none."""
     if field.is_required() or field.get_default(call_default_factory=True) is None:
         return f'"{OPEN}"' if _is_text(field.annotation) else OPEN
     return _toml(field.get_default(call_default_factory=True))

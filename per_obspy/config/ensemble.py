@@ -11,9 +11,13 @@ from per_obspy.config.section import RelativePath, Section
 class EnsembleScenario(Section):
     """One earthquake that may happen."""
 
-    name: str = Field(min_length=1, description="unique; stands in the name of its column")
+    name: str = Field(
+        min_length=1, description="name of the scenario, unique; part of the name of its column"
+    )
     run: RelativePath = Field(description="TOML file of its run")
-    weight: float | None = Field(None, ge=0, description="how likely it is beside the others")
+    weight: float | None = Field(
+        None, ge=0, description="probability of the scenario relative to the others"
+    )
     rate: float | None = Field(None, ge=0, description="how often it happens, 1/year")
 
 
@@ -51,7 +55,7 @@ class Ensemble(Section):
         names = [scenario.name for scenario in self.scenario]
         counts = Counter(name.lower() for name in names)
         if repeated := [name for name in names if counts[name.lower()] > 1]:
-            raise ValueError(f"name: {repeated[-1]!r} stands twice (capitals do not count)")
+            raise ValueError(f"name: {repeated[-1]!r} occurs twice (capitals do not count)")
         return self
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""Where the building pairs of a run come from, and how their table is written."""
+"""Settings of the building pairs of a run: their source, and the form of their table."""
 
 from typing import Literal, Self
 
@@ -9,25 +9,29 @@ from per_obspy.config.simulation import SimulatedPairs
 
 
 class TableForm(Section):
-    """How a table of pairs is written, where that cannot be recognised or is to be another."""
+    """Form of a table of pairs, where it cannot be recognised or is recognised wrongly."""
 
     encoding: str | None = Field(
-        None, description="of its text, such as cp1254 or cp932; recognised if not given"
+        None, description="encoding of the text, such as cp1254 or cp932; recognised if not set"
     )
     separator: Literal[",", ";", "\t", "|"] | None = Field(
-        None, description="sign between its columns; recognised if not given"
+        None, description="character between the columns; recognised if not set"
     )
     decimal: Literal[".", ","] | None = Field(
-        None, description="decimal mark of its numbers; recognised if not given"
+        None, description="decimal mark of the numbers; recognised if not set"
     )
     sheet: str | None = Field(
-        None, description="sheet of a workbook; the only one with a pair table if not given"
+        None, description="sheet of a workbook; if not set, the only one with a pair table"
     )
     columns: dict[str, str] = Field(
-        {}, description='names: column of the schema = "heading in the table"'
+        {}, description='headings of the table: column of the schema = "heading in the table"'
     )
     units: dict[str, str] = Field(
-        {}, description='units: column of the schema = "cm", "ft", ...; those of the schema if none'
+        {},
+        description=(
+            'units of the table: column of the schema = "cm", "ft", ...; if not set, those '
+            "of the schema"
+        ),
     )
 
 
@@ -37,17 +41,19 @@ class Footprints(Section):
     file: RelativePath = Field(
         description="layer of polygons: GeoPackage, GeoParquet, GeoJSON, Shapefile, FlatGeobuf"
     )
-    distance: float = Field(3.0, ge=0.001, le=10.0, description="m, largest gap of a pair")
+    distance: float = Field(3.0, ge=0.001, le=10.0, description="largest gap of a pair, m")
     layer: str | None = Field(None, description="name of the layer, for files that have several")
     gap_std: float | None = Field(
         None,
         ge=0,
         le=1,
-        description="m, standard deviation of drawn gaps; not given: assumed and marked",
+        description="standard deviation of drawn gaps, m; if not set, assumed and marked so",
     )
     columns: dict[str, str] = Field(
         default_factory=dict,
-        description='quantity of a building -> column of the layer, such as { height = "altura" }',
+        description=(
+            'columns of the layer: quantity of a building = "column", such as height = "altura"'
+        ),
     )
 
 
@@ -56,19 +62,23 @@ class Pairs(TableForm):
 
     file: RelativePath | None = Field(None, description="pair table: CSV, Parquet or workbook")
     footprints: Footprints | None = Field(
-        None, description="outlines of buildings; their pairs are found first"
+        None, description="outlines of buildings, of which neighbours become the pairs"
     )
     catalog: RelativePath | None = Field(
         None, description="index of stored inventories, catalog.toml"
     )
     names: tuple[str, ...] = Field(
-        (), description="of stored inventories; none: all that the stations' region touches"
+        (),
+        description="names of stored inventories; if empty, all within the region of the stations",
     )
     simulated: SimulatedPairs | None = Field(
         None, description="simulated inventory around the stations"
     )
     largest_rejected_share: float = Field(
-        0.5, ge=0, le=1, description="share of rejected rows above which a run warns; see --strict"
+        0.5,
+        ge=0,
+        le=1,
+        description="share of rejected rows above which a run warns, and stops with --strict",
     )
 
     @model_validator(mode="after")
@@ -86,5 +96,5 @@ class Pairs(TableForm):
 
     @property
     def form(self) -> TableForm:
-        """What is given of the form of the table."""
+        """The configured part of the form of the table."""
         return TableForm(**self.model_dump(include=set(TableForm.model_fields), exclude_unset=True))

@@ -20,87 +20,91 @@ from per_obspy.constants import (
 
 
 class Check(Section):
-    """One check of a record: where it fails, and what a failure means."""
+    """One check of a record: its limit, and the consequence of a failure."""
 
-    threshold: float = Field(description="in the unit that the check names")
+    threshold: float = Field(description="limit of the check, in its unit")
     level: str = Field(
         pattern="^(reject|warn|note)$",
-        description="reject leaves the trace out; warn, note: recorded",
+        description="reject: the trace is left out; warn or note: the finding is recorded",
     )
 
 
 class Checks(Section):
     """Thresholds of the record checks (``processing/quality``, ``processing/filter/corners``)."""
 
-    sampling_rate: Check = Field(Check(threshold=20.0, level="reject"), description="Hz, at least")
-    duration: Check = Field(Check(threshold=5.0, level="reject"), description="s, at least")
+    sampling_rate: Check = Field(
+        Check(threshold=20.0, level="reject"), description="smallest sampling rate, Hz"
+    )
+    duration: Check = Field(
+        Check(threshold=5.0, level="reject"), description="shortest duration, s"
+    )
     levels: Check = Field(
         Check(threshold=16, level="reject"),
-        description="different values a sample takes, at least",
+        description="smallest number of different values of the samples",
     )
     clipped_run: Check = Field(
         Check(threshold=5, level="reject"),
-        description="equal samples at an extreme, fewer than",
+        description="number of equal samples at an extreme from which a record is clipped",
     )
     counter_use: Check = Field(
         Check(threshold=0.8, level="warn"),
-        description="peak over full scale of a 24-bit counter, at most",
+        description="largest peak relative to the full scale of a 24-bit counter",
     )
     dropout: Check = Field(
         Check(threshold=0.5, level="reject"),
-        description="s without change during the shaking, less than",
+        description="duration without a change during the shaking that means missing samples, s",
     )
     spike: Check = Field(
         Check(threshold=6.0, level="reject"),
-        description="jump of one sample over others within 0.5 s, at most",
+        description="largest ratio of the jump of one sample to the others within 0.5 s",
     )
     zero_crossings: Check = Field(
         Check(threshold=0.1, level="reject"),
-        description="zero crossings per second, at least",
+        description="smallest number of zero crossings per second",
     )
     header_peak: Check = Field(
         Check(threshold=0.01, level="warn"),
-        description="peak, relative difference between header and samples, at most",
+        description="largest relative difference between the peaks of header and samples",
     )
     outlier: Check = Field(
         Check(threshold=5.0, level="reject"),
-        description="peak over the largest peak of two sisters, at most",
+        description="largest ratio of a peak to the largest peak of two other components",
     )
     late_trigger: Check = Field(
         Check(threshold=0.1, level="warn"),
-        description="motion of the first second over the peak, at most",
+        description="largest ratio of the motion of the first second to the peak",
     )
     cut_off: Check = Field(
         Check(threshold=0.1, level="warn"),
-        description="motion of the last second over the peak, at most",
+        description="largest ratio of the motion of the last second to the peak",
     )
     second_event: Check = Field(
         Check(threshold=0.3, level="warn"),
-        description="later peak after quiet over the peak, at most",
+        description="largest ratio of a later peak after a quiet interval to the peak",
     )
     signal_to_noise: Check = Field(
         Check(threshold=2.0, level="reject"),
-        description="signal to noise at the best frequency, at least",
+        description="smallest signal-to-noise ratio at the best frequency",
     )
     clear_band: Check = Field(
         Check(threshold=2.0, level="warn"),
-        description="signal to noise over required_band, at least",
+        description="smallest signal-to-noise ratio over required_band",
     )
     bandwidth: Check = Field(
         Check(threshold=4.0, level="reject"),
-        description="low-pass over high-pass corner, at least",
+        description="smallest ratio of low-pass to high-pass corner",
     )
     final_velocity: Check = Field(
         Check(threshold=0.1, level="reject"),
-        description="final velocity over its peak, at most",
+        description="largest ratio of the final velocity to its peak",
     )
     final_displacement: Check = Field(
         Check(threshold=0.2, level="reject"),
-        description="final displacement over its peak, at most",
+        description="largest ratio of the final displacement to its peak",
     )
     baseline_shift: Check = Field(
         Check(threshold=0.5, level="warn"),
-        description="velocity before the filter that stays, over the peak",
+        description="largest ratio of the lasting velocity before the filter to the peak velocity",
     )
 
 
@@ -108,68 +112,102 @@ class Processing(Section):
     """Settings of the processing chain of a record (Boore 2005; gmprocess 2.8)."""
 
     highpass: float | None = Field(
-        None, gt=0, description="corner, Hz; not given: found for each record"
+        None, gt=0, description="high-pass corner, Hz; if not set, chosen for each record"
     )
     lowpass: float | None = Field(
-        None, gt=0, description="corner, Hz; not given: found; never above 0.75 of Nyquist"
+        None,
+        gt=0,
+        description=(
+            "low-pass corner, Hz; if not set, chosen for each record; never above 0.75 of Nyquist"
+        ),
     )
     order: int = Field(
-        5, ge=1, le=20, description="n of the Butterworth amplitude 1/sqrt(1+(f_hp/f)^2n)"
+        5, ge=1, le=20, description="order n of the Butterworth amplitude 1/sqrt(1 + (f_hp/f)^2n)"
     )
-    taper: float = Field(0.05, ge=0, le=0.5, description="fraction of the record at each end, Hann")
-    usable: float = Field(0.8, gt=0, le=1, description="longest usable period = usable / f_hp")
+    taper: float = Field(
+        0.05, ge=0, le=0.5, description="share of the record that is tapered at each end (Hann)"
+    )
+    usable: float = Field(
+        0.8, gt=0, le=1, description="longest usable period times high-pass corner"
+    )
     pre_event: float | None = Field(
-        None, ge=0, description="s of noise at the start; not given: until the first wave"
+        None,
+        ge=0,
+        description=(
+            "length of the noise at the start of the record, s; if not set, until the first wave"
+        ),
     )
     gain_tolerance: float = Field(
-        0.1, gt=0, description="between product of stage gains and sensitivity, relative"
+        0.1,
+        gt=0,
+        description="largest relative difference between product of stage gains and sensitivity",
     )
     overlap: float = Field(
-        0.8, gt=0, le=1, description="part of the longer horizontal that both must cover"
+        0.8, gt=0, le=1, description="share of the longer horizontal component that both must cover"
     )
     onset_margin: float = Field(
-        0.5, ge=0, description="s before the first wave where the noise ends"
+        0.5, ge=0, description="time between the end of the noise and the first wave, s"
     )
     shortest_noise: float = Field(
-        2.0, gt=0, description="s of noise that tell something; fewer count as none"
+        2.0,
+        gt=0,
+        description="shortest noise window that is used, s; shorter ones count as missing",
     )
-    longest_noise: float = Field(120.0, gt=0, description="s before the first wave that are kept")
-    longest_signal: float = Field(600.0, gt=0, description="s after the first wave that are kept")
+    longest_noise: float = Field(
+        120.0, gt=0, description="longest time before the first wave that is kept, s"
+    )
+    longest_signal: float = Field(
+        600.0, gt=0, description="longest time after the first wave that is kept, s"
+    )
     pick_tolerance: float = Field(
-        10.0, gt=0, description="s between a pick and the computed travel time of P"
+        10.0,
+        gt=0,
+        description="largest difference between a pick and the computed travel time of P, s",
     )
-    smoothing: float = Field(20.0, gt=0, description="b of the Konno-Ohmachi window")
+    smoothing: float = Field(20.0, gt=0, description="bandwidth b of the Konno-Ohmachi window")
     required_band: tuple[float, float] = Field(
-        (0.2, 10.0), description="Hz, where the signal should clear the noise"
+        (0.2, 10.0), description="frequencies between which the signal should exceed the noise, Hz"
     )
     highest_lowpass: float = Field(
-        40.0, gt=0, description="Hz, where the noise does not ask for less"
+        40.0, gt=0, description="low-pass corner where the noise does not require a lower one, Hz"
     )
     highpass_range: tuple[float, float] = Field(
-        (0.001, 0.5), description="Hz; never below 1 / duration"
+        (0.001, 0.5),
+        description="lowest and highest high-pass corner, Hz; never below 1 / duration",
     )
     drift: float = Field(
-        0.02, gt=0, lt=1, description="polynomial part of the displacement that counts as clean"
+        0.02,
+        gt=0,
+        lt=1,
+        description=(
+            "largest polynomial part of the displacement of a clean record, relative to its peak"
+        ),
     )
     baseline_spread: float = Field(
         0.05,
         gt=0,
         description=(
-            "usable periods end where ln PER varies more between the times at which the baseline "
-            "may have shifted"
+            "largest deviation of ln PER between possible times of a baseline shift; usable "
+            "periods end where it is exceeded"
         ),
     )
     fallback_highpass: dict[float, Annotated[float, Field(gt=0)]] = Field(
         {-10.0: 0.5, 3.5: 0.3, 5.5: 0.1},
         description=(
-            "without noise to measure: magnitude from which on -> corner, Hz (gmprocess 2.8)"
+            "high-pass corner, Hz, of records without noise to measure, by smallest "
+            "magnitude: magnitude = corner (gmprocess 2.8)"
         ),
     )
     unknown_highpass: float = Field(
-        0.08, gt=0, description="Hz, without noise to measure and without magnitude"
+        0.08,
+        gt=0,
+        description=(
+            "high-pass corner of records without noise to measure and without a magnitude, Hz"
+        ),
     )
     permanent_offset: bool = Field(
-        False, description="near a fault: keep it, no high-pass, adaptive baseline"
+        False,
+        description="keep the permanent displacement near a fault: no high-pass, adaptive baseline",
     )
     checks: Checks = Field(Checks(), description="thresholds of the record checks")
 
@@ -201,21 +239,27 @@ class Processing(Section):
 
 
 class Spectra(Section):
-    """The grid of the stored spectra; pairs are computed at their own periods, not read off it."""
+    """The grid of the stored spectra; pairs are computed at exact periods, not read off it."""
 
     dampings: tuple[Annotated[float, Field(ge=0, lt=1)], ...] = Field(
-        STORED_DAMPINGS, min_length=1, description="fractions of critical, rising"
+        STORED_DAMPINGS,
+        min_length=1,
+        description="dampings of the stored spectra, fractions of critical, ascending",
     )
-    shortest: float = Field(SHORTEST_STORED_PERIOD, ge=0.001, description="s")
-    longest: float = Field(LONGEST_STORED_PERIOD, le=100.0, description="s")
+    shortest: float = Field(
+        SHORTEST_STORED_PERIOD, ge=0.001, description="shortest period of the stored spectra, s"
+    )
+    longest: float = Field(
+        LONGEST_STORED_PERIOD, le=100.0, description="longest period of the stored spectra, s"
+    )
     count: int = Field(
-        STORED_PERIODS, ge=2, le=10_000, description="periods, logarithmically spaced"
+        STORED_PERIODS, ge=2, le=10_000, description="number of periods, logarithmically spaced"
     )
     azimuth_step: int = Field(
         STORED_AZIMUTH_STEP,
         ge=1,
         le=90,
-        description="degrees between stored azimuths; RotD uses every degree",
+        description="step between stored azimuths, degrees; RotD uses every degree",
     )
 
     @field_validator("dampings")

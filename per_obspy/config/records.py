@@ -1,4 +1,4 @@
-"""Where records come from."""
+"""Settings of the sources of records."""
 
 from typing import Annotated, Self
 
@@ -19,30 +19,37 @@ SeedLinkServer = Annotated[str, Field(pattern=r"^(seedlink://)?[A-Za-z0-9.-]{1,2
 
 
 class Columns(Section):
-    """How to read a plain table of samples (``records/text_table.py``)."""
+    """Form of a plain table of samples (``records/text_table.py``)."""
 
-    file: RelativePath = Field(description="text file of samples, all rows with as many values")
+    file: RelativePath = Field(
+        description="text file of samples; all rows have the same number of values"
+    )
     network: str = Field("", description="SEED network code: letters, digits, - and _")
     station: str = Field(description="SEED station code: letters, digits, - and _")
-    latitude: float = Field(ge=-90, le=90, description="degrees north")
-    longitude: float = Field(ge=-180, le=180, description="degrees east")
+    latitude: float = Field(ge=-90, le=90, description="latitude of the station, degrees north")
+    longitude: float = Field(ge=-180, le=180, description="longitude of the station, degrees east")
     units: str = Field(
-        pattern="^(m/s2|cm/s2|gal|g)$", description="of the samples: m/s2, cm/s2, gal, g"
+        pattern="^(m/s2|cm/s2|gal|g)$", description="unit of the samples: m/s2, cm/s2, gal or g"
     )
-    channels: dict[str, int] = Field(description="channel code -> column, counted from 0")
+    channels: dict[str, int] = Field(
+        description="column of each channel, counted from 0: channel code = column"
+    )
     azimuths: dict[str, float] = Field(
-        default_factory=dict, description="channel code -> degrees from north"
+        default_factory=dict,
+        description="azimuth of each channel, degrees clockwise from north: channel code = azimuth",
     )
-    separator: str | None = Field(None, description="between columns; white space if not given")
-    skip: int = Field(0, ge=0, description="header lines")
+    separator: str | None = Field(
+        None, description="character between columns; white space if not set"
+    )
+    skip: int = Field(0, ge=0, description="number of header lines to skip")
     time_column: int | None = Field(
         None, ge=0, description="column of time in s, checked for even spacing"
     )
     dt: float | None = Field(
-        None, gt=0, description="sampling interval in s, where there is no time column"
+        None, gt=0, description="sampling interval, s, for tables without a time column"
     )
     start: str | None = Field(None, description="time of the first sample, ISO 8601, UTC")
-    raw: bool = Field(False, description="not corrected yet")
+    raw: bool = Field(False, description="whether the record is uncorrected")
     layout: str | None = Field(
         None,
         pattern="^(columns|rows)$",
@@ -82,75 +89,113 @@ class Window(Section):
     """A time window; what is not given is seen from the origin time of the event."""
 
     start: Moment | None = Field(
-        None, description="ISO 8601, UTC; not given: before the origin time"
+        None,
+        description=(
+            "start of the time window, ISO 8601, UTC; if not set: `before` seconds before "
+            "the origin time"
+        ),
     )
-    end: Moment | None = Field(None, description="ISO 8601, UTC; not given: after the origin time")
+    end: Moment | None = Field(
+        None,
+        description=(
+            "end of the time window, ISO 8601, UTC; if not set: `after` seconds after the "
+            "origin time"
+        ),
+    )
     before: float = Field(
-        30.0, ge=0, description="s from the start of the window to the origin time"
+        30.0, ge=0, description="time from the start of the window to the origin time, s"
     )
-    after: float = Field(300.0, gt=0, description="s from the origin time to the end of the window")
+    after: float = Field(
+        300.0, gt=0, description="time from the origin time to the end of the window, s"
+    )
 
 
 class Fdsn(Window):
-    """Records from FDSN web services around an epicentre; what was fetched stays in the cache."""
+    """Records from FDSN web services around an epicentre; downloads stay in the cache."""
 
     providers: tuple[Provider, ...] = Field(
         min_length=1,
         description=(
-            "in order of preference: ObsPy's names, base URLs, eida-routing, earthscope-federator"
+            "services in order of preference: names known to ObsPy, base URLs, eida- "
+            "routing, earthscope-federator"
         ),
     )
-    cache: RelativePath = Field(description="folder that keeps what was fetched")
+    cache: RelativePath = Field(description="folder that keeps all downloads")
     seedlink: tuple[SeedLinkServer, ...] = Field(
         (),
         description=(
-            "SeedLink servers (host or host:port; port 18000 if none) that are asked for records "
-            "of listed stations which no provider has, as minutes after an earthquake"
+            "SeedLink servers (host or host:port; port 18000 if not set) for records of "
+            "listed stations that no provider has, as in the first minutes after an "
+            "earthquake"
         ),
     )
-    event_id: str | None = Field(None, description="of the event service, instead of records.event")
+    event_id: str | None = Field(
+        None,
+        description="identifier of the earthquake at the event service, instead of records.event",
+    )
     event_provider: Provider = Field(
-        "USGS", description="ObsPy's name or base URL of the event service"
+        "USGS", description="event service: a name known to ObsPy, or a base URL"
     )
     latitude: float | None = Field(
-        None, ge=-90, le=90, description="centre, degrees north; not given: epicentre"
+        None,
+        ge=-90,
+        le=90,
+        description="latitude of the centre, degrees north; if not set, the epicentre",
     )
     longitude: float | None = Field(
-        None, ge=-180, le=180, description="centre, degrees east; not given: epicentre"
+        None,
+        ge=-180,
+        le=180,
+        description="longitude of the centre, degrees east; if not set, the epicentre",
     )
     radius: float = Field(
-        100_000.0, gt=0, le=20_000_000, description="m, of the circle in which stations are wanted"
+        100_000.0, gt=0, le=20_000_000, description="radius of the circle of the search, m"
     )
     networks: tuple[str, ...] = Field(
-        ("*",), min_length=1, description="SEED codes, * and ? allowed"
+        ("*",), min_length=1, description="SEED network codes; * and ? are wildcards"
     )
     stations: tuple[str, ...] = Field(
-        ("*",), min_length=1, description="SEED codes, * and ? allowed"
+        ("*",), min_length=1, description="SEED station codes; * and ? are wildcards"
     )
     locations: tuple[str, ...] = Field(
-        ("*",), min_length=1, description="SEED codes, * and ? allowed; empty: --"
+        ("*",),
+        min_length=1,
+        description="SEED location codes; * and ? are wildcards; an empty code is --",
     )
     channels: tuple[str, ...] = Field(
         ("HN?", "BN?", "CN?", "EN?"),
         min_length=1,
-        description="SEED codes, * and ? allowed; accelerometers",
+        description="SEED channel codes; * and ? are wildcards; accelerometers by default",
     )
-    timeout: float = Field(60.0, gt=0, description="s without an answer, or without more of it")
+    timeout: float = Field(
+        60.0, gt=0, description="longest time without an answer, or without more of it, s"
+    )
     longest_answer: float = Field(
-        600.0, gt=0, description="s, of one attempt in all; a slower answer is given up"
+        600.0, gt=0, description="longest duration of one answer, s; slower answers are given up"
     )
     largest_answer: int = Field(
-        256 * 2**20, gt=0, description="bytes after unpacking; a larger answer is given up"
+        256 * 2**20,
+        gt=0,
+        description="largest size of an answer after unpacking, bytes; larger answers are given up",
     )
     retries: int = Field(
-        5, ge=0, description="after a fault that may pass (429, 5xx, time-out, cut answer)"
+        5,
+        ge=0,
+        description=(
+            "number of further attempts after a temporary fault (429, 5xx, time-out, cut answer)"
+        ),
     )
     wait: float = Field(
         1.0,
         ge=0,
-        description="s; the second retry waits twice as long, and so on; Retry-After counts",
+        description=(
+            "time before the second attempt, s; it doubles with each further one, and "
+            "Retry-After counts"
+        ),
     )
-    connections: int = Field(3, ge=1, le=16, description="stations asked for at the same time")
+    connections: int = Field(
+        3, ge=1, le=16, description="number of stations requested at the same time"
+    )
 
     @property
     def knows_where_and_when(self) -> bool:
@@ -161,69 +206,90 @@ class Fdsn(Window):
 class Sds(Window):
     """A time window of an SDS archive."""
 
-    folder: RelativePath = Field(description="with YEAR/NET/STA/CHAN.D/ below it")
+    folder: RelativePath = Field(
+        description="root of the archive, which contains YEAR/NET/STA/CHAN.D/"
+    )
 
 
 class Asdf(Section):
     """A workspace of gmprocess, or another ASDF file."""
 
-    file: RelativePath = Field(description="HDF5 file")
+    file: RelativePath = Field(description="HDF5 file of the workspace")
     tag: str = Field(
         "*_unprocessed",
-        description="of the waveforms, * and ? allowed; *_default is gmprocess's result",
+        description=(
+            "tag of the waveforms; * and ? are wildcards; *_default is the processed result "
+            "of gmprocess"
+        ),
     )
 
 
 class Archives(Section):
-    """How much the archives of a folder may unpack to."""
+    """Limits of unpacking the archives of a folder."""
 
     largest_member: int = Field(
-        512 * 2**20, gt=0, description="bytes, of one file of an archive; larger ones are left out"
+        512 * 2**20,
+        gt=0,
+        description=(
+            "largest size of one unpacked file of an archive, bytes; larger files are left out"
+        ),
     )
     largest_total: int = Field(
-        8 * 2**30, gt=0, description="bytes, of all files of an archive; a larger one is left out"
+        8 * 2**30,
+        gt=0,
+        description=(
+            "largest size of all unpacked files of an archive, bytes; larger archives are left out"
+        ),
     )
     largest_ratio: float = Field(
         200.0,
         ge=1,
         description=(
-            "unpacked size of an archive over its own, from 64 MiB on; one of a larger ratio is "
-            "left out"
+            "largest ratio of unpacked to packed size of an archive, checked from 64 MiB "
+            "on; archives above it are left out"
         ),
     )
     most_members: int = Field(
-        1_000_000, gt=0, description="files of an archive; one of more is left out"
+        1_000_000,
+        gt=0,
+        description="largest number of files of an archive; archives with more are left out",
     )
     most_levels: int = Field(
         3,
         ge=1,
         le=5,
         description=(
-            "levels of archives inside archives, whose files share the limits of the outermost; "
-            "1: none inside another is opened"
+            "largest depth of archives inside archives, whose files share the limits of the "
+            "outermost one; 1: archives inside an archive are not opened"
         ),
     )
 
 
 class Records(Section):
-    """Where the records are; several sources may be given."""
+    """Sources of the records; several may be set."""
 
     folder: RelativePath | None = Field(
-        None, description="folder of waveform files, with StationXML beside them"
+        None,
+        description=(
+            "folder of waveform files, which may also hold StationXML and tables of stations"
+        ),
     )
     stationxml: RelativePath | None = Field(
         None,
         description=(
-            "StationXML file or folder, or a CSV table of stations, if not beside the records"
+            "StationXML file or folder, or a CSV table of stations, if not in the folder of "
+            "the records"
         ),
     )
-    event: RelativePath | None = Field(None, description="QuakeML file; no event is fine")
+    event: RelativePath | None = Field(
+        None, description="QuakeML file of the earthquake; a run without one is possible"
+    )
     time: Moment | None = Field(
         None,
         description=(
-            "ISO 8601, UTC: the earthquake to screen where the folder holds several, by a time "
-            "within its records or up to event_gap before; not given: origin time of the event, or "
-            "else the earthquake of most stations"
+            "time of the earthquake to screen where the folder holds several, ISO 8601, "
+            "UTC: within its records or up to event_gap before them; if not set: origin "
+            "time of the event, or else the earthquake of most stations"
         ),
     )
     event_gap: float = Field(
@@ -231,8 +297,8 @@ class Records(Section):
         gt=0,
         le=86_400,
         description=(
-            "s; records of the folder that start within it of the first one are of one earthquake; "
-            "longer where clocks of stations are wrong"
+            "records of the folder that start within this time of the first one belong to "
+            "one earthquake, s; increase it where clocks of stations are wrong"
         ),
     )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")
@@ -243,7 +309,7 @@ class Records(Section):
     shakemap: RelativePath | None = Field(
         None,
         description=(
-            "grid.xml of a USGS ShakeMap, also .gz: the demand of pairs without a station in reach"
+            "grid.xml of a USGS ShakeMap, also .gz: the motion of pairs without a station in reach"
         ),
     )
     shakemap_uncertainty: RelativePath | None = Field(

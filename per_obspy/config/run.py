@@ -28,18 +28,16 @@ class ReportTexts(Section):
 
 
 class Run(Section):
-    """Everything one run needs."""
+    """Configuration of one run."""
 
     name: str = Field(min_length=1, description="title of tables and figures")
     output: RelativePath = Field(description="folder of the results")
-    workers: int = Field(0, ge=0, description="processes; 0: one a processor")
+    workers: int = Field(0, ge=0, description="number of processes; 0: one per processor")
     simulation: RelativePath | None = Field(
         None, description="TOML file of an event to simulate instead of records"
     )
-    records: Records | None = Field(None, description="where the records are")
-    pairs: Pairs | None = Field(
-        None, description="where the pairs come from, if not from the simulation"
-    )
+    records: Records | None = Field(None, description="sources of the records")
+    pairs: Pairs | None = Field(None, description="source of the pairs, if not the simulation")
     processing: Processing = Processing()
     spectra: Spectra = Spectra()
     building: Building = Building()
@@ -48,7 +46,9 @@ class Run(Section):
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
     csv_rows: int = Field(
-        100_000, ge=1, description="largest number of rows in risk.csv, the worst; Parquet has all"
+        100_000,
+        ge=1,
+        description="largest number of rows in risk.csv, the worst ones; the Parquet file has all",
     )
     geopackage: bool = Field(
         False, description="write risk.gpkg, risk.qgz and GeoParquet; needs per_obspy[gis]"

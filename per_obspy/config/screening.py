@@ -1,4 +1,4 @@
-"""What is assumed of buildings, and how pairs find their motion and their names."""
+"""Assumptions about buildings, and settings of the motion, states and classes of pairs."""
 
 from typing import Annotated, Self
 
@@ -15,79 +15,118 @@ FLOOR_TOLERANCE = 0.61
 
 
 class Building(Section):
-    """Assumptions about a building that the inventory leaves open; each use is marked derived."""
+    """Assumptions about buildings where the inventory has no value; each use is marked derived."""
 
-    damping: float = Field(0.05, ge=0, lt=1, description="fraction of critical")
+    damping: float = Field(
+        0.05,
+        ge=0,
+        lt=1,
+        description="damping of buildings without a known one, fraction of critical",
+    )
     damping_log_std: float = Field(
         0.3, ge=0, description="log-standard deviation of an assumed damping"
     )
-    storey_height: float = Field(3.0, ge=2, le=12, description="m")
+    storey_height: float = Field(
+        3.0, ge=2, le=12, description="height of a storey for heights derived from storeys, m"
+    )
     storey_height_log_std: float = Field(
         0.13, ge=0, le=1, description="log-standard deviation of a height derived from storeys"
     )
-    mass_per_area: float = Field(1000.0, ge=50, le=10_000, description="kg/m2 and floor")
-    area: float = Field(
-        200.0, ge=1, le=1e6, description="floor area, m2; only the ratio of the masses matters"
+    mass_per_area: float = Field(
+        1000.0, ge=50, le=10_000, description="mass per floor and floor area, kg/m2"
     )
-    restitution: float = Field(0.65, ge=0, le=1, description="of impact between concrete buildings")
+    area: float = Field(
+        200.0,
+        ge=1,
+        le=1e6,
+        description=(
+            "floor area of buildings without a known one, m2; only the ratio of the masses matters"
+        ),
+    )
+    restitution: float = Field(
+        0.65,
+        ge=0,
+        le=1,
+        description="coefficient of restitution of impacts between buildings; 0.65: concrete",
+    )
     gap: float | None = Field(
         None,
         gt=0,
         le=10,
-        description="median of the gap where the pair table gives none, m; without it such pairs "
-        "have a demand, but no probability",
+        description=(
+            "median of unknown gaps, m; if not set, such pairs have a demand, but no probability"
+        ),
     )
-    gap_log_std: float = Field(1.0, gt=0, le=2, description="log-standard deviation of that gap")
+    gap_log_std: float = Field(
+        1.0, gt=0, le=2, description="log-standard deviation of unknown gaps about their median"
+    )
     floor_tolerance: float = Field(
         FLOOR_TOLERANCE,
         ge=0,
         le=12,
-        description="m; floors further apart misalign; 2 ft: FEMA P-154",
+        description="largest difference of floor levels that count as aligned, m; 2 ft: FEMA P-154",
     )
     period_formula: str = Field(
-        "asce7", pattern="^(asce7|ec8)$", description="asce7 or ec8; medians, not lower bounds"
+        "asce7",
+        pattern="^(asce7|ec8)$",
+        description=(
+            "formula of periods derived from heights: asce7 or ec8; medians, not lower bounds"
+        ),
     )
 
 
 class Interpolation(Section):
-    """How the motion between stations is estimated (``screening/ground_motion/kriging.py``)."""
+    """Estimation of the motion between stations (``screening/ground_motion/kriging.py``)."""
 
     log_std: float = Field(
-        0.6, gt=0, description="of ln PER within an event, before any station tells; SA: 0.5 to 0.7"
+        0.6,
+        gt=0,
+        description=(
+            "assumed log-standard deviation of PER within an earthquake; published for SA: "
+            "0.5 to 0.7"
+        ),
     )
     log_std_weight: float = Field(
         5.0,
         gt=2,
-        description="number of stations that this value counts as; above 2, or Student's t "
-        "distribution of the motion has no deviation",
+        description=(
+            "number of stations that log_std counts as; above 2, because Student's t "
+            "distribution of the motion has no deviation below"
+        ),
     )
     distance_slope: float = Field(
         -1.3,
         ge=-5,
         le=0,
-        description="expected change of ln PER per ln of the distance to the hypocentre, which "
-        "stations correct",
+        description=(
+            "expected change of ln PER per ln of the distance to the hypocentre, corrected "
+            "by the stations"
+        ),
     )
     distance_slope_std: float = Field(
-        0.5, gt=0, description="standard deviation of this slope between earthquakes"
+        0.5, gt=0, description="standard deviation of distance_slope between earthquakes"
     )
     demand_log_std: float = Field(
         0.55,
         ge=0,
-        description="log-standard deviation of an exact demand about the demand that the motion "
-        "between stations lets expect, far from the pair's record (docs/calibration.md)",
+        description=(
+            "log-standard deviation of an exact demand about the demand expected from the "
+            "motion between stations, far from the record of the pair (docs/calibration.md)"
+        ),
     )
     demand_length: float = Field(
         4000.0,
         gt=0,
-        description="m; distance from the record at which what is special in its demand of a "
-        "pair has faded to 1/e of the way from 1 to demand_persistence",
+        description=(
+            "distance from the record at which the correlation of the particular part of "
+            "its demand has fallen to 1/e of the way from 1 to demand_persistence, m"
+        ),
     )
     demand_persistence: float = Field(
         0.5,
         ge=0,
         le=1,
-        description="correlation of what is special in the demand of a pair at places far apart",
+        description="correlation of the particular part of demands at places far apart",
     )
     vs30_clustered: bool = Field(
         False, description="Vs30 varies smoothly over the region (Jayaram & Baker, case 2)"
@@ -98,24 +137,27 @@ class Codes(Section):
     """Inputs of code rules (``screening/codes.py``); a rule is empty where its input is missing."""
 
     ntc_zone: str | None = Field(
-        None, pattern="^(I|II|III)$", description="NTC Mexico City 2004: I, II or III"
+        None, pattern="^(I|II|III)$", description="zone of NTC Mexico City 2004: I, II or III"
     )
     gb_intensity: int | None = Field(
-        None, ge=6, le=9, description="GB 50011-2010: fortification intensity"
+        None, ge=6, le=9, description="fortification intensity of GB 50011-2010"
     )
     italy_ground: float | None = Field(
-        None, gt=0, le=2, description="NTC Italy 2018: a_g S of the life safety limit state, g"
+        None, gt=0, le=2, description="a_g S of the life safety limit state of NTC Italy 2018, in g"
     )
     fema_seismicity: str | None = Field(
         None,
         pattern="^(very_high|high|moderately_high|lower)$",
-        description="FEMA P-154: of the region",
+        description="seismicity of the region by FEMA P-154",
     )
     floor_tolerance: float = Field(
         FLOOR_TOLERANCE,
         ge=0,
         le=12,
-        description="m; floors no further apart align; 2 ft: FEMA P-154",
+        description=(
+            "largest difference of floor levels that count as aligned in code rules, m; 2 "
+            "ft: FEMA P-154"
+        ),
     )
 
 
@@ -143,49 +185,76 @@ class States(Section):
 
 
 class Screening(Section):
-    """How pairs find their ground motion and how risk is named."""
+    """Ground motion of pairs, and thresholds of states and classes."""
 
     largest_distance: float = Field(
-        20_000.0, gt=0, description="m from station to pair; pairs beyond are rejected"
+        20_000.0,
+        gt=0,
+        description="largest distance from station to pair, m; pairs beyond are rejected",
     )
-    flag_distance: float = Field(5_000.0, gt=0, description="m, flagged beyond")
+    flag_distance: float = Field(
+        5_000.0, gt=0, description="distance from station to pair beyond which it is flagged, m"
+    )
     exact: bool = Field(
         True, description="exact demand and history of every pair; false: estimates only, faster"
     )
     model_median: float = Field(
-        1.16, gt=0, description="median of critical gap by PER / exact (docs/reliability.md)"
+        1.16,
+        gt=0,
+        description=(
+            "median of the ratio of the critical gap by PER to the exact one (docs/reliability.md)"
+        ),
     )
     model_dispersion: float = Field(
-        0.35, ge=0, description="log-standard deviation of critical gap by PER / exact"
+        0.35,
+        ge=0,
+        description=(
+            "log-standard deviation of the ratio of the critical gap by PER to the exact one"
+        ),
     )
     states: States = States()
     per_to_sd: float = Field(
-        1.5, ge=1, description="PER/SD above which a gap from PER is flagged as far too large"
+        1.5, ge=1, description="ratio PER/SD above which a gap from PER is flagged as far too large"
     )
     classes: dict[str, Annotated[float, Field(ge=0, allow_inf_nan=False)]] = Field(
         {"severe": 0.5, "high": 0.2, "moderate": 0.05, "low": 0.0},
         description=(
-            "risk class -> smallest expected impact velocity (m/s) that belongs to it, in "
-            "descending order to 0; our own thresholds, not verified (docs/screening.md)"
+            "smallest expected impact velocity of each risk class, m/s, in descending order "
+            "to 0: class = velocity; thresholds of this package, not verified "
+            "(docs/screening.md)"
         ),
     )
     linearized_median: float = Field(
-        2.7, gt=0, description="the same of the demand where the linearized gap decides"
+        2.7,
+        gt=0,
+        description=(
+            "median of the ratio of the linearized critical gap of yielding pairs to the "
+            "exact one, where the linearized gap decides"
+        ),
     )
     linearized_dispersion: float = Field(
-        0.65, ge=0, description="the same of the linearized gap of yielding pairs"
+        0.65,
+        ge=0,
+        description=(
+            "log-standard deviation of the ratio of the linearized critical gap of yielding "
+            "pairs to the exact one"
+        ),
     )
     target_amplification: float = Field(
-        1.25, ge=1, description="largest PER after / before that a bumper is to allow"
+        1.25,
+        ge=1,
+        description="largest ratio of PER after to PER before an impact that a bumper may allow",
     )
     shakemap_log_std: float = Field(
-        0.6, gt=0, description="of the motion of a ShakeMap that tells none: assumed"
+        0.6,
+        gt=0,
+        description="assumed log-standard deviation of a ShakeMap without uncertainty",
     )
     interpolation: Interpolation = Field(
-        Interpolation(), description="how the motion between stations is estimated"
+        Interpolation(), description="settings of the motion between stations"
     )
     codes: Codes = Field(
-        Codes(), description="inputs of code rules; a rule is empty where its input is missing"
+        Codes(), description="inputs of code rules; a rule without its input stays empty"
     )
 
     @field_validator("classes")
@@ -200,14 +269,17 @@ class Screening(Section):
 
 
 class Totals(Section):
-    """How pairs are counted by area: one of these decides."""
+    """Areas by which pairs are counted: one of these settings decides."""
 
-    cell: float = Field(1000.0, gt=0, description="m, size of the cells of a grid")
+    cell: float = Field(1000.0, gt=0, description="size of the cells of a grid, m")
     area: str | None = Field(
         None, description="column of the pair table that names the area, instead of cells"
     )
     h3: int | None = Field(
-        None, ge=0, le=15, description="resolution of H3 hexagons, instead; needs per_obspy[gis]"
+        None,
+        ge=0,
+        le=15,
+        description="resolution of H3 hexagons, instead of cells; needs per_obspy[gis]",
     )
 
     @model_validator(mode="after")

@@ -137,7 +137,7 @@ def checked(
 
 
 def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
-    """Return whether a list is too short only because what stands in it is wrong."""
+    """Return whether a list is too short only because its elements are wrong."""
     depth = len(fault["loc"])
     inside = [
         other
@@ -162,7 +162,7 @@ def _fault(fault: ErrorDetails, section: type[Section]) -> str:
 
 
 def _place_of(key: str, fields: dict[str, FieldInfo]) -> str:
-    """Return to which section beside it a key belongs, empty if to none."""
+    """Return the neighbouring section to which a key belongs, empty if there is none."""
     inside = (
         name
         for name, field in fields.items()

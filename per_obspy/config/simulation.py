@@ -85,12 +85,14 @@ class Scenario(Section):
 class SimulatedPairs(Section):
     """A simulated inventory around the stations of a run."""
 
-    count: int = Field(2000, ge=1, description="pairs")
-    seed: int = Field(20, ge=0, description="of every random number")
+    count: int = Field(2000, ge=1, description="number of pairs")
+    seed: int = Field(20, ge=0, description="seed of all random numbers")
     radius: float = Field(
-        2000.0, gt=0, description="m, largest distance of a pair from its station"
+        2000.0, gt=0, description="largest distance of a pair from its station, m"
     )
-    touching: float = Field(0.5, ge=0, le=1, description="share of pairs without a gap")
+    touching: float = Field(
+        0.5, ge=0, le=1, description="share of pairs without a gap, from 0 to 1"
+    )
 
 
 class Simulation(Section):

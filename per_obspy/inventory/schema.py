@@ -111,19 +111,22 @@ _PAIR = (
 
 _BUILDING = (
     Column("building_id", "str", "", "identifier of the building"),
-    Column("longitude", "float64", "degrees", "east", required=True, low=-180.0, high=180.0,
+    Column("longitude", "float64", "degrees", "longitude of the building, east", required=True,
+           low=-180.0, high=180.0,
            hint="metres of a projection?"),
-    Column("latitude", "float64", "degrees", "north", required=True, low=-90.0, high=90.0,
+    Column("latitude", "float64", "degrees", "latitude of the building, north", required=True,
+           low=-90.0, high=90.0,
            hint="longitude and latitude swapped, or metres of a projection?"),
     Column("position", "str", "", "whether the building is at the end of its row of buildings",
            choices=POSITIONS),
-    Column("height", "float64", "m", "from ground to roof", low=2.0, high=1000.0,
+    Column("height", "float64", "m", "height of the building from ground to roof",
+           low=2.0, high=1000.0,
            hint="metres above ground expected"),
     Column("height_log_std", "float64", "1",
            "logarithmic standard deviation of an estimated height, or of the storeys from which it "
            "follows; above 0 it marks the height as derived", low=0.0, high=2.0),
-    Column("storeys", "float64", "1", "storeys above ground", low=1.0, high=250.0),
-    Column("system", "str", "", "structural system", choices=SYSTEMS),
+    Column("storeys", "float64", "1", "number of storeys above ground", low=1.0, high=250.0),
+    Column("system", "str", "", "structural system of the building", choices=SYSTEMS),
     Column("period", "float64", "s", "first natural period in the direction of the axis",
            low=0.01, high=20.0, hint="in milliseconds?"),
     Column("period_log_std", "float64", "1", "logarithmic standard deviation of the period",
@@ -138,7 +141,8 @@ _BUILDING = (
            "displacement at contact height / displacement of the oscillator",
            low=TINY, high=3.0),
     Column("yield_displacement", "float64", "m",
-           "of the equivalent oscillator; infinite if it stays linear", low=TINY),
+           "yield displacement of the equivalent oscillator; infinite if it stays "
+           "linear", low=TINY),
     Column("yield_coefficient", "float64", "1",
            "base shear at yield / total weight of the building; the oscillator yields at that over "
            "the effective mass ratio 3(N+1)/(2(2N+1)) of N storeys, 1 where they are unknown",
@@ -173,8 +177,8 @@ ONE_OF = tuple((f"height_{i}", f"storeys_{i}", f"period_{i}") for i in (1, 2))
 COMPLETED: dict[str, Column] = {
     column.name: column
     for column in (
-        Column("longitude", "float64", "degrees", "of the middle between the two buildings, east"),
-        Column("latitude", "float64", "degrees", "of the middle between the two buildings, north"),
+        Column("longitude", "float64", "degrees", "longitude of the middle of the pair, east"),
+        Column("latitude", "float64", "degrees", "latitude of the middle of the pair, north"),
         *(
             Column(
                 f"contact_mass_{i}",

@@ -144,7 +144,7 @@ def _rows(seed: int, count: int) -> _Rows:
 
 def _names(rows: _Rows) -> Columns:
     """Return identifiers of the buildings, and whether a pair is at the end of its row."""
-    # Each pair has a new building 2, and the first of a row a new building 1
+    # Each pair has a new building 2, and the first pair of each row a new building 1
     last = np.cumsum(np.where(rows.goes_on, 1, 2))
     straight = rows.goes_on & ~rows.turns
     inside = straight & np.append(straight[1:], False)

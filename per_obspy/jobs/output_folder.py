@@ -97,7 +97,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
 def _acquired_lock(folder: Path, holder: Path) -> FileLock:
     """Make the output folder if need be and acquire its lock at once."""
-    # The lock ends with its process, so that a killed run holds nothing
+    # The lock ends with its process, so that a killed run does not hold it
     lock = FileLock(str(folder / ".lock"), timeout=0)
     try:
         with writing(folder):

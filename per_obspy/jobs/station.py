@@ -48,7 +48,7 @@ class Products(NamedTuple):
     rejected : tuple of Rejection
         What was left out, with every reason.
     files : tuple of Path
-        The shard and what was written with it; empty if nothing usable was left.
+        The shard and what was written with it; empty if no usable record was left.
     facts : mapping
         Plain values that the status file holds besides.
     """
@@ -132,7 +132,7 @@ class FinishedStation(NamedTuple):
     station : str
         ``NETWORK.STATION``.
     shard : Path or None
-        Its Dataset; None if nothing usable was left.
+        Its Dataset; None if no usable record was left.
     rejected : tuple of Rejection
         What was left out, with every reason.
     resumed : bool
@@ -311,7 +311,7 @@ def earlier_station(status_file: Path) -> FinishedStation:
     Parameters
     ----------
     status_file : Path
-        Beside its shard of spectra.
+        Next to its shard of spectra.
 
     Raises
     ------

@@ -137,7 +137,7 @@ def _prefixed(name: str, progress: Progress) -> Progress:
 
 
 def _risk_table(result: Result) -> Path | None:
-    """Return the risk table of a run, None if nothing usable was left."""
+    """Return the risk table of a run, None without a usable pair."""
     return result.folder / "risk.parquet" if "risk.parquet" in result.record["outputs"] else None
 
 

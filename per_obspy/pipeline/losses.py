@@ -35,7 +35,7 @@ def number_of_rows(record: Path) -> int | None:
 
 def losses(settings: Run, counts: Mapping[str, int], earlier: int | None) -> list[str]:
     """
-    Return a sentence for each kind of loss; none if nothing is lost.
+    Return a sentence for each kind of loss; none without losses.
 
     Parameters
     ----------

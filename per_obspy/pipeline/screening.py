@@ -179,7 +179,7 @@ def _parts(
         rows += part.rows
         progress("screening", min(rows, inventory.count), inventory.count)
     _remove_others(_chunk_folder(folder), parts)
-    # What is said about the tables, after all their rows were read
+    # Findings about the tables, after all their rows were read
     notes = PairNotes(tuple(inventory.recognised()), tuple(gap_suspicions(inventory.gaps)))
     return sorted(parts, key=lambda part: part.number), notes
 

@@ -158,7 +158,7 @@ def finished_stations(
         If a station cannot be written; it names the stations that wait for another run.
     """
     finished = []
-    # A machine that cannot write says nothing about the stations that wait
+    # A failure to write is no property of the stations that wait
     try:
         for station in do_stations(jobs, workers or usable_processors(), executor):
             finished.append(station)

@@ -24,7 +24,7 @@ def write_evaluation(risk: pd.DataFrame, folder: Path, simulated: bool) -> list[
     Parameters
     ----------
     risk : DataFrame
-        Risk table, or its observed pairs; only with a column ``observed`` there is something to
+        Risk table, or its observed pairs; only with a column ``observed`` there are values to
         compare.
     folder : Path
         Folder of ``evaluation.json`` and, where there are probabilities,

@@ -34,7 +34,7 @@ SHOWN_CLUSTERS = 6
 #: Pairs of a cluster that are hidden by each other on the map of the whole.
 FEWEST = 5
 
-#: A cluster this large beside the whole map is seen there already.
+#: A cluster this large relative to the whole map is visible there already.
 LARGE = 0.6
 
 #: Maps of clusters are drawn where one of them is smaller than this share of the whole map.
@@ -234,7 +234,7 @@ def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
         width, height = frame.east - frame.west, frame.north - frame.south
         corner = frame.west, frame.south
         axes.add_patch(Rectangle(corner, width, height, fill=False, linewidth=0.8, zorder=4))
-        # Beside its corner, whatever the scale
+        # Next to its corner, whatever the scale
         place: dict[str, Any] = {"xytext": (3.0, 3.0), "textcoords": "offset points"}
         axes.annotate(letter, (frame.east, frame.north), fontweight="bold", zorder=5, **place)
 
@@ -308,7 +308,7 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame, classes: Sequence[str]) -> None:
     demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
     demand, gap = (value if np.isfinite(value) else 0.0 for value in (demand, gap))
     axes.plot([0.0, demand], [0.0, demand], color=MOTION_COLOUR, linewidth=0.8)
-    # Beside its end, where no mark is hidden
+    # Next to its end, where no mark is hidden
     axes.annotate("gap = demand", (demand, demand), ha="right", va="bottom", fontsize=8)
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)")
     axes.set_title("gap against demand; below the line it is too small", fontsize=11)

@@ -108,7 +108,7 @@ def _text(pair: Mapping[str, Any], name: str) -> str:
 
 
 def _verdict(pair: Mapping[str, Any]) -> list[str]:
-    """Say whether it pounds."""
+    """Return the sentence on whether the pair pounds."""
     state = STATE_WORDS.get(_text(pair, "state"), "has been screened")
     lines = [f"Pair {name_text(pair['pair_id'])} {state}."]
     if _text(pair, "risk_class"):
@@ -124,7 +124,7 @@ def _verdict(pair: Mapping[str, Any]) -> list[str]:
 
 
 def _gap_lines(pair: Mapping[str, Any]) -> list[str]:
-    """Say which gap there is, and which is needed."""
+    """Return sentences on the gap and the needed gap."""
     lines = [f"Gap: {length_text(number(pair, 'gap'))}."]
     if math.isfinite(needed := number(pair, "demand")):
         rule = _text(pair, "demand_rule").replace("_", " ")
@@ -133,7 +133,7 @@ def _gap_lines(pair: Mapping[str, Any]) -> list[str]:
 
 
 def _impact_lines(pair: Mapping[str, Any]) -> list[str]:
-    """Say how hard it pounds."""
+    """Return sentences on the severity of the impacts."""
     lines = list[str]()
     if math.isfinite(expected := number(pair, "expected_impact_velocity")):
         text = f"Expected impact velocity: {speed_text(expected)}"
@@ -160,7 +160,7 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
             "latitude {:.5f}": number(pair, f"latitude_{i}"),
             "longitude {:.5f}": number(pair, f"longitude_{i}"),
         }
-        # Only what is known is said
+        # Sentences on known values only
         known = [text.format(value) for text, value in facts.items() if math.isfinite(value)]
         name = _text(pair, f"building_id_{i}")
         if known or name:
@@ -170,7 +170,7 @@ def _building_lines(pair: Mapping[str, Any]) -> list[str]:
 
 
 def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
-    """Say which ground motion it is judged by."""
+    """Return sentences on the ground motion of the pair."""
     if station := _text(pair, "station"):
         away = number(pair, "distance") / 1000.0
         return [f"Record: station {name_text(station)}, {away:.1f} km away."]
@@ -180,7 +180,7 @@ def _motion_lines(pair: Mapping[str, Any]) -> list[str]:
 
 
 def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
-    """Say what would have prevented or softened it."""
+    """Return sentences on measures that prevent or soften pounding."""
     lines = list[str]()
     # More gap, more damping, a softer contact
     if (missing := number(pair, "missing_gap")) > 0:

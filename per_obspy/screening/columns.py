@@ -38,147 +38,209 @@ RESULTS: dict[str, Column] = {
         _whole_number(
             "rank",
             "",
-            "1 is the worst: by expected impact velocity, amplification, probability, importance",
+            "order of severity, 1 is the worst: by expected impact velocity, then "
+            "amplification, probability, importance",
         ),
         _text(
             "risk_class",
-            "by expected impact velocity, thresholds are configured; gap unknown without a gap",
+            'class of the expected impact velocity by configured thresholds; "gap '
+            'unknown" without a gap',
         ),
         _text(
             "state",
-            "by probability: yes, likely, possible, unlikely or no; unknown if the gap is unknown",
+            "state by probability: yes, likely, possible, unlikely or no; unknown if "
+            "the gap is unknown",
         ),
         _number(
-            "probability", "1", "of pounding in this event, with what is uncertain of the pair"
+            "probability",
+            "1",
+            "probability of pounding in this event, over all uncertain values of the pair",
         ),
         _number(
             "expected_impact_velocity",
             "m/s",
-            "mean over what is uncertain of the pair; 0 where the buildings do not touch",
+            "mean impact velocity over all uncertain values of the pair; 0 for outcomes "
+            "without contact",
         ),
         _number(
             "impact_velocity_84",
             "m/s",
-            "not exceeded in 84 of 100 outcomes of what is uncertain; 0 without contact",
+            "impact velocity that 84 of 100 outcomes do not exceed; 0 without contact",
         ),
         _number(
             "expected_amplification",
             "1",
-            "mean radius with / without pounding, of the more amplified building; 1 if apart",
+            "mean ratio of the largest radius with pounding to that without, of the "
+            "more amplified building; 1 without contact",
         ),
-        _number("demand", "m", "gap needed at contact height, by the rule in demand_rule"),
-        _text("demand_rule", "exact, per_white_noise, per_record, linearized, srss or shakemap"),
         _number(
-            "demand_estimated", "m", "the largest estimate, which is the demand where none is exact"
+            "demand",
+            "m",
+            "gap needed to prevent pounding, at contact height, by the rule in demand_rule",
+        ),
+        _text(
+            "demand_rule",
+            "rule of the demand: exact, per_white_noise, per_record, linearized, srss or shakemap",
+        ),
+        _number(
+            "demand_estimated",
+            "m",
+            "largest estimate of the demand; it is the demand where demand_exact is empty",
         ),
         _text(
             "estimate_rule",
-            "which estimate that is: per_white_noise, per_record, linearized or srss",
+            "rule of demand_estimated: per_white_noise, per_record, linearized or srss",
         ),
         _number(
-            "estimate_over_exact", "1", "demand_estimated / demand_exact; empty where there is none"
+            "estimate_over_exact",
+            "1",
+            "demand_estimated / demand_exact; empty where demand_exact is empty",
         ),
-        _number("demand_ratio", "1", "gap / demand; 0 when touching, empty where the demand is 0"),
+        _number(
+            "demand_ratio",
+            "1",
+            "gap / demand; 0 for touching buildings, empty where the demand is 0",
+        ),
         _number(
             "impact_velocity",
             "m/s",
             "approach velocity of the single hit with the estimated demand",
         ),
         _text(
-            "single_hit_status", "ok, no_pounding, no_grazing_state or inconsistent_critical_gap"
+            "single_hit_status",
+            "status of the single-hit estimate: ok, no_pounding, no_grazing_state or "
+            "inconsistent_critical_gap",
         ),
         *_per_building(
             "amplification",
             "1",
-            "PER after a single hit / before, at least 1; empty without a grazing state",
+            "ratio of PER after a single hit to PER before, at least 1; empty without a "
+            "grazing state",
         ),
-        _text("flags", "names separated by spaces, each explained in a row flag_..."),
+        _text(
+            "flags",
+            "names of flags separated by spaces; each is explained in a row flag_... of this table",
+        ),
         _text(
             "station",
-            "whose record is used: the nearest in reach on the same site class, or of all",
+            "station of the record: the nearest in reach on the same site class, or else of all",
         ),
         _number(
-            "distance", "m", "from the station to the middle of the pair, along the great circle"
+            "distance",
+            "m",
+            "distance from the station to the middle of the pair, along the great circle",
         ),
-        _number("azimuth_used", "degrees", "of the ground motion, the same for both buildings"),
+        _number(
+            "azimuth_used",
+            "degrees",
+            "azimuth of the ground motion, clockwise from north, the same for both buildings",
+        ),
         _text(
             "azimuth_rule",
-            "given; worst: that of the largest demand by demand_rule; station: its only horizontal",
+            "rule of azimuth_used: given; worst: azimuth of the largest demand; "
+            "station: azimuth of its only horizontal",
         ),
         *_per_building(
             "per",
             "m",
-            "pseudo energy radius of the oscillator, to be multiplied by its participation",
+            "pseudo energy radius of the oscillator; multiply it by participation for "
+            "contact height",
         ),
         *_per_building(
             "sd",
             "m",
-            "spectral displacement of the oscillator, to be multiplied by its participation",
+            "spectral displacement of the oscillator; multiply it by participation for "
+            "contact height",
         ),
-        _number("correlation", "1", "of the two responses to white noise, eq. (16)"),
-        _number("correlation_record", "1", "of the two responses to this record, over all time"),
-        _number("critical_gap_per", "m", "eq. (15) from PER and eq. (16), at contact height"),
+        _number("correlation", "1", "correlation of the two responses to white noise, eq. (16)"),
+        _number(
+            "correlation_record",
+            "1",
+            "correlation of the two responses to this record, over its whole duration",
+        ),
+        _number(
+            "critical_gap_per",
+            "m",
+            "critical gap by eq. (15) from PER and eq. (16), at contact height",
+        ),
         _number(
             "critical_gap_record",
             "m",
-            "eq. (15) from PER and correlation_record, at contact height",
+            "critical gap by eq. (15) from PER and correlation_record, at contact height",
         ),
-        _number("critical_gap_sd", "m", "eq. (15) from SD and eq. (16), at contact height"),
+        _number(
+            "critical_gap_sd",
+            "m",
+            "critical gap by eq. (15) from SD and eq. (16), at contact height",
+        ),
         _number("srss_gap", "m", "root of the sum of the squared PER, at contact height"),
         _number(
             "demand_exact",
             "m",
-            "exact largest relative displacement of 1 towards 2; unknown azimuth: worse side",
+            "exact largest relative displacement of building 1 towards building 2; the "
+            "worse direction if the azimuth is unknown",
         ),
-        _number("demand_two_sided", "m", "the same in either order of the buildings, for design"),
+        _number(
+            "demand_two_sided",
+            "m",
+            "exact largest relative displacement in either direction, as design needs it",
+        ),
         _whole_number(
             "impacts",
             "1",
-            "in the exact history, faster than 1 mm/s and than 1 % of the fastest; slower: chatter",
+            "number of impacts in the exact history that are faster than 1 mm/s and "
+            "than 1 % of the fastest one",
         ),
         _number(
             "impact_velocity_exact",
             "m/s",
-            "largest approach velocity in that history, however slow; 0 without an impact",
+            "largest approach velocity in the exact history, also of slow impacts; 0 "
+            "without an impact",
         ),
         *_per_building(
-            "amplification_exact", "1", "largest radius with pounding / without, in that history"
+            "amplification_exact",
+            "1",
+            "ratio of the largest radius with pounding to that without, in the exact history",
         ),
-        _number("absolute_gap", "m", "sum of the PER, at contact height"),
+        _number("absolute_gap", "m", "sum of the PER of both buildings, at contact height"),
         *_per_building(
             "ln_per_ratio", "1", "ln(PER at the site / PER of the record), at 5 % damping, RotD50"
         ),
         *_per_building(
             "ln_per_std",
             "1",
-            "log-standard deviation of that; its spatial correlation was published for SA",
+            "log-standard deviation of PER at the site; its spatial correlation was "
+            "published for SA",
         ),
         _number(
             "critical_gap_linearized",
             "m",
-            "eq. (15) of equivalent linear buildings, at contact height",
+            "critical gap by eq. (15) of equivalent linear buildings, at contact height",
         ),
         _number(
             "correlation_linearized",
             "1",
-            "eq. (16) of them; in narrow motion not above correlation",
+            "correlation by eq. (16) of equivalent linear buildings; not above "
+            "correlation in narrow motion",
         ),
         *_per_building(
             "ductility",
             "1",
-            "estimated displacement / yield displacement; up to 1 it stays elastic",
+            "estimated displacement / yield displacement; the building stays elastic up to 1",
         ),
-        _number("missing_gap", "m", "by which the gap is below the demand; 0 where it is enough"),
+        _number("missing_gap", "m", "demand minus gap; 0 where the gap is enough"),
         _number(
             "supplemental_damping",
             "1",
-            "least to add to both so that the demand fits into the gap: by exact displacements "
-            "where demand_rule is exact, else an estimate; empty: 0.4 is too little",
+            "least damping to add to both buildings so that the demand fits into the "
+            "gap, fraction of critical: by exact displacements where demand_rule is "
+            "exact, else an estimate; empty where 0.4 is too little",
         ),
         _number(
             "bumper_restitution",
             "1",
-            "estimate: largest for target_amplification; empty: none helps",
+            "estimated largest restitution of a bumper that keeps the amplification "
+            "within target_amplification; empty where none does",
         ),
     )
 }

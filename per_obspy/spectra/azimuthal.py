@@ -71,7 +71,7 @@ def azimuthal_per_spectrum(
     Notes
     -----
     Exact, between samples too, along each azimuth given, so that every percentile of `rotd` is
-    exact for these azimuths. Nothing is interpolated between azimuths.
+    exact for these azimuths, without interpolation between azimuths.
 
     Examples
     --------

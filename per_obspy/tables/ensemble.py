@@ -115,8 +115,8 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 def _join_query(tables: list[Path | None]) -> str:
     """Return the query that joins risk tables by pair, which are ``table0`` and so on."""
     # Without any table there is still a header
-    nothing = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
-    rows = [f"SELECT -1 AS scenario, '' AS pair_id, {nothing} WHERE false"]
+    zeros = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
+    rows = [f"SELECT -1 AS scenario, '' AS pair_id, {zeros} WHERE false"]
     rows += [
         f"SELECT {number} AS scenario, pair_id, probability, {', '.join((*SAME, *SEVERITY))}"
         f" FROM table{number}"

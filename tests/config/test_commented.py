@@ -60,7 +60,7 @@ def test_every_key_has_a_line_and_its_help():
     inner = {key for key in keys if re.fullmatch(r"processing\.checks\.\w+\.\w+", key)}
     tables = {key for key in keys - inner if any(one.startswith(f"{key}.") for one in keys - inner)}
     assert found == keys - tables - inner
-    assert "# corner, Hz; not given: found for each record\n#highpass = ...\n" in text
+    assert "# high-pass corner, Hz; if not set, chosen for each record\n#highpass = ...\n" in text
 
 
 def test_defaults_in_comments_are_the_defaults():

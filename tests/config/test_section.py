@@ -86,7 +86,7 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ),
         (
             GOOD + "[spectra]\ndampings = [5.0]\n",
-            r"spectra\.dampings\.0: .*less than 1 \(got 5\.0\), expected: fractions",
+            r"spectra\.dampings\.0: .*less than 1 \(got 5\.0\), expected: dampings of",
         ),
         (GOOD + "[spectra]\ndampings = []\n", r"spectra\.dampings: .*at least 1 item"),
         (
@@ -104,16 +104,16 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
         ),
         (
             GOOD + "[spectra]\nlongest = inf\n",
-            r"spectra\.longest: .*finite number \(got inf\), expected: s",
+            r"spectra\.longest: .*finite number \(got inf\), expected: longest period",
         ),
         (GOOD + "[spectra]\nazimuth_step = 7\n", r"spectra\.azimuth_step: must divide 180 degrees"),
         (
             GOOD + "[building]\nstorey_height = 3000\n",
-            r"building\.storey_height: .*12 \(got 3000\), expected: m$",
+            r"building\.storey_height: .*12 \(got 3000\), expected: height of a storey .*, m$",
         ),
         (
             GOOD + "[building]\ndamping = 5\n",
-            r"building\.damping: .*less than 1 \(got 5\), expected: fraction of critical",
+            r"building\.damping: .*less than 1 \(got 5\), expected: damping of .*of critical",
         ),
         (GOOD + "[totals]\nh3 = 16\n", r"totals\.h3: .*less than or equal to 15 \(got 16\)"),
         (
@@ -131,8 +131,8 @@ def test_what_a_run_says_of_itself_holds_no_absolute_path(tmp_path):
                 'folder = "in"',
                 'columns = [{file = "a", station = "A", units = "mg", channels = {}}]',
             ),
-            r"records\.columns\.0\.units: .*\(got 'mg'\), expected: of the samples: m/s2, "
-            r"cm/s2, gal, g",
+            r"records\.columns\.0\.units: .*\(got 'mg'\), expected: unit of the samples: m/s2, "
+            r"cm/s2, gal or g",
         ),
         (
             GOOD.replace('folder = "in"', f"columns = [{TABLE}]"),

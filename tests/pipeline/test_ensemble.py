@@ -149,7 +149,7 @@ WRONG = {
     ),
     "infinite": (("rate = 0.03", "rate = inf"), "scenario.1.rate: Input should be a finite number"),
     "all 0": (("rate = 0.03", "rate = 0.0"), "weights or rates must have a positive sum"),
-    "same name": (('name = "small"', 'name = "Large"'), "name: 'Large' stands twice"),
+    "same name": (('name = "small"', 'name = "Large"'), "name: 'Large' occurs twice"),
     "same run": (
         ("small.toml", "large.toml"),
         "scenario 'small' has the output folder of scenario 'large'",

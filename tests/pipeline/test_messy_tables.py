@@ -147,7 +147,7 @@ def test_the_record_of_a_run_has_what_the_console_says(tried):
 MENDS = {
     'decimal = ","\n': "`2,345` and no number that decides",
     'encoding = "cp1254"\n': "names in cp1252 or cp1254, English headings",
-    '[pairs.columns]\ngap = "distance"\n': "a heading that may mean something else",
+    '[pairs.columns]\ngap = "distance"\n': "an ambiguous heading",
     'sheet = "2026"\n': "a workbook with two pair tables",
 }
 
@@ -162,7 +162,7 @@ def test_what_is_refused_is_read_with_what_the_message_asks_for(tried, form):
 
 
 def test_the_page_has_what_the_commands_say(outcomes, tmp_path):
-    lines = ["| table | outcome | what both commands say |", "|---|---|---|"]
+    lines = ["| table | outcome | output of both commands |", "|---|---|---|"]
     lines += [f"| {kind} | read | {_cell(outcomes[kind].checked.out)} |" for kind in readable()]
     lines += [f"| {kind} | refused | {_cell(outcomes[kind].checked.err)} |" for kind in refused()]
     said = outcomes["suspected"].ran.err.partition("per-obspy: ")[2]

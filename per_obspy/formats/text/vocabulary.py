@@ -212,7 +212,7 @@ def coordinates(
     Return the group of coordinates, degrees and m.
 
     It is empty where they are unknown or 0, 0. Impossible ones are unknown too, and ``problem``
-    says so; :func:`trace` turns it into a note.
+    describes that; :func:`trace` turns it into a note.
     """
     if latitude is None or longitude is None or (latitude == 0 and longitude == 0):
         return {}

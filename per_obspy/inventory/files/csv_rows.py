@@ -81,7 +81,7 @@ class CsvFile:
 
     @property
     def recognised_numbers(self) -> str:
-        """Which columns have decimal commas, or commas between thousands."""
+        """Description of columns with decimal commas, or commas between thousands."""
         # Columns by their decimal mark
         commas = [name for name, mark in self._marks.items() if mark == ","]
         thousands = [name for name, mark in self._marks.items() if mark == "."]

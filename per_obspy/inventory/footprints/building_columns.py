@@ -1,7 +1,7 @@
 """
 Columns of buildings: those of the schema, from names that the user gives, and all others kept.
 
-A column of the layer whose name the schema or the results need for something else is kept as
+A column of the layer whose name has another meaning in the schema or the results is kept as
 ``layer_`` and its name.
 """
 

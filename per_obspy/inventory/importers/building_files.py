@@ -82,7 +82,7 @@ def _first_character(file: Path) -> bytes:
 
 @contextmanager
 def _unpacked(file: Path) -> Iterator[Path]:
-    """Give the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
+    """Yield the unpacked copy of a gzip file, which is refused if it is too large or damaged."""
     with TemporaryDirectory(prefix="per_obspy_") as folder:
         plain = Path(folder, file.stem)
         # Block by block, up to the limit

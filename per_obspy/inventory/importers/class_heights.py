@@ -3,7 +3,7 @@ Heights of buildings that have none, from buildings of the same class in the sam
 
 The estimate is the median of the class, and its deviation is that of the class:
 ``height_log_std``. A class needs ``ENOUGH`` known heights; where there are none but storeys, the
-same is done with storeys. Nothing is taken from outside the layer. The known buildings are taken
+same is done with storeys. No value is taken from outside the layer. The known buildings are taken
 for a sample of the class, which they may not be: tall buildings are mapped first.
 """
 

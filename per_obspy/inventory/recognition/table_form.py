@@ -98,7 +98,7 @@ def text_form(file: Path, given: TableForm) -> TextForm:
     plain = next((form for form in found if _is_plain(form)), None)
     best = plain or max(found, key=_rank)
     if len(best.meanings.columns) < _FEWEST:
-        # Nothing is recognised: the first line, in most cells
+        # No heading is recognised: the first line, in most cells
         first = [form for form in found if form.header == 1]
         best = max(first, key=lambda form: (len(form.meanings.columns), len(form.cells)))
     # Now every configured column must be there

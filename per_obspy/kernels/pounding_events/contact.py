@@ -228,7 +228,7 @@ def close_pressed_interfaces(row, acceleration, slope, duration):
 
 @lean
 def join_cluster(row, first, last):
-    """Give a cluster its common velocity, by momentum."""
+    """Set the common velocity of a cluster, by momentum."""
     common = 0.0
     for i in range(first, last + 1):
         common += mass_share(row, first, last, i) * row[i, V]

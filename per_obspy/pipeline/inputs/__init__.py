@@ -1,1 +1,1 @@
-"""What the arguments of a command are: recognised by content, described, and made into a run."""
+"""Arguments of a command: recognised by content, described, and made into a run."""

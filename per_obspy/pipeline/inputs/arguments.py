@@ -57,7 +57,7 @@ def requested_run(
     Raises
     ------
     CatalogError
-        If records or pairs are missing, an argument is something else, or a change is wrong.
+        If records or pairs are missing, an argument is of another kind, or a change is wrong.
     """
     changed = parsed_changes(changes, Run)
     # A configuration, as it is or with changes
@@ -105,7 +105,7 @@ def configurations_in(folder: Path) -> list[Path]:
 
 
 def _configuration(argument: str) -> Path | None:
-    """Return the configuration that an argument names; None if it names something else."""
+    """Return the configuration that an argument names; None if it names another kind of input."""
     path = Path(argument)
     if path.is_dir():
         found = configurations_in(path)
@@ -115,7 +115,7 @@ def _configuration(argument: str) -> Path | None:
         return found[0] if found else None
     if path.is_file():
         return path if kind_of(path) is Kind.CONFIGURATION else None
-    # That it is missing is said where it is read
+    # A missing file is reported where it is read
     return path if path.suffix.lower() == ".toml" else None
 
 
@@ -196,7 +196,7 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
         return {"records": {"asdf": {"file": str(place)}}}
     if path.is_file():
         return {"records": {"folder": str(path)}}
-    # What lies beside the records and describes the earthquake
+    # Files with the records that describe the earthquake
     found = {"folder": str(path)}
     for key, beside in (("event", Kind.EVENT), ("shakemap", Kind.SHAKEMAP)):
         files = [file for file, one in files_in(path).items() if one is beside]

@@ -1,4 +1,4 @@
-"""What any input or result is, for ``per-obspy info``."""
+"""Describe any input or result, for ``per-obspy info``."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def described(argument: str, stationxml: Path | None = None) -> Facts:
     argument : str
         Path, or identifier of an earthquake.
     stationxml : Path, optional
-        Metadata of records, if not beside them.
+        Metadata of records, if not in their folder.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def described(argument: str, stationxml: Path | None = None) -> Facts:
     if kind is Kind.EVENT_ID:
         use = [("use", f"per-obspy run {argument} PAIRS fetches its records")]
         return Facts(kind, "not looked up", use, {}, {"event": argument})
-    # A folder with one table or layer stands for it
+    # A folder with one table or layer is described as that
     if path.is_dir() and kind in PAIR_KINDS:
         path = next(file for file, one in files_in(path).items() if one is kind)
     if kind is Kind.RECORDS:

@@ -190,7 +190,7 @@ def event_facts(path: Path) -> Facts:
     places: dict[str, Places] = {}
     if None not in (origin.longitude, origin.latitude):
         places = {"*": ([origin.longitude], [origin.latitude])}
-    lines.append(("use", "beside the records, or --set records.event=FILE"))
+    lines.append(("use", "put it with the records, or --set records.event=FILE"))
     return Facts(Kind.EVENT, "one earthquake", lines, places, {"time": str(origin.time)})
 
 
@@ -199,7 +199,7 @@ def station_facts(path: Path) -> Facts:
     names, places = _described_stations(path)
     lines = [
         ("stations", some(names, 8)),
-        ("use", "beside the records, or --set records.stationxml=FILE"),
+        ("use", "put it with the records, or --set records.stationxml=FILE"),
     ]
     layers = {"^": unzipped(places)}
     return Facts(Kind.STATIONS, f"{len(names)} stations", lines, layers, {"stations": names})

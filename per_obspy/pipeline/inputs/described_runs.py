@@ -84,7 +84,7 @@ def result_facts(folder: Path) -> Facts:
         record = read_status(file)
     except StatusError as error:
         raise CatalogError(str(file), f"cannot be read: {error}") from error
-    # What the run says of itself
+    # Facts of run.json
     counts = record.get("counts") or {}
     # The risk table has states, worst pairs and places
     risk = folder / "risk.parquet"
@@ -141,7 +141,7 @@ def _rejected(counts: dict[str, int]) -> str:
 
 
 def _stations(path: Path) -> dict[str, Places]:
-    """Return the places of the stations of a run, nothing if there is no table."""
+    """Return the places of the stations of a run, empty without a table."""
     try:
         table = pd.read_csv(path, usecols=["longitude", "latitude"])
     except (OSError, ValueError):

@@ -26,7 +26,7 @@ MOST_ROWS = 100_000
 #: Rejections that are listed.
 FIRST = 2
 
-#: Quantities of a building whose range is said.
+#: Quantities of a building whose range is listed.
 _RANGES = ("height", "storeys", "period")
 
 

@@ -136,7 +136,7 @@ def _are_records(files: Sequence[Path]) -> bool:
 def _chosen(
     named: str | None, found: Sequence[Path], kinds: Sequence[Kind], role: str
 ) -> tuple[str | None, str]:
-    """Return the input of a role, named or the only one found, and what is said of it."""
+    """Return the input of a role, named or the only one found, and its description."""
     # Named, the only one found, none or several
     if named is not None:
         kind = kind_of(named)
@@ -152,7 +152,7 @@ def _chosen(
 
 
 def _output(folder: Path, records: str | None) -> Path:
-    """Return the folder of the results: beside the configuration, but not among the records."""
+    """Return the folder of the results: next to the configuration, but not among the records."""
     is_inside = records is not None and folder.is_relative_to(Path(records).absolute())
     return folder.parent / f"{folder.name}_results" if is_inside else folder / RESULTS
 

@@ -22,7 +22,7 @@ BUILDINGS = "pairs.buildings.parquet"
 #: Names of the counts of a search.
 COUNTED = ("pairs", "rejected")
 
-#: Files of a Shapefile beside the one that is named.
+#: Further files of a Shapefile.
 _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 
@@ -33,7 +33,7 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
     Parameters
     ----------
     settings : Run
-        What to do; without footprints nothing is done.
+        The settings; without footprints the function returns at once.
     folder : Path
         Of the results; ``pairs.parquet`` and ``pairs.rejected.csv`` are written there.
     progress : callable
@@ -86,7 +86,7 @@ def pair_table(settings: Run, folder: Path) -> Path | None:
 
 
 def layer_files(layer: Path) -> list[Path]:
-    """Return the files of a layer: of a Shapefile also those beside it."""
+    """Return the files of a layer: of a Shapefile all its parts."""
     parts = [layer.with_suffix(suffix) for suffix in _PARTS] if layer.suffix == ".shp" else []
     return [layer, *(part for part in parts if part.is_file())]
 

@@ -1,4 +1,4 @@
-"""What is said of an input: a title, facts on a line each, and places for a map."""
+"""Description of an input: a title, facts on a line each, and places for a map."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple

@@ -74,7 +74,7 @@ _GEOMETRY, _RISK = {"geometry", "wkt", "wkb"}, {"pair_id", "state", "rank", "pro
 #: Columns of a list of buildings that has one place per row.
 _EAST, _NORTH = {"longitude", "lon", "long", "lng"}, {"latitude", "lat"}
 
-#: Files that belong to others: parts of a Shapefile, and what this package leaves beside tables.
+#: Files that belong to others: parts of a Shapefile, and side files of tables.
 SIDECARS = (".dbf", ".shx", ".prj", ".cpg", ".sbn", ".sbx", ".qix", ".qmd")
 
 
@@ -261,7 +261,7 @@ def _text_kind(path: Path, head: bytes) -> Kind:
 
 
 def _is_json(path: Path) -> bool:
-    """Return whether the name of a file says JSON: descriptions of buildings may be so."""
+    """Return whether the name of a file ends in JSON: descriptions of buildings may be so."""
     return path.suffix.lower() in (".json", ".geojson")
 
 

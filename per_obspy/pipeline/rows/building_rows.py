@@ -238,7 +238,7 @@ def _pieces(folder: Path, risk: Dataset, placed: pd.DataFrame) -> Iterator[pd.Da
     names = ["pair_id", "longitude", "latitude", *NEEDED]
     mapping = pa.table({"rank": placed["rank"].to_numpy(), "place": np.arange(len(placed))})
     with bounded_database(folder) as database:
-        # The rank of a pair tells it from all others
+        # The rank of a pair identifies it
         database.register("risk", some_columns(risk, ["rank", *names]))
         database.register("mapping", mapping)
         columns = ", ".join(f"risk.{name}" for name in names)

@@ -50,7 +50,7 @@ class RowMaxima(NamedTuple):
         Largest radius ``sqrt(D² + (D' / w)²)`` of the modal coordinate in the row, exact between
         samples, m.
     free_radius : (n_buildings,) ndarray
-        The same of the building alone, without contact, m.
+        Largest radius of the building alone, without contact, m.
     displacement : (n_buildings,) ndarray
         Largest ``|D|`` in the row, exact between samples, m.
     impacts : (n_buildings,) ndarray of int
@@ -205,7 +205,7 @@ def _lines_at_rest(
     duration: FloatArray,
 ) -> FloatArray:
     """Return the kernels' lines of all buildings; ``duration`` is that of a step of each row."""
-    # Nothing is in contact with the last building of a row from the right: its gap is 1
+    # The last building of a row has no neighbour on its right: its gap is 1
     lines = np.zeros((len(table), columns.ROW_COLUMNS))
     lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap

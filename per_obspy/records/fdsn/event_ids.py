@@ -49,7 +49,7 @@ def event_of(identifier: str) -> tuple[str, str]:
     ----------
     identifier : str
         ``PROVIDER:ID``, where the provider is a name of ObsPy in any case; or an ID alone of the
-        USGS, GeoNet or EMSC, whose forms differ. Nothing is asked for.
+        USGS, GeoNet or EMSC, whose forms differ. No request is made.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def gpx_routes(table: pd.DataFrame) -> str:
     for team, visits in table.groupby("team"):
         route = GPXRoute(name=f"team {team}")
         for visit in visits.to_dict("records"):
-            # Names are data: nothing but printable letters
+            # Names are data: only printable letters
             name = printable(f"{visit['visit']}: {visit['building_id']}")
             point = GPXRoutePoint(visit["latitude"], visit["longitude"], name=name)
             point.description = printable(_description(visit))

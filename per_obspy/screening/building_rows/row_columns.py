@@ -52,21 +52,30 @@ _SIDES = tuple(
 
 #: One row per interface of a row of buildings.
 ROWS: tuple[Column, ...] = (
-    _text("row_id", "R- and the first of the names of its pairs"),
-    _count("buildings", "buildings of the row"),
-    _count("interface", "1 is that between the first and the second building of the row"),
+    _text("row_id", "identifier of the row: R- and the first of the names of its pairs"),
+    _count("buildings", "number of buildings of the row"),
+    _count(
+        "interface",
+        "number of the interface; 1 is between the first and the second building of the row",
+    ),
     _text("pair_id", "pair of this interface in risk.parquet"),
     _truth("turned", "whether building 1 of the pair is the one on the right"),
     *_SIDES,
-    _number("azimuth", "degrees", "of the axis of the row, from its first to its last building"),
-    _text("station", "whose record the row is followed under; empty if none"),
-    _number("gap", "m", "clear distance of this interface"),
+    _number(
+        "azimuth", "degrees", "azimuth of the axis of the row, from its first to its last building"
+    ),
+    _text("station", "station of the record that drives the row; empty without one"),
+    _number("gap", "m", "clear distance at this interface"),
     _count("impacts", "in the row, faster than 1 mm/s and than 1 % of the fastest; empty without"),
     _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
-    _count("impacts_alone", "the same of the pair alone, under the same motion"),
-    _number("impact_velocity_alone", "m/s", "the same of the pair alone, under the same motion"),
-    _number("longitude", "degrees", "of the middle of the pair, east"),
-    _number("latitude", "degrees", "of the middle of the pair, north"),
+    _count("impacts_alone", "number of such impacts of the pair alone, under the same motion"),
+    _number(
+        "impact_velocity_alone",
+        "m/s",
+        "largest approach velocity of the pair alone, under the same motion",
+    ),
+    _number("longitude", "degrees", "longitude of the middle of the pair or of the building, east"),
+    _number("latitude", "degrees", "latitude of the middle of the pair or of the building, north"),
     _text("flags", "of the row, separated by spaces, each explained in a row flag_..."),
 )
 
@@ -83,38 +92,67 @@ BUILDINGS: tuple[Column, ...] = (
     _number(
         "severity",
         "m/s",
-        "largest over its pairs of expected_impact_velocity, plus what the exact history of the "
-        "row adds to the impact velocity of the pair alone",
+        "largest over the pairs of the building of expected_impact_velocity plus "
+        "the increase of the impact velocity in the exact history of the row",
     ),
-    _text("risk_class", "by severity; names and thresholds are those of the pairs"),
-    _number("probability_independent", "1", "that any neighbour hits it, if pairs are independent"),
-    _number("probability_common", "1", "the same if one cause decides all: the largest of them"),
-    _text("position", "inside its row; end of it; corner of two rows; single: it has one pair"),
-    _count("neighbours", "buildings that it has a gap to"),
+    _text("risk_class", "class of the severity, by the names and thresholds of the pairs"),
+    _number(
+        "probability_independent",
+        "1",
+        "probability that any neighbour hits the building, if pairs are independent",
+    ),
+    _number(
+        "probability_common",
+        "1",
+        "probability that any neighbour hits the building, if one cause decides all "
+        "pairs: the largest of them",
+    ),
+    _text(
+        "position",
+        "place of the building: inside its row; end of it; corner of two rows; "
+        "single: it has one pair",
+    ),
+    _count("neighbours", "number of buildings next to it, across a gap"),
     _count(
         "neighbours_that_can_hit",
-        "of these, by the state of the pair (not no) or an impact in the row",
+        "number of neighbours whose pair has a state other than no, or an impact in the row",
     ),
     _count("impacts", "hits in all its rows; empty without a history"),
     *(_count(f"impacts_{side}", f"of these, from the {side}") for side in COMPASS),
     _number("impact_velocity", "m/s", "largest in its rows"),
-    _number("amplification_row", "1", "largest radius in a row / without contact"),
-    _number("amplification_pair", "1", "the same in the worst of its pairs, each alone"),
-    _text("worst_neighbour", "neighbour of the largest severity"),
-    _text("worst_pair", "pair with it"),
-    _number("worst_azimuth", "degrees", "towards it; empty if unknown"),
-    _text("prevention", "what would have kept it from being hit, or else softened the hit"),
-    _number("missing_gap", "m", "largest of its pairs; all of its row together are enough"),
+    _number("amplification_row", "1", "largest radius in a row / largest radius without contact"),
     _number(
-        "supplemental_damping", "1", "largest of its pairs; empty if 0.4 is too little for one"
+        "amplification_pair",
+        "1",
+        "largest radius in the worst of its pairs, each alone / largest radius without contact",
     ),
-    _number("bumper_restitution", "1", "smallest of its pairs; empty if none helps at one"),
-    _truth("floors_misaligned", "floors of a neighbour may hit its columns"),
+    _text("worst_neighbour", "neighbour of the largest severity"),
+    _text("worst_pair", "pair_id of the pair with worst_neighbour"),
+    _number("worst_azimuth", "degrees", "azimuth towards worst_neighbour; empty if unknown"),
+    _text(
+        "prevention", "measures that would have prevented or else softened the hits of the building"
+    ),
+    _number(
+        "missing_gap",
+        "m",
+        "largest missing gap of its pairs; enough only if all of its row are widened together",
+    ),
+    _number(
+        "supplemental_damping",
+        "1",
+        "largest supplemental damping of its pairs; empty if 0.4 is too little for one",
+    ),
+    _number(
+        "bumper_restitution",
+        "1",
+        "smallest bumper restitution of its pairs; empty if none helps at one",
+    ),
+    _truth("floors_misaligned", "whether floors of a neighbour may hit its columns"),
     _text("rows", "row_id of its rows, separated by spaces"),
-    _count("longest_row", "buildings of the longest of them"),
+    _count("longest_row", "number of buildings of the longest row of the building"),
     _text("area", "area or cell of its worst pair, as in totals.csv"),
-    _number("longitude", "degrees", "east"),
-    _number("latitude", "degrees", "north"),
+    _number("longitude", "degrees", "longitude of the middle of the pair or of the building, east"),
+    _number("latitude", "degrees", "latitude of the middle of the pair or of the building, north"),
     _number("importance", "1", "importance factor; empty if unknown"),
     _number("occupants", "1", "people in the building; empty if unknown"),
     _text("flags", "of its rows and of itself, separated by spaces; each explained in flag_..."),

@@ -50,13 +50,13 @@ DESIGN: dict[str, Column] = {
             "demand_rule",
             "str",
             "",
-            "what the demand is: sd_white_noise, or sd_srss for derived periods",
+            "rule of the demand: sd_white_noise, or sd_srss for derived periods",
         ),
         Column(
             "probability",
             "float64",
             "1",
-            "of pounding under the spectrum, with what is uncertain of the pair",
+            "probability of pounding under the spectrum, over all uncertain values of the pair",
         ),
     )
 }

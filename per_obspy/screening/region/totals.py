@@ -26,7 +26,7 @@ TOTALS: dict[str, Column] = {
             "area",
             "str",
             "",
-            "name of the area or of the cell; empty where the pair table does not tell",
+            "name of the area or of the cell; empty where the pair table has none",
         ),
         Column("pairs", "int64", "1", "pairs in the area"),
         *(Column(state, "int64", "1", f"pairs of the state {state}") for state in EVERY_STATE),
@@ -40,19 +40,34 @@ TOTALS: dict[str, Column] = {
             "expected_pounding_std_independent",
             "float64",
             "1",
-            "its standard deviation if pairs were independent",
+            "standard deviation of expected_pounding if pairs were independent",
         ),
         Column(
             "expected_pounding_std_common",
             "float64",
             "1",
-            "its standard deviation if one cause decided all pairs",
+            "standard deviation of expected_pounding if one cause decided all pairs",
         ),
         Column("worst_pair", "str", "", "pair_id of the area's worst pair"),
-        Column("worst_state", "str", "", "its state"),
-        Column("worst_expected_impact_velocity", "float64", "m/s", "its expected impact velocity"),
-        Column("longitude", "float64", "degrees", "of the middle of the area's pairs, east"),
-        Column("latitude", "float64", "degrees", "of the middle of the area's pairs, north"),
+        Column("worst_state", "str", "", "state of worst_pair"),
+        Column(
+            "worst_expected_impact_velocity",
+            "float64",
+            "m/s",
+            "expected impact velocity of worst_pair",
+        ),
+        Column(
+            "longitude",
+            "float64",
+            "degrees",
+            "longitude of the middle of the pairs of the area, east",
+        ),
+        Column(
+            "latitude",
+            "float64",
+            "degrees",
+            "latitude of the middle of the pairs of the area, north",
+        ),
     )
 }
 
@@ -72,7 +87,8 @@ BUILDING_TOTALS: dict[str, Column] = {
             "expected_buildings_independent",
             "float64",
             "1",
-            "the same if its pairs were independent; the truth lies in between",
+            "expected number of buildings that are hit, if pairs were independent; the truth lies "
+            "between both numbers",
         ),
         Column("worst_building", "str", "", "building_id of the area's worst building"),
     )

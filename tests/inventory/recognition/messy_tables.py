@@ -200,9 +200,7 @@ def refused() -> dict[str, Messy]:
         "names in cp1252 or cp1254, English headings": Messy(
             "pairs.csv", text_of(NAMES, named).encode("cp1254")
         ),
-        "a heading that may mean something else": Messy(
-            "pairs.csv", text_of(distance, ROWS).encode()
-        ),
+        "an ambiguous heading": Messy("pairs.csv", text_of(distance, ROWS).encode()),
         "a workbook with two pair tables": Messy(
             "pairs.xlsx", workbook_of({"2025": table, "2026": table})
         ),
