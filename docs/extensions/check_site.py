@@ -39,7 +39,7 @@ class Page(HTMLParser):
 
 
 def faults(site: Path) -> Iterator[str]:
-    """Yield each link that leads nowhere and each address outside the site that is fetched."""
+    """Yield each link without a target and each address outside the site that is fetched."""
     files = (path for path in site.rglob("*.html") if "_static" not in path.parts)  # templates
     pages = {path: Page(path.read_text(encoding="utf-8")) for path in files}
     for path, page in pages.items():
