@@ -15,8 +15,8 @@ INTRODUCTION = """
 # Command line
 
 Every command with its arguments and options, made from the program. `per-obspy COMMAND --help`
-prints the same. Exit codes: 0 done, 2 wrong input (one line names file, field and value), 3 no usable record or
-pair was left, 75 try again later, 130 interrupted.
+prints the same. Exit codes: 0 done, 2 wrong input (one line names file, field and value), 3 no
+usable record or pair was left, 75 try again later, 130 interrupted.
 """
 
 
