@@ -1,6 +1,7 @@
 """Configuration of the documentation; ``make docs`` builds it offline, with warnings as errors."""
 
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 DOCS = Path(__file__).parent
@@ -40,7 +41,8 @@ math_renderer = "mathml"
 
 html_theme = "sphinx_book_theme"
 html_title = "per_obspy"
-html_static_path = ["static"]
+# A font with stretching brackets and roots, which comes with ziamath (SIL Open Font Licence)
+html_static_path = ["static", str(files("ziamath") / "fonts")]
 html_css_files = ["site.css"]
 html_sourcelink_suffix = ""
 html_copy_source = False

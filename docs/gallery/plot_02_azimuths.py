@@ -27,7 +27,7 @@ for period, radius in zip(periods, per, strict=True):
     both = np.concatenate([radius, radius])  # the axis has no direction
     axes.plot(np.radians(np.arange(360)), 100.0 * both, label=f"{period} s")
 axes.set_title("PER (cm) by azimuth of the axis")
-axes.legend(loc="lower left")
+axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.15))
 plt.show()
 
 # %%

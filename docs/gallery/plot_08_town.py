@@ -12,7 +12,7 @@ from per_obspy.config.simulation import Scenario
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.records.simulation.earthquake import simulate
 
-scenario = Scenario(magnitude=6.8, stations=6, city_radius=6_000.0)
+scenario = Scenario(magnitude=7.3, stations=6, city_radius=6_000.0)
 simulation = simulate(scenario)
 for trace in simulation.stream:
     trace.stats.response = simulation.inventory.get_response(trace.id, trace.stats.starttime)
@@ -32,10 +32,14 @@ print(table[["pair_id", "risk_class", "state", "probability", "gap", "demand"]].
 # %%
 figure, axes = plt.subplots(figsize=(6.0, 4.6), layout="constrained")
 points = axes.scatter(
-    table["longitude"], table["latitude"], c=table["expected_impact_velocity"], cmap="magma_r", s=15
+    table["longitude"],
+    table["latitude"],
+    c=table["expected_impact_velocity"],
+    cmap="viridis_r",
+    s=25,
 )
 axes.plot(longitudes, latitudes, "k^", markerfacecolor="none", label="stations")
-axes.set(xlabel="longitude (°)", ylabel="latitude (°)", aspect="equal")
+axes.set(xlabel="longitude (°)", ylabel="latitude (°)", title="200 pairs of buildings")
 figure.colorbar(points, label="expected impact velocity (m/s)")
 axes.legend()
 plt.show()
