@@ -9,6 +9,7 @@ import column_pages
 import command_pages
 import configuration_pages
 import mathml
+import pandas as pd
 import pytest
 from blocks import ROOT, pages
 
@@ -140,3 +141,19 @@ def test_ipython_completes_every_public_name():
         sys.excepthook = sys.__excepthook__
     names = {name for name in per_obspy.__all__ if name != "__version__"}
     assert {f".{name}" for name in names} <= found or names <= found
+
+
+def test_the_rows_of_the_readme_are_those_of_the_demonstration():
+    made = ROOT / "output" / "demo" / "risk.csv"
+    if not made.is_file():
+        pytest.skip("the demonstration is not done: make demo, which CI does before the tests")
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = text.partition("| rank | pair_id |")[2].splitlines()[2:5]
+    table = pd.read_csv(made, nrows=3)
+    for line, (_, row) in zip(lines, table.iterrows(), strict=True):
+        rank, pair, severity, state, impact, gap, demand = line.strip("| ").split(" | ")
+        assert [int(rank), pair, severity, state] == [*row[["rank", "pair_id", "risk_class", "state"]]]
+        # the page shows five digits; compilers may change the last ones after many impacts
+        shown = [float(value) for value in (impact, gap, demand)]
+        found = row[["expected_impact_velocity", "gap", "demand"]].astype(float)
+        assert shown == pytest.approx(found.tolist(), rel=1e-3)
