@@ -21,7 +21,7 @@ WRONG_INPUT, NOTHING_USABLE, TRY_LATER = 2, 3, 75
 
 
 class PageLanguage(StrEnum):
-    """Languages of the page ``report.html``."""
+    """Languages of the page ``report.html`` and of the summaries."""
 
     en = "en"
     es = "es"
@@ -29,7 +29,7 @@ class PageLanguage(StrEnum):
 
 Language = Annotated[
     PageLanguage | None,
-    typer.Option("--language", help="Of report.html, instead of the configured one."),
+    typer.Option("--language", help="Of report.html and summaries, instead of the configured one."),
 ]
 
 Strict = Annotated[

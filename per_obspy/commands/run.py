@@ -124,14 +124,12 @@ def report(
 
     Example: per-obspy report workflows/demo.toml
     """
-    from per_obspy.config import Run, load
+    from per_obspy.config import Run, in_language, load
     from per_obspy.pipeline.run import report as report_again
 
     settings: Path | Run = configuration
     if language is not None:
-        read = load(configuration, Run)
-        texts = read.report.model_copy(update={"language": language.value})
-        settings = read.model_copy(update={"report": texts})
+        settings = in_language(load(configuration, Run), language)
     with shown_progress() as progress:
         result = report_again(settings, output, progress=progress)
     print_and_end(result, as_json, print_result)

@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Language,
     Strict,
     output_option,
     print_and_end,
@@ -56,6 +57,7 @@ def screen(
         Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")
     ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
@@ -73,32 +75,40 @@ def screen(
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
     if kind is Design:
-        _screen_by_spectrum(configuration, output, as_json)
+        _screen_by_spectrum(configuration, output, language, as_json)
     elif kind is Ensemble:
-        _screen_ensemble(configuration, output, as_json)
+        _screen_ensemble(configuration, output, language, as_json)
     else:
-        _screen_again(configuration, output, strict, as_json)
+        _screen_again(configuration, output, language, strict, as_json)
 
 
-def _screen_again(configuration: Path, output: Path | None, strict: bool, as_json: bool) -> None:
+def _screen_again(
+    configuration: Path, output: Path | None, language: Language, strict: bool, as_json: bool
+) -> None:
     """Screen the pairs of a run again with the stations that it left."""
+    from per_obspy.config import Run, in_language, load
     from per_obspy.pipeline.run import screen as screen_again
 
+    settings: Path | Run = configuration
+    if language is not None:
+        settings = in_language(load(configuration, Run), language)
     with shown_progress() as progress:
-        result = screen_again(configuration, output, progress=progress)
+        result = screen_again(settings, output, progress=progress)
     print_and_end(result, as_json, print_result, strict)
 
 
-def _screen_by_spectrum(configuration: Path, output: Path | None, as_json: bool) -> None:
+def _screen_by_spectrum(
+    configuration: Path, output: Path | None, language: Language, as_json: bool
+) -> None:
     """Screen pairs by a design or user spectrum instead of a record, and print the result."""
-    from per_obspy.config import Design, load
+    from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.preflight import require_extras
     from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
     from per_obspy.screening.by_spectrum.design_table import design_table
 
     # Screen
-    settings = load(configuration, Design)
+    settings = in_language(load(configuration, Design), language)
     require_extras(settings)
     spectrum = read_design_spectrum(settings.spectrum)
     pairs = read_pairs(settings.pairs)
@@ -152,12 +162,14 @@ def _print_spectrum_result(
     print(*files, sep="\n")
 
 
-def _screen_ensemble(configuration: Path, output: Path | None, as_json: bool) -> None:
+def _screen_ensemble(
+    configuration: Path, output: Path | None, language: Language, as_json: bool
+) -> None:
     """Screen pairs in every scenario and print their joint probabilities."""
     from per_obspy.pipeline.ensemble import screen_scenarios
 
     with shown_progress() as progress:
-        result = screen_scenarios(configuration, output, progress=progress)
+        result = screen_scenarios(configuration, output, progress=progress, language=language)
     print_and_end(result, as_json, _print_ensemble)
 
 

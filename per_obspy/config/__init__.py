@@ -11,7 +11,15 @@ from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
 from per_obspy.config.run import Design, Run, screening_kind
-from per_obspy.config.screening import Building, Codes, Interpolation, Screening, States, Totals
+from per_obspy.config.screening import (
+    Building,
+    Codes,
+    Interpolation,
+    Screening,
+    States,
+    Totals,
+    in_language,
+)
 from per_obspy.config.section import RelativePath, Section, checked, load
 from per_obspy.config.simulation import Scenario, SimulatedPairs, Simulation
 
@@ -46,6 +54,7 @@ __all__ = [
     "Totals",
     "Window",
     "checked",
+    "in_language",
     "load",
     "screening_kind",
 ]

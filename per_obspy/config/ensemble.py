@@ -5,6 +5,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from per_obspy.config.screening import ReportTexts
 from per_obspy.config.section import RelativePath, Section
 
 
@@ -27,6 +28,7 @@ class Ensemble(Section):
     name: str = Field(min_length=1, description="title")
     output: RelativePath = Field(description="folder of the results; every run keeps its own")
     scenario: tuple[EnsembleScenario, ...] = Field(min_length=1)
+    report: ReportTexts = ReportTexts()
     csv_rows: int = Field(
         100_000, ge=1, description="largest number of rows in ensemble.csv, the worst"
     )

@@ -1,7 +1,7 @@
 """Settings of a whole run and of a screening by a spectrum, and the kind of a TOML file."""
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import (
     Field,
@@ -13,18 +13,10 @@ from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
-from per_obspy.config.screening import Building, Screening, Totals
+from per_obspy.config.screening import Building, ReportTexts, Screening, Totals
 from per_obspy.config.section import RelativePath, Section, read_toml
 from per_obspy.constants import REFERENCE_DAMPING
 from per_obspy.errors import CatalogError
-
-
-class ReportTexts(Section):
-    """The page ``report.html``."""
-
-    language: Literal["en", "es"] = Field(
-        "en", description="of the page: en (English) or es (Spanish)"
-    )
 
 
 class Run(Section):
@@ -86,6 +78,8 @@ class Design(Section):
     output: RelativePath = Field(description="folder of the results")
     building: Building = Building()
     screening: Screening = Screening()
+    totals: Totals = Totals()
+    report: ReportTexts = ReportTexts()
     geopackage: bool = Field(
         False, description="write design.gpkg, design.qgz and GeoParquet; needs per_obspy[gis]"
     )

@@ -1,6 +1,6 @@
 """Assumptions about buildings, and settings of the motion, states and classes of pairs."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import (
     Field,
@@ -9,6 +9,9 @@ from pydantic import (
 )
 
 from per_obspy.config.section import Section
+
+#: Any kind of settings.
+SectionType = TypeVar("SectionType", bound=Section)
 
 #: Largest offset of two floors that still hit floor to floor, m: 2 ft in FEMA P-154.
 FLOOR_TOLERANCE = 0.61
@@ -266,6 +269,23 @@ class Screening(Section):
         if thresholds[-1] != 0.0:
             raise ValueError(f"the last threshold must be 0 m/s, got {classes}")
         return classes
+
+
+class ReportTexts(Section):
+    """The page ``report.html`` and the summaries."""
+
+    language: Literal["en", "es"] = Field(
+        "en", description="of page and summaries: en (English) or es (Spanish)"
+    )
+
+
+def in_language(settings: SectionType, language: str | None) -> SectionType:
+    """Return settings with another language of page and summaries, if one is given."""
+    if language is None:
+        return settings
+    return settings.model_copy(
+        update={"report": ReportTexts.model_validate({"language": language})}
+    )
 
 
 class Totals(Section):

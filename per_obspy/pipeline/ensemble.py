@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from per_obspy.config import Ensemble, EnsembleScenario, Run, load
+from per_obspy.config import Ensemble, EnsembleScenario, Run, in_language, load
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, remove_file
 from per_obspy.jobs.output_folder import (
@@ -25,6 +25,7 @@ from per_obspy.jobs.output_folder import (
     software_versions,
 )
 from per_obspy.pipeline.preflight import check_inputs, require_extras
+from per_obspy.pipeline.results.scenario_runs import ScenarioRun, ScenarioRuns
 from per_obspy.pipeline.results.table_report import report_ensemble
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
@@ -40,6 +41,7 @@ def screen_scenarios(
     output: Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
+    language: str | None = None,
 ) -> Result:
     """
     Do the run of every scenario, unless it is done, and join their probabilities pair by pair.
@@ -55,6 +57,8 @@ def screen_scenarios(
         Where stations and chunks are processed; processes of this machine if not given.
     progress : callable
         Called for every stage: scenario and name, done, total.
+    language : {'en', 'es'}, optional
+        Of page and summary of the ensemble, instead of the configured one.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def screen_scenarios(
         If services fail and no record is at hand.
     """
     configuration = configuration.resolve()
-    settings = load(configuration, Ensemble)
+    settings = in_language(load(configuration, Ensemble), language)
     require_extras(settings)
     folder = (output or settings.output).resolve()
     _check_runs(settings, configuration, folder)
@@ -102,7 +106,14 @@ def _joined(
     tables = {name: _risk_table(result) for name, result in runs.items()}
     scenarios = Scenarios(tables, settings.weights, settings.yearly)
     files, counts = write_ensemble(scenarios, folder, facts, settings.csv_rows)
-    made = report_ensemble(settings, folder, simulated, counts["pairs"])
+    # Results of the runs know buildings, stations and records
+    scenarios_run = {
+        scenario.name: ScenarioRun(load(scenario.run, Run), runs[scenario.name].folder)
+        for scenario in settings.scenario
+    }
+    made = report_ensemble(
+        settings, folder, simulated, counts["pairs"], ScenarioRuns(scenarios_run)
+    )
     # Rejections make a result partial, those of a run too
     is_partial = any(result.record["partial"] for result in runs.values())
     return {

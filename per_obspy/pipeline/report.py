@@ -1,9 +1,10 @@
 """Last stage: the risk table and the spectra become totals, figures and layers for a map."""
 
+import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 import xarray as xr
@@ -25,6 +26,7 @@ from per_obspy.report.overview import Region, draw_overview
 from per_obspy.report.page.tally import COUNTED, PairTally
 from per_obspy.report.pair_figure import draw_record_to_pair
 from per_obspy.report.summary.statements import event_sentences
+from per_obspy.report.words import number
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
 from per_obspy.tables.risk import RankedTable, ranked_table
@@ -115,7 +117,7 @@ def reported(
         report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
     if risk.exists():
-        place = _region(settings, simulated, spectra)
+        place = _region(settings, simulated, spectra, folder)
         summary = _summary(settings, risk, folder, place, report)
         # Totals, layers and the comparison with observations need no record
         write_totals(summary.totals.table, folder / "totals.csv")
@@ -130,7 +132,7 @@ def reported(
     return report
 
 
-def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Region:
+def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None, folder: Path) -> Region:
     """Return title, classes, stations and epicentre of a run."""
     places = pd.DataFrame({"longitude": [], "latitude": []}, dtype="float64")
     epicentre = None
@@ -142,18 +144,34 @@ def _region(settings: Run, simulated: bool, spectra: xr.Dataset | None) -> Regio
             epicentre = (float(spectra.attrs[attributes[0]]), float(spectra.attrs[attributes[1]]))
     # Classes in their order, the worst first
     classes = list(settings.screening.classes)
-    return Region(settings.name, classes, simulated, places, epicentre)
+    region = Region(settings.name, classes, simulated, places, epicentre)
+    if epicentre is None:
+        region = region._replace(epicentre=_epicentre_of(_event(settings, folder, region)))
+    return region
+
+
+def _event(settings: Run, folder: Path, place: Region) -> dict[str, Any]:
+    """Return the facts of the earthquake, of records or of the ShakeMap."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return event_of_run(folder / "run.json", place, shakemap)
+
+
+def _epicentre_of(event: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return longitude and latitude of an earthquake, None where they are unknown."""
+    longitude, latitude = (number(event, name) for name in ("longitude", "latitude"))
+    known = math.isfinite(longitude) and math.isfinite(latitude)
+    return (longitude, latitude) if known else None
 
 
 def _write_summary(
     settings: Run, summary: RiskSummary, folder: Path, place: Region, report: Report
 ) -> None:
     """Write summary, KML and workbook."""
-    source = event_sentences(event_of_run(folder / "run.json", place))
+    language = settings.report.language
+    source = event_sentences(_event(settings, folder, place), language)
     stations = read_stations(folder / "stations.csv")
-    written = Screening(
-        folder, "risk", place, source, settings.spreadsheet, stations, summary.totals.table
-    )
+    written = Screening(folder, "risk", place, source, settings.spreadsheet, language)
+    written = written._replace(stations=stations, areas=summary.totals.table)
     write_results(written, summary.notes, summary.shown, report)
 
 

@@ -135,7 +135,7 @@ def screen(
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         _require_stations(folder)
-        stations = stations_of_earlier_run(folder)
+        stations = _earlier_stations(settings, folder)
         drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
         earthquakes = _earlier_earthquakes(folder)
@@ -166,13 +166,22 @@ def report(
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         record = _finished(folder / RECORD)
-        stations = _usable(stations_of_earlier_run(folder))
+        stations = _usable(_earlier_stations(settings, folder))
         made = reported(settings, folder, stations, progress)
         outputs = record["outputs"] | file_hashes(folder, made.outputs)
         # A picture or layer that failed is made by the next run
         key = "" if made.faults else record["key"]
         found = {"outputs": outputs, "faults": made.faults, "key": key}
         return recorded(folder / RECORD, {**record, **found})
+
+
+def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
+    """Return the stations of the latest run; none where only a ShakeMap served its pairs."""
+    records = settings.records
+    has_map = records is not None and records.shakemap is not None
+    if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
+        return []
+    return stations_of_earlier_run(folder)
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:

@@ -89,8 +89,5 @@ def plot_station(shard: Path, damping: float, period: float, folder: Path) -> tu
     name = shard.stem
     spectra, state_space = folder / f"{name}.spectra.png", folder / f"{name}.state_space.png"
     draw_spectra(station, damping, spectra)
-    # The component with the larger peak acceleration
-    strongest = max(station["acceleration"].to_numpy(), key=lambda motion: abs(motion).max())
-    interval = float(station["sampling_interval"])
-    draw_state_space(strongest, interval, period, damping, state_space)
+    draw_state_space(station, period, damping, state_space)
     return spectra, state_space

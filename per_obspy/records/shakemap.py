@@ -3,10 +3,10 @@
 import gzip
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -36,7 +36,6 @@ GRID_UNITS = {
 _HEAD = 10_000
 
 _SPECTRAL, _MAP = ("period", "latitude", "longitude"), ("latitude", "longitude")
-
 
 #: Bytes that are read at once.
 PIECE = 2**20
@@ -118,6 +117,57 @@ def is_scenario(path: Path) -> bool:
     """Return whether a ShakeMap is of a simulated earthquake, from the head of its grid."""
     head = _text(path)[:_HEAD].upper()
     return re.search(r"SHAKEMAP_EVENT_TYPE\s*=\s*[\"']SCENARIO[\"']", head) is not None
+
+
+def map_event(path: Path) -> dict[str, object]:
+    """
+    Return the facts of the earthquake that the head of a grid states.
+
+    Parameters
+    ----------
+    path : Path
+        ``grid.xml``.
+
+    Returns
+    -------
+    dict
+        ``time`` (ISO 8601), ``magnitude``, ``longitude, latitude`` (degrees), ``depth`` (m), and
+        ``map, version``; without those that are missing or implausible.
+    """
+    tags = _head_tags(path)
+    event, root = tags.get("event", {}), tags.get("shakemap_grid", {})
+    time = re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", event.get("event_timestamp", ""))
+    # Kilometres become metres
+    facts = {
+        "time": time[0] if time else None,
+        "magnitude": _within(event.get("magnitude"), -2.0, 10.0),
+        "longitude": _within(event.get("lon"), -180.0, 360.0),
+        "latitude": _within(event.get("lat"), -90.0, 90.0),
+        "depth": _within(event.get("depth"), -10.0, 1000.0, 1000.0),
+        "map": root.get("event_id") or root.get("shakemap_id"),
+        "version": root.get("shakemap_version"),
+    }
+    return {name: value for name, value in facts.items() if value is not None}
+
+
+def _head_tags(path: Path) -> dict[str, Mapping[str, str]]:
+    """Return the attributes of the elements that begin in the head of a grid."""
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start",))
+    try:
+        parser.feed(_text(path)[:_HEAD])
+        # The head ends within the grid, so that the document stays open
+        events = cast("Iterable[tuple[str, ElementTree.Element]]", parser.read_events())
+        return {_name(element): element.attrib for _, element in events}
+    except ElementTree.ParseError:
+        return {}
+
+
+def _within(text: str | None, low: float, high: float, factor: float = 1.0) -> float | None:
+    """Return a number times a factor, None where it is none or outside its limits."""
+    try:
+        return factor * value if low <= (value := float(text or "")) <= high else None
+    except ValueError:
+        return None
 
 
 def _variable(dimensions: tuple[str, ...], values: FloatArray, unit: str, meaning: str) -> Any:

@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
@@ -126,7 +126,7 @@ def _draw_top(figure: SubFigure, table: pd.DataFrame, region: Region) -> Axes:
     return whole
 
 
-def draw_map(axes: Axes, table: pd.DataFrame, region: Region) -> None:
+def draw_map(axes: Axes, table: pd.DataFrame, region: Region, around_pairs: bool = False) -> None:
     """
     Draw pairs in the colours of their classes, stations and the epicentre on axes of any shape.
 
@@ -138,9 +138,13 @@ def draw_map(axes: Axes, table: pd.DataFrame, region: Region) -> None:
         As for :func:`draw_overview`.
     region : Region
         As for :func:`draw_overview`.
+    around_pairs : bool
+        Show the surroundings of the pairs only, without stations and an epicentre that are further
+        away: a small map of a large region would hide all pairs behind one mark.
     """
     points = _points(table, region)
-    frame = _whole_frame(points, region)
+    seen = region._replace(stations=region.stations[:0], epicentre=None) if around_pairs else region
+    frame = _whole_frame(points, seen)
     _draw_points(axes, points, frame)
     _draw_stations(axes, region, frame)
     axes.set_title(f"{len(table)} pairs shown", fontsize=11)
@@ -179,8 +183,18 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
     """Return frames and members of the clusters that the whole map hides, worst first."""
     if not points.longitude.size:
         return []
-    # Stations and epicentre may be far away; a few pairs do not hide each other
+    # Stations and epicentre may be far away: then one town has a map of its own too
     pairs_frame = frame_of(points.longitude, points.latitude)
+    seen, first = whole, list[tuple[Frame, IntArray]]()
+    if pairs_frame.size < SMALL * whole.size and points.longitude.size >= FEWEST:
+        seen = pairs_frame.padded(MARGIN)
+        first = [(seen, np.arange(points.longitude.size))]
+    return _cluster_maps(points, pairs_frame, seen) or first
+
+
+def _cluster_maps(points: _Points, pairs_frame: Frame, seen: Frame) -> list[tuple[Frame, IntArray]]:
+    """Return frames and members of the clusters that a map of all pairs hides, worst first."""
+    # A few pairs do not hide each other
     every = clusters(points.longitude, points.latitude, pairs_frame)
     found = [members for members in every if members.size >= FEWEST]
     frames = [
@@ -188,9 +202,9 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
         for members in found
     ]
     pairs = list(zip(frames, found, strict=True))
-    if not any(frame.size < SMALL * whole.size for frame in frames):
+    if not any(frame.size < SMALL * seen.size for frame in frames):
         return []
-    return [pair for pair in pairs if pair[0].size < LARGE * whole.size]
+    return [pair for pair in pairs if pair[0].size < LARGE * seen.size]
 
 
 def _draw_points(axes: Axes, points: _Points, frame: Frame) -> None:
@@ -307,7 +321,9 @@ def _draw_gaps(axes: Axes, table: pd.DataFrame, classes: Sequence[str]) -> None:
     # The demand of the medians; the class is that of the whole population
     demand, gap = (100 * float(table[name].max()) for name in ("demand", "gap"))
     demand, gap = (value if np.isfinite(value) else 0.0 for value in (demand, gap))
-    axes.plot([0.0, demand], [0.0, demand], color=MOTION_COLOUR, linewidth=0.8)
+    # Scales of both axes differ: equal values lie on a curve
+    equal = np.linspace(0.0, demand, 500)
+    axes.plot(equal, equal, color=MOTION_COLOUR, linewidth=0.8)
     # Next to its end, where no mark is hidden
     axes.annotate("gap = demand", (demand, demand), ha="right", va="bottom", fontsize=8)
     axes.set(xlabel="demand (cm)", ylabel="gap (cm)")
@@ -322,5 +338,6 @@ def _from_zero(
     """Make an axis linear up to 1, or to a tenth of a smaller largest value; logarithmic beyond."""
     linear = min(1.0, 0.1 * largest) if largest > 0 else 1.0
     set_scale("symlog", linthresh=linear)
+    axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=linear, subs=(1.0, 2.0, 5.0)))
     set_limits(-0.1 * linear, 1.5 * max(largest, linear))
     axis.set_major_formatter("{x:g}")

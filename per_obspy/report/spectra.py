@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from per_obspy.checks import FloatArray
 from per_obspy.constants import STANDARD_GRAVITY, UNSET_DAYS
@@ -89,20 +88,17 @@ def _draw_component(
     ratio.semilogx(period, per / sd * usable, color=colour, label=name)
 
 
-def draw_state_space(
-    acceleration: ArrayLike, dt: float, period: float, damping: float, path: Path
-) -> None:
+def draw_state_space(station: xr.Dataset, period: float, damping: float, path: Path) -> None:
     """
     Draw the motion of one oscillator in its state space, and its PER circle.
 
-    The state space is the plane of displacement and velocity over frequency.
+    The state space is the plane of displacement and velocity over frequency. The motion is that of
+    the component with the largest peak acceleration.
 
     Parameters
     ----------
-    acceleration : (n_samples,) array_like
-        m/s².
-    dt : float
-        Sampling interval, s.
+    station : Dataset
+        From :func:`per_obspy.station_spectra`, with its motion.
     period, damping : float
         Undamped period of the oscillator, s, and its damping, fraction of critical.
     path : Path
@@ -113,13 +109,20 @@ def draw_state_space(
     Valles-Mattox & Reinhorn (1996), 11WCEE, Fig. 2a.
     """
     # An infinite yield displacement leaves the oscillator linear
-    motion = bilinear_response(acceleration, dt, period, damping, np.inf, 0.0)
+    motions = station["acceleration"].to_numpy()
+    strongest = int(np.abs(motions).max(axis=1).argmax())
+    dt = float(station["sampling_interval"])
+    motion = bilinear_response(motions[strongest], dt, period, damping, np.inf, 0.0)
     figure = Figure(figsize=(5.5, 5.5), layout="constrained")
     axes = figure.subplots()
     add_state_space(axes, motion.displacement, motion.velocity, period)
-    axes.set_title(f"T = {period:g} s, ξ = {damping:g}")
+    # A record is named by its station, channel and day
+    name = f"{station['station'].item()} {station['channel'].values[strongest]}"
+    title = f"{title_name(name)}, {record_date(station)}\nT = {period:g} s, ξ = {damping:g}"
+    axes.set_title(title, fontsize=11, parse_math=False)
     axes.legend(fontsize=9, loc="upper right")
-    save(figure, path, simulated=False)
+    fit_titles(figure)
+    save(figure, path, station.attrs["simulated"] == "true")
 
 
 def add_state_space(

@@ -26,10 +26,10 @@ def write_design(table: pd.DataFrame, folder: Path) -> list[Path]:
         Folder of ``design.csv``, ``design.parquet``, ``design.columns.csv``, ``rejected.csv``.
     """
     text, whole, columns, rejected = paths = [folder / name for name in FILES]
-    write_csv(rounded_table(table), text)
+    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
+    write_csv(rounded_table(table, own=known), text)
     write_parquet(table, whole)
     # Columns of the pair table that are not computed here are carried through
-    known = COLUMNS | COMPLETED | RESULTS | DESIGN | rule_columns()
     carried = Column("", "", "", "carried through from the pair table")
     described = (known.get(name, carried)._replace(name=name) for name in map(str, table))
     write_described(described, columns)

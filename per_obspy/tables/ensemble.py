@@ -144,7 +144,7 @@ def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
     for number, name in enumerate(scenarios.tables):
         for column in ("probability", *SEVERITY):
             names[f"{column}_{number}"] = f"{column}_{name}"
-    with pq.ParquetFile(joined) as table:
+    with pq.ParquetFile(joined, pre_buffer=False) as table:
         for batch in table.iter_batches(ROWS):
             piece: pd.DataFrame = batch.to_pandas().rename(columns=names)
             # A batch of empty cells has no type

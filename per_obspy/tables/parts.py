@@ -179,7 +179,7 @@ class _Rows:
 def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
     """Yield the row groups of a part with the columns of the whole."""
     for index in range(pq.read_metadata(part.absolute()).num_row_groups):
-        with pq.ParquetFile(part.absolute()) as file:
+        with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
             table = file.read_row_group(index, use_threads=False)
         table = table.drop_columns([*KEYS, _PART])
         yield table if table.schema.equals(schema) else _conforming(table, schema)
@@ -198,7 +198,7 @@ def _conforming(table: pa.Table, schema: pa.Schema) -> pa.Table:
 
 def _number(part: Path) -> int:
     """Return the number of a part."""
-    with pq.ParquetFile(part.absolute()) as file:
+    with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
         number: int = file.read_row_group(0, columns=[_PART])[_PART][0].as_py()
     return number
 

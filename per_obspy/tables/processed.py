@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv
 
 #: Column -> (unit, meaning), in the order of the table; every useful number of
@@ -110,7 +111,10 @@ def write_processed_table(
     descriptions: Mapping[str, Iterable[Mapping[str, Any]]], folder: Path
 ) -> None:
     """Write ``processed.csv`` and ``processed.columns.csv``; see :func:`processed_table`."""
-    write_csv(processed_table(descriptions), folder / "processed.csv")
+    table = processed_table(descriptions)
+    # Sampling intervals such as 1/300 s keep their digits
+    rounded = rounded_table(table, own=[name for name in COLUMNS if name != "delta"])
+    write_csv(rounded, folder / "processed.csv")
     rows = [(name, *meaning) for name, meaning in COLUMNS.items()]
     described = pd.DataFrame(rows, columns=["name", "unit", "meaning"])
     write_csv(described, folder / "processed.columns.csv")

@@ -139,7 +139,7 @@ def _write_rows(
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
-                _append_csv(database, piece.slice(0, csv_rows - before), text)
+                _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
     return states, stations
 
 
@@ -153,11 +153,9 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 
 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
-    """Append rows to a CSV file that has a header."""
+    """Append rows, rounded already, to a CSV file that has a header."""
     # Names of columns may differ in case only, or be anything: the database numbers them
-    numbered = arrow_cells(rounded_arrow(rows)).rename_columns(
-        [f"c{i}" for i in range(rows.num_columns)]
-    )
+    numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
     # It writes a separate file, which is appended to the others
     piece = path.with_suffix(".piece")
     database.register("piece", numbered)
@@ -172,10 +170,10 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
 
 
 def write_worst(table: Path, rows: int, path: Path) -> None:
-    """Write the first rows of a ranked Parquet table as CSV."""
+    """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
     with (
         bounded_database(path.parent) as database,
-        pq.ParquetFile(table.absolute()) as file,
+        pq.ParquetFile(table.absolute(), pre_buffer=False) as file,
         written_whole(path) as part,
     ):
         part.write_text(header(file.schema_arrow.names), encoding="utf-8")
@@ -184,7 +182,7 @@ def write_worst(table: Path, rows: int, path: Path) -> None:
             piece = pa.Table.from_batches([batch]).slice(0, rows)
             rows -= piece.num_rows
             if piece.num_rows:
-                _append_csv(database, piece, part)
+                _append_csv(database, rounded_arrow(piece, piece.column_names), part)
 
 
 @contextmanager
@@ -199,5 +197,6 @@ def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[R
     columns : sequence of str, optional
         Columns that are read, all if not given; those that the table lacks are left out.
     """
-    with pq.ParquetFile(path.absolute()) as file:
+    # Buffers that are read ahead stay in memory until the end of the file
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
         yield RankedTable(file, None if columns is None else list(columns))

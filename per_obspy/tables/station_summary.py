@@ -13,6 +13,7 @@ from per_obspy.errors import Rejection
 from per_obspy.inventory.schema import Column
 from per_obspy.screening.flags import record_flags
 from per_obspy.screening.ground_motion.spatial_correlation import great_circle
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv, write_described
 
 
@@ -115,7 +116,7 @@ def write_stations(
     """
     table = station_table(spectra, rejected, pairs)
     text, columns = files = [folder / "stations.csv", folder / "stations.columns.csv"]
-    write_csv(table, text)
+    write_csv(rounded_table(table, own=table.columns), text)
     write_described(COLUMNS.values(), columns)
     # Stations of each flag, in the order of the table
     warnings: dict[str, list[str]] = {}

@@ -181,4 +181,4 @@ def region_totals(pieces: Iterable[PieceTotals], settings: Totals) -> RegionTota
 
 def write_totals(table: pd.DataFrame, path: Path) -> None:
     """Write the totals as CSV, numbers rounded."""
-    write_csv(rounded_table(table), path)
+    write_csv(rounded_table(table, own=table.columns), path)

@@ -11,10 +11,11 @@ from numpy.testing import assert_allclose
 from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
-from per_obspy.pipeline.run import run, screen
+from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
+from .results.test_page import content_of
 from .small_run import SPECTRA, InProcess, write_configuration
 
 RESULTS = (
@@ -199,7 +200,8 @@ def test_an_area_that_the_inventory_does_not_name(copied):
 #: A ShakeMap with the same motion everywhere, in % g.
 MAP = """\
 <shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap" event_id="x"
- shakemap_event_type="ACTUAL">
+ shakemap_version="3" shakemap_event_type="ACTUAL">
+<event event_timestamp="2026-11-01T11:58:02UTC" magnitude="6.7" lon="0.4" lat="0.1" depth="11.2"/>
 <grid_specification lon_min="{west}" lon_max="{east}" lat_min="-0.5" lat_max="0.5"
  nlon="3" nlat="3" nominal_lon_spacing="0.8" nominal_lat_spacing="0.5"/>
 <grid_field index="1" name="LON" units="dd"/><grid_field index="2" name="LAT" units="dd"/>
@@ -249,6 +251,16 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     people |= {f"risk.{suffix}" for suffix in ("gpkg", "qgz", "geoparquet", "kml")}
     assert people <= set(record["outputs"])
     assert record["faults"] == []
+    # the page and the summary name the map, and where no record does, its earthquake
+    text = (copied / "map" / "summary.txt").read_text()
+    assert "Motion of ShakeMap x, version 3" in text.replace("\n", " ")
+    page = content_of(copied / "map" / "report.html")
+    assert "Motion of ShakeMap x, version 3" in page["event"]
+    assert "no displacement history" in page["provenance"][-1][1]
+    assert page["epicentre"] is not None
+    # and can be written again, in another language, also where no station was needed
+    report(copied / "map.toml")
+    screen(copied / "map.toml", executor=InProcess())
 
 
 def test_a_changed_map_changes_every_chunk(copied):

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from per_obspy.errors import CatalogError
-from per_obspy.records.shakemap import read_shakemap
+from per_obspy.records.shakemap import map_event, read_shakemap
 
 UNITS = {"LON": "dd", "LAT": "dd", "MMI": "intensity", "PGV": "cms", "SVEL": "ms"}
 
@@ -220,3 +220,46 @@ def test_a_bomb_of_zeros_is_not_unpacked(tmp_path, monkeypatch):
     (tmp_path / "zeros.xml.gz").write_bytes(gzip.compress(b" " * 20_000))
     with pytest.raises(CatalogError, match="has more than 10000 bytes"):
         read_shakemap(tmp_path / "zeros.xml.gz")
+
+
+#: Head of a grid as the USGS writes it (ShakeMap 4 manual, "grid.xml").
+USGS_HEAD = """\
+<?xml version="1.0" encoding="US-ASCII" standalone="yes"?>
+<shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap" event_id="us7000test"
+ shakemap_version="3" shakemap_event_type="ACTUAL">
+<event event_id="us7000test" {facts} event_network="us" event_description="near a town"/>
+<grid_data>
+"""
+
+
+def test_the_head_of_a_map_names_its_earthquake(tmp_path):
+    facts = 'magnitude="6.7" depth="11.2" lat="0.01" lon="-0.02"'
+    facts += ' event_timestamp="2026-11-01T11:58:02UTC"'
+    # the grid goes on for megabytes, of which only the head is parsed
+    text = USGS_HEAD.format(facts=facts) + 5000 * "0.1 0.2 0.3\n"
+    (tmp_path / "grid.xml").write_text(text)
+    found = map_event(tmp_path / "grid.xml")
+    assert found.pop("depth") == pytest.approx(11_200.0)
+    assert found == {
+        "time": "2026-11-01T11:58:02",
+        "magnitude": 6.7,
+        "longitude": -0.02,
+        "latitude": 0.01,
+        "map": "us7000test",
+        "version": "3",
+    }
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        "",
+        'magnitude="nan" depth="1e9" lat="91" lon="inf" event_timestamp="yesterday"',
+        'magnitude="" depth="x" lat="-" lon="1,5" event_timestamp=""',
+        'magnitude="6.7" magnitude="7"',
+    ],
+)
+def test_facts_of_a_map_that_are_wrong_are_left_out(tmp_path, facts):
+    (tmp_path / "grid.xml").write_text(USGS_HEAD.format(facts=facts))
+    # they decide no number: a map without them serves as well
+    assert set(map_event(tmp_path / "grid.xml")) <= {"map", "version"}

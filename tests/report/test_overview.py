@@ -91,7 +91,11 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
 def test_gaps_are_drawn_over_demands_in_centimetres(overview):
     gaps = overview(TABLE).axes[1]
     assert _points(gaps)[STATE_COLOURS["yes"]] == [[30.0, 10.0]]
-    assert gaps.lines[0].get_xydata().tolist() == [[0.0, 0.0], [30.0, 30.0]]
+    # a curve of equal values: scales of both axes differ
+    equal = gaps.lines[0].get_xydata()
+    assert equal[[0, -1]].tolist() == [[0.0, 0.0], [30.0, 30.0]]
+    assert np.array_equal(equal[:, 0], equal[:, 1])
+    assert len(equal) > 100
     assert (gaps.get_xlabel(), gaps.get_ylabel()) == ("demand (cm)", "gap (cm)")
     # zero demands and gaps are inside, and so is the largest of both
     assert gaps.get_xlim()[0] < 0.0
@@ -172,3 +176,10 @@ def test_nothing_is_clipped_and_the_legend_covers_nothing(monkeypatch, tmp_path,
         texts = [label for label in axis.get_ticklabels() if label.get_text()]
         boxes = [label.get_window_extent() for label in texts]
         assert not any(first.overlaps(second) for first, second in combinations(boxes, 2))
+
+
+def test_a_far_epicentre_hides_no_single_town(overview):
+    # would catch: all pairs are one mark, as the town alone would have no map of its own
+    whole, _, own = overview(towns(1, 40, 0.1), ALONE._replace(epicentre=(-103.0, 18.0))).axes
+    assert own.get_title().startswith("A: 40 pairs")
+    assert [text.get_text() for text in whole.texts] == ["A"]

@@ -1,5 +1,7 @@
 """Spectra of a station and the state space of an oscillator: what is drawn is what was computed."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -86,19 +88,25 @@ def test_simulated_motion_is_passed_on(station, drawn):
     assert figures[0][2]
 
 
-def test_the_trace_stays_in_its_circle_and_touches_it(drawn):
-    motion = np.random.default_rng(3).normal(size=800)
+def test_the_trace_stays_in_its_circle_and_touches_it(station, drawn):
     figures = drawn("spectra")
-    draw_state_space(motion, 0.01, 0.5, 0.05, "state.png")
+    draw_state_space(station, 0.5, 0.05, "state.png")
+    # the stronger component
+    motions = station["acceleration"].to_numpy()
+    motion = max(motions, key=lambda samples: np.abs(samples).max())
+    dt = float(station["sampling_interval"])
     (axes,) = figures[0][0].axes
     trace, circle = axes.lines
     # An elastic oscillator at the samples
-    response = bilinear_response(motion, 0.01, 0.5, 0.05, np.inf, 0.0)
+    response = bilinear_response(motion, dt, 0.5, 0.05, np.inf, 0.0)
     assert_array_equal(trace.get_xdata(), response.displacement)
     assert_allclose(trace.get_ydata(), response.velocity / (4 * np.pi), rtol=1e-12)
     radius = np.hypot(*trace.get_xydata().T)
     assert_allclose(np.hypot(*circle.get_xydata().T), radius.max(), rtol=1e-12)
-    assert axes.get_title() == "T = 0.5 s, ξ = 0.05"
+    name, oscillator = axes.get_title().splitlines()
+    assert name.startswith("XX.ONE HN")
+    assert name.endswith(", date unknown")
+    assert oscillator == "T = 0.5 s, ξ = 0.05"
     assert circle.get_label() == f"PER = {radius.max():.3g} m"
 
 
@@ -110,6 +118,28 @@ def test_a_circle_closes_around_its_centre():
     assert_allclose(np.hypot(x - 3.0, y), 2.0)
     assert_allclose([x[0], y[0]], [x[-1], y[-1]], atol=1e-12)
     assert axes.lines[0].get_linestyle() == ":"
+
+
+@pytest.mark.parametrize("name", ["XX.ONE", "Ministry of the interior, basement of the tower " * 2])
+@pytest.mark.parametrize("draw", [draw_spectra, draw_state_space])
+def test_no_title_leaves_its_figure(station, tmp_path, monkeypatch, draw, name):
+    figures = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr("per_obspy.report.style.written_whole", nullcontext)
+    named = station.assign_coords(station=name).assign_attrs(simulated="true")
+    named.attrs["time_coverage_start"] = "1985-09-19T13:17:47"
+    arguments = (0.05,) if draw is draw_spectra else (1.0, 0.05)
+    draw(named, *arguments, tmp_path / "figure.png")
+    (figure,) = figures
+    figure.draw_without_rendering()
+    texts = [*figure.texts, *(axes.title for axes in figure.axes)]
+    for text in texts:
+        box = text.get_window_extent()
+        # one pixel: extents are rounded outwards
+        assert -1.0 <= box.x0 <= box.x1 <= figure.bbox.width + 1.0, text
+        assert -1.0 <= box.y0 <= box.y1 <= figure.bbox.height + 1.0, text
+    title = " ".join(text.get_text() for text in texts)
+    assert "1985-09-19 13:17 UTC" in title
 
 
 def test_the_state_space_has_one_scale():

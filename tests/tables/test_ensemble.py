@@ -93,7 +93,8 @@ def test_every_file_is_written_and_every_column_described(tables, tmp_path):
     table = pd.read_parquet(tmp_path / "out" / "ensemble.parquet")
     worst = pd.read_csv(tmp_path / "out" / "ensemble.csv")
     # text is of another type
-    pd.testing.assert_frame_equal(worst, table.head(5), check_dtype=False)
+    # the text has five digits
+    pd.testing.assert_frame_equal(worst, table.head(5), check_dtype=False, rtol=5.1e-5, atol=0)
     columns = pd.read_csv(tmp_path / "out" / "ensemble.columns.csv")
     assert columns["name"].tolist() == list(table)
     assert columns["meaning"].str.len().min() > 5

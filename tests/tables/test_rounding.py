@@ -50,3 +50,13 @@ def test_the_table_itself_keeps_all_digits():
     before = TABLE.copy(deep=True)
     rounded_table(TABLE)
     pd.testing.assert_frame_equal(TABLE, before)
+
+
+def test_columns_that_the_package_computed_are_rounded_by_their_names():
+    found = rounded_table(TABLE, own=["cadastre"])
+    assert found["cadastre"].tolist() == [123460000.0, 1.0]
+
+
+def test_a_tiny_probability_has_five_digits_too():
+    # beyond 10^22, the largest power of ten that is exact
+    assert rounded(np.array([5.846121131152857e-30])).tolist() == [5.8461e-30]

@@ -58,7 +58,7 @@ class ParquetFile:
     def identifiers(self) -> Iterator[pa.Array]:
         """Yield the identifiers of the pairs, block by block."""
         column = self.headings[self.names.index(IDENTIFIER)]
-        with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
+        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
             for batch in stored.iter_batches(columns=[column]):
                 if pa.types.is_nested(batch.schema.field(0).type):
                     batch.column(0).cast(pa.string())  # lists and the like are no names
@@ -68,7 +68,7 @@ class ParquetFile:
     def rows(self, size: int) -> Iterator[RawRows]:
         """Yield blocks of so many rows in the units of the schema."""
         line = 2
-        with self._readable(), pa.parquet.ParquetFile(self._path) as stored:
+        with self._readable(), pa.parquet.ParquetFile(self._path, pre_buffer=False) as stored:
             for batch in stored.iter_batches(batch_size=size, columns=self.headings):
                 # Lines as if the file had a header
                 lines = np.arange(line, line + batch.num_rows)

@@ -2,10 +2,10 @@
 
 import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,11 +13,10 @@ import pyarrow.parquet as pq
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import Run
-from per_obspy.jobs.ground_files import read_station_once
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.layer_sources import outlines_beside
 from per_obspy.pipeline.results.run_facts import event_of_run
-from per_obspy.pipeline.stations import file_stem
+from per_obspy.pipeline.results.station_facts import pair_histories, station_rows
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
 from per_obspy.report.page.coast import lines_around
@@ -29,18 +28,14 @@ from per_obspy.report.page.content import (
     PageData,
 )
 from per_obspy.report.page.document import write_page
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
+from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
+from per_obspy.report.summary.statements import event_sentences, station_sentences
+from per_obspy.report.summary.wording import WORDING
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
-
-#: Pairs whose history is drawn, the worst ones.
-HISTORIES = 50
-
-#: Period and damping of the spectra in the table of stations.
-SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05
 
 #: Columns of the worst pairs that the page needs.
 PAGE_COLUMNS = tuple(dict.fromkeys((*PAIR_KINDS, *HISTORY_COLUMNS)))
@@ -80,14 +75,14 @@ def write_run_page(
     # Files that the stages before have written
     region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
     # Sentences are made of tables, and the map of pairs
-    table = _station_table(folder / "stations.csv", stations)
+    table = station_rows(folder / "stations.csv", stations)
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
         title=region.title,
         language=settings.report.language,
         simulated=simulated,
         classes=tuple(region.classes),
-        event=_event(stations, table, event_of_run(folder / "run.json", region)),
+        event=_event(stations, table, _known(settings, folder, region), settings.report.language),
         tally=tally,
         worst=worst,
         stations=table,
@@ -95,55 +90,105 @@ def write_run_page(
         rejected=rejected,
         rejections=rejections,
         buildings=_buildings(folder / "buildings.parquet"),
-        outlines=_outlines(settings, folder, worst),
+        outlines=_outlines(_outlines_of(settings, folder), worst),
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
-        histories=_histories(worst, stations),
+        histories=pair_histories(worst, stations),
         provenance=_provenance(settings),
     )
     write_page(data, folder / "report.html")
 
 
+def _known(settings: Run, folder: Path, region: Region) -> Mapping[str, Any]:
+    """Return the facts of the earthquake of a run."""
+    shakemap = settings.records.shakemap if settings.records else None
+    return event_of_run(folder / "run.json", region, shakemap)
+
+
+def _outlines_of(settings: Run, folder: Path) -> Path | None:
+    """Return the outlines of a run: of a layer, it keeps pairs and outlines in its folder."""
+    given = settings.pairs.file if settings.pairs else None
+    return outlines_beside(given, folder / "pairs.parquet")
+
+
+class TableSources(NamedTuple):
+    """
+    Everything of a page that is in no table of pairs, for a screening by a spectrum or an ensemble.
+
+    Attributes
+    ----------
+    region : Region
+        Title, classes, epicentre, and whether the motion is simulated.
+    language : Language
+        Of the page.
+    source : sequence of str
+        Sentences on the spectrum or the scenarios, instead of an earthquake.
+    stations, areas : DataFrame
+        Stations and totals; may be empty.
+    outlines : Path or None
+        GeoParquet with the outlines of the buildings.
+    histories : mapping of int to dict
+        Rank -> history of a pair.
+    notes : sequence of str
+        Sentences on what is left out, or comes from elsewhere.
+    """
+
+    region: Region
+    language: Language
+    source: Sequence[str]
+    stations: pd.DataFrame
+    areas: pd.DataFrame
+    outlines: Path | None
+    histories: Mapping[int, dict[str, Any]]
+    notes: Sequence[str]
+
+
 def write_table_page(
-    folder: Path, region: Region, source: Sequence[str], tally: PairTally, worst: pd.DataFrame
+    folder: Path, sources: TableSources, tally: PairTally, worst: pd.DataFrame
 ) -> None:
     """
-    Write ``report.html`` of a screening without stations: by a design spectrum, or an ensemble.
+    Write ``report.html`` of a screening by a design spectrum, or of an ensemble.
 
     Parameters
     ----------
     folder : Path
         Of the results.
-    region : Region
-        Title, classes, and whether the motion is simulated.
-    source : sequence of str
-        Sentences on what stands for the earthquake.
+    sources : TableSources
+        Everything that is in no table of pairs.
     tally : PairTally
         Counts of all pairs.
     worst : DataFrame
         The worst pairs.
     """
-    # There are no stations, totals and rows of buildings
     rejected, rejections = _rejected(folder / "rejected.csv")
-    longitude, latitude = _column(worst, "longitude"), _column(worst, "latitude")
+    region, stations = sources.region, sources.stations
+    # Stations of all scenarios; a spectrum has none
+    used = int((stations["state"] == "used").sum()) if "state" in stations else 0
+    counts = used, len(stations) - used
+    # The sentences replace an earthquake
     data = PageData(
         title=region.title,
-        language="en",
+        language=sources.language,
         simulated=region.simulated,
         classes=tuple(region.classes),
-        event=Event("", "", math.nan, None, 0, 0, " ".join(source)),
+        event=Event("", "", math.nan, None, *counts, " ".join(sources.source)),
         tally=tally,
         worst=worst,
-        stations=pd.DataFrame(),
-        areas=pd.DataFrame(),
+        stations=stations,
+        areas=sources.areas,
         rejected=rejected,
         rejections=rejections,
         buildings=None,
-        outlines=[],
-        lines=lines_around(longitude, latitude),
-        histories={},
-        provenance=_made("en"),
+        outlines=_outlines(sources.outlines, worst),
+        lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
+        histories=sources.histories,
+        provenance=[*_made(sources.language), *_content(sources.notes, sources.language)],
     )
     write_page(data, folder / "report.html")
+
+
+def _content(notes: Sequence[str], language: Language) -> list[tuple[str, str]]:
+    """Return sentences on the content of the page as a row of its provenance."""
+    return [(WORDING[language]["page_content"], " ".join(notes))] if notes else []
 
 
 def _column(table: pd.DataFrame, name: str) -> FloatArray:
@@ -152,7 +197,10 @@ def _column(table: pd.DataFrame, name: str) -> FloatArray:
 
 
 def _event(
-    stations: Sequence[FinishedStation], table: pd.DataFrame, known: Mapping[str, Any]
+    stations: Sequence[FinishedStation],
+    table: pd.DataFrame,
+    known: Mapping[str, Any],
+    language: Language,
 ) -> Event:
     """Return the facts of the earthquake that its file and the spectra of the stations hold."""
     facts = [station.spectra.attrs for station in stations if station.spectra is not None]
@@ -167,7 +215,16 @@ def _event(
         place=_place(facts, known),
         used=used,
         missing=len(table) - used,
+        # A ShakeMap is named in sentences of its own
+        source=" ".join(_map_sentences(known, table, language)),
     )
+
+
+def _map_sentences(known: Mapping[str, Any], table: pd.DataFrame, language: Language) -> list[str]:
+    """Return sentences on earthquake, ShakeMap and stations; none where there is no map."""
+    if not known.get("map"):
+        return []
+    return [*event_sentences(known, language), *station_sentences(table, language)]
 
 
 def _place(
@@ -201,31 +258,6 @@ def _is_dated(facts: Mapping[str, Any]) -> bool:
     return str(facts.get("time_coverage_start", "1970")) >= "1971"
 
 
-def _station_table(path: Path, stations: Sequence[FinishedStation]) -> pd.DataFrame:
-    """Return the table of the stations with PER and SD of each at one period, cm."""
-    if not path.is_file():
-        return pd.DataFrame()
-    texts = dict.fromkeys(("station", "state", "warnings", "rejected"), str)
-    table = pd.read_csv(path, dtype=texts, keep_default_na=True)
-    # Largest of the horizontals
-    for name in ("per", "sd"):
-        values = {
-            station.station: _at_one_period(station.spectra, name)
-            for station in stations
-            if station.spectra is not None
-        }
-        table[name] = table["station"].map(values)
-    return table
-
-
-def _at_one_period(spectra: Any, name: str) -> float:
-    """Return the largest spectral value of a station over its horizontals, cm."""
-    chosen = spectra[name].sel(damping=SHOWN_DAMPING, method="nearest")
-    values = chosen.sel(period=SHOWN_PERIOD, method="nearest").to_numpy()
-    horizontals = values[: int(spectra.attrs.get("horizontals", values.size))]
-    return 100.0 * float(np.nanmax(horizontals)) if horizontals.size else math.nan
-
-
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
     """Return the first rows of the table of rejections, and how many it has."""
     # Line by line: rejections of a large inventory are many
@@ -245,55 +277,33 @@ def _buildings(path: Path) -> pd.DataFrame | None:
     """Return the worst buildings with the columns of the page, None without a table."""
     if not path.is_file():
         return None
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path, pre_buffer=False) as file:
         names = [name for name in BUILDING_KINDS if name in file.schema_arrow.names]
         batches = file.iter_batches(PAGE_PAIRS, columns=names)
         first = next(batches, None)
     return None if first is None else first.to_pandas()
 
 
-def _outlines(settings: Run, folder: Path, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
+def _outlines(beside: Path | None, worst: pd.DataFrame) -> list[tuple[str, list[float]]]:
     """Return the outlines of the buildings of the worst pairs, if the pairs came with them."""
-    given = settings.pairs.file if settings.pairs else None
-    # Of a layer, a run keeps pairs and outlines in its folder
-    beside = outlines_beside(given, folder / "pairs.parquet")
     if beside is None or "building_id_1" not in worst:
         return []
     names = pd.concat([worst["building_id_1"], worst["building_id_2"]]).dropna().astype(str)
     return read_outlines(beside, names.unique().tolist())
 
 
-def _histories(
-    worst: pd.DataFrame, stations: Iterable[FinishedStation]
-) -> dict[int, dict[str, Any]]:
-    """Return the histories of the worst pairs with a gap and a record, by their rank."""
-    if not set(HISTORY_COLUMNS) <= set(worst):
-        return {}
-    usable = worst[worst["gap"].notna() & (worst["station"] != "")].head(HISTORIES)
-    shards = {station.shard.stem: station for station in stations if station.shard}
-    histories = {}
-    # Station by station, because motions are large
-    for name, pairs in usable.groupby("station", sort=False):
-        station = shards.get(file_stem(str(name)))
-        if station is None or station.shard is None:
-            continue
-        motion = read_station_once(station.shard, station.hash)
-        for _, pair in pairs.iterrows():
-            history = drawn_history(motion, pair)
-            if history is not None:
-                histories[int(pair["rank"])] = history
-    return histories
-
-
 def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return how the results were made."""
     # Everything else is in the files beside the page
     texts = LANGUAGES[settings.report.language]
+    has_map = settings.records is not None and settings.records.shakemap is not None
+    notes = [WORDING[settings.report.language]["page_shakemap"]] if has_map else []
     exact = {"exact": settings.screening.exact, "output": settings.output.name}
     return [
         *_made(settings.report.language),
         (texts["files"], texts["files_list"]),
         (texts["configuration"], ", ".join(f"{name}: {value}" for name, value in exact.items())),
+        *_content(notes, settings.report.language),
     ]
 
 

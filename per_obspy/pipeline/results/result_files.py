@@ -1,5 +1,6 @@
 """Summary, KML and workbook of a screening of any kind."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -9,12 +10,16 @@ import pyarrow.parquet as pq
 
 from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.table_notes import Notes
+from per_obspy.report.layers.kml import ROWS as KML_ROWS
 from per_obspy.report.layers.kml import write_kml
+from per_obspy.report.layers.spreadsheet import ROWS as SHEET_ROWS
 from per_obspy.report.layers.spreadsheet import Sheet, write_workbook
 from per_obspy.report.overview import Region
+from per_obspy.report.page.texts import Language
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import write_text
 from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
+from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
 from per_obspy.screening.columns import column_table, known_column
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
@@ -22,7 +27,7 @@ from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 
 class Screening(NamedTuple):
     """
-    What is known of a screening beside its table.
+    Facts of a screening that are not in its table.
 
     Attributes
     ----------
@@ -36,6 +41,10 @@ class Screening(NamedTuple):
         Sentences on the earthquake, spectrum or scenarios.
     spreadsheet : bool
         Whether a workbook is written.
+    language : Language
+        Of the summary.
+    own : sequence of str
+        Columns of pairs that are computed, besides those of every risk table.
     stations : DataFrame
         Rows of ``stations.csv``; empty where there are none.
     areas : DataFrame
@@ -47,6 +56,8 @@ class Screening(NamedTuple):
     region: Region
     source: list[str]
     spreadsheet: bool = False
+    language: Language = "en"
+    own: Sequence[str] = ()
     stations: pd.DataFrame = pd.DataFrame()
     areas: pd.DataFrame = pd.DataFrame()
 
@@ -58,7 +69,7 @@ def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, repor
     Parameters
     ----------
     screening : Screening
-        What is known beside the table.
+        Facts that are not in the table.
     notes : Notes
         Of all rows of the table.
     shown : DataFrame
@@ -77,11 +88,13 @@ def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, repor
         write_page(facts, shown, folder / "summary.pdf")
     with report.tried(folder / f"{stem}.kml"):
         title, classes = screening.region.title, screening.region.classes
-        write_kml(worst, classes, title, folder / f"{stem}.kml")
+        note = _extent(screening, notes, KML_ROWS)
+        write_kml(worst, classes, title, folder / f"{stem}.kml", note)
     # The workbook needs an optional library
     if screening.spreadsheet:
         with report.tried(folder / f"{stem}.xlsx"):
-            sheets = _sheets(screening, worst, buildings)
+            note = _extent(screening, notes, SHEET_ROWS)
+            sheets = _sheets(screening, worst, buildings, note)
             write_workbook(sheets, folder / f"{stem}.xlsx")
 
 
@@ -90,12 +103,12 @@ def _facts(
 ) -> SummaryFacts:
     """Return the facts of the summary."""
     # The area with most pounding is worth a name where there are several
-    area, totals = "", screening.areas
+    area, totals, texts = "", screening.areas, WORDING[screening.language]
     if len(totals) > 1:
         most = totals.iloc[int(totals["expected_pounding"].argmax())]
-        place = place_text(float(most["latitude"]), float(most["longitude"]), 4)
-        area = f"{name_text(most['area'])}, around {place}"
-    made = f"per-obspy {version('per_obspy')}. All numbers and their units: {screening.stem}.csv."
+        place = place_text(float(most["latitude"]), float(most["longitude"]), 4, screening.language)
+        area = texts["around"].format(name=name_text(most["area"]), place=place)
+    made = texts["made"].format(version=version("per_obspy"), table=screening.stem)
     listed = worst.head(LISTED), buildings.head(LISTED)
     return SummaryFacts(
         screening.region,
@@ -105,6 +118,7 @@ def _facts(
         screening.stations,
         area,
         made,
+        screening.language,
     )
 
 
@@ -112,12 +126,22 @@ def _worst_buildings(path: Path) -> pd.DataFrame:
     """Return the first rows of the table of the buildings; none where there is no such table."""
     if not path.exists():
         return pd.DataFrame()
-    with pq.ParquetFile(path.absolute()) as file:
+    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
         batch = next(file.iter_batches(5000), None)
         return pd.DataFrame() if batch is None else batch.to_pandas()
 
 
-def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) -> list[Sheet]:
+def _extent(screening: Screening, notes: Notes, most: int) -> str:
+    """Return a sentence on how many pairs a file has, the worst, and where all of them are."""
+    pairs = notes.counts.pairs
+    if pairs <= most:
+        return f"All {pairs} pairs."
+    return f"The worst {most} of {pairs} pairs; all of them are in {screening.stem}.parquet."
+
+
+def _sheets(
+    screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame, note: str
+) -> list[Sheet]:
     """Return the sheets of the workbook."""
     units = {
         str(name): column.unit for name in worst if (column := known_column(str(name))) is not None
@@ -125,11 +149,13 @@ def _sheets(screening: Screening, worst: pd.DataFrame, buildings: pd.DataFrame) 
     of_stations = {name: column.unit for name, column in STATION_COLUMNS.items()}
     # What every column means is a sheet too
     meanings = column_table(map(str, worst))
+    velocity = {"worst_expected_impact_velocity": "m/s"}
     given = [
-        Sheet("pairs", worst, units),
-        Sheet("buildings", buildings, {"severity": "m/s"}),
-        Sheet("areas", screening.areas, {"worst_expected_impact_velocity": "m/s"}),
-        Sheet("stations", screening.stations, of_stations),
+        Sheet("pairs", worst, units, screening.own),
+        Sheet("contents", pd.DataFrame({"sheet": ["pairs"], "content": [note]}), {}),
+        Sheet("buildings", buildings, {"severity": "m/s"}, buildings.columns),
+        Sheet("areas", screening.areas, velocity, screening.areas.columns),
+        Sheet("stations", screening.stations, of_stations, screening.stations.columns),
         Sheet("columns", meanings, {}),
     ]
     return [sheet for sheet in given if not sheet.table.empty]

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from per_obspy.records.shakemap import map_event
 from per_obspy.report.overview import Region
 from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.station_summary import COLUMNS
@@ -41,7 +42,7 @@ def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[d
     return [group | {"event": facts} if group["screened"] else group for group in groups]
 
 
-def event_of_run(record: Path, region: Region) -> dict[str, Any]:
+def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> dict[str, Any]:
     """
     Return the facts of the earthquake of a run: of its file, else of the headers of its records.
 
@@ -51,14 +52,17 @@ def event_of_run(record: Path, region: Region) -> dict[str, Any]:
         ``run.json``, finished or not.
     region : Region
         Whose epicentre counts where nothing else is known.
+    shakemap : Path, optional
+        Grid of the map that serves pairs without a station; it names itself, and the earthquake
+        where no record does.
     """
     try:
         groups = read_status(record).get("earthquakes")
     except StatusError:
         groups = None
-    facts: dict[str, Any] = {}
+    facts: dict[str, Any] = dict(map_event(shakemap)) if shakemap else {}
     if region.epicentre is not None:
-        facts = dict(zip(("longitude", "latitude"), region.epicentre, strict=True))
+        facts |= dict(zip(("longitude", "latitude"), region.epicentre, strict=True))
     # One earthquake is screened
     for group in groups if isinstance(groups, list) else ():
         if isinstance(group, Mapping) and group.get("screened"):

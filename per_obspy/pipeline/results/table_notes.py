@@ -34,7 +34,7 @@ class Notes:
         self.far += int(_texts(piece, "flags").str.contains(r"\bfar_station\b").sum())
         # The first rows are the worst
         if self._rows < ROWS:
-            self._worst.append(piece.head(ROWS - self._rows))
+            self._worst.append(piece.head(ROWS - self._rows).copy())
             self._rows += len(self._worst[-1])
 
     @property

@@ -1,25 +1,37 @@
-"""Results for people of screenings without stations of their own: design spectrum, ensemble."""
+"""Results for people of screenings without records of their own: design spectrum, ensemble."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from per_obspy.config import Design, Ensemble
+from per_obspy.config import Design, Ensemble, Totals
 from per_obspy.config import Screening as ScreeningSettings
+from per_obspy.errors import CatalogError
 from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
-from per_obspy.pipeline.results.page import write_table_page
+from per_obspy.pipeline.results.page import TableSources, write_table_page
 from per_obspy.pipeline.results.result_files import Screening, write_results
+from per_obspy.pipeline.results.scenario_runs import ScenarioRuns
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region, draw_overview
 from per_obspy.report.page.content import PAIR_KINDS
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
+from per_obspy.screening.by_spectrum.design_table import DESIGN
 from per_obspy.screening.ranking import pounding_state, risk_class
-from per_obspy.tables.risk import ranked_table
+from per_obspy.screening.region.ensemble import ensemble_columns
+from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.tables.totals import (
+    PieceTotals,
+    areas_of,
+    piece_totals,
+    region_totals,
+    write_totals,
+)
 
 #: Pairs that a figure shows, evenly from all of them.
 SHOWN = 20_000
@@ -27,20 +39,64 @@ SHOWN = 20_000
 #: Columns of the pairs that a figure shows, as far as the table has them.
 _SHOWN_COLUMNS = ("rank", "pair_id", "risk_class", "longitude", "latitude", "demand", "gap")
 
+#: Columns of the pairs of the page, and of their histories.
+_PAGE_COLUMNS = (*(name for name in PAIR_KINDS if name != "area"), "worst_scenario")
+
 
 class _Asked(NamedTuple):
-    """Which results are wanted, and where."""
+    """
+    Results that are wanted, their place, and everything that is not in the table.
+
+    Attributes
+    ----------
+    folder, stem : Path and str
+        Of the results.
+    settings : Design or Ensemble
+        Which files and language are wanted.
+    region : Region
+        Title, classes, and whether the motion is simulated.
+    source : list of str
+        Sentences on the spectrum or the scenarios.
+    totals : Totals
+        Areas.
+    outlines : Path or None
+        Of the buildings.
+    notes : list of str
+        Sentences on what the page leaves out.
+    own : sequence of str
+        Columns that are computed, besides those of a risk table.
+    stations : DataFrame
+        Of all scenarios; empty for a spectrum.
+    histories : callable
+        Returns the histories of the worst pairs; None where there is no record.
+    """
 
     folder: Path
     stem: str
-    geopackage: bool
-    spreadsheet: bool
-    outlines: Path | None = None
+    settings: Design | Ensemble
+    region: Region
+    source: list[str]
+    totals: Totals
+    outlines: Path | None
+    notes: list[str]
+    own: Sequence[str]
+    stations: pd.DataFrame = pd.DataFrame()
+    histories: Callable[[pd.DataFrame], Mapping[int, dict[str, Any]]] | None = None
+
+
+class _Noted(NamedTuple):
+    """Whatever is noted of a table while it is read in pieces."""
+
+    notes: Notes
+    tally: PairTally
+    shown: list[pd.DataFrame]
+    worst: list[pd.DataFrame]
+    totals: list[PieceTotals]
 
 
 def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report:
     """
-    Write summary, overview, KML, layers and workbook of a screening by a design spectrum.
+    Write page, summary, totals, overview, KML, layers and workbook of a design spectrum.
 
     Parameters
     ----------
@@ -50,24 +106,48 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
         From :func:`per_obspy.screening.by_spectrum.design_table.design_table`.
     folder : Path
         Of the results.
+
+    Raises
+    ------
+    CatalogError
+        If the pair table lacks the column of the areas.
     """
     report = Report([], [])
     if table.empty:
         return report
-    # The spectrum stands for the earthquake
-    spectrum = name_text(settings.spectrum.name)
-    title = f"Design spectrum {spectrum}"
-    source = [f"Screened by the spectrum {spectrum}, not by an earthquake."]
-    outlines = outlines_beside(settings.pairs)
-    asked = _Asked(folder, "design", settings.geopackage, settings.spreadsheet, outlines)
-    region = _region(title, list(settings.screening.classes), simulated=False)
-    _write(asked, region, source, iter([table]), len(table), report)
+    # The spectrum replaces the earthquake
+    if settings.totals.area and settings.totals.area not in table:
+        reason = f"area: the pair table has no column {settings.totals.area!r}"
+        raise CatalogError("totals", reason)
+    texts, spectrum = WORDING[settings.report.language], name_text(settings.spectrum.name)
+    title = texts["spectrum_title"].format(name=spectrum)
+    asked = _Asked(
+        folder,
+        "design",
+        settings,
+        _region(title, list(settings.screening.classes), simulated=False),
+        [texts["spectrum"].format(name=spectrum)],
+        settings.totals,
+        outlines_beside(settings.pairs),
+        [texts["page_design"]],
+        list(DESIGN),
+    )
+    _write(asked, iter([_with_flags(table)]), len(table), report)
     return report
 
 
-def report_ensemble(settings: Ensemble, folder: Path, simulated: bool, pairs: int) -> Report:
+def _with_flags(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with the flags of its pairs that need no record."""
+    derived = np.where(table["derived"].fillna("") != "", "derived_inputs", "")
+    touching = np.where(table["gap"] == 0.0, "touching", "")
+    return table.assign(flags=pd.Series(derived + " " + touching, table.index).str.strip())
+
+
+def report_ensemble(
+    settings: Ensemble, folder: Path, simulated: bool, pairs: int, runs: ScenarioRuns
+) -> Report:
     """
-    Write summary, overview, KML, layers and workbook of an ensemble.
+    Write page, summary, totals, overview, KML, layers and workbook of an ensemble.
 
     An ensemble has no limits of states and classes of its own: those of a run's defaults are used.
 
@@ -81,25 +161,37 @@ def report_ensemble(settings: Ensemble, folder: Path, simulated: bool, pairs: in
         Whether the motion of a scenario is simulated.
     pairs : int
         Number of pairs.
+    runs : ScenarioRuns
+        Runs of the scenarios, which know buildings, stations and records.
     """
     report = Report([], [])
     if not pairs:
         return report
-    # The scenarios stand for the earthquake
-    limits, weights = ScreeningSettings(), settings.weights
-    unit = "a year" if settings.yearly else "in weight"
-    source = [f"{len(weights)} scenarios together.", *_scenario_sentences(weights, unit)]
-    asked = _Asked(folder, "ensemble", settings.geopackage, settings.spreadsheet)
-    region = _region(settings.name, list(limits.classes), simulated)
-    with ranked_table(folder / "ensemble.parquet") as table:
-        pieces = (_with_classes(piece, limits) for piece in table.pieces())
-        _write(asked, region, source, pieces, pairs, report)
+    # The scenarios replace the earthquake
+    limits, texts = ScreeningSettings(), WORDING[settings.report.language]
+    asked = _Asked(
+        folder,
+        "ensemble",
+        settings,
+        _region(settings.name, list(limits.classes), simulated),
+        [texts["scenarios"].format(count=len(settings.weights)), *_scenario_sentences(settings)],
+        runs.totals(),
+        runs.outlines(),
+        [texts["page_ensemble"]],
+        list(ensemble_columns(settings.weights, settings.yearly)),
+        runs.stations(),
+        runs.histories,
+    )
+    pieces = (_with_classes(piece, limits) for piece in runs.pieces(folder / "ensemble.parquet"))
+    _write(asked, pieces, pairs, report)
     return report
 
 
-def _scenario_sentences(weights: Mapping[str, float], unit: str) -> list[str]:
+def _scenario_sentences(settings: Ensemble) -> list[str]:
     """Name the first scenarios."""
-    return [f"{name_text(name)}: {weight:g} {unit}." for name, weight in [*weights.items()][:5]]
+    key = "scenario_rate" if settings.yearly else "scenario_weight"
+    sentence, first = WORDING[settings.report.language][key], [*settings.weights.items()][:5]
+    return [sentence.format(name=name_text(name), value=f"{value:g}") for name, value in first]
 
 
 def _region(title: str, classes: Sequence[str], simulated: bool) -> Region:
@@ -118,54 +210,91 @@ def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFram
     )
 
 
-def _write(
-    asked: _Asked,
-    region: Region,
-    source: list[str],
-    pieces: Iterator[pd.DataFrame],
-    pairs: int,
-    report: Report,
-) -> None:
+def _write(asked: _Asked, pieces: Iterator[pd.DataFrame], pairs: int, report: Report) -> None:
     """Read a table once, and write everything that people look at."""
-    notes, shown, folder = Notes(), list[pd.DataFrame](), asked.folder
-    # Of all pairs, and of those that the page holds
-    tally, worst = PairTally(region.classes), list[pd.DataFrame]()
-    noted = _tallied(_noted(pieces, pairs, notes, shown), tally, worst)
-    if asked.geopackage:
-        files, none = layer_paths(folder, asked.stem), pd.DataFrame()
+    found = _Noted(Notes(), PairTally(asked.region.classes), [], [], [])
+    noted = _noted(pieces, pairs, asked, found)
+    if asked.settings.geopackage:
+        files = layer_paths(asked.folder, asked.stem)
         with report.tried(*files):
-            write_map_layers(noted, region, none, lambda: None, asked.outlines, files)
+            write_map_layers(
+                noted,
+                asked.region,
+                asked.stations,
+                lambda: region_totals(found.totals, asked.totals),
+                asked.outlines,
+                files,
+            )
     # All rows, or those that a layer left when it failed
     for _ in noted:
         continue
-    points = pd.concat(shown, ignore_index=True)
-    written = Screening(folder, asked.stem, region, source, asked.spreadsheet)
-    write_results(written, notes, points, report)
+    areas = region_totals(found.totals, asked.totals).table
+    write_totals(areas, asked.folder / "totals.csv")
+    report.outputs.append(asked.folder / "totals.csv")
+    _write_files(asked, found, areas, report)
+
+
+def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Report) -> None:
+    """Write summary, KML, workbook, page and overview."""
+    # Each file is tried by itself
+    folder, region = asked.folder, _with_stations(asked)
+    # Pairs of figures, and those of the page
+    points = pd.concat(found.shown, ignore_index=True)
+    worst = pd.concat(found.worst, ignore_index=True)
+    language = asked.settings.report.language
+    written = Screening(
+        folder,
+        asked.stem,
+        region,
+        asked.source,
+        asked.settings.spreadsheet,
+        language,
+        asked.own,
+        asked.stations,
+        areas,
+    )
+    write_results(written, found.notes, points, report)
     with report.tried(folder / "report.html"):
-        write_table_page(folder, region, source, tally, pd.concat(worst, ignore_index=True))
+        histories = asked.histories(worst) if asked.histories else {}
+        sources = TableSources(
+            region,
+            language,
+            asked.source,
+            asked.stations,
+            areas,
+            asked.outlines,
+            histories,
+            asked.notes,
+        )
+        write_table_page(folder, sources, found.tally, worst)
     overview = folder / "figures" / "overview.png"
     with report.tried(overview):
         draw_overview(points, region, overview)
 
 
-def _tallied(
-    pieces: Iterator[pd.DataFrame], tally: PairTally, worst: list[pd.DataFrame]
-) -> Iterator[pd.DataFrame]:
-    """Yield pieces, and note what the page says of all pairs and the pairs that it holds."""
-    for piece in pieces:
-        kept = piece.head(max(PAGE_PAIRS - tally.pairs, 0))
-        worst.append(kept[[name for name in PAIR_KINDS if name in kept]])
-        tally.add(piece)
-        yield piece
+def _with_stations(asked: _Asked) -> Region:
+    """Return the region with the stations of all scenarios that are used."""
+    if asked.stations.empty:
+        return asked.region
+    used = asked.stations[asked.stations["state"] == "used"]
+    return asked.region._replace(stations=used[["longitude", "latitude"]].drop_duplicates())
 
 
 def _noted(
-    pieces: Iterator[pd.DataFrame], pairs: int, notes: Notes, shown: list[pd.DataFrame]
+    pieces: Iterator[pd.DataFrame], pairs: int, asked: _Asked, found: _Noted
 ) -> Iterator[pd.DataFrame]:
-    """Yield pieces, and note numbers, worst rows and the pairs of figures."""
-    step = -(-pairs // SHOWN)
+    """Yield pieces, and note numbers, totals, and pairs of figures and of the page."""
+    step, totals = -(-pairs // SHOWN), asked.totals
+    classes = [*asked.region.classes, UNKNOWN_CLASS]
     for piece in pieces:
-        notes.add(piece)
+        found.notes.add(piece)
         columns = [name for name in _SHOWN_COLUMNS if name in piece]
-        shown.append(piece.loc[piece["rank"].to_numpy() % step == 1 % step, columns])
+        found.shown.append(piece.loc[piece["rank"].to_numpy() % step == 1 % step, columns])
+        # Totals by area, and the rest from the same pass
+        found.totals.append(piece_totals(piece, totals, classes))
+        # The page holds the worst pairs
+        kept = piece.head(max(PAGE_PAIRS - found.tally.pairs, 0))
+        columns = [name for name in _PAGE_COLUMNS if name in kept]
+        found.worst.append(kept[columns].assign(area=areas_of(kept, totals, totals.area or "")))
+        found.tally.add(piece)
         yield piece

@@ -115,7 +115,7 @@ def _buildings(path: Path, wanted: int) -> tuple[pd.DataFrame, int]:
     """Return the worst buildings that a neighbour can hit, and the number of all of them."""
     pieces, found, count = list[pd.DataFrame](), 0, 0
     try:
-        with pq.ParquetFile(path.absolute()) as file:
+        with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
             for batch in file.iter_batches(ROWS, columns=[*CARRIED, "neighbours_that_can_hit"]):
                 piece = batch.to_pandas()
                 hit = piece[piece["neighbours_that_can_hit"] > 0]

@@ -22,6 +22,9 @@ CRS = "EPSG:4326"
 GEOMETRY, IDENTIFIER = "geom", "fid"
 STYLES = "layer_styles"
 
+#: Version of the GeoPackage: libraries of 2020 read it without a warning.
+PACKAGE_VERSION = "1.2"
+
 #: Kinds of shapes by their type, as GDAL names them.
 _KINDS = {0: "Point", 1: "LineString", 3: "Polygon", 6: "MultiPolygon"}
 
@@ -71,6 +74,7 @@ def append_layer(path: Path, layer: Layer, is_new: bool, facts: Mapping[str, str
         layer=layer.name,
         append=not is_new or path.exists(),
         driver="GPKG",
+        dataset_options=None if path.exists() else {"VERSION": PACKAGE_VERSION},
         layer_options={
             "GEOMETRY_NAME": GEOMETRY,
             "FID": IDENTIFIER,

@@ -20,7 +20,9 @@ NAMESPACE = "http://www.opengis.net/kml/2.2"
 ROWS = 1000
 
 
-def write_kml(worst: pd.DataFrame, classes: Sequence[str], title: str, path: Path) -> None:
+def write_kml(
+    worst: pd.DataFrame, classes: Sequence[str], title: str, path: Path, note: str = ""
+) -> None:
     """
     Write the worst pairs, in the colours of their classes, whole or not at all.
 
@@ -36,10 +38,14 @@ def write_kml(worst: pd.DataFrame, classes: Sequence[str], title: str, path: Pat
         Name of the run.
     path : Path
         ``.kml``.
+    note : str
+        Sentence on the pairs that the file leaves out.
     """
     root = ElementTree.Element("kml", xmlns=NAMESPACE)
     document = ElementTree.SubElement(root, "Document")
     ElementTree.SubElement(document, "name").text = shortened(title, 200)
+    if note:
+        ElementTree.SubElement(document, "description").text = _as_html(note)
     # One style per class
     styles = dict[str, str]()
     for number, (name, colour) in enumerate(class_colours(classes).items()):

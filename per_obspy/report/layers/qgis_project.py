@@ -18,7 +18,7 @@ _GEOMETRIES = {
     "MultiPolygon": "Polygon",
 }
 
-#: WGS 84 as projects describe it; longitude and latitude are told by the authority's name.
+#: WGS 84 as projects describe it; the authority's name implies longitude and latitude.
 _REFERENCE = {
     "proj4": "+proj=longlat +datum=WGS84 +no_defs",
     "srsid": "3452",
@@ -79,12 +79,12 @@ def write_project(
     _add_reference(ElementTree.SubElement(root, "projectCrs"))
     tree = ElementTree.SubElement(root, "layer-tree-group")
     _add_view(root, extent)
-    # Each layer stands in the tree, among the described layers and in their order
+    # Each layer is in the tree, among the described layers and in their order
     described = ElementTree.SubElement(root, "projectlayers")
     order = ElementTree.SubElement(root, "layerorder")
     for layer in layers:
         _add_layer(tree, described, order, layer, f"./{data}|layername={layer.name}")
-    _add_relative_paths(root)
+    _add_properties(root)
     document = DOCTYPE + ElementTree.tostring(root, encoding="unicode")
     # The same project has the same bytes: entries of an archive have a fixed date
     entry = zipfile.ZipInfo(f"{path.stem}.qgs", (1980, 1, 1, 0, 0, 0))
@@ -92,10 +92,14 @@ def write_project(
         archive.writestr(entry, document.encode(), zipfile.ZIP_DEFLATED)
 
 
-def _add_relative_paths(root: ElementTree.Element) -> None:
-    """Add the setting that paths are seen from the project."""
-    paths = ElementTree.SubElement(ElementTree.SubElement(root, "properties"), "Paths")
+def _add_properties(root: ElementTree.Element) -> None:
+    """Add that paths are seen from the project, and that it has a coordinate reference system."""
+    properties = ElementTree.SubElement(root, "properties")
+    paths = ElementTree.SubElement(properties, "Paths")
     ElementTree.SubElement(paths, "Absolute", type="bool").text = "false"
+    # Without this QGIS ignores the reference system of the project
+    system = ElementTree.SubElement(properties, "SpatialRefSys")
+    ElementTree.SubElement(system, "ProjectionsEnabled", type="int").text = "1"
 
 
 def _add_view(root: ElementTree.Element, extent: tuple[float, float, float, float]) -> None:

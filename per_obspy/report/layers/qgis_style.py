@@ -10,11 +10,15 @@ from per_obspy.report.style import class_colours
 #: First line of the XML files of QGIS.
 DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 
-#: Version of QGIS whose XML this is: a long-term release, which later ones read.
-VERSION = "3.28.0"
+#: Version of QGIS whose XML this is: a long-term release, which later ones read without a warning.
+VERSION = "3.22.16"
 
 #: Diameter of a marker or width of a line, worst and mildest class, millimetres on the screen.
 LARGEST, SMALLEST = 2.6, 1.2
+
+#: Width of the dark edge of a line, millimetres, and opacity of a building, 0 to 255: a pair is
+#: visible on buildings of its class.
+EDGE, OPACITY = 0.25, 150
 
 #: Geometry of a layer -> its number in QML, kind of symbol, and class of the symbol's layer.
 _KINDS = {
@@ -120,42 +124,47 @@ def _add_categories(renderer: ElementTree.Element, classes: Sequence[str], geome
         facts = {"value": printable(name), "label": printable(name)}
         facts |= {"symbol": str(number), "render": "true"}
         ElementTree.SubElement(categories, "category", facts)
-        _add_symbol(symbols, str(number), geometry, _options(geometry, colour, size))
+        _add_symbol(symbols, str(number), geometry, *_options(geometry, colour, size))
 
 
-def _options(geometry: str, colour: str, size: float) -> dict[str, str]:
-    """Return the options of a symbol of a colour (hexadecimal) and a size, mm."""
+def _options(geometry: str, colour: str, size: float) -> list[dict[str, str]]:
+    """Return the options of each layer of a symbol of a colour (hexadecimal) and a size, mm."""
     dark, fill = "35,35,35,255", _rgba(colour)
     if _KINDS[geometry][1] == "line":
-        # Round ends: pairs are dots on the map of a town
-        return {"line_color": fill, "line_width": f"{size:.2f}", "capstyle": "round"}
+        # A wider dark line below; round ends: pairs are dots on the map of a town
+        widths = {dark: size + 2.0 * EDGE, fill: size}
+        return [
+            {"line_color": line, "line_width": f"{width:.2f}", "capstyle": "round"}
+            for line, width in widths.items()
+        ]
     common = {"color": fill, "outline_color": dark, "outline_width": "0.1"}
     if _KINDS[geometry][1] == "fill":
-        return common | {"style": "solid"}
-    return common | {"name": "circle", "size": f"{size:.2f}", "size_unit": "MM"}
+        return [common | {"color": _rgba(colour, OPACITY), "style": "solid"}]
+    return [common | {"name": "circle", "size": f"{size:.2f}", "size_unit": "MM"}]
 
 
-def _rgba(colour: str) -> str:
+def _rgba(colour: str, opacity: int = 255) -> str:
     """Return a hexadecimal colour as QGIS takes it: red, green, blue and opacity, 0 to 255."""
     parts = [int(colour[start : start + 2], 16) for start in (1, 3, 5)]
-    return ",".join(map(str, [*parts, 255]))
+    return ",".join(map(str, [*parts, opacity]))
 
 
 def _add_symbol(
-    symbols: ElementTree.Element, name: str, geometry: str, options: Mapping[str, str]
+    symbols: ElementTree.Element, name: str, geometry: str, *layers: Mapping[str, str]
 ) -> None:
-    """Add a symbol of one layer with its options."""
+    """Add a symbol of layers with these options, the lowest first."""
     _, kind, layer_class = _KINDS[geometry]
     symbol = ElementTree.SubElement(
         symbols, "symbol", type=kind, name=name, alpha="1", clip_to_extent="1"
     )
-    layer = ElementTree.SubElement(
-        symbol, "layer", {"class": layer_class, "enabled": "1", "locked": "0", "pass": "0"}
-    )
-    # Options as QGIS stores them since version 3.24
-    mapping = ElementTree.SubElement(layer, "Option", type="Map")
-    for option, value in options.items():
-        ElementTree.SubElement(mapping, "Option", type="QString", name=option, value=value)
+    for options in layers:
+        layer = ElementTree.SubElement(
+            symbol, "layer", {"class": layer_class, "enabled": "1", "locked": "0", "pass": "0"}
+        )
+        # Options as QGIS stores them since version 3.22
+        mapping = ElementTree.SubElement(layer, "Option", type="Map")
+        for option, value in options.items():
+            ElementTree.SubElement(mapping, "Option", type="QString", name=option, value=value)
 
 
 def column_aliases(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +35,18 @@ class Sheet:
         Its first ``ROWS`` rows are written.
     units : mapping of str to str
         Column -> unit; others have none.
+    own : collection of str
+        Columns that are computed, besides those of every risk table: their numbers are rounded.
     """
 
-    def __init__(self, name: str, table: pd.DataFrame, units: Mapping[str, str]) -> None:
-        self.name, self.table, self.units = name, table.head(ROWS), units
+    def __init__(
+        self,
+        name: str,
+        table: pd.DataFrame,
+        units: Mapping[str, str],
+        own: Collection[str] = (),
+    ) -> None:
+        self.name, self.table, self.units, self.own = name, table.head(ROWS), units, own
 
 
 def write_workbook(sheets: Sequence[Sheet], path: Path) -> None:
@@ -69,7 +77,7 @@ def _add_sheet(book: Any, sheet: Sheet) -> None:
     page.freeze_panes = "C3" if "rank" in names else "B3"
     page.append([_text_cell(page, name, bold=True) for name in names])
     page.append([_text_cell(page, sheet.units.get(name, ""), bold=False) for name in names])
-    plain = rounded_table(sheet.table)
+    plain = rounded_table(sheet.table, sheet.own)
     for row in plain.itertuples(index=False, name=None):
         page.append([_cell(page, value) for value in row])
 

@@ -38,7 +38,7 @@ def read_outlines(path: Path, names: Collection[str]) -> list[tuple[str, list[fl
     # The first names are of the worst pairs
     wanted = set(list(names)[:MOST_OUTLINES])
     outlines = list[tuple[str, list[float]]]()
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(path, pre_buffer=False) as file:
         if not {"building_id", "geometry"} <= set(file.schema_arrow.names):
             return []
         for batch in file.iter_batches(10_000, columns=["building_id", "geometry"]):

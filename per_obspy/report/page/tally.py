@@ -51,7 +51,7 @@ class PairTally:
         if "probability" in piece:
             self.expected += float(np.nansum(piece["probability"]))
         if "distance" in piece:
-            self._distances.append(piece["distance"].dropna())
+            self._distances.append(piece["distance"].dropna().copy())
         others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
         if len(others) and {"longitude", "latitude", "risk_class"} <= set(piece):
             self.cells.add(others)

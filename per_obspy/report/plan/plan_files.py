@@ -8,6 +8,7 @@ import pandas as pd
 from per_obspy.errors import printable
 from per_obspy.files import written_whole
 from per_obspy.inventory.schema import Column
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.table_files import write_csv, write_described
 
 #: Columns of the table of visits; those of the building follow.
@@ -62,7 +63,7 @@ def write_plan(table: pd.DataFrame, described: list[Column], folder: Path) -> li
     """
     files = [folder / name for name in ("plan.csv", "plan.columns.csv", "plan.gpx")]
     text, columns, routes = files
-    write_csv(table, text)
+    write_csv(rounded_table(table, own=[column.name for column in described]), text)
     write_described([*VISITS, *described], columns)
     with written_whole(routes) as part:
         part.write_text(gpx_routes(table), encoding="utf-8")

@@ -1,8 +1,9 @@
 """``summary.pdf``: one A4 page with a small map, made without a browser."""
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -19,6 +20,7 @@ from per_obspy.report.summary.statements import (
     station_sentences,
     sureness,
 )
+from per_obspy.report.summary.wording import in_language
 from per_obspy.report.words import chance_text, length_text, number, speed_text
 
 #: A4, inches; margins and lines as shares of the page.
@@ -32,10 +34,10 @@ HALF, WHOLE = 52, 108
 #: Colour of the warning that motion is simulated.
 WARNING_COLOUR = "#AA0000"
 
-#: Columns of the list of pairs: title, place from the left.
+#: Columns of the list of pairs: key of the title, place from the left.
 COLUMNS = {
     "": 0.07, "pair": 0.10, "class": 0.31, "impact": 0.40, "contact": 0.485, "gap": 0.61,
-    "needed": 0.675, "latitude, longitude": 0.93,
+    "needed": 0.675, "place": 0.93,
 }  # fmt: skip
 
 
@@ -56,20 +58,29 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     at = _write_head(figure, facts)
     at = _write_numbers(figure, facts, at)
     bottom = at - 0.30
-    axes = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225))
-    draw_map(axes, shown, facts.region)
-    axes.tick_params(labelsize=7)
-    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
-        text.set_fontsize(8)
-    _write_legend(figure, facts, bottom + 0.005)
-    lowest = _write_section(figure, "What to do first", first_steps(facts), at, HALF)
-    lowest = _write_section(figure, "How sure", sureness(facts), lowest, HALF)
+    _draw_map(figure, facts, shown, bottom)
+    texts = facts.texts
+    lowest = _write_section(figure, texts["what_first"], first_steps(facts), at, HALF)
+    lowest = _write_section(figure, texts["how_sure"], sureness(facts), lowest, HALF)
     _write_pairs(figure, facts, min(lowest, bottom))
     # Where the numbers are from
     figure.text(LEFT, 0.03, literal(shortened(facts.made, 150)), fontsize=7, color=MOTION_COLOUR)
     # The same page has the same bytes
     with written_whole(path) as part:
         figure.savefig(part, metadata={"CreationDate": None})
+
+
+def _draw_map(figure: Figure, facts: SummaryFacts, shown: pd.DataFrame, bottom: float) -> None:
+    """Draw the map of the pairs on the right, with its legend."""
+    axes, texts = figure.add_axes((0.56, bottom + 0.05, RIGHT - 0.56, 0.225)), facts.texts
+    draw_map(axes, shown, facts.region, around_pairs=True)
+    # Labels in the language of the summary
+    axes.set_title(texts["map_title"].format(count=len(shown)))
+    axes.set(xlabel=texts["map_east"], ylabel=texts["map_north"])
+    axes.tick_params(labelsize=7)
+    for text in (axes.xaxis.label, axes.yaxis.label, axes.title):
+        text.set_fontsize(8)
+    _write_legend(figure, facts, bottom + 0.005)
 
 
 def _write_head(figure: Figure, facts: SummaryFacts) -> float:
@@ -79,11 +90,13 @@ def _write_head(figure: Figure, facts: SummaryFacts) -> float:
         figure.text(LEFT, at, literal(line), fontsize=14, fontweight="bold")
         at -= 0.024
     if facts.region.simulated:
-        text = "SIMULATED ground motion: this is not an earthquake"
-        figure.text(LEFT, at, text, fontsize=12, color=WARNING_COLOUR, fontweight="bold")
+        figure.text(
+            LEFT, at, facts.texts["simulated"], fontsize=12, color=WARNING_COLOUR, fontweight="bold"
+        )
         at -= 0.022
     # Sentences one after the other
-    for text in (" ".join(facts.source), " ".join(station_sentences(facts))):
+    stations = station_sentences(facts.stations, facts.language)
+    for text in (" ".join(facts.source), " ".join(stations)):
         at = _write_lines(figure, wrap(shortened(text, 600), WHOLE), at)
     return at - 0.01
 
@@ -134,25 +147,38 @@ def _write_legend(figure: Figure, facts: SummaryFacts, at: float) -> None:
 
 def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst pairs, and the worst buildings where there are any."""
-    figure.text(LEFT, at, "The worst pairs", fontsize=11, fontweight="bold")
+    figure.text(LEFT, at, facts.texts["worst_pairs"], fontsize=11, fontweight="bold")
     at -= 0.02
-    _write_row(figure, COLUMNS, at, MOTION_COLOUR)
-    for position, pair in enumerate(facts.worst.to_dict("records"), start=1):
+    _write_row(figure, _titles(facts), at, MOTION_COLOUR)
+    for position, (_, pair) in enumerate(facts.worst.iterrows(), start=1):
         # As many as the summary lists, one per line
         at -= LINE
         cells = (
             str(position),
             shortened(str(pair["pair_id"]), 26),
             shortened(str(pair["risk_class"]), 12),
-            speed_text(number(pair, "expected_impact_velocity")),
-            chance_text(number(pair, "probability")),
-            length_text(number(pair, "gap")),
-            length_text(number(pair, "demand")),
+            *(in_language(text, facts.language) for text in _number_cells(dict(pair))),
             f"{pair['latitude']:.5f}, {pair['longitude']:.5f}",
         )
         _write_row(figure, cells, at, "black")
     if not facts.buildings.empty:
         _write_buildings(figure, facts, at - 2.5 * LINE)
+
+
+def _titles(facts: SummaryFacts) -> list[str]:
+    """Return the titles of the columns; an ensemble has no gap needed."""
+    hidden = set() if "demand" in facts.worst else {"needed"}
+    return [facts.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
+
+
+def _number_cells(pair: dict[Hashable, Any]) -> list[str]:
+    """Return velocity, probability, gap and demand of a pair in words."""
+    return [
+        speed_text(number(pair, "expected_impact_velocity")),
+        chance_text(number(pair, "probability")),
+        length_text(number(pair, "gap")),
+        length_text(number(pair, "demand")) if "demand" in pair else "",
+    ]
 
 
 def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> None:
@@ -173,7 +199,7 @@ def _fit(text: Text, room: float) -> None:
 
 def _write_buildings(figure: Figure, facts: SummaryFacts, at: float) -> None:
     """Write the worst buildings in two columns."""
-    figure.text(LEFT, at, "The worst buildings", fontsize=11, fontweight="bold")
+    figure.text(LEFT, at, facts.texts["worst_buildings"], fontsize=11, fontweight="bold")
     for position, building in enumerate(facts.buildings.to_dict("records")):
         # Five below each other
         left = LEFT if position < 5 else 0.52

@@ -6,6 +6,7 @@ from textwrap import wrap
 from unicodedata import normalize
 
 from per_obspy.files import written_whole
+from per_obspy.report.page.texts import Language
 from per_obspy.report.summary.statements import (
     SummaryFacts,
     building_sentence,
@@ -22,18 +23,20 @@ WIDTH = 72
 #: Characters that are spoken, or a pause; anything else becomes a blank.
 _UNSPOKEN = re.compile(r"[^A-Za-z0-9 .,:;()'/-]")
 
-#: Symbols with a word.
-_WORDS = {
-    "cm/s": "cm per second",
-    "%": " percent",
-    "°": " degrees",
-    "&": " and ",
-    "_": " underscore ",
-    "+": " plus ",
-}
+#: Symbols with a word, by language.
+_WORDS: dict[Language, dict[str, str]] = {
+    "en": {
+        "cm/s": "cm per second", "%": " percent", "°": " degrees", "&": " and ",
+        "_": " underscore ", "+": " plus ",
+    },
+    "es": {
+        "cm/s": "cm por segundo", "%": " por ciento", "°": " grados", "&": " y ",
+        "_": " guion bajo ", "+": " mas ",
+    },
+}  # fmt: skip
 
 
-def spoken(text: str) -> str:
+def spoken(text: str, language: Language = "en") -> str:
     """
     Return a text of plain letters and numbers; accents are dropped, symbols are words or blanks.
 
@@ -42,7 +45,7 @@ def spoken(text: str) -> str:
     >>> spoken("Añasco_1 <script>"), spoken("84 %")
     ('Anasco underscore 1 script', '84 percent')
     """
-    for symbol, word in _WORDS.items():
+    for symbol, word in _WORDS[language].items():
         text = text.replace(symbol, word)
     letters = normalize("NFKD", text).encode("ascii", "ignore").decode()
     return " ".join(_UNSPOKEN.sub(" ", letters).split())
@@ -50,29 +53,42 @@ def spoken(text: str) -> str:
 
 def summary_lines(facts: SummaryFacts) -> list[str]:
     """Return the lines of a summary, none longer than ``WIDTH`` characters."""
-    simulated = ["SIMULATED. THIS IS NOT AN EARTHQUAKE."] if facts.region.simulated else []
-    head = [facts.region.title[:200], *simulated, *facts.source, *station_sentences(facts)]
-    numbers = [f"{value} {meaning}." for value, meaning in five_numbers(facts)]
-    pairs = map(pair_sentence, facts.worst.to_dict("records"))  # type: ignore[arg-type]
-    buildings = map(building_sentence, facts.buildings.to_dict("records"))  # type: ignore[arg-type]
-    sections = {
-        "": head,
-        "FIVE NUMBERS": numbers,
-        "WHAT TO DO FIRST": first_steps(facts),
-        "WORST PAIRS": _numbered(pairs),
-        "WORST BUILDINGS": _numbered(buildings),
-        "HOW SURE": sureness(facts),
-        "SOURCE": [facts.made],
-    }
     lines = list[str]()
-    for title, sentences in sections.items():
+    for title, sentences in _sections(facts).items():
         if sentences:
-            lines += ["", title] if title else []
-            lines += [line for sentence in sentences for line in wrap(spoken(sentence), WIDTH)]
+            lines += ["", spoken(title).upper()] if title else []
+            plain = (spoken(sentence, facts.language) for sentence in sentences)
+            lines += [line for sentence in plain for line in wrap(sentence, WIDTH)]
     return lines
 
 
-def _numbered(sentences: "map[str]") -> list[str]:
+def _sections(facts: SummaryFacts) -> dict[str, list[str]]:
+    """Return the sentences of each section by its title; the first has none."""
+    texts, language = facts.texts, facts.language
+    simulated = [texts["simulated_spoken"]] if facts.region.simulated else []
+    head = [
+        facts.region.title[:200],
+        *simulated,
+        *facts.source,
+        *station_sentences(facts.stations, language),
+    ]
+    # Pairs and buildings with their places in the ranking
+    numbers = [f"{value} {meaning}." for value, meaning in five_numbers(facts)]
+    pairs = [pair_sentence(dict(row), language) for _, row in facts.worst.iterrows()]
+    buildings = [building_sentence(dict(row), language) for _, row in facts.buildings.iterrows()]
+    # In the order of their weight for a listener
+    return {
+        "": head,
+        texts["five_numbers"]: numbers,
+        texts["what_first"]: first_steps(facts),
+        texts["worst_pairs"]: _numbered(pairs),
+        texts["worst_buildings"]: _numbered(buildings),
+        texts["how_sure"]: sureness(facts),
+        texts["made_by"]: [facts.made],
+    }
+
+
+def _numbered(sentences: list[str]) -> list[str]:
     """Return sentences with their numbers."""
     return [f"{place}. {sentence}" for place, sentence in enumerate(sentences, start=1)]
 

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from per_obspy.report.overview import Region
+from per_obspy.report.page.texts import Language
+from per_obspy.report.summary.wording import WORDING, in_language
 from per_obspy.report.words import chance_text, name_text, number, speed_text
 
 #: Pairs and buildings that the summary lists.
@@ -64,6 +66,8 @@ class SummaryFacts(NamedTuple):
         Name and place of the area with most expected pounding; empty if there are no areas.
     made : str
         When and with which version the results were made.
+    language : Language
+        Of its sentences.
     """
 
     region: Region
@@ -74,9 +78,15 @@ class SummaryFacts(NamedTuple):
     stations: pd.DataFrame
     area: str
     made: str
+    language: Language = "en"
+
+    @property
+    def texts(self) -> Mapping[str, str]:
+        """Return the sentences of its language by their keys."""
+        return WORDING[self.language]
 
 
-def event_sentences(facts: Mapping[str, Any]) -> list[str]:
+def event_sentences(facts: Mapping[str, Any], language: Language = "en") -> list[str]:
     """
     Return sentences on an earthquake: time, size and place, as far as they are known.
 
@@ -84,113 +94,138 @@ def event_sentences(facts: Mapping[str, Any]) -> list[str]:
     ----------
     facts : mapping of str to object
         ``time`` (text), ``magnitude``, ``longitude``, ``latitude`` (degrees), ``depth`` (m), and
-        ``start``, the first record.
+        ``start``, the first record; ``map`` and ``version`` of a ShakeMap.
+    language : {'en', 'es'}
+        Of the sentences.
     """
-    sentences = list[str]()
+    texts, sentences = WORDING[language], list[str]()
     if facts.get("time"):
         day = str(facts["time"])[:19].replace("T", " ")
-        sentences.append(f"Earthquake of {day} UTC.")
+        sentences.append(texts["event_time"].format(time=day))
     elif facts.get("start"):
         day = str(facts["start"])[:16].replace("T", " ")
-        sentences.append(f"Origin time unknown; first record {day} UTC.")
+        sentences.append(texts["first_record"].format(time=day))
     # Size and place
     if math.isfinite(size := number(facts, "magnitude")):
-        sentences.append(f"Magnitude {size:.1f}.")
-    # A place needs both coordinates
+        sentences.append(texts["magnitude"].format(value=f"{size:.1f}"))
+    return [*sentences, *_epicentre(facts, language), *_map_name(facts, texts)]
+
+
+def _epicentre(facts: Mapping[str, Any], language: Language) -> list[str]:
+    """Return a sentence on the epicentre, which needs both coordinates."""
     east, north = number(facts, "longitude"), number(facts, "latitude")
-    if math.isfinite(east) and math.isfinite(north):
-        place = place_text(north, east, 3)
-        depth = number(facts, "depth") / 1000.0
-        deep = f", depth {depth:.0f} km" if math.isfinite(depth) else ""
-        sentences.append(f"Epicentre {place}{deep}.")
-    return sentences
+    if not (math.isfinite(east) and math.isfinite(north)):
+        return []
+    # The depth may be unknown
+    place, depth = place_text(north, east, 3, language), number(facts, "depth") / 1000.0
+    key = "epicentre_depth" if math.isfinite(depth) else "epicentre"
+    return [WORDING[language][key].format(place=place, depth=f"{depth:.0f}")]
+
+
+def _map_name(facts: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
+    """Return a sentence on the ShakeMap, if there is one."""
+    if not facts.get("map"):
+        return []
+    version = name_text(facts.get("version") or "?")
+    return [texts["shakemap"].format(name=name_text(facts["map"]), version=version)]
 
 
 def five_numbers(facts: SummaryFacts) -> list[tuple[str, str]]:
     """Return the five numbers of the summary, each with its meaning."""
-    counts, first = facts.counts, facts.region.classes[0]
+    counts, first, texts = facts.counts, facts.region.classes[0], facts.texts
     pounding = counts.states.get("yes", 0) + counts.states.get("likely", 0)
     # Of all pairs the worst ones are the fastest
     fastest = facts.worst["expected_impact_velocity"].max() if len(facts.worst) else math.nan
     return [
-        (str(counts.pairs), "pairs of buildings screened"),
-        (str(pounding), "pairs that pound or are likely to"),
-        (f"{counts.expected:.0f}", "pairs expected to pound in all"),
-        (str(counts.classes.get(first, 0)), f"pairs of the worst class, {name_text(first)}"),
-        (speed_text(float(fastest)), "largest expected impact velocity"),
+        (str(counts.pairs), texts["number_pairs"]),
+        (str(pounding), texts["number_pounding"]),
+        (f"{counts.expected:.0f}", texts["number_expected"]),
+        (str(counts.classes.get(first, 0)), texts["number_class"].format(name=name_text(first))),
+        (in_language(speed_text(float(fastest)), facts.language), texts["number_velocity"]),
     ]
 
 
-def station_sentences(facts: SummaryFacts) -> list[str]:
-    """Say which stations were used and which are missing."""
-    table = facts.stations
+def station_sentences(table: pd.DataFrame, language: Language) -> list[str]:
+    """Return sentences on the stations that were used and those that are missing."""
+    texts = WORDING[language]
     if table.empty:
-        return ["No station: the motion is not that of records."]
+        return [texts["no_station"]]
     # Rejected stations are as good as missing
     used = table.loc[table["state"] == "used", "station"].tolist()
     missing = table.loc[table["state"] != "used", "station"].tolist()
-    sentences = [f"{len(used)} stations used{_named(used)}."]
+    sentences = [texts["stations_used"].format(count=len(used), names=_named(used, texts))]
     if missing:
-        sentences.append(f"{len(missing)} stations missing or refused{_named(missing)}.")
+        names = _named(missing, texts)
+        sentences.append(texts["stations_missing"].format(count=len(missing), names=names))
     else:
-        sentences.append("No station of the folder is missing.")
+        sentences.append(texts["none_missing"])
     return sentences
 
 
-def _named(names: Sequence[str]) -> str:
+def _named(names: Sequence[str], texts: Mapping[str, str]) -> str:
     """Return the first names of a list."""
     if not names:
         return ""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    more = texts["and_more"].format(count=len(names) - NAMED) if len(names) > NAMED else ""
     return ": " + ", ".join(map(name_text, names[:NAMED])) + more
 
 
 def first_steps(facts: SummaryFacts) -> list[str]:
     """Return what to do first."""
-    counts = facts.counts
-    steps = ["Inspect the pairs below in their order, at the joint between them."]
+    counts, texts = facts.counts, facts.texts
+    # The rest depends on the results
+    steps = [texts["inspect"]]
     if facts.area:
-        steps.append(f"Most pounding is expected in area {facts.area}: go there first.")
+        steps.append(texts["area_first"].format(area=facts.area))
     if unknown := counts.states.get("unknown", 0):
-        steps.append(f"Measure the gap of {unknown} pairs whose gap is unknown.")
+        steps.append(texts["measure"].format(count=unknown))
     if facts.region.simulated:
-        steps.append("Do not act on this as on an earthquake: its motion is simulated.")
+        steps.append(texts["exercise"])
     return steps
 
 
 def sureness(facts: SummaryFacts) -> list[str]:
-    """Say how sure the numbers are."""
-    counts, sentences = facts.counts, list[str]()
+    """Return sentences on how sure the numbers are."""
+    counts, sentences, texts = facts.counts, list[str](), facts.texts
     # States between yes and no
     middle = sum(counts.states.get(state, 0) for state in ("likely", "possible", "unlikely"))
-    sentences.append(f"{middle} pairs are open: neither a clear yes nor a clear no.")
+    sentences.append(texts["open"].format(count=middle))
     if counts.derived:
-        sentences.append(f"{counts.derived} pairs have derived inputs, such as periods by height.")
+        sentences.append(texts["derived"].format(count=counts.derived))
     if counts.far:
-        sentences.append(f"{counts.far} pairs are far from their station.")
-    sentences.append("This is a screening. It replaces no inspection, and a no is not a promise.")
+        sentences.append(texts["far"].format(count=counts.far))
+    sentences.append(texts["nature"])
     return sentences
 
 
-def pair_sentence(pair: Mapping[str, Any]) -> str:
+def pair_sentence(pair: Mapping[str, Any], language: Language) -> str:
     """Return a pair of the list in one sentence."""
-    parts = [f"{name_text(pair['pair_id'])}: {name_text(pair['risk_class'])}"]
-    # What is unknown is left out
-    parts.append(f"impact {speed_text(number(pair, 'expected_impact_velocity'))}")
+    texts, parts = WORDING[language], [_headline(pair, "pair_id")]
+    # Values that are unknown are left out
+    speed = in_language(speed_text(number(pair, "expected_impact_velocity")), language)
+    parts.append(texts["impact"].format(speed=speed))
     if math.isfinite(chance := number(pair, "probability")):
-        parts.append(f"contact in {chance_text(chance)}")
-    parts += _at(pair)
+        shares = in_language(chance_text(chance), language)
+        parts.append(texts["contact"].format(chance=shares))
+    parts += _at(pair, language)
     return f"{', '.join(parts)}."
 
 
-def _at(row: Mapping[str, Any]) -> list[str]:
+def _headline(row: Mapping[str, Any], name: str) -> str:
+    """Return name and class of a pair or building."""
+    return f"{name_text(row[name])}: {name_text(row['risk_class'])}"
+
+
+def _at(row: Mapping[str, Any], language: Language) -> list[str]:
     """Return the place of a pair or building, as a list that is empty where it is unknown."""
     north, east = number(row, "latitude"), number(row, "longitude")
     is_known = math.isfinite(north) and math.isfinite(east)
-    return [f"at {place_text(north, east, 5)}"] if is_known else []
+    if not is_known:
+        return []
+    return [WORDING[language]["at"].format(place=place_text(north, east, 5, language))]
 
 
-def place_text(north: float, east: float, decimals: int) -> str:
+def place_text(north: float, east: float, decimals: int, language: Language = "en") -> str:
     """
     Return a place (degrees) without signs, which are lost on the radio.
 
@@ -199,14 +234,18 @@ def place_text(north: float, east: float, decimals: int) -> str:
     >>> place_text(-0.07316, 0.3, 5)
     '0.07316 south, 0.30000 east'
     """
+    texts = WORDING[language]
+    # Longitudes may go beyond 180 degrees
     east = (east + 180.0) % 360.0 - 180.0
     sides = "north" if north >= 0 else "south", "east" if east >= 0 else "west"
-    return f"{abs(north):.{decimals}f} {sides[0]}, {abs(east):.{decimals}f} {sides[1]}"
+    return (
+        f"{abs(north):.{decimals}f} {texts[sides[0]]}, {abs(east):.{decimals}f} {texts[sides[1]]}"
+    )
 
 
-def building_sentence(building: Mapping[str, Any]) -> str:
+def building_sentence(building: Mapping[str, Any], language: Language) -> str:
     """Return a building of the list in one sentence."""
-    parts = [f"{name_text(building['building_id'])}: {name_text(building['risk_class'])}"]
-    parts.append(f"severity {speed_text(number(building, 'severity'))}")
-    parts += _at(building)
+    speed = in_language(speed_text(number(building, "severity")), language)
+    severity = WORDING[language]["severity"].format(speed=speed)
+    parts = [_headline(building, "building_id"), severity, *_at(building, language)]
     return f"{', '.join(parts)}."

@@ -243,7 +243,8 @@ def _probabilities(rows: pd.DataFrame) -> pd.DataFrame | None:
     """Return area and probability of the pairs that have one, if the table has the column."""
     if "probability" not in rows:
         return None
-    return rows[["area", "probability"]].dropna().astype({"area": "category"})
+    # A copy: a view would keep all columns of the piece in memory
+    return rows[["area", "probability"]].dropna().astype({"area": "category"}).copy()
 
 
 def joined_totals(parts: Iterable[PartialTotals]) -> pd.DataFrame:

@@ -3,27 +3,42 @@ Every kind of screening has its summary, overview, layers and workbook, and its 
 
 Tests of per_obspy.pipeline.results.faults, per_obspy.pipeline.results.table_notes,
 per_obspy.pipeline.results.result_files, per_obspy.pipeline.results.layer_sources,
-per_obspy.pipeline.results.run_facts and per_obspy.pipeline.results.shown_pair too, through
+per_obspy.pipeline.results.run_facts, per_obspy.pipeline.results.station_facts,
+per_obspy.pipeline.results.scenario_runs and per_obspy.pipeline.results.shown_pair too, through
 per_obspy.commands.show and the commands that screen.
 """
 
+import csv
+import gc
 import json
+import re
 
 import numpy as np
 import openpyxl
 import pandas as pd
+import pyarrow as pa
 import pyogrio
 import pytest
 from pyarrow import parquet
 
+from per_obspy.config import Totals
+from per_obspy.pipeline.results.faults import Report
+from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
+from per_obspy.report.page.tally import PairTally
+from per_obspy.tables.risk import ranked_table
+from per_obspy.tables.totals import piece_totals
+
+from ...report.page.made_up import CLASSES, pair_table
+from .test_page import content_of
 
 SCENARIO = "[scenario]\nstations = 1\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 4\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
 WANTED = "geopackage = true\nspreadsheet = true\n"
 LAYERS = ("gpkg", "qgz", "geoparquet", "kml", "xlsx")
+NOWHERE = pd.DataFrame({"longitude": [], "latitude": []}, dtype="float64")
 HOSTILE = ["<script>x</script>", '=HYPERLINK("x")', "\u202eevil", "x" * 300]
 
 
@@ -72,7 +87,71 @@ def test_every_screening_has_everything(done, stem):
     assert parquet.read_metadata(folder / f"{stem}.geoparquet").num_rows == 4
     pairs = openpyxl.load_workbook(folder / f"{stem}.xlsx")["pairs"]
     assert pairs.max_row == 6
+    assert "All 4 pairs." in (folder / f"{stem}.kml").read_text()
     assert "f" not in {cell.data_type for row in pairs.iter_rows() for cell in row}
+
+
+def test_the_page_of_an_ensemble_knows_buildings_stations_and_histories(done):
+    ensemble = content_of(done["ensemble"] / "report.html")
+    run = content_of(done["risk"] / "report.html")
+    assert [row[0] for row in ensemble["stations"]["rows"]] == ["XX.S001 (one)"]
+    assert [row[1:] for row in ensemble["stations"]["rows"]] == [
+        row[1:] for row in run["stations"]["rows"]
+    ]
+    assert ensemble["areas"]["rows"]
+    # the only scenario is the worst of every pair, so that the histories are those of its run
+    assert sorted(map(str, ensemble["histories"].values())) == sorted(
+        map(str, run["histories"].values())
+    )
+    assert ensemble["histories"]
+    columns = {column["name"] for column in ensemble["tables"][0]["columns"]}
+    assert {"building_id_1", "longitude_2", "height_1", "area", "derived"} <= columns
+    layers = dict(pyogrio.list_layers(done["ensemble"] / "ensemble.gpkg"))
+    assert layers["pairs"] == "LineString"
+    assert {"buildings", "stations", "areas"} <= set(layers)
+
+
+def test_the_page_of_a_spectrum_says_what_it_leaves_out(done):
+    content = content_of(done["design"] / "report.html")
+    assert content["histories"] == {}
+    assert content["stations"]["rows"] == []
+    assert content["areas"]["rows"]
+    assert "neither stations nor displacement histories" in content["provenance"][-1][1]
+    assert "areas" in dict(pyogrio.list_layers(done["design"] / "design.gpkg"))
+
+
+@pytest.mark.parametrize("stem", ["design", "ensemble"])
+def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
+    configuration = done[stem].parent / f"{stem}.toml"
+    code, _, errors = call("screen", configuration, "-o", tmp_path / "es", "--language", "es")
+    assert code == 0, errors
+    content = content_of(tmp_path / "es" / "report.html")
+    assert content["texts"]["close"] == "cerrar"
+    text = (tmp_path / "es" / "summary.txt").read_text()
+    assert "4 pares de edificios evaluados." in text
+    assert not re.search(r"\b(the|pairs|with|of)\b", text.split("\n\n", 1)[1])
+
+
+#: Digits that a number of a CSV file needs at most; coordinates have seven decimals.
+MOST_DIGITS = 5
+
+
+@pytest.mark.parametrize("stem", ["risk", "design", "ensemble"])
+def test_numbers_of_every_csv_file_are_rounded(done, stem):
+    checked = 0
+    for path in done[stem].glob("*.csv"):
+        # as simulated: an input of the run, with all its digits
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = [] if path.name == "pairs.csv" else list(csv.DictReader(file))
+        for row in rows:
+            for name, text in row.items():
+                number = re.fullmatch(r"-?(\d+\.\d*)(e[-+]\d+)?", text)
+                if number and not name.startswith(("longitude", "latitude")):
+                    digits = number[1].replace(".", "").strip("0")
+                    assert len(digits) <= MOST_DIGITS, (path.name, name, text)
+                    checked += 1
+    # a file of every kind has numbers
+    assert checked > 20
 
 
 def test_the_summary_of_a_run_has_its_earthquake_and_stations(done):
@@ -129,6 +208,43 @@ def test_a_pair_of_an_ensemble_is_shown_in_words(done, call):
     code, output, _ = call("show", "#1", done["ensemble"])
     assert code == 0
     assert "Probability of contact in a year: 0.0" in output
+
+
+def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
+    module = "per_obspy.pipeline.results.result_files"
+    monkeypatch.setattr(f"{module}.KML_ROWS", 2)
+    monkeypatch.setattr("per_obspy.report.layers.kml.ROWS", 2)
+    monkeypatch.setattr(f"{module}.SHEET_ROWS", 3)
+    table = pair_table(5)
+    notes = Notes()
+    notes.add(table)
+    report, region = Report([], []), Region("x", list(CLASSES), False, NOWHERE)
+    write_results(Screening(tmp_path, "risk", region, [], True), notes, table, report)
+    assert report.faults == []
+    kml = (tmp_path / "risk.kml").read_text()
+    assert "The worst 2 of 5 pairs; all of them are in risk.parquet." in kml
+    assert kml.count("<Placemark>") == 2
+    contents = openpyxl.load_workbook(tmp_path / "risk.xlsx")["contents"]
+    assert contents["B3"].value == "The worst 3 of 5 pairs; all of them are in risk.parquet."
+
+
+def test_pieces_leave_no_memory_behind(tmp_path):
+    # would catch views: one column of a piece that keeps all others, and files read ahead
+    more = pd.DataFrame(np.full((4000, 100), 0.5), columns=[f"more_{i}" for i in range(100)])
+    table = pd.concat([pair_table(4000), more], axis=1)
+    parquet.write_table(pa.Table.from_pandas(table), tmp_path / "risk.parquet")
+    notes, tally, totals, before = Notes(), PairTally(CLASSES), [], []
+    for _ in range(4):
+        with ranked_table(tmp_path / "risk.parquet") as file:
+            for piece in file.pieces():
+                notes.add(piece)
+                tally.add(piece)
+                totals.append(piece_totals(piece, Totals(), CLASSES))
+        del piece
+        gc.collect()
+        before.append(pa.total_allocated_bytes())
+    # 4000 rows of 100 numbers are 3 MB
+    assert before[3] - before[0] < 2e6
 
 
 def test_notes_do_not_depend_on_pieces():

@@ -1,7 +1,8 @@
 """
 Summary of a screening as text and as a page.
 
-Tests of per_obspy.report.summary.statements and per_obspy.report.summary.one_page too.
+Tests of per_obspy.report.summary.statements, per_obspy.report.summary.wording and
+per_obspy.report.summary.one_page too.
 """
 
 import re
@@ -15,6 +16,7 @@ from per_obspy.report.overview import Region
 from per_obspy.report.summary.one_page import write_page
 from per_obspy.report.summary.spoken_text import WIDTH, spoken, summary_lines, write_text
 from per_obspy.report.summary.statements import Counts, SummaryFacts, event_sentences
+from per_obspy.report.summary.wording import ENGLISH, SPANISH
 
 HOSTILE = ["<script>alert(1)</script>", "=HYPERLINK(1)", "\u202eevil", "x" * 10_000, "$a_{b"]
 EVENT = {
@@ -106,7 +108,7 @@ def test_every_line_can_be_read_aloud(tmp_path, name):
     lines = (tmp_path / "summary.txt").read_text(encoding="ascii").splitlines()
     assert max(map(len, lines)) <= WIDTH
     assert all(re.fullmatch(r"[A-Za-z0-9 .,:;()'/-]*", line) for line in lines)
-    assert "WORST BUILDINGS" in lines
+    assert "THE WORST BUILDINGS" in lines
     # one page of radio, whatever the names are
     assert len(lines) < 120
 
@@ -146,3 +148,19 @@ def test_the_same_facts_are_the_same_bytes(tmp_path):
     for name in ("a.pdf", "b.pdf"):
         write_page(make_facts(), make_facts().worst, tmp_path / name)
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+
+
+def test_every_sentence_has_both_languages_with_the_same_places():
+    assert set(SPANISH) == set(ENGLISH)
+    for key, text in ENGLISH.items():
+        assert sorted(re.findall(r"{\w+}", text)) == sorted(re.findall(r"{\w+}", SPANISH[key])), key
+
+
+def test_the_spanish_page_keeps_its_texts_apart(page_text, monkeypatch):
+    facts = make_facts(buildings=True)._replace(language="es")
+    figure, _ = page_text(facts, monkeypatch)
+    drawn = " ".join(text.get_text() for text in figure.texts)
+    assert "Movimiento SIMULADO" in drawn
+    assert "Los peores edificios" in drawn
+    figure.draw_without_rendering()
+    assert all(text.get_window_extent().x1 <= figure.bbox.width for text in figure.texts)
