@@ -35,7 +35,7 @@ PAIRS = pd.DataFrame(
 @contextmanager
 def compiling(progress: Progress) -> Iterator[None]:
     """Compile the kernels of screening in a thread, while other processes do the stations."""
-    # xarray imports Dask with its first Dataset, where Dask is installed; two threads that both make
+    # Where Dask is installed, xarray imports it with the first Dataset: two threads that both make
     # their first one would break this import
     _station()
     thread = Thread(target=compile_screening)

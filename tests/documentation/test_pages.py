@@ -152,7 +152,9 @@ def test_the_rows_of_the_readme_are_those_of_the_demonstration():
     table = pd.read_csv(made, nrows=3)
     for line, (_, row) in zip(lines, table.iterrows(), strict=True):
         rank, pair, severity, state, impact, gap, demand = line.strip("| ").split(" | ")
-        assert [int(rank), pair, severity, state] == [*row[["rank", "pair_id", "risk_class", "state"]]]
+        assert [int(rank), pair, severity, state] == [
+            *row[["rank", "pair_id", "risk_class", "state"]]
+        ]
         # the page shows five digits; compilers may change the last ones after many impacts
         shown = [float(value) for value in (impact, gap, demand)]
         found = row[["expected_impact_velocity", "gap", "demand"]].astype(float)
