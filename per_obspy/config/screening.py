@@ -277,6 +277,9 @@ class ReportTexts(Section):
     language: Literal["en", "es"] = Field(
         "en", description="of page and summaries: en (English) or es (Spanish)"
     )
+    revision: int = Field(
+        0, ge=0, description="number of the revision that the page shows; 0: none is shown"
+    )
 
 
 def in_language(settings: SectionType, language: str | None) -> SectionType:

@@ -87,7 +87,6 @@ class _Pieces(NamedTuple):
     observed: list[pd.DataFrame]
     totals: list[PieceTotals]
     notes: Notes
-    tally: PairTally
 
 
 def reported(
@@ -187,8 +186,7 @@ def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Rep
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else _needed_columns(settings)
     # The layer takes the pieces one by one, and so they are noted on the way
-    tally = PairTally(list(settings.screening.classes))
-    pieces = _Pieces([], [], [], [], [], Notes(), tally)
+    pieces = _Pieces([], [], [], [], [], Notes(list(settings.screening.classes)))
     with ranked_table(risk, columns) as table:
         listed = worst_pairs(table, settings)
         noted = _noted(table, settings, pieces)
@@ -207,7 +205,7 @@ def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Rep
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
         _totals(settings, pieces, folder),
         pieces.notes,
-        (tally, listed),
+        (pieces.notes.tally, listed),
     )
 
 
@@ -258,9 +256,7 @@ def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.Dat
             observed = piece["observed"].notna()
             found.observed.append(piece.loc[observed, OBSERVED_COLUMNS])
         found.totals.append(piece_totals(piece, settings.totals, classes))
-        # Numbers of the summary and of the page
         found.notes.add(piece)
-        found.tally.add(piece)
         yield piece
 
 

@@ -102,7 +102,7 @@ def screened(
     CatalogError
         If the inventory is wrong as a whole.
     """
-    maps = _maps(settings)
+    maps = shakemap_files(settings)
     ground, unplaced = ground_files(stations, maps, settings.screening.interpolation)
     # Pairs need a station or a map
     parts, notes = list[Part](), PairNotes()
@@ -154,7 +154,7 @@ def _counts(
     return counts | rows.counts
 
 
-def _maps(settings: Run) -> tuple[Path, ...]:
+def shakemap_files(settings: Run) -> tuple[Path, ...]:
     """Return the files of the ShakeMap, none if there is no map."""
     records = settings.records
     maps = (records.shakemap, records.shakemap_uncertainty) if records else ()

@@ -18,10 +18,12 @@ from per_obspy.files import written_whole
 from per_obspy.processing.noise.signal_to_noise import noise_spectra
 from per_obspy.report.style import (
     BUILDING_COLOURS,
+    CORNER_COLOUR,
     DOTS_PER_INCH,
     FAINT_COLOUR,
     MOTION_COLOUR,
-    STATE_COLOURS,
+    NOISE_COLOUR,
+    USABLE_COLOUR,
     literal,
 )
 from per_obspy.tables.processed import COLUMNS
@@ -95,7 +97,7 @@ def _draw_motion(figure: Any, processed: Any, unfiltered: Any) -> None:
     for axes, (name, unit) in zip(panels, QUANTITIES.items(), strict=True):
         _draw_quantity(axes, dt, _without_pads(processed, samples), raw, unit)
         axes.set_ylabel(f"{name} ({unit})")
-        axes.axvspan(0.0, noise, color=STATE_COLOURS["likely"], alpha=0.15, linewidth=0)
+        axes.axvspan(0.0, noise, color=NOISE_COLOUR, alpha=0.15, linewidth=0)
         axes.grid(alpha=0.25)
         # The next panel is the integral, which begins in the pads
         samples = cumulative_trapezoid(samples, dx=dt, initial=0)
@@ -130,9 +132,9 @@ def _draw_amplitudes(axes: Axes, processed: Any, unfiltered: Any) -> None:
     # Corners of the filter, and the band whose periods are usable
     for name in ("highpass", "lowpass"):
         label = f"{name} {chosen[name]:.3g} Hz"
-        axes.axvline(chosen[name], color=STATE_COLOURS["yes"], linestyle="--", label=label)
+        axes.axvline(chosen[name], color=CORNER_COLOUR, linestyle="--", label=label)
     usable = 1 / chosen.longest_period, 1 / chosen.shortest_period
-    axes.axvspan(*usable, color=STATE_COLOURS["no"], alpha=0.1, linewidth=0, label="usable")
+    axes.axvspan(*usable, color=USABLE_COLOUR, alpha=0.1, linewidth=0, label="usable")
 
     # From one period in the record to the Nyquist frequency
     axes.set(xlabel="frequency (Hz)", ylabel="Fourier amplitude (m/s)", xlim=(lowest, 0.5 / dt))
@@ -155,7 +157,7 @@ def _draw_noise(axes: Axes, unfiltered: FloatArray, dt: float, noise: float, low
     frequency, signal = spectra.frequencies[known], spectra.signal[known]
     # In the colours of the record and of the noise window
     axes.loglog(frequency, signal, color=BUILDING_COLOURS[0], label="signal before the filter")
-    colour = STATE_COLOURS["likely"]
+    colour = NOISE_COLOUR
     axes.loglog(frequency, spectra.noise[known], color=colour, label="noise")
 
 

@@ -11,17 +11,16 @@ from per_obspy.errors import printable
 from per_obspy.files import written_whole
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
-#: State of a pair -> colour (Okabe & Ito 2008, distinct for colour-blind readers too).
-STATE_COLOURS = {
-    "yes": "#D55E00",
-    "likely": "#E69F00",
-    "possible": "#F0E442",
-    "unlikely": "#56B4E9",
-    "no": "#009E73",
-}
+#: Colours of severity, the worst first. Dark red to pale orange for what is to be inspected, blue
+#: for the mildest class: no class is green, because none is a promise of safety. Neighbours differ
+#: for colour-blind readers too, see the test.
+SEVERITY_COLOURS = ("#7F0000", "#D7301F", "#FC8D59", "#FDD08E", "#A6BFD8")
 
-#: Pairs whose gap is unknown.
-UNKNOWN_COLOUR = "#999999"
+#: Pairs whose gap is unknown: not a severity.
+UNKNOWN_COLOUR = "#7A5FA8"
+
+#: Marks in figures of records, which have no severity (Okabe & Ito 2008).
+NOISE_COLOUR, CORNER_COLOUR, USABLE_COLOUR = "#CC79A7", "#0072B2", "#56B4E9"
 
 #: Buildings 1 and 2, the ground motion, and whatever is only for comparison.
 BUILDING_COLOURS = ("#0072B2", "#CC79A7")
@@ -50,15 +49,15 @@ def class_colours(classes: Sequence[str]) -> dict[str, str]:
     Examples
     --------
     >>> class_colours(["severe", "low"])
-    {'severe': '#D55E00', 'low': '#009E73', 'gap unknown': '#999999'}
+    {'severe': '#7F0000', 'low': '#A6BFD8', 'gap unknown': '#7A5FA8'}
     """
-    known, last = list(STATE_COLOURS.values()), max(len(classes) - 1, 1)
+    known, last = SEVERITY_COLOURS, max(len(classes) - 1, 1)
     if len(classes) > len(known):
-        ramp = LinearSegmentedColormap.from_list("risk", known)
+        ramp = LinearSegmentedColormap.from_list("risk", list(known))
         chosen = [to_hex(ramp(number / last)) for number in range(len(classes))]
     else:
         # Mixed colours would not be distinct for colour-blind readers
-        steps = (round(number / last * (len(known) - 1)) for number in range(len(classes)))
+        steps = (number * (len(known) - 1) // last for number in range(len(classes)))
         chosen = [known[step] for step in steps]
     colours = dict(zip(classes, chosen, strict=True))
     return colours | {UNKNOWN_CLASS: UNKNOWN_COLOUR}

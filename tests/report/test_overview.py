@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from numpy.testing import assert_allclose
 
 from per_obspy.report.overview import SHOWN_CLUSTERS, Region, draw_overview
-from per_obspy.report.style import STATE_COLOURS
+from per_obspy.report.style import SEVERITY_COLOURS
 
 CLASSES = ("severe", "high", "moderate", "low")
 TABLE = pd.DataFrame(
@@ -72,9 +72,9 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
     figure = overview(TABLE)
     chart = figure.axes[0]
     found = _points(chart)
-    assert found[STATE_COLOURS["yes"]] == [[20.0, 60.0]]
-    assert found[STATE_COLOURS["likely"]] == [[20.3, 60.0]]
-    assert sorted(found[STATE_COLOURS["no"]]) == [[20.1, 60.1], [20.2, 59.9]]
+    assert found[SEVERITY_COLOURS[0]] == [[20.0, 60.0]]
+    assert found[SEVERITY_COLOURS[1]] == [[20.3, 60.0]]
+    assert sorted(found[SEVERITY_COLOURS[-1]]) == [[20.1, 60.1], [20.2, 59.9]]
     # stations and epicentre are open, and drawn below the pairs
     pairs, stations, epicentre = chart.collections
     assert_allclose(stations.get_offsets(), [[20.05, 60.02]])
@@ -90,7 +90,7 @@ def test_the_map_has_every_pair_and_station_at_its_place(overview):
 
 def test_gaps_are_drawn_over_demands_in_centimetres(overview):
     gaps = overview(TABLE).axes[1]
-    assert _points(gaps)[STATE_COLOURS["yes"]] == [[30.0, 10.0]]
+    assert _points(gaps)[SEVERITY_COLOURS[0]] == [[30.0, 10.0]]
     # a curve of equal values: scales of both axes differ
     equal = gaps.lines[0].get_xydata()
     assert equal[[0, -1]].tolist() == [[0.0, 0.0], [30.0, 30.0]]

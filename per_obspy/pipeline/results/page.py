@@ -15,7 +15,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.config import Run
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.results.layer_sources import outlines_beside
-from per_obspy.pipeline.results.run_facts import event_of_run
+from per_obspy.pipeline.results.page_drawings import page_drawings
+from per_obspy.pipeline.results.run_facts import event_of_run, revision_of_run
 from per_obspy.pipeline.results.station_facts import pair_histories, station_rows
 from per_obspy.report.overview import Region
 from per_obspy.report.page.building_outlines import read_outlines
@@ -23,12 +24,11 @@ from per_obspy.report.page.coast import lines_around
 from per_obspy.report.page.content import (
     BUILDING_KINDS,
     MOST_ROWS,
-    PAIR_KINDS,
     REJECTED_COLUMNS,
     PageData,
 )
 from per_obspy.report.page.document import write_page
-from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS
+from per_obspy.report.page.export_columns import MOST_COLUMNS
 from per_obspy.report.page.first_screen import Event
 from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
@@ -37,14 +37,13 @@ from per_obspy.report.summary.wording import WORDING
 from per_obspy.tables.risk import RankedTable
 from per_obspy.tables.totals import areas_of
 
-#: Columns of the worst pairs that the page needs.
-PAGE_COLUMNS = tuple(dict.fromkeys((*PAIR_KINDS, *HISTORY_COLUMNS)))
-
 
 def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
-    """Return the worst pairs of a risk table with the columns of the page and their areas."""
+    """Return the worst pairs of a risk table with all columns and their areas."""
+    # The leading columns are those of the package, those of the inventory follow
     area = [settings.totals.area] if settings.totals.area else []
-    worst = table.first(PAGE_PAIRS, [*PAGE_COLUMNS, *area])
+    names = table.file.schema_arrow.names[: 2 * MOST_COLUMNS]
+    worst = table.first(PAGE_PAIRS, [*names, *area])
     return worst.assign(area=areas_of(worst, settings.totals, settings.totals.area or ""))
 
 
@@ -76,13 +75,14 @@ def write_run_page(
     region = Region(settings.name, tuple(settings.screening.classes), simulated, pd.DataFrame())
     # Sentences are made of tables, and the map of pairs
     table = station_rows(folder / "stations.csv", stations)
+    event = _run_event(settings, folder, region, stations, table)
     rejected, rejections = _rejected(folder / "rejected.csv")
     data = PageData(
         title=region.title,
         language=settings.report.language,
         simulated=simulated,
         classes=tuple(region.classes),
-        event=_event(stations, table, _known(settings, folder, region), settings.report.language),
+        event=event,
         tally=tally,
         worst=worst,
         stations=table,
@@ -94,6 +94,7 @@ def write_run_page(
         lines=lines_around(*(_column(worst, name) for name in ("longitude", "latitude"))),
         histories=pair_histories(worst, stations),
         provenance=_provenance(settings),
+        drawings=page_drawings(settings, worst, stations),
     )
     write_page(data, folder / "report.html")
 
@@ -159,6 +160,7 @@ def write_table_page(
     worst : DataFrame
         The worst pairs.
     """
+    # Files that the stages before have written
     rejected, rejections = _rejected(folder / "rejected.csv")
     region, stations = sources.region, sources.stations
     # Stations of all scenarios; a spectrum has none
@@ -218,6 +220,20 @@ def _event(
         # A ShakeMap is named in sentences of its own
         source=" ".join(_map_sentences(known, table, language)),
     )
+
+
+def _run_event(
+    settings: Run,
+    folder: Path,
+    region: Region,
+    stations: Sequence[FinishedStation],
+    table: pd.DataFrame,
+) -> Event:
+    """Return the earthquake of a run, with number and time of its revision, if it has them."""
+    known = _known(settings, folder, region)
+    event = _event(stations, table, known, settings.report.language)
+    number, time = revision_of_run(folder / "run.json")
+    return event._replace(revision=settings.report.revision or number, revised=time)
 
 
 def _map_sentences(known: Mapping[str, Any], table: pd.DataFrame, language: Language) -> list[str]:

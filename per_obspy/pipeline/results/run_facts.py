@@ -1,5 +1,6 @@
 """Facts of a run that its summary states: the earthquake and the stations."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,9 @@ from per_obspy.records.shakemap import map_event
 from per_obspy.report.overview import Region
 from per_obspy.resume import StatusError, read_status
 from per_obspy.tables.station_summary import COLUMNS
+
+#: A time of ISO 8601 up to its minute.
+TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
 
 
 def event_facts(event: Any) -> dict[str, object]:
@@ -70,6 +74,26 @@ def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> 
             facts |= {"start": group.get("start")}
             facts |= {name: value for name, value in known.items() if value is not None}
     return facts
+
+
+def revision_of_run(record: Path) -> tuple[int, str]:
+    """
+    Return number and time (``HH:MM``, UTC) of the revision of a run; 0 and empty where unknown.
+
+    Parameters
+    ----------
+    record : Path
+        ``run.json``, finished or not: ``revision``, and ``revised`` or else ``started``.
+    """
+    try:
+        known = read_status(record)
+    except StatusError:
+        return 0, ""
+    given, time = known.get("revision"), str(known.get("revised") or known.get("started") or "")
+    # Anything else than a whole number above 0 is none
+    is_number = isinstance(given, int) and not isinstance(given, bool) and given > 0
+    number = int(str(given)) if is_number else 0
+    return number, time[11:16] if TIME.match(time) else ""
 
 
 def read_stations(path: Path) -> pd.DataFrame:

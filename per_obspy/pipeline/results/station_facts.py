@@ -14,8 +14,8 @@ from per_obspy.pipeline.results.run_facts import read_stations
 from per_obspy.pipeline.stations import file_stem
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS, drawn_history
 
-#: Pairs whose history is drawn, the worst ones.
-HISTORIES = 50
+#: Pairs whose history is drawn, the worst ones: 2 kB and 0.02 s each, 0.2 s in a long record.
+HISTORIES = 100
 
 #: Period and damping of the spectra in the table of stations.
 SHOWN_PERIOD, SHOWN_DAMPING = 1.0, 0.05

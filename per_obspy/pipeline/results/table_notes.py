@@ -1,11 +1,11 @@
 """Numbers of a whole table, and its worst rows, noted while it is read in pieces."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 import pandas as pd
 
 from per_obspy.report.layers.spreadsheet import ROWS
+from per_obspy.report.page.tally import PairTally
 from per_obspy.report.summary.statements import Counts
 
 #: Columns that notes need; those that a table lacks are left out.
@@ -18,20 +18,22 @@ COLUMNS = (
 
 
 class Notes:
-    """Counts of a table that is read in pieces, worst first, and its worst rows."""
+    """
+    Counts of a table that is read in pieces, worst first, and its worst rows.
 
-    def __init__(self) -> None:
-        self.states, self.classes = Counter[str](), Counter[str]()
-        self.expected, self.derived, self.far = 0.0, 0, 0
+    Parameters
+    ----------
+    classes : sequence of str
+        Names of the risk classes, worst first.
+    """
+
+    def __init__(self, classes: Sequence[str]) -> None:
+        self.tally = PairTally(classes)
         self._worst, self._rows = list[pd.DataFrame](), 0
 
     def add(self, piece: pd.DataFrame) -> None:
         """Take the next rows."""
-        self.states.update(piece["state"].tolist())
-        self.classes.update(piece["risk_class"].tolist())
-        self.expected += float(piece["probability"].sum())
-        self.derived += int((_texts(piece, "derived") != "").sum())
-        self.far += int(_texts(piece, "flags").str.contains(r"\bfar_station\b").sum())
+        self.tally.add(piece)
         # The first rows are the worst
         if self._rows < ROWS:
             self._worst.append(piece.head(ROWS - self._rows).copy())
@@ -40,19 +42,14 @@ class Notes:
     @property
     def counts(self) -> Counts:
         """Return the numbers of the table."""
-        return Counts(self.states, self.classes, self.expected, self.derived, self.far)
+        found = self.tally
+        far = found.flags["far_station"]
+        return Counts(found.states, found.classes, found.expected, found.derived, far)
 
     @property
     def worst(self) -> pd.DataFrame:
         """Return the worst rows, as many as a workbook has."""
         return pd.concat(self._worst, ignore_index=True) if self._worst else pd.DataFrame()
-
-
-def _texts(piece: pd.DataFrame, name: str) -> "pd.Series[str]":
-    """Return a column of texts, empty where the table has none."""
-    if name not in piece:
-        return pd.Series("", index=piece.index, dtype=str)
-    return piece[name].fillna("").astype(str)
 
 
 def needed_columns(more: Sequence[str]) -> list[str]:

@@ -17,8 +17,8 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.scenario_runs import ScenarioRuns
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region, draw_overview
-from per_obspy.report.page.content import PAIR_KINDS
-from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
+from per_obspy.report.page.export_columns import MOST_COLUMNS
+from per_obspy.report.page.tally import PAGE_PAIRS
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
 from per_obspy.screening.by_spectrum.design_table import DESIGN
@@ -38,9 +38,6 @@ SHOWN = 20_000
 
 #: Columns of the pairs that a figure shows, as far as the table has them.
 _SHOWN_COLUMNS = ("rank", "pair_id", "risk_class", "longitude", "latitude", "demand", "gap")
-
-#: Columns of the pairs of the page, and of their histories.
-_PAGE_COLUMNS = (*(name for name in PAIR_KINDS if name != "area"), "worst_scenario")
 
 
 class _Asked(NamedTuple):
@@ -88,7 +85,6 @@ class _Noted(NamedTuple):
     """Whatever is noted of a table while it is read in pieces."""
 
     notes: Notes
-    tally: PairTally
     shown: list[pd.DataFrame]
     worst: list[pd.DataFrame]
     totals: list[PieceTotals]
@@ -212,7 +208,7 @@ def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFram
 
 def _write(asked: _Asked, pieces: Iterator[pd.DataFrame], pairs: int, report: Report) -> None:
     """Read a table once, and write everything that people look at."""
-    found = _Noted(Notes(), PairTally(asked.region.classes), [], [], [])
+    found = _Noted(Notes(asked.region.classes), [], [], [])
     noted = _noted(pieces, pairs, asked, found)
     if asked.settings.geopackage:
         files = layer_paths(asked.folder, asked.stem)
@@ -242,6 +238,7 @@ def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Repo
     points = pd.concat(found.shown, ignore_index=True)
     worst = pd.concat(found.worst, ignore_index=True)
     language = asked.settings.report.language
+    # Files of every screening, then the page
     written = Screening(
         folder,
         asked.stem,
@@ -266,7 +263,8 @@ def _write_files(asked: _Asked, found: _Noted, areas: pd.DataFrame, report: Repo
             histories,
             asked.notes,
         )
-        write_table_page(folder, sources, found.tally, worst)
+        write_table_page(folder, sources, found.notes.tally, worst)
+    # The map of all pairs
     overview = folder / "figures" / "overview.png"
     with report.tried(overview):
         draw_overview(points, region, overview)
@@ -287,14 +285,15 @@ def _noted(
     step, totals = -(-pairs // SHOWN), asked.totals
     classes = [*asked.region.classes, UNKNOWN_CLASS]
     for piece in pieces:
+        before = found.notes.tally.pairs
         found.notes.add(piece)
+        # Figures show some of the pairs
         columns = [name for name in _SHOWN_COLUMNS if name in piece]
         found.shown.append(piece.loc[piece["rank"].to_numpy() % step == 1 % step, columns])
         # Totals by area, and the rest from the same pass
         found.totals.append(piece_totals(piece, totals, classes))
-        # The page holds the worst pairs
-        kept = piece.head(max(PAGE_PAIRS - found.tally.pairs, 0))
-        columns = [name for name in _PAGE_COLUMNS if name in kept]
+        # The page holds the worst pairs, with all columns for its export
+        kept = piece.head(max(PAGE_PAIRS - before, 0))
+        columns = [str(name) for name in kept if name != "area"][: 2 * MOST_COLUMNS]
         found.worst.append(kept[columns].assign(area=areas_of(kept, totals, totals.area or "")))
-        found.tally.add(piece)
         yield piece

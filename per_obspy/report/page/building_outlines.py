@@ -1,4 +1,4 @@
-"""Outlines of buildings for the page, from the table beside pairs made from footprints."""
+"""Outlines of buildings for the page, from the table next to pairs made from footprints."""
 
 from collections.abc import Collection
 from importlib.util import find_spec

@@ -1,10 +1,11 @@
-"""Counts of pairs by cell and class, for the pairs that a page does not show one by one."""
+"""Counts of pairs by cell, class and state, for those that a page does not show one by one."""
 
 from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 #: Largest number of cells; where there would be more, cells become twice as large.
 MOST_CELLS = 10_000
@@ -15,31 +16,32 @@ SMALLEST_CELL = 0.001
 
 class CellCounts:
     """
-    Numbers of pairs in cells of a grid in degrees, by class, taken in pieces.
+    Numbers of pairs in cells of a grid in degrees, by class and state, taken in pieces.
 
     A class, because cells grow while the pieces of a table arrive.
 
     Parameters
     ----------
-    kinds : sequence of str
-        Risk classes that a pair can have; others are counted as the last one.
+    classes, states : sequence of str
+        Risk classes and states that a pair can have; others are counted as the last ones.
     """
 
-    def __init__(self, kinds: Sequence[str]) -> None:
+    def __init__(self, classes: Sequence[str], states: Sequence[str]) -> None:
         """Begin without a pair."""
-        self.kinds = tuple(kinds)
+        self.classes, self.states = tuple(classes), tuple(states)
         self.size = SMALLEST_CELL
         self._counts: Counter[tuple[int, int, int]] = Counter()
 
     def add(self, pairs: pd.DataFrame) -> None:
-        """Count pairs by place and class; those without a place are left out."""
+        """Count pairs by place, class and state; those without a place are left out."""
         # Columns and rows of the grid
         placed = pairs[np.isfinite(pairs["longitude"]) & np.isfinite(pairs["latitude"])]
         column = np.floor(placed["longitude"].to_numpy() / self.size).astype(np.int64)
         row = np.floor(placed["latitude"].to_numpy() / self.size).astype(np.int64)
-        codes = pd.Index(self.kinds).get_indexer(placed["risk_class"])
-        kind = np.where(codes < 0, len(self.kinds) - 1, codes)
-        # Pairs of one cell and class together
+        # A class and a state are one kind
+        kind = len(self.states) * _codes(placed["risk_class"], self.classes)
+        kind += _codes(placed["state"], self.states)
+        # Pairs of one cell and kind together
         keys, counts = np.unique(np.stack([column, row, kind]), axis=1, return_counts=True)
         for key, count in zip(keys.T.tolist(), counts.tolist(), strict=True):
             self._counts[key[0], key[1], key[2]] += count
@@ -55,13 +57,24 @@ class CellCounts:
         self._counts = joined
 
     def table(self) -> pd.DataFrame:
-        """Return one row per cell: ``longitude, latitude`` of its middle, a column per class."""
+        """
+        Return one row per cell: ``longitude, latitude`` of its middle, a column per kind that is.
+
+        The name of a kind is the number of its class and the number of its state.
+        """
         if not self._counts:
-            return pd.DataFrame(columns=["longitude", "latitude", *self.kinds], dtype=float)
+            return pd.DataFrame(columns=["longitude", "latitude"], dtype=float)
         counts = pd.Series(dict(self._counts)).unstack(fill_value=0)
-        counts = counts.reindex(columns=range(len(self.kinds)), fill_value=0)
-        counts.columns = pd.Index(self.kinds)
+        # Names cannot be those of a hostile class
+        kinds = (divmod(int(kind), len(self.states)) for kind in counts.columns)
+        counts.columns = pd.Index([f"{code} {state}" for code, state in kinds])
         # Cells are numbered from their south-western corner
         middle = (np.array(counts.index.to_list()) + 0.5) * self.size
         places = pd.DataFrame(middle, columns=["longitude", "latitude"])
         return pd.concat([places, counts.reset_index(drop=True)], axis=1)
+
+
+def _codes(column: pd.Series, names: Sequence[str]) -> NDArray[np.int64]:
+    """Return the number of each row's name, of other names the last one."""
+    codes = pd.Index(names).get_indexer(pd.Index(column)).astype(np.int64)
+    return np.where(codes < 0, len(names) - 1, codes)

@@ -7,23 +7,23 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from per_obspy.errors import shortened
+from per_obspy.report.page.export_columns import addresses, pack_export, text_kind
 from per_obspy.report.page.first_screen import Event, first_screen
 from per_obspy.report.page.packing import LONGEST_TEXT, PackedTable, pack_table
 from per_obspy.report.page.tally import PairTally
-from per_obspy.report.page.texts import LANGUAGES, Language
+from per_obspy.report.page.texts import LANGUAGES, Language, fixed_phrases
 from per_obspy.report.style import BUILDING_COLOURS, class_colours
 from per_obspy.screening.columns import FLAGS
 from per_obspy.screening.ranking import EVERY_STATE
-from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: Columns of a pair on the page, and their kinds.
 PAIR_KINDS = {
-    "rank": "number", "pair_id": "text", "state": "choice", "risk_class": "choice",
+    "rank": "whole", "pair_id": "text", "state": "choice", "risk_class": "choice",
     "probability": "number", "expected_impact_velocity": "number", "impact_velocity_84": "number",
     "expected_amplification": "number", "gap": "number", "demand": "number",
     "demand_rule": "choice", "missing_gap": "number", "impacts": "number",
     "impact_velocity_exact": "number", "amplification_exact_1": "number",
-    "amplification_exact_2": "number", "flags": "choice", "derived": "choice", "area": "choice",
+    "amplification_exact_2": "number", "flags": "names", "derived": "names", "area": "choice",
     "station": "choice", "distance": "number", "azimuth_used": "number",
     "building_id_1": "text", "building_id_2": "text", "longitude": "place", "latitude": "place",
     "longitude_1": "place", "latitude_1": "place", "longitude_2": "place", "latitude_2": "place",
@@ -34,6 +34,9 @@ PAIR_KINDS = {
     "period_log_std_2": "number", "supplemental_damping": "number",
     "bumper_restitution": "number",
 }  # fmt: skip
+
+#: Kinds of texts that the script never shows by their keys.
+HIDDEN = ("flag_", "flagname_", "class_", "kind_", "stations_", "sure_", "todo_", "number_")
 
 #: Columns of a building on the page, and their kinds.
 BUILDING_KINDS = {
@@ -58,6 +61,30 @@ MOST_ROWS = 500
 
 #: Longest text of a cell in them, characters.
 LONGEST_CELL = 300
+
+
+class PageDrawings(NamedTuple):
+    """
+    Drawings and sensitivities, computed again for some pairs and stations.
+
+    Attributes
+    ----------
+    stations : mapping of str to dict
+        Name -> record and spectra of a station for a drawing.
+    sensitivity : mapping of int to list
+        Rank -> input, both values, and probability and state at each of them.
+    worst, doubtful : int
+        Pairs whose sensitivity is computed: the worst, and those with a chance nearest to a half.
+    """
+
+    stations: Mapping[str, dict[str, Any]]
+    sensitivity: Mapping[int, list[list[Any]]]
+    worst: int
+    doubtful: int
+
+
+#: A page without drawings of stations and without sensitivities.
+NO_DRAWINGS = PageDrawings({}, {}, 0, 0)
 
 
 class PageData(NamedTuple):
@@ -92,6 +119,8 @@ class PageData(NamedTuple):
         ``coast`` and ``borders``, lines of longitude and latitude by turns.
     histories : mapping of int to dict
         Rank -> history of a pair for a drawing.
+    drawings : PageDrawings
+        Stations and sensitivities for drawings.
     provenance : sequence of (str, str)
         Where the results come from.
     """
@@ -112,18 +141,22 @@ class PageData(NamedTuple):
     lines: Mapping[str, list[list[float]]]
     histories: Mapping[int, dict[str, Any]]
     provenance: Sequence[tuple[str, str]]
+    drawings: PageDrawings = NO_DRAWINGS
 
 
 def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
     """Return the content of the page, and its tables, whose descriptions the content holds."""
     # Sentences first, then whatever the script draws
     facts = data.language, data.simulated
-    screen = first_screen(data.event, data.tally, data.worst, data.areas, data.buildings, facts)
+    # Tables of which it names rows
+    found = data.areas, data.stations
+    screen = first_screen(data.event, data.tally, data.worst, found, data.buildings, facts)
     texts, tables = LANGUAGES[data.language], _tables(data)
     content = {
         "language": data.language,
-        "texts": {key: text for key, text in texts.items() if not key.startswith("flag_")},
+        "texts": {key: text for key, text in texts.items() if not key.startswith(HIDDEN)},
         "flags": {name: texts[f"flag_{name}"] for name in FLAGS},
+        "flag_names": {name: texts[f"flagname_{name}"] for name in FLAGS},
         "title": shortened(data.title, LONGEST_CELL),
         "simulated": data.simulated,
         **screen._asdict(),
@@ -148,20 +181,38 @@ def _drawn(data: PageData) -> dict[str, Any]:
         "outlines": [[shortened(name, LONGEST_TEXT), ring] for name, ring in data.outlines],
         "histories": {str(rank): history for rank, history in data.histories.items()},
         "history_count": len(data.histories),
+        "station_drawings": {
+            shortened(name, LONGEST_TEXT): drawn for name, drawn in data.drawings.stations.items()
+        },
+        "sensitivity": {str(rank): rows for rank, rows in data.drawings.sensitivity.items()},
+        "sensitivity_counts": [data.drawings.worst, data.drawings.doubtful],
     }
 
 
 def _tables(data: PageData) -> list[PackedTable]:
-    """Return pairs, cells and buildings."""
-    cells = dict.fromkeys(("longitude", "latitude"), "place") | dict.fromkeys(
-        data.tally.cells.kinds, "number"
-    )
-    buildings = pd.DataFrame() if data.buildings is None else data.buildings
+    """Return pairs, cells, buildings, and the columns of pairs that only the export needs."""
+    cells = data.tally.cells.table()
+    kinds = dict.fromkeys(("longitude", "latitude"), "place")
+    kinds |= {str(name): "whole" for name in cells if name not in kinds}
+    # Places of the inventory by name, for the search
+    address = addresses(data.worst)
+    pairs = data.worst if address is None else data.worst.assign(address=address)
     return [
-        pack_table(data.worst, PAIR_KINDS),
-        pack_table(data.tally.cells.table(), cells),
-        pack_table(buildings, BUILDING_KINDS),
+        pack_table(pairs, PAIR_KINDS | {"address": text_kind(pairs, "address")}),
+        pack_table(cells, kinds),
+        pack_table(_buildings(data), BUILDING_KINDS),
+        pack_export(data.worst, PAIR_KINDS),
     ]
+
+
+def _buildings(data: PageData) -> pd.DataFrame:
+    """Return the buildings with their prevention in the language of the page."""
+    if data.buildings is None:
+        return pd.DataFrame()
+    if "prevention" not in data.buildings:
+        return data.buildings
+    sentences = [fixed_phrases(str(text), data.language) for text in data.buildings["prevention"]]
+    return data.buildings.assign(prevention=sentences)
 
 
 def _states(tally: PairTally, texts: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -178,7 +229,7 @@ def _classes(data: PageData, texts: Mapping[str, str]) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "label": texts["state_unknown"] if name == UNKNOWN_CLASS else shortened(name, 40),
+            "label": texts.get(f"class_{name}", shortened(name, 40)),
             "colour": colour,
             "weight": 4.0 * max(1.0 - number / max(len(colours) - 2, 1), 0.0),
             "count": data.tally.classes[name],
@@ -194,26 +245,38 @@ def _further_tables(data: PageData, texts: Mapping[str, str]) -> dict[str, Any]:
         areas = areas.sort_values("expected_pounding", ascending=False)
     if data.rejections:
         shown = min(data.rejections, MOST_ROWS)
-        note = texts["rejected_some"].format(shown=shown, all=data.rejections)
+        key = "rejected_some_one" if data.rejections == 1 else "rejected_some"
+        note = texts[key].format(shown=shown, all=data.rejections)
     # Stations are on the map too
-    stations = _rows(_described(data.stations, texts), STATION_COLUMNS, texts)
+    stations = _rows(_described(data.stations, data.language), STATION_COLUMNS, texts)
     return {
         "stations": {**stations, "places": _station_places(data.stations)},
         "areas": _rows(areas, AREA_COLUMNS, texts),
-        "rejected": {**_rows(data.rejected, REJECTED_COLUMNS, texts), "note": note},
+        "rejected": {**_rows(_reasons(data, texts), REJECTED_COLUMNS, texts), "note": note},
         "provenance": [[name, shortened(value, LONGEST_CELL)] for name, value in data.provenance],
     }
 
 
-def _described(stations: pd.DataFrame, texts: Mapping[str, str]) -> pd.DataFrame:
+def _reasons(data: PageData, texts: Mapping[str, str]) -> pd.DataFrame:
+    """Return the rejections with kinds and reasons in the language of the page."""
+    if not {"kind", "reasons"} <= set(data.rejected):
+        return data.rejected
+    kinds = [texts.get(f"kind_{kind}", str(kind)) for kind in data.rejected["kind"]]
+    reasons = [fixed_phrases(str(text), data.language) for text in data.rejected["reasons"]]
+    return data.rejected.assign(kind=kinds, reasons=reasons)
+
+
+def _described(stations: pd.DataFrame, language: Language) -> pd.DataFrame:
     """Return stations with their states in words, and reasons of rejection with the warnings."""
+    texts = LANGUAGES[language]
     if not {"state", "warnings", "rejected"} <= set(stations):
         return stations
     # Reasons and warnings are one column
     named = {name: texts[f"station_{name}"] for name in ("used", "rejected")}
     both = stations["rejected"].fillna("") + " " + stations["warnings"].fillna("")
     state = stations["state"].map(named).fillna("")
-    return stations.assign(state=state, warnings=both.str.strip())
+    sentences = [fixed_phrases(text, language) for text in both.str.strip()]
+    return stations.assign(state=state, warnings=sentences)
 
 
 def _station_places(stations: pd.DataFrame) -> list[list[Any]]:

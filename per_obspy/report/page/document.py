@@ -11,7 +11,7 @@ from per_obspy.report.page.content import PageData, page_content
 from per_obspy.report.page.packing import encoded
 
 #: Parts of the script, in their order.
-SCRIPTS = ("data.js", "map.js", "list.js", "details.js", "page.js")
+SCRIPTS = ("data.js", "map.js", "list.js", "details.js", "stations.js", "page.js")
 
 
 def write_page(data: PageData, path: Path) -> None:

@@ -8,13 +8,16 @@ import pandas as pd
 
 from per_obspy.errors import shortened
 from per_obspy.report.page.tally import PairTally
-from per_obspy.report.page.texts import LANGUAGES, Language, written
+from per_obspy.report.page.texts import LANGUAGES, Language, counted, fixed_phrases, written
 
 #: Names in a sentence.
 NAMED = 5
 
 #: Longest name in a sentence, characters.
 LONGEST_NAME = 40
+
+#: Stations in a sentence, and the longest reason of one that is not used, characters.
+NAMED_STATIONS, LONGEST_REASON = 12, 90
 
 #: Longest text on what stands for an earthquake, characters.
 LONGEST_SOURCE = 500
@@ -48,6 +51,10 @@ class Event(NamedTuple):
         Stations that serve pairs and those that do not.
     source : str
         Sentences on what stands for the earthquake, instead of all that; empty if there is one.
+    revision : int
+        Number of the revision of these results; 0 if they have none.
+    revised : str
+        Time of that revision, UTC, as text; empty if unknown.
     """
 
     start: str
@@ -57,6 +64,8 @@ class Event(NamedTuple):
     used: int
     missing: int
     source: str = ""
+    revision: int = 0
+    revised: str = ""
 
 
 class FirstScreen(NamedTuple):
@@ -65,8 +74,10 @@ class FirstScreen(NamedTuple):
 
     Attributes
     ----------
-    event : str
-        One line.
+    event, revision : str
+        One line each; the revision is empty if there is none.
+    expected : str
+        Which stations are expected, used, and missing or rejected, with their names.
     numbers : list of (str, str)
         Value and meaning.
     first, sure : list of str
@@ -74,6 +85,8 @@ class FirstScreen(NamedTuple):
     """
 
     event: str
+    revision: str
+    expected: str
     numbers: list[tuple[str, str]]
     first: list[str]
     sure: list[str]
@@ -83,7 +96,7 @@ def first_screen(
     event: Event,
     tally: PairTally,
     worst: pd.DataFrame,
-    areas: pd.DataFrame,
+    tables: tuple[pd.DataFrame, pd.DataFrame],
     buildings: pd.DataFrame | None,
     facts: tuple[Language, bool],
 ) -> FirstScreen:
@@ -98,16 +111,18 @@ def first_screen(
         Of all pairs.
     worst : DataFrame
         The worst pairs in their order.
-    areas : DataFrame
-        Totals by area.
+    tables : (DataFrame, DataFrame)
+        Totals by area, and stations with ``station, state, rejected``.
     buildings : DataFrame or None
         Buildings, the worst first, if the run has them.
     facts : (Language, bool)
         Language, and whether the motion is simulated.
     """
-    language = facts[0]
+    language, (areas, stations) = facts[0], tables
     return FirstScreen(
         _event_line(event, language),
+        _revision(event, language),
+        _expected(stations, language),
         _numbers(tally, worst, buildings, language),
         _first(tally, worst, areas, buildings, facts),
         _sure(tally, areas, language) if tally.pairs else [],
@@ -126,10 +141,46 @@ def _event_line(event: Event, language: Language) -> str:
         parts.append(f"{event.time} UTC")
     elif event.start:
         parts.append(texts["event_time"].format(time=event.start))
-    # Where, and by how many stations
     parts += _place_texts(event, language)
-    parts.append(texts["event_stations"].format(used=event.used, missing=event.missing))
-    return ", ".join(parts) + "."
+    return f"{', '.join(parts)}." if parts else ""
+
+
+def _revision(event: Event, language: Language) -> str:
+    """Return number and time of the revision, empty if there is none."""
+    if not event.revision:
+        return ""
+    key = "revision_time" if event.revised else "revision"
+    value = written(event.revision, 0, language)
+    return LANGUAGES[language][key].format(value=value, time=shortened(event.revised, 20))
+
+
+def _expected(stations: pd.DataFrame, language: Language) -> str:
+    """Return how many stations are expected, and the names of the used and the missing ones."""
+    if stations.empty or not {"station", "state"} <= set(stations):
+        return ""
+    # Whatever is not used serves no pair
+    is_used = (stations["state"] == "used").to_numpy()
+    used, missing = stations[is_used], stations[~is_used]
+    parts = [counted(language, "stations_expected", len(stations))]
+    for key, chosen in (("stations_used", used), ("stations_missing", missing)):
+        if len(chosen):
+            names = _station_names(chosen, language, with_reasons=key == "stations_missing")
+            parts.append(f"{counted(language, key, len(chosen))}: {names}")
+    return "; ".join(parts) + "."
+
+
+def _station_names(stations: pd.DataFrame, language: Language, *, with_reasons: bool) -> str:
+    """Return the names of the first stations, with reasons where they are known."""
+    shown = list[str]()
+    for _, station in stations.head(NAMED_STATIONS).iterrows():
+        name, reason = shortened(str(station["station"]), LONGEST_NAME), station.get("rejected")
+        if with_reasons and isinstance(reason, str) and reason:
+            name += f" ({shortened(fixed_phrases(reason, language), LONGEST_REASON)})"
+        shown.append(name)
+    # Names of all of them are in the table of stations
+    others = len(stations) - len(shown)
+    more = counted(language, "and_more", others)
+    return ", ".join(shown) + (f" {more}" if others else "")
 
 
 def _place_texts(event: Event, language: Language) -> list[str]:
@@ -153,19 +204,28 @@ def _numbers(
     # Five numbers that a decision needs, the last one in a unit
     texts = LANGUAGES[language]
     sure = tally.states["yes"] + tally.states["likely"]
-    numbers = [(float(tally.pairs), texts["number_pairs"]), (sure, texts["number_pounding"])]
+    numbers = [(float(tally.pairs), "number_pairs"), (float(sure), "number_pounding")]
     if buildings is not None and "neighbours_that_can_hit" in buildings:
         hit = float((buildings["neighbours_that_can_hit"] > 0).sum())
-        numbers.append((hit, texts["number_buildings"]))
+        numbers.append((hit, "number_buildings"))
     else:
-        numbers.append((tally.expected, texts["number_expected"]))
+        numbers.append((tally.expected, "number_expected"))
+    counts = [
+        (written(value, 0, language), _meaning(key, value, language)) for value, key in numbers
+    ]
     # The class of the worst pair is the worst that occurs
     if "risk_class" in worst and len(worst):
         name = str(worst["risk_class"].iloc[0])
-        meaning = texts["number_severe"].format(name=shortened(name, LONGEST_NAME))
-        numbers.append((tally.classes[name], meaning))
-    counts = [(written(value, 0, language), meaning) for value, meaning in numbers]
+        label = texts.get(f"class_{name}", shortened(name, LONGEST_NAME))
+        meaning = texts["number_severe"].format(name=label)
+        counts.append((written(tally.classes[name], 0, language), meaning))
     return [*counts, *_fastest(worst, language)]
+
+
+def _meaning(key: str, value: float, language: Language) -> str:
+    """Return the meaning of a number, in the singular where it is written as one."""
+    texts = LANGUAGES[language]
+    return texts[f"{key}_one"] if written(value, 0, language) == "1" else texts[key]
 
 
 def _fastest(worst: pd.DataFrame, language: Language) -> list[tuple[str, str]]:
@@ -193,8 +253,7 @@ def _first(
     # Gaps to be measured, and pairs that come later
     for state in ("unknown", "possible"):
         if tally.states[state]:
-            value = written(tally.states[state], 0, language)
-            said.append(texts[f"todo_{state}"].format(count=value))
+            said.append(counted(language, f"todo_{state}", tally.states[state]))
     return said
 
 
@@ -220,8 +279,7 @@ def _sure(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str
     whole = written(tally.pairs, 0, language)
     for flag, key in DOUBTS.items():
         if tally.flags[flag]:
-            value = written(tally.flags[flag], 0, language)
-            said.append(texts[key].format(count=value, all=whole))
+            said.append(counted(language, key, tally.flags[flag], all=whole))
     # The nearer the records, the surer the motion
     distance = tally.median_distance()
     if math.isfinite(distance):
@@ -240,7 +298,8 @@ def _spread(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[s
     high = float(areas[names[1]].fillna(0.0).sum())
     values = {"mean": tally.expected, "low": low, "high": high}
     texts = {name: written(value, 0, language) for name, value in values.items()}
-    return [LANGUAGES[language]["sure_expected"].format(**texts)]
+    key = "sure_expected_one" if texts["mean"] == "1" else "sure_expected"
+    return [LANGUAGES[language][key].format(**texts)]
 
 
 def _placed_names(areas: pd.DataFrame, language: Language) -> str:

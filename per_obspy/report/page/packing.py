@@ -22,6 +22,9 @@ UNKNOWN_PLACE = np.iinfo(np.int32).min
 #: Longest name on the page, characters: an inventory may have identifiers of any length.
 LONGEST_TEXT = 120
 
+#: Longest text of flags or columns of the package separated by blanks, characters.
+LONGEST_NAMES = 4_000
+
 #: Largest number of different texts that are stored once each, with a number per row.
 MOST_CHOICES = 65_536
 
@@ -51,7 +54,9 @@ def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
     table : DataFrame
         Its rows keep their order.
     kinds : mapping of str to str
-        Column -> ``number``, ``place`` (degrees), ``choice`` (few different texts) or ``text``.
+        Column -> ``number`` (four digits), ``whole`` (all digits), ``place`` (degrees), ``choice``
+        (few different texts), ``names`` (words of the package, of which none may be cut) or
+        ``text``.
     """
     # Data follow each other in the order of the descriptions
     columns, pieces = list[dict[str, Any]](), list[bytes]()
@@ -85,6 +90,14 @@ def rounded(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.ldexp(np.rint(fraction * scale) / scale, exponent).astype(np.float32)
 
 
+def _wholes(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return whole numbers of up to nine digits."""
+    numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
+    known = np.isfinite(numbers)
+    whole = np.where(known, numbers, 0.0).astype(np.int32)
+    return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
+
+
 def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
     """Return degrees as whole numbers."""
     degrees = column.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -93,12 +106,17 @@ def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
     return {}, _planes(np.where(known, whole, np.int32(UNKNOWN_PLACE)))
 
 
-def _choices(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+def _choices(column: pd.Series, longest: int = LONGEST_TEXT) -> tuple[dict[str, Any], bytes]:
     """Return the different texts, and the number of each row's text."""
     codes, texts = pd.factorize(column.fillna("").astype(str))
     if len(texts) > MOST_CHOICES:
         raise ValueError(f"{column.name}: {len(texts)} different texts are no choice")
-    return {"texts": _short(texts)}, codes.astype("<u2").tobytes()
+    return {"texts": _short(texts, longest)}, codes.astype("<u2").tobytes()
+
+
+def _names(column: pd.Series) -> tuple[dict[str, Any], bytes]:
+    """Return choices that are long enough for many names."""
+    return _choices(column, LONGEST_NAMES)
 
 
 def _texts(column: pd.Series) -> tuple[dict[str, Any], bytes]:
@@ -106,9 +124,9 @@ def _texts(column: pd.Series) -> tuple[dict[str, Any], bytes]:
     return {"texts": _short(column.fillna("").astype(str))}, b""
 
 
-def _short(texts: Any) -> list[str]:
+def _short(texts: Any, longest: int = LONGEST_TEXT) -> list[str]:
     """Return texts without control characters, cut where they are long."""
-    return [shortened(str(text), LONGEST_TEXT) for text in texts]
+    return [shortened(str(text), longest) for text in texts]
 
 
 def _planes(values: NDArray[Any]) -> bytes:
@@ -117,7 +135,14 @@ def _planes(values: NDArray[Any]) -> bytes:
     return little.view(np.uint8).reshape(-1, 4).T.tobytes()
 
 
-_PACKERS = {"number": _numbers, "place": _places, "choice": _choices, "text": _texts}
+_PACKERS = {
+    "number": _numbers,
+    "whole": _wholes,
+    "place": _places,
+    "choice": _choices,
+    "names": _names,
+    "text": _texts,
+}
 
 
 def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:

@@ -1,4 +1,4 @@
-"""Everything that the page says of all pairs, counted while the risk table is read in pieces."""
+"""Numbers of all pairs for page and summary, counted while the risk table is read in pieces."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from per_obspy.report.page.cells import CellCounts
+from per_obspy.screening.ranking import EVERY_STATE
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 
 #: Pairs that the page holds one by one, the worst; the others are counted in cells.
@@ -14,7 +15,8 @@ PAGE_PAIRS = 20_000
 
 #: Columns of the risk table that are counted; a table may lack some.
 COUNTED = (
-    "rank", "state", "risk_class", "probability", "flags", "distance", "longitude", "latitude",
+    "rank", "state", "risk_class", "probability", "flags", "derived", "distance", "longitude",
+    "latitude",
 )  # fmt: skip
 
 
@@ -34,10 +36,11 @@ class PairTally:
         """Begin without a pair."""
         self.pairs = 0
         self.expected = 0.0
+        self.derived = 0
         self.states: Counter[str] = Counter()
         self.classes: Counter[str] = Counter()
         self.flags: Counter[str] = Counter()
-        self.cells = CellCounts([*classes, UNKNOWN_CLASS])
+        self.cells = CellCounts([*classes, UNKNOWN_CLASS], EVERY_STATE)
         self._distances: list[pd.Series] = []
 
     def add(self, piece: pd.DataFrame) -> None:
@@ -48,12 +51,15 @@ class PairTally:
         self.classes.update(_counts(piece, "risk_class"))
         for names, count in _counts(piece, "flags").items():
             self.flags.update(dict.fromkeys(names.split(), count))
+        # Rows with a name of a derived column
+        derived = _counts(piece, "derived")
+        self.derived += sum(derived.values()) - derived.get("", 0)
         if "probability" in piece:
             self.expected += float(np.nansum(piece["probability"]))
         if "distance" in piece:
             self._distances.append(piece["distance"].dropna().copy())
         others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
-        if len(others) and {"longitude", "latitude", "risk_class"} <= set(piece):
+        if len(others) and {"longitude", "latitude", "risk_class", "state"} <= set(piece):
             self.cells.add(others)
 
     def median_distance(self) -> float:

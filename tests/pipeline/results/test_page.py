@@ -1,4 +1,9 @@
-"""The page of a run: per_obspy.pipeline.results.page and per_obspy.report.page.drawn_histories."""
+"""
+The page of a run, from its results.
+
+Tests of per_obspy.pipeline.results.page, per_obspy.pipeline.results.page_drawings and
+per_obspy.report.page.drawn_histories.
+"""
 
 import json
 import re
@@ -46,7 +51,8 @@ def test_page_states_what_the_run_found(content, risk):
     counts = {state["name"]: state["count"] for state in content["states"]}
     assert counts["yes"] == (risk["state"] == "yes").sum()
     assert content["numbers"][0][0] == str(len(risk))
-    assert "3 stations used, 0 not usable" in content["event"]
+    assert content["expected"] == ("3 stations expected; 3 used: XX.S001, XX.S002, XX.S003.")
+    assert content["revision"] == ""
     assert [row[0] for row in content["stations"]["rows"]] == ["XX.S001", "XX.S002", "XX.S003"]
 
 
@@ -75,6 +81,42 @@ def test_radius_of_a_station_is_at_least_its_displacement(content):
         assert row[per] >= row[sd] > 0
 
 
+def test_stations_are_drawn_with_their_peaks_and_spectra(content):
+    """The peaks and the radius at 1 s are those of the table, which is made elsewhere."""
+    heads = content["stations"]["heads"]
+    for row in content["stations"]["rows"]:
+        drawn = content["station_drawings"][row[0]]
+        peaks = [max(map(abs, drawn[name])) for name in ("north", "east")]
+        # Three digits
+        assert max(peaks) == pytest.approx(row[heads.index("PGA, m/s²")], rel=5e-3)
+        at_one = min(range(12), key=lambda i: abs(drawn["period"][i] - 1.0))
+        assert drawn["per"][at_one] == pytest.approx(row[heads.index("PER (1 s), cm")], rel=5e-3)
+
+
+def test_sensitivities_surround_the_probability(content, risk):
+    """A monotonic chance at both ends of one input lies on both sides of the mean over it."""
+    by_rank = risk.set_index("rank")
+    assert content["sensitivity_counts"] == [60, 0]
+    rows = [(int(rank), row) for rank, found in content["sensitivity"].items() for row in found]
+    assert len(rows) > 50
+    uncertain = {"period_1", "period_2", "damping_1", "damping_2", "gap"}
+    assert {row[0] for _, row in rows} <= uncertain
+    near = 0
+    for rank, (name, low, high, *chances, _, _) in rows:
+        assert low < high, name
+        chance = by_rank.loc[rank, "probability"]
+        near += min(chances) - 0.1 <= chance <= max(chances) + 0.1
+    # A chance that has its peak at the median is on neither side
+    assert near > 0.8 * len(rows)
+
+
+def test_all_columns_of_the_risk_table_are_exported(content, risk):
+    tables = content["tables"]
+    names = {column["name"] for table in (tables[0], tables[3]) for column in table["columns"]}
+    assert set(risk) <= names
+    assert tables[3]["left_out"] == []
+
+
 def test_areas_of_the_page_are_those_of_the_totals(folder, content):
     totals = pd.read_csv(folder / "out" / "totals.csv")
     (area,) = (column for column in content["tables"][0]["columns"] if column["name"] == "area")
@@ -85,6 +127,15 @@ def test_report_writes_the_page_in_the_language_of_the_configuration(folder):
     configuration = write_configuration(folder, '[report]\nlanguage = "es"\n')
     report(configuration, folder / "out")
     assert content_of(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
+
+
+def test_revision_of_the_run_is_on_the_page(folder):
+    """Its number is that of the configuration; its time the beginning of the run."""
+    configuration = write_configuration(folder, "[report]\nrevision = 3\n")
+    report(configuration, folder / "out")
+    shown = content_of(folder / "out" / "report.html")["revision"]
+    assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
+    report(write_configuration(folder), folder / "out")
 
 
 def test_rejections_are_counted_and_their_beginning_shown(content):

@@ -27,7 +27,6 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
-from per_obspy.report.page.tally import PairTally
 from per_obspy.tables.risk import ranked_table
 from per_obspy.tables.totals import piece_totals
 
@@ -216,7 +215,7 @@ def test_files_of_the_worst_pairs_say_so(tmp_path, monkeypatch):
     monkeypatch.setattr("per_obspy.report.layers.kml.ROWS", 2)
     monkeypatch.setattr(f"{module}.SHEET_ROWS", 3)
     table = pair_table(5)
-    notes = Notes()
+    notes = Notes(CLASSES)
     notes.add(table)
     report, region = Report([], []), Region("x", list(CLASSES), False, NOWHERE)
     write_results(Screening(tmp_path, "risk", region, [], True), notes, table, report)
@@ -233,12 +232,11 @@ def test_pieces_leave_no_memory_behind(tmp_path):
     more = pd.DataFrame(np.full((4000, 100), 0.5), columns=[f"more_{i}" for i in range(100)])
     table = pd.concat([pair_table(4000), more], axis=1)
     parquet.write_table(pa.Table.from_pandas(table), tmp_path / "risk.parquet")
-    notes, tally, totals, before = Notes(), PairTally(CLASSES), [], []
+    notes, totals, before = Notes(CLASSES), [], []
     for _ in range(4):
         with ranked_table(tmp_path / "risk.parquet") as file:
             for piece in file.pieces():
                 notes.add(piece)
-                tally.add(piece)
                 totals.append(piece_totals(piece, Totals(), CLASSES))
         del piece
         gc.collect()
@@ -258,7 +256,7 @@ def test_notes_do_not_depend_on_pieces():
         }
     )
     for pieces in ([table], [table[:1], table[1:]]):
-        notes = Notes()
+        notes = Notes(["severe"])
         for piece in pieces:
             notes.add(piece)
         # an unknown gap adds nothing to what is expected, and is counted

@@ -51,11 +51,11 @@ def _marks(path):
 def test_pairs_have_their_colours_places_and_numbers(tmp_path):
     write_kml(make_table(["a", "b"]), CLASSES, "old town", tmp_path / "risk.kml")
     worst, mild = _marks(tmp_path / "risk.kml")
-    # alpha, blue, green, red of vermilion d55e00
+    # alpha, blue, green, red of dark red 7f0000
     colours = [
         e.text for e in ElementTree.parse(tmp_path / "risk.kml").iter(f"{{{NAMESPACE}}}color")
     ]
-    assert colours[0] == "ff005ed5"
+    assert colours[0] == "ff00007f"
     styles = [mark.findtext(f"{{{NAMESPACE}}}styleUrl") for mark in (worst, mild)]
     assert styles == ["#class0", "#class1"]
     # GDAL reads points and lines

@@ -23,7 +23,7 @@ def test_every_class_has_a_mark_of_its_own_and_the_worst_is_on_top(geometry, siz
     ]
     assert [symbol.get("name") for symbol in root.iter("symbol")] == [*"0123"]
     assert len({mark[colour] for mark in marks}) == 4
-    assert marks[0][colour] == "213,94,0,255"  # Okabe & Ito's vermilion
+    assert marks[0][colour] == "127,0,0,255"  # dark red of style.SEVERITY_COLOURS
     assert float(marks[0][size]) > float(marks[2][size])
     # drawn by falling rank: the worst, rank 1, last
     order = next(root.iter("orderByClause"))

@@ -82,7 +82,7 @@ def page_data(table, language="en", **changes):
             "longitude": [13.1, 13.05],
             "latitude": [43.1, 43.15],
             "warnings": ["", ""],
-            "rejected": ["", "clipped"],
+            "rejected": ["", "clipped: 9 equal samples at an extreme"],
         }
     )
     areas = pd.DataFrame(

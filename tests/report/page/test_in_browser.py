@@ -8,10 +8,12 @@ per_obspy.report.page.first_screen.
 import csv
 import math
 import re
+from itertools import pairwise
 
 import pandas as pd
 import pytest
 
+from per_obspy.report.page.content import PageDrawings
 from per_obspy.report.page.first_screen import Event
 
 from .made_up import HOSTILE, page_data, pair_table
@@ -19,6 +21,13 @@ from .made_up import HOSTILE, page_data, pair_table
 #: Seconds for 20 000 pairs, the best of some loads: other work of the machine only adds to it.
 LONGEST_DRAWING = 0.3
 LOADS = 4
+
+#: A station for a drawing: a peak of 2 m/s² to the east.
+STATION = {
+    "start": 0.0, "step": 0.5, "north": [-1.0, 1.0, -0.5, 0.5], "east": [-0.1, 0.1, -0.2, 2.0],
+    "period": [0.1, 1.0, 10.0], "per": [1.0, 20.0, 60.0], "sd": [1.0, 15.0, 30.0],
+    "damping": 0.05, "usable": [0.2, 8.0],
+}  # fmt: skip
 
 #: Bytes of a page of a million pairs.
 LARGEST_PAGE = 5_000_000
@@ -37,10 +46,14 @@ def test_first_screen_says_what_happened_and_what_to_do(opened):
         "2026-01-02 03:04:05 UTC",
         "43.00°",
         "13.00°",
-        "1 stations used, 1 not usable",
     ):
         assert fact in event
-    assert "1 stations used, 1 not usable" in event
+    expected = page.page.inner_text("#expected")
+    assert expected == (
+        "2 stations expected; 1 used: XX.A1; 1 missing or rejected: XX.B2 (clipped: 9 equal "
+        "samples at an extreme)."
+    )
+    assert page.page.is_hidden("#revision")
     numbers = page.texts("#numbers dd")
     # 12 pairs, 6 of them sure or likely, 3 severe; 6 expected: probabilities fall evenly to 0
     assert numbers[:4] == ["12", "6", "6", "3"]
@@ -79,9 +92,49 @@ def test_filters_by_state_area_and_flag(opened):
     assert set(page.column(4)) == {"likely", "possible", "no"}
     page.page.select_option("#area", "harbour")
     assert page.column(2) == ["P0000006", "P0000012", "P0000018"]
-    page.page.select_option("#flag", "far_station")
+    page.page.click("#filters summary")
+    page.page.check("input[value='far_station']")
     assert page.column(2) == []
     assert page.page.inner_text("#count").startswith("0 of 24")
+
+
+@pytest.mark.parametrize(
+    ("kind", "passes"),
+    [
+        ("any", lambda flags: bool(flags & {"touching", "far_station"})),
+        ("all", lambda flags: flags >= {"touching", "far_station"}),
+        ("none", lambda flags: not flags & {"touching", "far_station"}),
+    ],
+)
+def test_filter_takes_several_flags(opened, kind, passes):
+    table = pair_table(12)
+    texts = ["touching", "far_station", "touching far_station derived_inputs", "derived_inputs"]
+    table["flags"] = [texts[row % 4] for row in range(12)]
+    page = opened(page_data(table))
+    page.page.click("#filters summary")
+    page.page.check("input[value='touching']")
+    page.page.check("input[value='far_station']")
+    page.page.select_option("#flag", kind)
+    names = [set(flags.split()) for flags in table["flags"]]
+    expected = [pair for pair, flags in zip(table["pair_id"], names, strict=True) if passes(flags)]
+    assert page.column(2) == expected
+    assert page.page.inner_text("#filters summary") == "Flags: 2"
+    page.page.click("#clear")
+    assert len(page.column(2)) == 12
+
+
+def test_search_by_name_of_a_place(opened):
+    """Streets and towns of the inventory, of either building, areas and stations."""
+    table = pair_table(12)
+    table["addr:street_1"] = ["Calle 5" if row == 3 else "Avenida 2" for row in range(12)]
+    table["city_2"] = ["Escazú" if row in (3, 7) else "San José" for row in range(12)]
+    page = opened(page_data(table))
+    for sought, rows in (("calle 5", [3]), ("escazú", [3, 7]), ("harbour", [0, 6])):
+        page.page.fill("#search", sought)
+        assert page.column(2) == [f"P{row:07}" for row in rows]
+    page.page.fill("#search", "calle")
+    page.page.click("#pairs tbody tr:first-child button")
+    assert "Place: Calle 5, Escazú." in page.page.inner_text("#detail")
 
 
 def test_search_by_place_finds_what_is_within_a_kilometre(opened):
@@ -159,7 +212,7 @@ def test_every_control_has_a_name_for_a_screen_reader(opened):
     page = opened(page_data(pair_table(30)))
     unnamed = page.page.evaluate(
         """[...document.querySelectorAll("button, input, select, canvas")].filter((control) => {
-          const label = control.labels && control.labels.length ? control.labels[0].innerText : "";
+          const label = control.labels?.length ? control.labels[0].textContent : "";
           return !(label + (control.getAttribute("aria-label") || "") + control.innerText).trim();
         }).map((control) => control.outerHTML)"""
     )
@@ -186,6 +239,183 @@ def test_export_holds_what_is_filtered_in_its_order(opened):
     assert [row["pair_id"] for row in rows] == chosen["pair_id"].to_list()
     gaps = [float(row["gap"]) for row in rows]
     assert gaps == pytest.approx(chosen["gap"].to_list(), rel=1e-3)  # four digits are stored
+
+
+def test_export_holds_columns_that_the_page_does_not_show(opened):
+    table = pair_table(12).assign(owner=HOSTILE[2], parcel=9_876_543, doubt=0.25)
+    page = opened(page_data(table))
+    page.page.fill("#search", "P0000004")
+    (row,) = exported(page)
+    assert set(table) <= set(row)
+    assert row["owner"] == f"'{HOSTILE[2]}"
+    # Identifiers that are numbers keep their digits
+    assert (row["parcel"], row["doubt"], row["rank"]) == ("9876543", "0.25", "5")
+
+
+def outlined(names):
+    """Return pairs, and square outlines of 20 m around the first buildings of them."""
+    table = pair_table(len(names), names)
+    places = zip(table["longitude_1"], table["latitude_1"], strict=True)
+    half = 1e-4
+    rings = [
+        [x - half, y - half, x + half, y - half, x + half, y + half, x - half, y + half]
+        for x, y in places
+    ]
+    return table, list(zip(table["building_id_1"], rings, strict=True))
+
+
+def test_a_click_on_an_outline_chooses_its_worst_pair(opened):
+    table, outlines = outlined(["A"])
+    # Far from the line between the buildings, within the outline
+    table["longitude_2"] = table["longitude_1"] + 1e-5
+    table["longitude"] = table["longitude_1"]
+    page = opened(page_data(table, outlines=outlines))
+    page.page.focus("#map")
+    x, y = page.page.evaluate(
+        """() => { const box = document.getElementById("map").getBoundingClientRect();
+          return [box.x + box.width / 2, box.y + box.height / 2]; }"""
+    )
+    # 50 m are half of the height of a map of one pair: outlines are drawn
+    page.page.mouse.click(x - 40, y - 40)
+    assert "Pair A" in page.page.inner_text("#detail h2")
+    page.page.click("#detail .close")
+    page.page.mouse.click(x - 400, y - 200)
+    assert page.page.is_hidden("#detail")
+
+
+def test_hostile_names_of_outlines_and_stations(opened):
+    table, outlines = outlined(HOSTILE)
+    stations = pd.DataFrame(
+        {"station": HOSTILE, "state": "used", "longitude": 13.1, "latitude": 43.1}
+    )
+    drawn = dict.fromkeys(HOSTILE, STATION)
+    drawings = PageDrawings(drawn, {}, 0, 0)
+    page = opened(page_data(table, outlines=outlines, stations=stations, drawings=drawings))
+    for row in range(len(HOSTILE)):
+        page.page.click(f"#pairs tbody tr:nth-child({row + 1}) td:nth-child(2) button")
+        page.page.click(f"#stations tbody tr:nth-child({row + 1}) button")
+        assert page.page.inner_text("#station h2").startswith("station ")
+    assert page.page.locator("img, iframe, link, object, embed, [onerror]").count() == 0
+    assert page.page.locator("script").count() == 2
+    assert page.page.title() == "A made-up quarter – per_obspy"
+    # Outlines are found by names as they are packed: those of all but the first are cut
+    found = page.page.evaluate("document.querySelectorAll('#station svg').length")
+    assert found == 2
+
+
+def test_a_station_shows_record_spectra_and_warnings(opened):
+    drawings = PageDrawings({"XX.A1": STATION}, {}, 0, 0)
+    page = opened(page_data(pair_table(12), drawings=drawings))
+    page.page.click("#stations tbody tr:first-child button")
+    assert page.page.evaluate("document.activeElement.id") == "station"
+    assert page.texts("#station figcaption") == [
+        "Processed acceleration, m/s²: north above, east below",
+        "PER (solid) and SD (dashed) at 5 % damping, cm, over the period, s",
+    ]
+    assert "No check of its record has failed." in page.page.inner_text("#station")
+    # The peak of 2 m/s² to the east is drawn: 64 pixels from the middle of the second panel
+    points = page.page.locator("#station polyline").nth(1).get_attribute("points")
+    heights = [float(point.split(",")[1]) for point in points.split()]
+    assert max(abs(height - 220) for height in heights) == pytest.approx(64, abs=0.1)
+    page.page.click("#stations tbody tr:nth-child(2) button")
+    assert "clipped: 9 equal samples" in page.page.inner_text("#station")
+
+
+def test_sensitivity_of_a_pair(opened):
+    rows = [["period_1", 0.4, 0.9, 0.3, 0.95, "possible", "yes"],
+            ["gap", 0.0, 0.1, 1.0, 0.2, "yes", "possible"]]  # fmt: skip
+    drawings = PageDrawings({}, {1: rows}, 2, 1)
+    table = pair_table(30).assign(derived="period_1 mass_2 gap")
+    page = opened(page_data(table, drawings=drawings))
+    page.page.click("#pairs tbody tr:first-child button")
+    text = page.page.inner_text("#detail")
+    assert "period 1\t0.40 s\t30 %, possible\t0.90 s\t95 %, sure" in text
+    assert "gap\t0.0 cm\t100 %, sure\t10.0 cm\t20 %, possible" in text
+    assert "No deviation is known of: mass 2." in text
+    page.page.click("#pairs tbody tr:nth-child(9) button")
+    text = page.page.inner_text("#detail")
+    assert "Computed for the 2 worst pairs and the 1 most doubtful ones, not for this." in text
+    # The page holds one history: how to get another one
+    assert 'per-obspy show "#9" . -o pair.png' in text
+
+
+def test_revision_is_shown(opened):
+    event = Event("", "2026-01-02 03:04:05", 6.4, None, 1, 1, revision=3, revised="04:12")
+    page = opened(page_data(pair_table(3), event=event))
+    assert page.page.inner_text("#revision") == "Revision 3, 04:12 UTC"
+
+
+def test_what_a_screen_reader_is_given(opened):
+    """The accessibility tree of the browser: heads, names, live regions and their order."""
+    page = opened(page_data(pair_table(30)))
+    tree = page.page.locator("body").aria_snapshot()
+    for part in (
+        '- note: "SIMULATED ground motion',
+        '- heading "A made-up quarter" [level=1]',
+        '- region "summary"',
+        '- heading "What to do first" [level=2]',
+        '- application "Map of the pairs. Arrow keys move it',
+        '- group "severity"',
+        '- checkbox "severe (8)" [checked]',
+        '- spinbutton "probability from, %"',
+        '- combobox "area"',
+        '- searchbox "search"',
+        "- status: 30 of 30 pairs of this page (30 screened)",
+        '- button "export as CSV"',
+        '- columnheader "rank"',
+        '- columnheader "impact, cm/s"',
+    ):
+        assert part in tree, part
+    # A filter says how many pairs are left, a choice which pair it is
+    page.page.fill("#search", "P0000007")
+    assert "- status: 1 of 30 pairs" in page.page.locator("#list").aria_snapshot()
+    page.page.click("#pairs tbody tr:first-child button")
+    assert page.page.locator("#opened").inner_text().startswith("P0000007: ")
+    detail = page.page.locator("#detail").aria_snapshot()
+    assert '- rowheader "period, s"' in detail
+    assert '- img "Circles of energy' in detail
+
+
+def test_tab_walks_through_the_page_from_top_to_bottom(opened):
+    page = opened(page_data(pair_table(30)))
+    seen = []
+    for _ in range(22):
+        page.page.keyboard.press("Tab")
+        seen.append(
+            page.page.evaluate(
+                """() => { const one = document.activeElement;
+                  return [one.id || one.value || one.innerText, one.getBoundingClientRect().top
+                    + window.scrollY]; }"""
+            )
+        )
+    names = [name for name, _ in seen]
+    assert names[:5] == ["to the table of pairs", "map", "nearer", "further", "whole"]
+    assert {"probability", "velocity", "area", "search", "export"} <= set(names)
+    # Never upwards by more than a row of controls: the order is that of the page
+    tops = [top for _, top in seen[5:]]
+    assert all(after > before - 60 for before, after in pairwise(tops))
+
+
+def test_cells_follow_class_and_state_and_hide_from_other_filters(opened, monkeypatch):
+    monkeypatch.setattr("per_obspy.report.page.tally.PAGE_PAIRS", 4)
+    table = pair_table(40)
+    data = page_data(table)
+    page = opened(data._replace(worst=table.head(4)))
+    picture = "document.getElementById('map').toDataURL()"
+    whole = page.page.evaluate(picture)
+    assert "They follow the filters" in page.page.inner_text("#cells")
+    # All pairs that are drawn one by one are sure: without another state only cells change
+    page.page.uncheck("input[value='no']")
+    page.page.wait_for_timeout(100)
+    fewer = page.page.evaluate(picture)
+    assert fewer != whole
+    page.page.check("input[value='no']")
+    page.page.wait_for_timeout(100)
+    assert page.page.evaluate(picture) == whole
+    page.page.fill("#probability", "1")
+    page.page.wait_for_timeout(100)
+    assert "hidden now" in page.page.inner_text("#cells")
+    assert page.page.evaluate(picture) not in (whole, fewer)
 
 
 def test_hostile_names_are_texts_and_no_formulas(opened):
@@ -236,7 +466,17 @@ def test_spanish(opened):
     assert page.page.get_attribute("html", "lang") == "es"
     assert page.texts("#todo li")[0] == "No envíe a nadie: el movimiento es simulado."
     page.page.click("#pairs tbody tr:first-child button")
-    assert "Qué lo habría evitado" in page.page.inner_text("#detail")
+    detail = page.page.inner_text("#detail")
+    assert "Qué lo habría evitado" in detail
+    assert "severa; choque: seguro" in detail
+    assert "período 1, período 2" in detail
+    assert "estación lejana" in page.page.text_content("#filters")
+    assert "saturado: 9 muestras iguales en un extremo" in page.page.inner_text("#stations")
+    assert "1 usadas" not in page.page.inner_text("#expected")
+    # Nothing of the page is left in English but names of data
+    english = re.compile(r"\b(the|of|with|and|is|severe|moderate|high|low)\b")
+    words = page.page.inner_text("main").replace("made with", "")
+    assert english.findall(words) == []
 
 
 def test_rest_of_the_page(opened):

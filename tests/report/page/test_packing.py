@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from per_obspy.report.page.packing import LONGEST_TEXT, encoded, pack_table
+from per_obspy.screening.columns import FLAGS
 
 KINDS = {"speed": "number", "longitude": "place", "state": "choice", "name": "text"}
 
@@ -56,6 +57,20 @@ def test_texts_are_stored_once_and_cut(table):
     assert choice["texts"] == ["yes", "no", ""]
     assert text["texts"][:3] == ["a", "<b>", " "]
     assert len(text["texts"][3]) == LONGEST_TEXT
+
+
+def test_whole_numbers_keep_all_digits():
+    table = pd.DataFrame({"rank": [16_385, 20_000, 123_456_789]})
+    packed = pack_table(table, {"rank": "whole"})
+    assert plane_values(packed.data, 3, "i") == [16_385, 20_000, 123_456_789]
+
+
+def test_names_of_flags_are_never_cut():
+    """A flag that is cut is a flag that a filter misses."""
+    names = " ".join(FLAGS)
+    assert len(names) > LONGEST_TEXT
+    packed = pack_table(pd.DataFrame({"flags": [names]}), {"flags": "names"})
+    assert packed.description["columns"][0]["texts"] == [names]
 
 
 def test_columns_that_a_table_lacks_are_left_out(table):

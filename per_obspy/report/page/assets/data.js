@@ -12,7 +12,10 @@ async function unpacked(text) {
   const length = new DataView(buffer).getUint32(0, true);
   const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   let at = 4 + length;
-  for (const table of content.tables) at = readColumns(table, buffer, at);
+  // Columns of the export are read when they are exported
+  const [shown, stored] = [content.tables.slice(0, 3), content.tables[3]];
+  for (const table of shown) at = readColumns(table, buffer, at);
+  if (stored) content.stored = () => { if (!stored.column) readColumns(stored, buffer, at); return stored; };
   return content;
 }
 
@@ -20,7 +23,7 @@ function readColumns(table, buffer, start) {
   let at = start;
   table.column = {};
   for (const column of table.columns) {
-    const size = { number: 4, place: 4, choice: 2, text: 0 }[column.kind] * table.count;
+    const size = { number: 4, whole: 4, place: 4, choice: 2, names: 2, text: 0 }[column.kind] * table.count;
     const bytes = new Uint8Array(buffer, at, size);
     table.column[column.name] = READERS[column.kind](column, bytes, table.count);
     at += size;
@@ -38,6 +41,10 @@ function joinedPlanes(bytes, count) {
 
 const READERS = {
   number: (column, bytes, count) => new Float32Array(joinedPlanes(bytes, count)),
+  whole: (column, bytes, count) => {
+    const whole = new Int32Array(joinedPlanes(bytes, count));
+    return Float64Array.from(whole, (value) => (value === UNKNOWN_PLACE ? NaN : value));
+  },
   place: (column, bytes, count) => {
     const whole = new Int32Array(joinedPlanes(bytes, count));
     return Float64Array.from(whole, (value) => (value === UNKNOWN_PLACE ? NaN : value / 1e6));
@@ -48,6 +55,7 @@ const READERS = {
   }),
   text: (column) => column.texts,
 };
+READERS.names = READERS.choice;
 
 // Elements: texts are always set as texts, never as markup.
 

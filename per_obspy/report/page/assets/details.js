@@ -25,7 +25,7 @@ class Details {
     const pictures = element("div", { class: "pictures" }, ...circles, ...this.history(i));
     this.place.replaceChildren(
       close, heading, words, pictures, this.buildings(i),
-      ...this.prevention(i), ...this.flags(i), ...this.derived(i), ...this.sides(i),
+      ...this.prevention(i), ...this.flags(i), ...this.derived(i), ...this.sensitivity(i), ...this.sides(i),
     );
     this.place.hidden = false;
     if (focus) this.place.focus();
@@ -52,10 +52,12 @@ class Details {
     const gap = known("gap") ? t(this.value("gap", i) === 0 ? "says_touching" : "says_gap", { value: this.centimetres("gap", i) }) : t("says_no_gap");
     said.push(gap, t("says_demand", { value: this.centimetres("demand", i), rule: t(`rule_${this.value("demand_rule", i)}`) }));
     if (this.value("impacts", i) > 0) {
-      said.push(t("says_impacts", { value: number(this.value("impacts", i), 0), velocity: number(100 * this.value("impact_velocity_exact", i), 0) }));
+      said.push(t("says_impacts", { count: number(this.value("impacts", i), 0), velocity: number(100 * this.value("impact_velocity_exact", i), 0) }));
     }
     if (known("expected_amplification")) said.push(t("says_amplification", { value: number(this.value("expected_amplification", i), 2) }));
     const station = this.value("station", i);
+    const address = this.value("address", i);
+    if (address && typeof address === "string") said.push(t("says_address", { value: address }));
     if (station) said.push(t("says_station", { station, value: number(this.value("distance", i) / 1000, 1) }));
     return said.join(" ");
   }
@@ -66,7 +68,9 @@ class Details {
       ["building_id", null], ["height", 1, 1], ["storeys", 1, 0], ["period", 1, 2], ["damping", 100, 1],
       ["participation", 1, 2], ["per", 100, 1], ["sd", 100, 1], ["amplification_exact", 1, 2],
     ];
-    const table = element("table", {}, element("caption", {}, t("both_buildings")));
+    const table = element("table", { class: "facts" }, element("caption", {}, t("both_buildings")));
+    const heads = [t("building"), "1", "2"].map((text, at) => element("th", { scope: "col", class: at ? "number" : "name" }, text));
+    table.append(element("tr", {}, ...heads));
     for (const [name, factor, digits] of facts) {
       if (!this.page.pairs.column[`${name}_1`]) continue;
       const cells = [1, 2].map((side) => {
@@ -117,8 +121,8 @@ class Details {
   history(i) {
     const { t } = this.page;
     const found = this.page.content.histories[String(Math.round(this.value("rank", i)))];
-    if (!found) return this.value("station", i) ? [element("p", { class: "small" }, t("no_history", { value: this.page.content.history_count }))] : [];
-    const caption = t("history", { value: found.impacts.length });
+    if (!found) return this.value("station", i) ? [element("p", { class: "small" }, t("no_history", { count: this.page.whole(this.page.content.history_count), command: this.command(i) }))] : [];
+    const caption = t("history", { count: this.page.whole(found.impacts.length) });
     // As wide as the page, so that letters keep their size
     const width = Math.max(300, Math.min(1150, document.documentElement.clientWidth - 60));
     const picture = drawing("svg", { class: "picture", viewBox: `0 0 ${width} 240`, role: "img", "aria-label": caption });
@@ -151,8 +155,14 @@ class Details {
       if (time < start || time > start + length) continue;
       picture.append(drawing("line", { x1: x(time), x2: x(time), y1: 208, y2: 208 - Math.max(4, (34 * speed) / fastest), stroke: "#000", "stroke-width": 1 }));
     }
-    return [element("figure", { class: "wide" }, element("figcaption", {}, caption), picture, element("p", { class: "small" }, t("history_note")))];
+    const notes = [element("p", { class: "small" }, t("history_note"))];
+    // The drawn inputs are the likeliest ones; others may hit
+    if (!found.impacts.length && this.value("probability", i) > 0) notes.push(element("p", { class: "small" }, t("history_apart")));
+    return [element("figure", { class: "wide" }, element("figcaption", {}, caption), picture, ...notes)];
   }
+
+  // The command that draws a pair of which the page holds no history; a rank needs no quotation
+  command(i) { return `per-obspy show "#${Math.round(this.value("rank", i))}" . -o pair.png`; }
 
   prevention(i) {
     const { t, number } = this.page;
@@ -171,7 +181,7 @@ class Details {
     if (!names.length) return [];
     const list = element("dl", {});
     for (const name of names) {
-      list.append(element("dt", {}, name.replaceAll("_", " ")), element("dd", {}, this.page.content.flags[name] || "–"));
+      list.append(element("dt", {}, this.page.flagName(name)), element("dd", {}, this.page.content.flags[name] || "–"));
     }
     return [element("h3", {}, this.page.t("flags")), list];
   }
@@ -180,12 +190,54 @@ class Details {
     const { t, number } = this.page;
     const names = String(this.value("derived", i) || "").split(" ").filter(Boolean);
     if (!names.length) return [];
-    const made = [element("h3", {}, t("derived")), element("p", {}, names.map((name) => name.replaceAll("_", " ")).join(", "))];
+    const made = [element("h3", {}, t("derived")), element("p", {}, names.map((name) => this.page.inputName(name)).join(", "))];
     const spread = [1, 2].map((side) => this.value(`period_log_std_${side}`, i));
     const sure = spread.every((value) => value > 0);
     if (sure) made.push(element("p", {}, t("derived_spread", { first: number(100 * spread[0], 0), second: number(100 * spread[1], 0) })));
     else made.push(element("p", {}, t("derived_fixed")));
     return made;
+  }
+
+  // Probability and state at other values of each uncertain input
+  sensitivity(i) {
+    const { t, content } = this.page;
+    const rows = (content.sensitivity || {})[String(Math.round(this.value("rank", i)))];
+    const [worst, doubtful] = content.sensitivity_counts || [0, 0];
+    const derived = String(this.value("derived", i) || "").split(" ").filter(Boolean);
+    const made = [element("h3", {}, t("sensitivity"))];
+    if (!rows) {
+      if (!derived.length || !worst) return [];
+      // One of the worst pairs without rows has no input with a deviation
+      if (this.value("rank", i) <= worst) return this.fixedInputs(derived, []);
+      return [...made, element("p", { class: "small" }, t("sensitivity_none", { worst: String(worst), doubtful: String(doubtful) }))];
+    }
+    const heads = ["column_input", "column_low", "column_then", "column_high", "column_then"];
+    const table = element("table", {}, element("tr", {}, ...heads.map((key) => element("th", { scope: "col" }, t(key)))));
+    for (const [name, low, high, chanceLow, chanceHigh, stateLow, stateHigh] of rows) {
+      const then = (chance, state) => element("td", {}, t("chance_and_state", { chance: this.page.number(100 * chance, 0), state: this.stateLabel(state) }));
+      table.append(element("tr", {}, element("th", { scope: "row" }, this.page.inputName(name)), element("td", {}, this.inputText(name, low)), then(chanceLow, stateLow), element("td", {}, this.inputText(name, high)), then(chanceHigh, stateHigh)));
+    }
+    return [...made, element("div", { class: "scroll" }, table), element("p", { class: "small" }, t("sensitivity_note")), ...this.fixedInputs(derived, rows)];
+  }
+
+  // Derived inputs that have no deviation: the probability takes them as exact
+  fixedInputs(derived, rows) {
+    const varied = new Set(rows.map(([name]) => name));
+    const fixed = derived.filter((name) => !varied.has(name) && name !== "gap_std");
+    if (!fixed.length) return [];
+    return [element("p", { class: "small" }, this.page.t("sensitivity_fixed", { names: fixed.map((name) => this.page.inputName(name)).join(", ") }))];
+  }
+
+  stateLabel(name) {
+    const found = this.page.content.states.find((state) => state.name === name);
+    return found ? found.label : name;
+  }
+
+  inputText(name, value) {
+    const { number } = this.page;
+    if (name.startsWith("period")) return `${number(value, 2)} s`;
+    if (name.startsWith("damping")) return `${number(100 * value, 1)} %`;
+    return `${number(100 * value, 1)} cm`;
   }
 
   // Other pairs of both buildings

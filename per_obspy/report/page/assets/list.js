@@ -33,13 +33,44 @@ class PairList {
     this.number("probability", t("least_probability"), 100);
     this.number("velocity", t("least_velocity"), 1000);
     this.choice("area", t("area"), pairs.column.area ? [...pairs.column.area.texts].sort() : []);
-    const flags = pairs.column.flags ? pairs.column.flags.texts.flatMap((text) => text.split(" ")) : [];
-    this.choice("flag", t("flag"), [...new Set(flags)].filter(Boolean).sort());
+    this.makeFlags();
     const search = element("input", { type: "search", id: "search", maxlength: "120", placeholder: t("search_hint") });
     form.append(element("label", { class: "tall" }, t("search"), search));
     this.fields.search = search;
     form.addEventListener("input", () => this.apply());
     form.addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  // Flags that occur, and whether any, all or none of those that are ticked is wanted
+  makeFlags() {
+    const { t, pairs } = this.page;
+    const texts = pairs.column.flags ? pairs.column.flags.texts : [];
+    const names = [...new Set(texts.flatMap((text) => text.split(" ")))].filter(Boolean).sort();
+    this.flags = names.map((name) => element("input", { type: "checkbox", value: name, name: "flag" }));
+    if (!names.length) return;
+    const kind = element("select", { id: "flag", "aria-label": t("flag") });
+    for (const name of ["any", "all", "none"]) kind.append(element("option", { value: name }, t(`flags_${name}`)));
+    this.fields.flag = kind;
+    const labels = this.flags.map((box) => element("label", {}, box, this.page.flagName(box.value)));
+    this.flagCount = element("summary", {}, t("flags"));
+    byId("filters").append(element("details", {}, this.flagCount, element("div", {}, kind, ...labels)));
+  }
+
+  // Codes of the texts of flags that pass, null if no flag is ticked
+  flagCodes() {
+    const { t, pairs } = this.page;
+    const chosen = this.flags.filter((box) => box.checked).map((box) => box.value);
+    if (this.flagCount) this.flagCount.textContent = chosen.length ? t("flags_chosen", { label: t("flags"), count: String(chosen.length) }) : t("flags");
+    if (!chosen.length) return null;
+    const kind = this.fields.flag.value;
+    const passes = (text) => {
+      const names = text.split(" ");
+      if (kind === "all") return chosen.every((name) => names.includes(name));
+      return chosen.some((name) => names.includes(name)) === (kind === "any");
+    };
+    const codes = new Set();
+    pairs.column.flags.texts.forEach((text, code) => { if (passes(text)) codes.add(code); });
+    return codes;
   }
 
   // Check boxes of classes or states that occur
@@ -101,12 +132,14 @@ class PairList {
     const { column, count } = pairs;
     const states = this.states.map((box) => box.checked);
     const classes = this.classes.map((box) => box.checked);
-    this.page.shownClasses = new Set(this.classes.filter((box) => box.checked).map((box) => box.value));
+    this.page.shownClasses = classes;
+    this.page.shownStates = states;
     const probability = Number(this.fields.probability.value) / 100;
     const velocity = Number(this.fields.velocity.value) / 100;
     const area = this.codesOf("area", (text, chosen) => text === chosen);
-    const flags = this.codesOf("flags", (text, chosen) => text.split(" ").includes(chosen), "flag");
+    const flags = this.flagCodes();
     const matches = this.searched();
+    this.page.noteCells(!probability && !velocity && !area && !flags && !matches);
     this.found = [];
     for (let i = 0; i < count; i += 1) {
       // A number that is missing passes only where nothing is asked of it
@@ -123,8 +156,8 @@ class PairList {
     this.fill();
   }
 
-  codesOf(name, isChosen, field = name) {
-    const chosen = this.fields[field].value;
+  codesOf(name, isChosen) {
+    const chosen = this.fields[name].value;
     if (!chosen) return null;
     const codes = new Set();
     this.page.pairs.column[name].texts.forEach((text, code) => { if (isChosen(text, chosen)) codes.add(code); });
@@ -144,7 +177,10 @@ class PairList {
       return (i) => Math.hypot((column.longitude[i] - longitude) * shrink, column.latitude[i] - latitude) < 1000 / 111200;
     }
     const texts = ["pair_id", "building_id_1", "building_id_2"].map((name) => column[name]).filter(Boolean);
+    // Names of places and areas are found by any part, stations by their whole name
+    const places = ["address", "area"].map((name) => column[name]).filter(Boolean).map((values) => matching(values, sought));
     return (i) => texts.some((names) => names[i].toLowerCase().includes(sought))
+      || places.some((found) => found(i))
       || (column.station && column.station.texts[column.station.codes[i]].toLowerCase() === sought);
   }
 
@@ -196,7 +232,7 @@ class PairList {
       } else if (name === "risk_class") {
         const grade = page.classOf(i);
         made.append(element("td", { class: "state" }, element("span", {}, swatch(grade), grade.label)));
-      } else made.append(element("td", { class: "name" }, values.texts[values.codes[i]]));
+      } else made.append(element("td", { class: "name" }, page.stations.link(values.texts[values.codes[i]])));
     }
     return made;
   }
@@ -208,9 +244,10 @@ class PairList {
   }
 
   csv() {
-    const { column } = this.page.pairs;
+    const stored = this.page.content.stored ? this.page.content.stored().column : {};
+    const column = { ...this.page.pairs.column, ...stored };
     const names = Object.keys(column);
-    const lines = [names.join(",")];
+    const lines = [names.map(quoted).join(",")];
     for (const i of this.found) lines.push(names.map((name) => cellText(column[name], i)).join(","));
     return `${lines.join("\r\n")}\r\n`;
   }
@@ -230,8 +267,21 @@ function cellText(values, i) {
     if (!Number.isFinite(value)) return Number.isNaN(value) ? "" : String(value).replace("Infinity", "inf");
     return String(values instanceof Float32Array ? Number(value.toPrecision(4)) : value);
   }
+  return quoted(value);
+}
+
+// A text for a cell: quoted where it must be, and never a formula
+function quoted(value) {
   const safe = /^[\s]*[=+\-@\t\r]/.test(value) ? `'${value}` : value;
   return /[",\r\n]/.test(safe) || safe !== value ? `"${safe.replaceAll('"', '""')}"` : safe;
+}
+
+// Whether the text of a row has a part, each different text being looked at once
+function matching(values, part) {
+  if (!values.codes) return (i) => values[i].toLowerCase().includes(part);
+  const codes = new Set();
+  values.texts.forEach((text, code) => { if (text.toLowerCase().includes(part)) codes.add(code); });
+  return (i) => codes.has(values.codes[i]);
 }
 
 // The mark of a class: its colour, and a bar that is the thicker the worse

@@ -112,16 +112,23 @@ class PairMap {
 
   drawCells(pen) {
     const { column, count } = this.page.cells;
-    if (!count) return;
+    if (!count || !this.page.showsCells) return;
     const side = this.page.content.cell_size;
-    const { classes } = this.page.content;
+    const { classes, states } = this.page.content;
+    // Columns of each class that the filters of class and state let pass
+    const passing = classes.map((_, code) => (this.page.shownClasses[code]
+      ? states.map((__, state) => (this.page.shownStates[state] ? column[`${code} ${state}`] : null)).filter(Boolean) : []));
     for (let i = 0; i < count; i += 1) {
       // A cell has the colour of the worst class in it, fainter where it has few such pairs
-      const worst = classes.findIndex(({ name }) => this.page.shownClasses.has(name) && column[name][i] > 0);
-      if (worst < 0) continue;
+      let [worst, sum] = [-1, 0];
+      for (let code = 0; code < passing.length && !sum; code += 1) {
+        for (const counts of passing[code]) sum += counts[i];
+        worst = code;
+      }
+      if (!sum) continue;
       const left = this.x(column.longitude[i] - side / 2);
       const top = this.y(column.latitude[i] + side / 2);
-      pen.globalAlpha = Math.min(0.75, 0.25 + 0.12 * Math.log10(1 + column[classes[worst].name][i]));
+      pen.globalAlpha = Math.min(0.75, 0.25 + 0.12 * Math.log10(1 + sum));
       pen.fillStyle = classes[worst].colour;
       pen.fillRect(left, top, Math.max(2, side * this.shrink * this.scale), Math.max(2, side * this.scale));
     }
@@ -324,6 +331,7 @@ class PairMap {
       if (!wasAlone || moved > 3 || event.type !== "pointerup") return;
       const pair = this.pairAt(event.offsetX, event.offsetY);
       if (pair !== null) this.page.choose(pair);
+      else this.page.stations.chooseAt(event.offsetX, event.offsetY);
     };
     canvas.addEventListener("pointerup", ended);
     canvas.addEventListener("pointercancel", ended);

@@ -6,10 +6,14 @@ class Page {
     this.content = content;
     [this.pairs, this.cells, this.buildings] = content.tables;
     this.chosen = null;
-    this.shownClasses = new Set(content.classes.map(({ name }) => name));
+    this.shownClasses = content.classes.map(() => true);
+    this.shownStates = content.states.map(() => true);
+    this.showsCells = true;
     this.isShown = new Uint8Array(this.pairs.count).fill(1);
     this.t = (key, values = {}) => {
-      const text = content.texts[key] === undefined ? key : content.texts[key];
+      // The singular where a count is one
+      const single = values.count === "1" ? content.texts[`${key}_one`] : undefined;
+      const text = single || (content.texts[key] === undefined ? key : content.texts[key]);
       return text.replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
     };
     this.number = (value, digits) => {
@@ -23,6 +27,9 @@ class Page {
   }
 
   whole(value) { return this.number(value, 0); }
+
+  // A number with at most four digits
+  short(value) { return value.toLocaleString(this.content.language, { maximumSignificantDigits: 4 }); }
 
   setGrades() {
     this.stateCodes = this.codes("state", this.content.states);
@@ -70,7 +77,7 @@ class Page {
       rank: this.whole(column.rank[i]), neighbours: this.whole(column.neighbours[i]),
       hit: this.whole(column.neighbours_that_can_hit[i]), probability: this.number(100 * column.probability_common[i], 0),
     })];
-    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { value: this.whole(column.impacts[i]), velocity: this.number(100 * column.impact_velocity[i], 0) }));
+    if (column.impacts && column.impacts[i] > 0) said.push(this.t("building_impacts", { count: this.whole(column.impacts[i]), velocity: this.number(100 * column.impact_velocity[i], 0) }));
     const prevention = column.prevention ? column.prevention.texts[column.prevention.codes[i]] : "";
     if (prevention) said.push(this.t("building_prevention", { value: prevention }));
     return said.join(" ") + (text(column.position) ? ` (${this.t(`position_${text(column.position)}`)})` : "");
@@ -83,15 +90,28 @@ class Page {
     return `${column.pair_id[pair]}: ${this.stateOf(pair).label}, ${this.number(100 * column.expected_impact_velocity[pair], 0)} cm/s`;
   }
 
+  flagName(name) { return (this.content.flag_names || {})[name] || name.replaceAll("_", " "); }
+
+  // Name of an input of a pair, as period_1
+  inputName(name) {
+    const side = /_[12]$/.test(name) ? ` ${name.slice(-1)}` : "";
+    const key = `input_${side ? name.slice(0, -2) : name}`;
+    const label = this.content.texts[key];
+    return (label || name.replaceAll("_", " ").replace(/ [12]$/, "")) + side;
+  }
+
   choose(pair, focus = false) {
     const before = this.chosen;
     this.chosen = pair;
     if (pair === null) {
       this.details.hide();
+      byId("opened").textContent = "";
       const row = document.querySelector(`#pairs tr[data-pair="${before}"] button`);
       if (row) row.focus();
     } else {
       this.details.show(pair, focus);
+      // One short sentence for screen readers; the panel itself is read by going there
+      byId("opened").textContent = this.shortText(pair);
       const { column } = this.pairs;
       if (focus) this.map.show(column.longitude[pair], column.latitude[pair], 400);
     }
@@ -106,16 +126,26 @@ class Page {
     document.title = `${content.title} – per_obspy`;
     byId("title").textContent = content.title;
     byId("event").textContent = content.event;
+    byId("revision").textContent = content.revision || "";
+    byId("expected").textContent = content.expected || "";
+    const lacks = (content.tables[3] && content.tables[3].left_out) || [];
+    byId("lacks").textContent = lacks.length ? this.t("export_lacks", { names: lacks.slice(0, 30).join(", ") }) : "";
     byId("simulated").hidden = !content.simulated;
     byId("simulated").textContent = this.t("simulated");
     for (const [value, label] of content.numbers) {
       byId("numbers").append(element("div", {}, element("dt", {}, label), element("dd", {}, value)));
     }
-    for (const text of content.first) byId("todo").append(element("li", {}, text));
+    for (const text of content.first || []) byId("todo").append(element("li", {}, text));
     for (const text of content.sure) byId("sure").append(element("li", {}, text));
     byId("map").setAttribute("aria-label", this.t("map_help"));
-    byId("cells").textContent = this.cells.count ? this.t("cells_note", { shown: this.whole(this.pairs.count), all: this.whole(content.pair_count) }) : "";
     this.fillLegend();
+  }
+
+  // Cells are counts by class and state: they can follow no other filter
+  noteCells(follow) {
+    this.showsCells = follow;
+    const values = { shown: this.whole(this.pairs.count), all: this.whole(this.content.pair_count) };
+    byId("cells").textContent = this.cells.count ? this.t(follow ? "cells_note" : "cells_hidden", values) : "";
   }
 
   fillLegend() {
@@ -133,6 +163,7 @@ class Page {
   fillRest() {
     const { stations, areas, rejected, provenance } = this.content;
     this.fillTable("stations", stations);
+    this.stations.linkNames();
     this.fillTable("areas", areas);
     this.fillTable("rejected", rejected);
     document.querySelector("#rejected p").textContent = rejected.note;
@@ -150,7 +181,7 @@ class Page {
     const isNumber = heads.map((_, i) => rows.some((row) => typeof row[i] === "number"));
     const head = element("tr", {}, ...heads.map((text, i) => element("th", { scope: "col", class: isNumber[i] ? "number" : "name" }, text)));
     const body = rows.map((row) => element("tr", {}, ...row.map((cell) => (typeof cell === "number"
-      ? element("td", { class: "number" }, cell.toLocaleString(this.content.language, { maximumSignificantDigits: 4 }))
+      ? element("td", { class: "number" }, this.short(cell))
       : element("td", { class: cell.length > 30 ? "text" : "name" }, cell)))));
     section.querySelector("div").append(element("table", {}, element("thead", {}, head), element("tbody", {}, ...body)));
   }
@@ -159,6 +190,7 @@ class Page {
 async function start() {
   const page = new Page(await unpacked(byId("data").textContent));
   page.fillFirstScreen();
+  page.stations = new Stations(page);
   page.list = new PairList(page);
   page.details = new Details(page);
   performance.mark("drawing");

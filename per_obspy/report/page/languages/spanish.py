@@ -7,27 +7,51 @@ SPANISH: dict[str, str] = {
     "do_first": "Qué hacer primero",
     "how_sure": "Qué tan seguro es",
     "number_pairs": "pares evaluados",
-    "number_pounding": "chocan, con seguridad o probablemente",
+    "number_pairs_one": "par evaluado",
+    "number_pounding": "pares chocan, con seguridad o probablemente",
+    "number_pounding_one": "par choca, con seguridad o probablemente",
     "number_expected": "choques esperados",
+    "number_expected_one": "choque esperado",
     "number_severe": "en la peor clase: {name}",
     "number_velocity": "impacto esperado más rápido",
     "number_buildings": "edificios que un vecino puede golpear",
+    "number_buildings_one": "edificio que un vecino puede golpear",
     "event_magnitude": "Magnitud {value}",
     "event_time": "Los registros empiezan {time} UTC",
     "event_place": "epicentro {latitude}°, {longitude}°",
     "event_depth": "profundidad {value} km",
-    "event_stations": "{used} estaciones usadas, {missing} no utilizables",
+    "revision": "Revisión {value}",
+    "revision_time": "Revisión {value}, {time} UTC",
+    "stations_expected": "{count} estaciones esperadas",
+    "stations_expected_one": "{count} estación esperada",
+    "stations_used": "{count} usadas",
+    "stations_used_one": "{count} usada",
+    "stations_missing_one": "{count} ausente o rechazada",
+    "stations_missing": "{count} ausentes o rechazadas",
+    "and_more": "y {count} más",
     "todo_exercise": "No envíe a nadie: el movimiento es simulado.",
     "todo_worst": "Inspeccione primero los pares con los impactos más rápidos: {names}.",
     "todo_buildings": "Inspeccione primero estos edificios: {names}.",
     "todo_areas": "Empiece en las zonas con más choques esperados: {names}.",
     "todo_unknown": "Mida {count} separaciones desconocidas: sin ellas no hay veredicto.",
+    "todo_unknown_one": "Mida {count} separación desconocida: sin ella no hay veredicto.",
+    "todo_possible_one": "Después revise {count} par con choque posible pero no probable.",
     "todo_possible": "Después revise los {count} pares con choque posible pero no probable.",
     "todo_none": "Ningún par chocó probablemente; revise los posibles.",
     "sure_expected": (
         "Se esperan {mean} pares con choque; la desviación estándar está entre {low} (pares "
         "independientes) y {high} (una sola causa)."
     ),
+    "sure_expected_one": (
+        "Se espera {mean} par con choque; la desviación estándar está entre {low} (pares "
+        "independientes) y {high} (una sola causa)."
+    ),
+    "sure_derived_one": "{count} de {all} pares tiene datos derivados, no medidos.",
+    "sure_far_one": "{count} par usa una estación lejana.",
+    "sure_periods_one": "{count} par tiene un período fuera de los utilizables de su registro.",
+    "sure_station_class_one": "{count} par usa el registro de otra clase de sitio.",
+    "sure_record_one": "{count} par usa un registro con advertencia: vea las estaciones.",
+    "sure_map_one": "{count} par no tiene estación cercana: un ShakeMap da su demanda.",
     "sure_derived": "{count} de {all} pares tienen datos derivados, no medidos.",
     "sure_far": "{count} pares usan una estación lejana.",
     "sure_periods": "{count} pares tienen un período fuera de los utilizables de su registro.",
@@ -48,7 +72,11 @@ SPANISH: dict[str, str] = {
     "epicentre": "epicentro",
     "cells_note": (
         "Los {shown} peores de {all} pares se dibujan uno por uno; los demás se cuentan en "
-        "celdas, con el color de la peor clase en ellas."
+        "celdas, con el color de la peor clase en ellas. Siguen los filtros de severidad y choque."
+    ),
+    "cells_hidden": (
+        "Los {shown} peores de {all} pares se dibujan uno por uno. Los demás son cuentas por "
+        "celda, ahora ocultas: hay un filtro que las cuentas no pueden seguir."
     ),
     "pairs": "Pares, los peores primero",
     "state": "choque",
@@ -60,7 +88,12 @@ SPANISH: dict[str, str] = {
     "area": "zona",
     "flag": "marca",
     "search": "buscar",
-    "search_hint": "identificador, o latitud, longitud",
+    "search_hint": "identificador, lugar, o latitud, longitud",
+    "flags_any": "con alguna de estas",
+    "flags_all": "con todas estas",
+    "flags_none": "sin ninguna de estas",
+    "flags_chosen": "{label}: {count}",
+    "export_lacks": "A la exportación le falta la columna {names}: están en risk.csv.",
     "count": "{found} de {shown} pares de esta página ({all} evaluados)",
     "export": "exportar como CSV",
     "clear": "quitar filtros",
@@ -82,6 +115,11 @@ SPANISH: dict[str, str] = {
     "state_unlikely": "improbable",
     "state_no": "no",
     "state_unknown": "separación desconocida",
+    "class_severe": "severa",
+    "class_high": "alta",
+    "class_moderate": "moderada",
+    "class_low": "baja",
+    "class_gap unknown": "separación desconocida",
     "pair": "Par",
     "building": "Edificio",
     "close": "cerrar",
@@ -94,8 +132,10 @@ SPANISH: dict[str, str] = {
     "says_gap": "La separación es {value} cm.",
     "says_no_gap": "La separación es desconocida.",
     "says_demand": "La separación necesaria es {value} cm ({rule}).",
-    "says_impacts": "La historia exacta tiene {value} impactos, el más rápido a {velocity} cm/s.",
+    "says_impacts": "La historia exacta tiene {count} impactos, el más rápido a {velocity} cm/s.",
+    "says_impacts_one": "La historia exacta tiene {count} impacto, a {velocity} cm/s.",
     "says_amplification": "El choque multiplica el movimiento de uno de ellos por {value}.",
+    "says_address": "Lugar: {value}.",
     "says_station": "Registro de la estación {station}, a {value} km.",
     "rule_exact": "exacta para el registro",
     "rule_per_white_noise": "estimada con PER",
@@ -119,14 +159,20 @@ SPANISH: dict[str, str] = {
         "Radio: el mayor movimiento de cada edificio a la altura de contacto, como energía (PER). "
         "Líneas: las caras de los edificios en reposo. El edificio 2 va a trazos."
     ),
-    "history": "Desplazamientos en el tiempo, cm, y {value} impactos",
+    "history": "Desplazamientos en el tiempo, cm, y {count} impactos",
+    "history_one": "Desplazamientos en el tiempo, cm, y {count} impacto",
     "history_note": (
         "Edificio 1 continuo, edificio 2 a trazos y a una separación de distancia; barras abajo: "
         "impactos, más altas cuanto más rápidos. Sigue el registro; tras unos diez impactos dos "
         "programas correctos pueden diferir."
     ),
+    "history_apart": (
+        "Con los datos de esta página no se tocan, como cuando ambos períodos son iguales; la "
+        "probabilidad cuenta los otros valores que los datos pueden tener."
+    ),
     "no_history": (
-        "Se dibujan historias de los {value} peores pares con separación conocida y registro."
+        "La página contiene las historias de los {count} peores pares con separación conocida y "
+        "registro. Para este par, en la carpeta de los resultados: {command}"
     ),
     "prevention": "Qué lo habría evitado",
     "prevents_gap": "{value} cm más de separación, {whole} cm en total.",
@@ -143,21 +189,71 @@ SPANISH: dict[str, str] = {
         "{first} % y {second} %, y la probabilidad las incluye."
     ),
     "derived_fixed": "Su incertidumbre no es parte de la probabilidad.",
+    "sensitivity": "Si un dato tuviera otro valor",
+    "sensitivity_note": (
+        "Cada dato solo, en el valor que no supera en 16, y en 84, de 100 casos; todo lo demás "
+        "sigue tan incierto como es."
+    ),
+    "sensitivity_none": (
+        "Calculado para los {worst} peores pares y los {doubtful} más dudosos, no para este."
+    ),
+    "sensitivity_fixed": (
+        "No se conoce desviación de: {names}. La probabilidad los toma como exactos."
+    ),
+    "column_input": "dato",
+    "column_low": "con 16 de 100",
+    "column_high": "con 84 de 100",
+    "column_then": "entonces",
+    "chance_and_state": "{chance} %, {state}",
     "other_pairs": "Sus otros pares:",
     "building_says": (
-        "Rango {rank} de los edificios; {hit} de sus {neighbours} vecinos pueden golpearlo, con "
-        "una probabilidad de al menos {probability} % de que uno lo haga."
+        "Rango {rank} de los edificios; vecinos que pueden golpearlo: {hit} de {neighbours}; la "
+        "probabilidad de que uno lo haga es al menos {probability} %."
     ),
-    "building_impacts": "En su fila recibe {value} golpes, de hasta {velocity} cm/s.",
-    "building_prevention": "Prevención (en inglés): {value}.",
+    "building_impacts": "En su fila recibe {count} golpes, de hasta {velocity} cm/s.",
+    "building_impacts_one": "En su fila recibe {count} golpe, a {velocity} cm/s.",
+    "building_prevention": "Prevención: {value}.",
     "position_inside": "dentro de su fila",
     "position_end": "extremo de su fila",
     "position_corner": "esquina de dos filas",
     "position_single": "un solo par",
+    "station_pairs": "Su registro sirve a {count} pares.",
+    "station_pairs_one": "Su registro sirve a {count} par.",
+    "station_record": "Aceleración procesada, m/s²: norte arriba, este abajo",
+    "station_record_note": (
+        "Cada intervalo de {value} s se dibuja de su menor a su mayor muestra: ningún máximo se "
+        "pierde."
+    ),
+    "station_spectra": (
+        "PER (continuo) y SD (a trazos) con {value} % de amortiguamiento, cm, según el período, s"
+    ),
+    "station_spectra_note": (
+        "La horizontal mayor. Sombreado: períodos no utilizables. Un PER muy por encima de SD "
+        "viene de movimiento lento, cuya velocidad también entra en PER."
+    ),
+    "station_none_one": "La página dibuja la {count} estación que sirve a más pares.",
+    "station_none": "La página dibuja las {count} estaciones que sirven a más pares.",
+    "station_clear": "Ninguna revisión de su registro falló.",
+    "show_pairs": "filtrar sus pares",
+    "input_system": "sistema estructural",
+    "input_period": "período",
+    "input_damping": "amortiguamiento",
+    "input_mass": "masa",
+    "input_area": "área de planta",
+    "input_height": "altura",
+    "input_storeys": "pisos",
+    "input_participation": "participación",
+    "input_yield_displacement": "desplazamiento de fluencia",
+    "input_contact_height": "altura de contacto",
+    "input_floor_offset": "desfase de losas",
+    "input_restitution": "restitución",
+    "input_gap": "separación",
+    "input_gap_std": "desviación de la separación",
     "stations": "Estaciones",
     "areas": "Zonas",
     "rejected": "Rechazado, con razones",
     "rejected_none": "No se rechazó nada.",
+    "rejected_some_one": "{shown} de {all} rechazo; también está en rejected.csv.",
     "rejected_some": "{shown} de {all} rechazos; todos están en rejected.csv.",
     "provenance": "De dónde viene esto",
     "head_station": "estación",
@@ -254,4 +350,37 @@ SPANISH: dict[str, str] = {
     "flag_undated": "se desconoce la hora del registro: puede ser de otro sismo",
     "flag_record_warning": ("el registro falló otra revisión que solo advierte: vea stations.csv"),
     "flag_simulated": "el movimiento del suelo es simulado",
+    "flagname_unknown_gap": "separación desconocida",
+    "flagname_touching": "en contacto",
+    "flagname_single_hit_unreliable": "golpe único poco confiable",
+    "flagname_outside_usable_periods": "fuera de períodos utilizables",
+    "flagname_per_far_above_sd": "PER muy sobre SD",
+    "flagname_far_station": "estación lejana",
+    "flagname_one_horizontal": "una horizontal",
+    "flagname_derived_inputs": "datos derivados",
+    "flagname_derived_period": "período derivado",
+    "flagname_linearized_not_converged": "linealización sin convergencia",
+    "flagname_no_damping_suffices": "ningún amortiguamiento basta",
+    "flagname_no_bumper_suffices": "ningún tope basta",
+    "flagname_no_demand": "sin demanda",
+    "flagname_floor_to_column": "losa contra columna",
+    "flagname_record_from_other_site_class": "registro de otra clase de sitio",
+    "flagname_motion_from_other_site_class": "movimiento de otra clase de sitio",
+    "flagname_shakemap_demand": "demanda de ShakeMap",
+    "flagname_shakemap_assumed_deviation": "desviación supuesta del ShakeMap",
+    "flagname_contradicting_coordinates": "coordenadas contradictorias",
+    "flagname_baseline_shift": "desplazamiento de línea base",
+    "flagname_second_event": "segundo evento",
+    "flagname_assumed_corners": "cortes supuestos",
+    "flagname_digitised": "digitalizado",
+    "flagname_undated": "sin fecha",
+    "flagname_record_warning": "advertencia del registro",
+    "flagname_simulated": "simulado",
+    "kind_file": "archivo",
+    "kind_record": "registro",
+    "kind_station": "estación",
+    "kind_service": "servicio",
+    "kind_pair": "par",
+    "kind_building": "edificio",
+    "kind_row": "fila",
 }

@@ -1,0 +1,173 @@
+"""
+Sensitivity of a pair to each input that is uncertain: its chance of contact at other values of it.
+
+Each input is set in turn to the value that it does not exceed in 16, and in 84, of 100 cases: one
+standard deviation on both sides of the median of a normal variable. Everything else of the pair
+stays as uncertain as it is, and the row is computed again as the risk table computes it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from per_obspy.checks import FloatArray
+from per_obspy.config import Building, Screening
+from per_obspy.screening.ground_motion.site_motion import RegionalMotion
+from per_obspy.screening.rows import risk_rows
+from per_obspy.screening.uncertainty.nodes import (
+    LARGEST_DAMPING,
+    gap_dispersion,
+    median_gap,
+    one_wall_chance,
+)
+from per_obspy.screening.uncertainty.unknown_gaps import kept_apart
+from per_obspy.screening.values import values
+
+#: Inputs that have a logarithmic standard deviation; the gap has one in metres.
+LOGNORMAL = ("period_1", "period_2", "damping_1", "damping_2")
+
+#: Share of outcomes below the lower value; as many lie above the upper one.
+TAIL = 0.16
+
+#: A row that is computed again must have its probability; else its inputs are not all known.
+TOLERANCE = 0.005
+
+#: Lower and upper values of an input, and rows in which it is uncertain.
+Ends = tuple[FloatArray, FloatArray, NDArray[np.bool_]]
+
+
+class Sensitivity(NamedTuple):
+    """
+    Outcome of a pair at both values of one input.
+
+    Attributes
+    ----------
+    pair_id : str
+        The pair.
+    name : str
+        Column of the input.
+    low, high : float
+        Its values, s, m or a fraction of critical.
+    probability_low, probability_high : float
+        Of contact at these values.
+    state_low, state_high : str
+        States at these values.
+    """
+
+    pair_id: str
+    name: str
+    low: float
+    high: float
+    probability_low: float
+    probability_high: float
+    state_low: str
+    state_high: str
+
+
+def input_sensitivity(
+    rows: pd.DataFrame, ground: RegionalMotion, building: Building, screening: Screening
+) -> list[Sensitivity]:
+    """
+    Return how the chance of contact depends on each uncertain input of some pairs.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Rows of the risk table with all columns.
+    ground : RegionalMotion
+        The ground motion with which they were computed.
+    building, screening : Building, Screening
+        The settings with which they were computed.
+
+    Returns
+    -------
+    list of Sensitivity
+        None of a pair without probability, or whose row cannot be computed again from its columns.
+    """
+    known = rows[rows["probability"].notna()].reset_index(drop=True)
+    inputs = {name: ends for name, ends in _ends(known).items() if ends[2].any()}
+    if not inputs:
+        return []
+    # Rows are compared with themselves: of other settings they have other probabilities
+    found, _ = risk_rows(_variants(known, inputs), ground, building, screening)
+    by_name = found.set_index("pair_id")[["probability", "state"]]
+    same = _same(known, by_name)
+    return [
+        _outcome(known["pair_id"].iloc[row], name, (low[row], high[row]), by_name, row)
+        for name, (low, high, varies) in inputs.items()
+        for row in np.flatnonzero(varies & same).tolist()
+    ]
+
+
+def _variants(known: pd.DataFrame, inputs: dict[str, Ends]) -> pd.DataFrame:
+    """Return the rows as they are, and with each input at both of its values, as a pair table."""
+    given = _as_given(known)
+    # Every variant is a pair with a name of its own
+    variants = [given.assign(pair_id=_names(known, "", 0))]
+    for name, (low, high, varies) in inputs.items():
+        for side, value in enumerate((low, high)):
+            changed = _with_value(given, name, value).assign(pair_id=_names(known, name, side))
+            variants.append(changed[varies])
+    return pd.concat(variants, ignore_index=True)
+
+
+def _names(rows: pd.DataFrame, name: str, side: int) -> list[str]:
+    """Return names of variants: number of the row, input and side."""
+    return [f"{row} {name} {side}" for row in range(len(rows))]
+
+
+def _same(known: pd.DataFrame, found: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return which rows have the probability of the risk table when they are computed again."""
+    again = found["probability"].reindex(_names(known, "", 0)).to_numpy(np.float64)
+    # NaN of a pair that was rejected compares as false
+    return np.asarray(np.abs(again - values(known, "probability")) <= TOLERANCE)
+
+
+def _outcome(
+    pair_id: str, name: str, ends: tuple[float, float], found: pd.DataFrame, row: int
+) -> Sensitivity:
+    """Return the outcome of one pair at both values of an input."""
+    variants = found.loc[[f"{row} {name} {side}" for side in (0, 1)]]
+    low, high = values(variants, "probability").tolist()
+    states = variants["state"].astype(str).tolist()
+    return Sensitivity(pair_id, name, float(ends[0]), float(ends[1]), low, high, *states)
+
+
+def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows as a pair table: what the completion derives with a deviation is empty."""
+    derived = rows["derived"].str.split()
+    columns: dict[str, pd.Series] = {}
+    # An empty period keeps its deviation; masses and heights have none of their own
+    for name in (*LOGNORMAL, "gap"):
+        is_derived = derived.map(lambda names, name=name: name in names)
+        columns[name] = rows[name].mask(is_derived, np.nan)
+    return rows.assign(**columns)
+
+
+def _with_value(given: pd.DataFrame, name: str, value: FloatArray) -> pd.DataFrame:
+    """Return a pair table in which one input is certain."""
+    deviation = "gap_std" if name == "gap" else name.replace("_", "_log_std_")
+    certain = np.zeros(len(given))
+    return given.assign(**{name: value, deviation: certain})
+
+
+def _ends(rows: pd.DataFrame) -> dict[str, Ends]:
+    """Return the lower and the upper value of each input, and the rows in which it is uncertain."""
+    ends = {}
+    for name in LOGNORMAL:
+        deviation = np.nan_to_num(values(rows, name.replace("_", "_log_std_")))
+        median, spread = values(rows, name), np.exp(deviation)
+        # A damping stays below the critical one, as at the nodes
+        largest = np.maximum(median, LARGEST_DAMPING) if "damping" in name else np.inf
+        ends[name] = median / spread, np.minimum(median * spread, largest), deviation > 0.0
+    return ends | {"gap": _gap_ends(rows)}
+
+
+def _gap_ends(rows: pd.DataFrame) -> Ends:
+    """Return both values of the gap, m; the lower one is 0 where the walls may be one."""
+    marked = kept_apart(rows)
+    median, deviation = median_gap(marked), gap_dispersion(marked)
+    low = np.where(one_wall_chance(marked) > TAIL, 0.0, median * np.exp(-deviation))
+    return low, median * np.exp(deviation), deviation > 0.0
