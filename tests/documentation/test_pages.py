@@ -8,7 +8,6 @@ import check_site
 import column_pages
 import command_pages
 import configuration_pages
-import mathml
 import pandas as pd
 import pytest
 from blocks import ROOT, pages
@@ -103,10 +102,6 @@ def test_links_to_nowhere_and_addresses_outside_are_found(tmp_path):
         "a.html: no anchor b.html#gone",
         "a.html: no c.html",
     ]
-
-
-def test_formulas_become_mathml():
-    assert mathml.convert(r"\frac{1}{2}", display="block").startswith("<math")
 
 
 def test_the_gallery_has_eight_to_twelve_programs_with_titles():
