@@ -38,10 +38,10 @@ wheel: .venv/check
 	@echo "== build the wheel, install it into an empty environment, use it in an empty folder, check its types"
 	rm -rf dist .venv/wheel
 	$(BIN)/python -m build --outdir dist . >/dev/null
-	$(PYTHON) -m venv .venv/wheel
-	.venv/wheel/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
-	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py && \
-	  $(CURDIR)/.venv/bin/mypy --strict --config-file= --python-executable $(CURDIR)/.venv/wheel/bin/python smoke.py
+	PYTHON=$(PYTHON) EXTRAS= workflows/container/install.sh install "$$(ls dist/*.whl)" .venv/wheel
+	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
+	@echo "== compile the kernels of the wheel, as a container does"
+	workflows/container/install.sh compile .venv/wheel workflows
 
 benchmark: .venv/benchmark
 	@for script in start_up formats spectra pounding rows pair_estimates footprints screening; do \

@@ -3,13 +3,12 @@ Command line: each command parses its arguments, calls one function and prints.
 
 Exit codes: 0 done, 2 wrong input (one line with the reason), 3 no usable record or pair, 75 try
 later: a service is unavailable, another run holds the output folder, a file cannot be written, or
-the machine failed otherwise, 130 interrupted.
+the machine failed otherwise, 130 interrupted, 143 ended by SIGTERM.
 """
 
 import errno
 import os
 import sys
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +18,7 @@ import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init
+from per_obspy.commands.operation.status import status
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
@@ -28,9 +28,16 @@ from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.machine import machine_fault
+from per_obspy.termination import (
+    INTERRUPTED,
+    TERMINATED,
+    end_now,
+    ending_in_time,
+    has_working_threads,
+)
 
-#: Exit code after the interrupt key, as of programs that this signal ends.
-INTERRUPTED = 130
+#: Words for the ends by a signal.
+SIGNALLED = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
 
 #: Errors of writing, rather than of opening files or starting processes.
 _ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -48,7 +55,10 @@ app = typer.Typer(
 )
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
-COMMANDS = (run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info)
+COMMANDS = (
+    *(run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info),
+    status,
+)
 for command in COMMANDS:
     app.command()(command)
 
@@ -74,12 +84,10 @@ def options(
 
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
-    try:
+    with ending_in_time():
         code = _exit_code()
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    if code == INTERRUPTED:
-        _end_interrupted()
+        if code in SIGNALLED:
+            _end_by_signal(code)
     try:
         with writing(Path("standard output")):
             sys.stdout.flush()
@@ -90,11 +98,11 @@ def main() -> None:
     raise SystemExit(code)
 
 
-def _end_interrupted() -> None:
+def _end_by_signal(code: int) -> None:
     """Print one word; end at once if a thread still works, which the interpreter would wait for."""
-    print("interrupted", file=sys.stderr, flush=True)
-    if threading.active_count() > 1:
-        os._exit(INTERRUPTED)
+    print(SIGNALLED[code], file=sys.stderr, flush=True)
+    if has_working_threads():
+        end_now(code)
 
 
 def _drop_output() -> None:
@@ -113,6 +121,8 @@ def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
         app()
+    except KeyboardInterrupt:
+        return INTERRUPTED
     except TryLater as error:
         return _failed(error, TRY_LATER)
     except NothingUsable as error:

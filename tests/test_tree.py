@@ -20,7 +20,7 @@ LARGER_FOLDERS = {"formats"}
 MIRRORED = {
     *("run", "pairs", "records", "screening", "station", "ensemble", "totals", "evaluation"),
     *("spectra", "risk", "demand", "single_hit", "probability", "links", "row_history"),
-    *("kriging", "bilinear", "building_rows", "buildings"),
+    *("kriging", "bilinear", "building_rows", "buildings", "status", "watch"),
 }
 
 

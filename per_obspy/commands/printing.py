@@ -50,9 +50,9 @@ def shown_progress() -> "Iterator[Progress]":
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
-    # A log gets one line per step
+    # A log gets one line per step, whatever the environment asks of colours
     console = Console(stderr=True)
-    if not console.is_terminal:
+    if not sys.stderr.isatty():
         yield _print_line
         return
 

@@ -16,6 +16,14 @@ from per_obspy.commands.endings import (
     print_and_end,
     stop_if_nothing,
 )
+from per_obspy.commands.operation.logged import (
+    LogFile,
+    LogForm,
+    LogFormat,
+    Quiet,
+    log_ending,
+    logged,
+)
 from per_obspy.commands.printing import print_table, shown_progress, state_texts
 from per_obspy.errors import printable
 from per_obspy.threads import usable_processors
@@ -86,6 +94,9 @@ def run(
     language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
+    log: LogFile = None,
+    log_format: LogForm = LogFormat.text,
+    quiet: Quiet = False,
 ) -> None:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -98,19 +109,20 @@ def run(
 
     Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
+    from per_obspy.operation.notified_run import notified_run
     from per_obspy.pipeline.inputs.arguments import requested_run
-    from per_obspy.pipeline.run import run as whole_run
 
     # An empty name would be the folder of the shell
     for name in (first, first if second is None else second):
         named_path(name)
     spoken = [f"report.language={language}"] if language else []
-    asked = requested_run(first, second, output, [*(changes or ()), *spoken])
-    if asked.line:
-        print(printable(asked.line), file=sys.stderr)
-    with shown_progress() as progress:
-        result = whole_run(asked.configuration, output, progress=progress)
-    print_and_end(result, as_json, print_result, strict)
+    with logged(log, log_format, quiet) as progress:
+        asked = requested_run(first, second, output, [*(changes or ()), *spoken])
+        if asked.line and not quiet:
+            print(printable(asked.line), file=sys.stderr)
+        result = notified_run(asked.configuration, output, progress)
+        log_ending(result.record)
+    print_and_end(result, as_json, print_nothing if quiet else print_result, strict)
 
 
 def report(
@@ -170,6 +182,9 @@ def spectra(
         typer.Option(min=0.01, max=100.0, help="Of the oscillator in the state-space figure, s."),
     ] = 1.0,
     as_json: AsJson = False,
+    log: LogFile = None,
+    log_format: LogForm = LogFormat.text,
+    quiet: Quiet = False,
 ) -> None:
     """
     Write the spectra of records to one netCDF file.
@@ -186,7 +201,7 @@ def spectra(
     grid = checked(Spectra, given)
 
     # Spectra of all stations, and figures of each on request
-    with shown_progress() as progress:
+    with logged(log, log_format, quiet) as progress:
         done, rejected = spectra_of(
             sources, output, Processing(), grid, usable_processors(), progress
         )
@@ -194,6 +209,9 @@ def spectra(
     files = [str(output)] if shards else []
     for shard in shards if plot else []:
         files += map(str, plot_station(shard, PLOT_DAMPING, plot_period, output.parent))
+    if quiet and not as_json:
+        stop_if_nothing(len(shards))
+        return
     _print_stations(len(shards), rejected, files, output.with_suffix(".rejected.csv"), as_json)
 
 
@@ -225,6 +243,9 @@ def process(
         bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")
     ] = False,
     as_json: AsJson = False,
+    log: LogFile = None,
+    log_format: LogForm = LogFormat.text,
+    quiet: Quiet = False,
 ) -> None:
     """
     Write processed records as MiniSEED, with a table of their corners and reasons.
@@ -236,7 +257,7 @@ def process(
 
     # Process every station
     chosen = load(settings, Processing) if settings else Processing()
-    with shown_progress() as progress:
+    with logged(log, log_format, quiet) as progress:
         result = process_records(
             sources, output, chosen, event, report, (usable_processors(), progress)
         )
@@ -249,9 +270,13 @@ def process(
         resumed = sum(station.resumed for station in result.done)
         counts = {"stations": stations, "resumed": resumed}
         print(json.dumps({**counts, "rejected": rows, "files": files}))
-    else:
+    elif not quiet:
         print(f"{stations} stations, {len(result.rejected)} rejected", *files, sep="\n  ")
     stop_if_nothing(stations)
+
+
+def print_nothing(result: "Result") -> None:
+    """Print no result: a quiet command prints what went wrong."""
 
 
 def print_result(result: "Result") -> None:

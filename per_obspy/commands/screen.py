@@ -16,13 +16,21 @@ from per_obspy.commands.endings import (
     stop_if_nothing,
     why_nothing,
 )
-from per_obspy.commands.printing import print_table, shown_progress, state_texts
-from per_obspy.commands.run import print_result
+from per_obspy.commands.operation.logged import (
+    LogFile,
+    LogForm,
+    LogFormat,
+    Quiet,
+    log_ending,
+    logged,
+)
+from per_obspy.commands.printing import print_table, state_texts
+from per_obspy.commands.run import print_nothing, print_result
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from per_obspy.config import Design
+    from per_obspy.config import Design, Run
     from per_obspy.jobs.output_folder import Result
 
 #: Columns of the worst pairs that are printed: by a design spectrum, and of an ensemble where the
@@ -60,6 +68,9 @@ def screen(
     language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
+    log: LogFile = None,
+    log_format: LogForm = LogFormat.text,
+    quiet: Quiet = False,
 ) -> None:
     """
     Screen pairs: in an ensemble of scenarios, by a design spectrum, or again with a run's stations.
@@ -70,37 +81,40 @@ def screen(
     Example: per-obspy screen workflows/ensemble.toml
     """
     from per_obspy.config import Design, Ensemble, screening_kind
+    from per_obspy.pipeline.ensemble import screen_scenarios
+    from per_obspy.pipeline.run import screen as screen_again
 
     kind = screening_kind(configuration)
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
+    with logged(log, log_format, quiet) as progress:
+        if kind is Design:
+            design = _screened_by_spectrum(configuration, output, language)
+        elif kind is Ensemble:
+            result = screen_scenarios(configuration, output, progress=progress, language=language)
+            log_ending(result.record)
+        else:
+            result = screen_again(_in_language(configuration, language), output, progress=progress)
+            log_ending(result.record)
+    # Results are printed when no line of the log can come between
     if kind is Design:
-        _screen_by_spectrum(configuration, output, language, as_json)
-    elif kind is Ensemble:
-        _screen_ensemble(configuration, output, language, as_json)
+        _end_design(design, as_json, quiet)
     else:
-        _screen_again(configuration, output, language, strict, as_json)
+        shown = _print_ensemble if kind is Ensemble else print_result
+        print_and_end(result, as_json, print_nothing if quiet else shown, strict)
 
 
-def _screen_again(
-    configuration: Path, output: Path | None, language: Language, strict: bool, as_json: bool
-) -> None:
-    """Screen the pairs of a run again with the stations that it left."""
+def _in_language(configuration: Path, language: Language) -> "Path | Run":
+    """Return the configuration of a run with the language of the command line, if it has one."""
     from per_obspy.config import Run, in_language, load
-    from per_obspy.pipeline.run import screen as screen_again
 
-    settings: Path | Run = configuration
-    if language is not None:
-        settings = in_language(load(configuration, Run), language)
-    with shown_progress() as progress:
-        result = screen_again(settings, output, progress=progress)
-    print_and_end(result, as_json, print_result, strict)
+    return configuration if language is None else in_language(load(configuration, Run), language)
 
 
-def _screen_by_spectrum(
-    configuration: Path, output: Path | None, language: Language, as_json: bool
-) -> None:
-    """Screen pairs by a design or user spectrum instead of a record, and print the result."""
+def _screened_by_spectrum(
+    configuration: Path, output: Path | None, language: Language
+) -> "tuple[pd.DataFrame, list[Path]]":
+    """Screen pairs by a design or user spectrum instead of a record; return table and files."""
     from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
     from per_obspy.pipeline.preflight import require_extras
@@ -117,14 +131,19 @@ def _screen_by_spectrum(
 
     if recognised := pairs.attrs["recognised"]:
         print(f"per-obspy: {recognised_line(settings.pairs, recognised)}", file=sys.stderr)
+    return table, files
 
+
+def _end_design(design: "tuple[pd.DataFrame, list[Path]]", as_json: bool, quiet: bool) -> None:
+    """Print the result of a screening by a spectrum, and stop where nothing was usable."""
+    table, files = design
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)
     rejected = len(table.attrs["rejected"])
     if as_json:
         names = [str(path) for path in files]
         print(json.dumps({"pairs": len(table), **counts, "rejected": rejected, "files": names}))
-    else:
+    elif not quiet:
         _print_spectrum_result(table, counts, rejected, files)
     if table.empty:
         stop_if_nothing(0, why_nothing(files[-1]))
@@ -160,17 +179,6 @@ def _print_spectrum_result(
     )
     _print_worst(table.head(WORST), SPECTRUM_COLUMNS)
     print(*files, sep="\n")
-
-
-def _screen_ensemble(
-    configuration: Path, output: Path | None, language: Language, as_json: bool
-) -> None:
-    """Screen pairs in every scenario and print their joint probabilities."""
-    from per_obspy.pipeline.ensemble import screen_scenarios
-
-    with shown_progress() as progress:
-        result = screen_scenarios(configuration, output, progress=progress, language=language)
-    print_and_end(result, as_json, _print_ensemble)
 
 
 def _print_ensemble(result: "Result") -> None:

@@ -7,6 +7,7 @@ or one section. Paths in a configuration are relative to the folder of its file.
 
 from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
+from per_obspy.config.operation.notify import Notify
 from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
@@ -36,6 +37,7 @@ __all__ = [
     "EnsembleScenario",
     "Fdsn",
     "Interpolation",
+    "Notify",
     "Pairs",
     "Processing",
     "Records",

@@ -301,6 +301,15 @@ class Records(Section):
             "one earthquake, s; increase it where clocks of stations are wrong"
         ),
     )
+    settle: float = Field(
+        0.0,
+        ge=0,
+        le=86_400,
+        description=(
+            "s; a file of the folder that was changed less than this ago, or changes while it is "
+            "read, waits for the next run; for folders that grow; 0: every file is read"
+        ),
+    )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")
     columns: tuple[Columns, ...] = Field((), description="plain tables of samples")
     fdsn: Fdsn | None = Field(None, description="FDSN web services")

@@ -10,6 +10,7 @@ from pydantic import (
 
 from per_obspy.config.building_rows import Rows
 from per_obspy.config.ensemble import Ensemble
+from per_obspy.config.operation.notify import Notify
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
@@ -37,6 +38,7 @@ class Run(Section):
     totals: Totals = Totals()
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
+    notify: Notify = Notify()
     csv_rows: int = Field(
         100_000,
         ge=1,

@@ -31,6 +31,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
 from per_obspy.machine import machine_fault, raise_machine_fault
+from per_obspy.termination import held
 from per_obspy.threads import use_one_thread
 
 Task = TypeVar("Task")
@@ -64,6 +65,9 @@ class Work(NamedTuple, Generic[Task, Result]):
 
 #: Reason of a task that takes its worker with it, also when it is alone.
 DIED = "its worker process was killed, perhaps for want of memory"
+
+#: Signals that end a run.
+_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 #: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
@@ -275,35 +279,44 @@ class _Pool(ProcessPoolExecutor):
         super().__init__(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """Submit a task; a process that is started for it does not see the interrupt key."""
-        with _interrupts_held():
+        """Submit a task; no signal ends the run while it starts a process for it."""
+        with _signals_held():
             return super().submit(do, *arguments, **named)
 
     def __exit__(self, kind: type[BaseException] | None, *others: Any) -> bool | None:
         """Wait for the workers; end them first if the work was interrupted."""
         if kind is not None and not issubclass(kind, Exception):
+            # Files are written whole, so that a worker can end anywhere
             for worker in set(active_children()) - self._others:
-                worker.terminate()
+                worker.kill()
         return super().__exit__(kind, *others)
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold back the interrupt key of the terminal, which reaches workers as well as the run."""
+def _signals_held() -> Iterator[None]:
+    """
+    Hold back the interrupt key and SIGTERM, also in a process that is started meanwhile.
+
+    The key of a terminal reaches workers as well as the run, and a process that is not yet known
+    to the run could not be ended with it.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with held():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker() -> None:
     """Prepare a worker process: one thread, and an end with the process that started it."""
-    # The run ends its workers itself; until here the interrupt key was held back
+    # The run ends its workers itself; until here both signals were held back
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     use_one_thread()
     _end_with_parent()
 

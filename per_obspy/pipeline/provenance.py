@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from per_obspy.config import Run, load
+from per_obspy.config import Notify, Run, load
 from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
@@ -71,8 +71,8 @@ class RunSettings:
             path: hashes.get(path) or hash_if_readable(path)
             for path in _input_files(self.settings, fetched)
         }
-        # The number of processes changes no result
-        placed = self.settings.model_copy(update={"output": self.folder, "workers": 0})
+        # Neither the number of processes nor messages change a result
+        placed = self._public.model_copy(update={"output": self.folder, "workers": 0})
         content = {
             "version": version("per_obspy"),
             "configuration": _values(placed, self.folder),
@@ -80,9 +80,14 @@ class RunSettings:
         }
         return {
             "key": content_hash(content),
-            "configuration": _values(self.settings, self.base),
+            "configuration": _values(self._public, self.base),
             "inputs": {os.path.relpath(path, self.base): one for path, one in found.items()},
         }
+
+    @property
+    def _public(self) -> Run:
+        """Return the settings without those of messages, whose commands may hold secrets."""
+        return self.settings.model_copy(update={"notify": Notify()})
 
     def write(self) -> None:
         """
@@ -96,7 +101,7 @@ class RunSettings:
         path = self.folder / CONFIGURATION
         if path == self.file:
             return
-        placed = self.settings.model_copy(update={"output": self.folder})
+        placed = self._public.model_copy(update={"output": self.folder})
         text = commented(Run, effective_content(placed, self.folder), HEADING)
         # A file of that name that somebody else wrote is kept
         before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None

@@ -28,6 +28,11 @@ from per_obspy.pipeline.losses import losses, number_of_rows
 from per_obspy.pipeline.preflight import check_inputs
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.pipeline.report import reported
+from per_obspy.pipeline.results.served_stations import (
+    KnownStations,
+    earlier_facts,
+    station_facts,
+)
 from per_obspy.pipeline.screening import Screened, screened
 from per_obspy.pipeline.stations import (
     FoundStations,
@@ -134,11 +139,12 @@ def screen(
     asked = RunSettings(configuration, output)
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
+        # Stations and their facts are those of the latest run
         _require_stations(folder)
         stations = _earlier_stations(settings, folder)
         drawn = write_drawn_pairs(settings, folder, progress)
         check_inputs(settings, folder)
-        earthquakes = _earlier_earthquakes(folder)
+        earthquakes, known = earlier_facts(folder / RECORD)
         earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
         started = now()
         # A later run does everything that has changed since, whatever is recorded here
@@ -148,6 +154,7 @@ def screen(
         with compiling(progress):
             record = _later_stages(settings, folder, stations, rejected, executor, progress)
         record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
+        _add_stations(record, known)
         return _finished_record(settings, folder, record, head, earlier_rows)
 
 
@@ -206,17 +213,15 @@ def _all_stages(
     rejected = all_rejections(found.rejected, stations)
     record = _later_stages(settings, folder, stations, rejected, executor, progress)
     record["earthquakes"] = found.earthquakes
+    _add_stations(record, found.known)
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
     return {**record, "seconds": seconds | record["seconds"]}
 
 
-def _earlier_earthquakes(folder: Path) -> list[Any]:
-    """Return the earthquakes of the run that left the stations; none where it has no record."""
-    try:
-        found = read_status(folder / RECORD).get("earthquakes")
-    except StatusError:
-        return []
-    return found if isinstance(found, list) else []
+def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
+    """Add expected, received, late and rejected stations to a record, with what each serves."""
+    used, served = record.pop("used"), record.pop("served")
+    record["stations"] = station_facts(known, used, served, record["counts"])
 
 
 def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
@@ -259,8 +264,9 @@ def _finished_record(
 ) -> Result:
     """Write the record of a run, with the rows that it lost."""
     lost = losses(settings, record["counts"], earlier_rows)
-    # What failed unexpectedly is done again by the next run
-    key = "" if record["failed"] else head["key"]
+    # What failed unexpectedly is done again by the next run, and files that waited are taken
+    waited = record["stations"]["waiting"]
+    key = "" if record["failed"] or waited else head["key"]
     return recorded(folder / RECORD, {**record, "losses": lost, **head, "key": key})
 
 
@@ -289,6 +295,8 @@ def _later_stages(
         # A picture or layer that failed is made by the next run
         "failed": outcome["failed"] or bool(made.faults),
         "faults": made.faults,
+        "used": _names_of(usable, found),
+        "served": found.served,
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
@@ -296,6 +304,12 @@ def _later_stages(
         "versions": software_versions(),
         "seconds": seconds,
     }
+
+
+def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
+    """Return the stations that can serve pairs: those without a place cannot."""
+    unplaced = {rejection.name for rejection in found.unplaced}
+    return [station.station for station in usable if station.station not in unplaced]
 
 
 def _outcome(found: Screened, stations: Sequence[FinishedStation]) -> dict[str, Any]:
@@ -325,7 +339,7 @@ def _write_stations(
 ) -> StationSummary:
     """Write the table of the stations with the pairs that each serves."""
     spectra = [station.spectra for station in usable if station.spectra is not None]
-    return write_stations(spectra, [*rejected, *found.unplaced], found.served, folder)
+    return write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
 
 
 def _intermediate_hashes(

@@ -16,6 +16,7 @@ from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
+from per_obspy.pipeline.results.served_stations import Served
 from per_obspy.pipeline.rows.building_rows import NO_ROWS, BuildingRowsDone, building_rows
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
@@ -53,8 +54,8 @@ class Screened(NamedTuple):
         The files.
     counts : dict
         Pairs and their states, rejections of each kind, and chunks that an earlier run had done.
-    served : Counter
-        Number of pairs for which the record of each station is used.
+    served : Served
+        Numbers of pairs and buildings for which the record of each station is used.
     unplaced : tuple of Rejection
         Stations that serve no pair because their place is unknown.
     failed : bool
@@ -65,7 +66,7 @@ class Screened(NamedTuple):
 
     outputs: list[Path]
     counts: dict[str, int]
-    served: Counter[str]
+    served: Served
     unplaced: tuple[Rejection, ...]
     failed: bool
     pair_tables: PairNotes
@@ -116,10 +117,12 @@ def screened(
         files, states, served = _ranked(tables, folder, facts, settings.csv_rows, progress)
         # Rows of buildings are read from it
         rows = building_rows(settings, folder, ground, facts, executor, progress)
-        outputs += [*files, *rows.outputs]
+        outputs += files + rows.outputs
     left_out = chain(rejected, unplaced, rejections(parts), rows.rejected)
     counts = _counts(states, write_rejected(left_out, outputs[0]), parts, rows)
-    return Screened(outputs, counts, served, unplaced, _any_failed(parts, rows), notes)
+    return Screened(
+        outputs, counts, Served(served, rows.served), unplaced, _any_failed(parts, rows), notes
+    )
 
 
 def _ranked(

@@ -13,6 +13,7 @@ from per_obspy.files import content_hash, is_part, remove_file
 from per_obspy.jobs.station import FinishedStation, StationJob, do_stations, earlier_station
 from per_obspy.names import inside
 from per_obspy.pipeline.results.run_facts import with_event
+from per_obspy.pipeline.results.served_stations import KnownStations
 from per_obspy.progress import Progress
 from per_obspy.records.event_file import EventFile
 from per_obspy.records.fdsn.cache import Fetched
@@ -40,12 +41,15 @@ class FoundStations(NamedTuple):
         Hash of every file that was read on the way.
     earthquakes : list of dict
         Facts of every earthquake in the folder of records.
+    known : KnownStations
+        Stations that are expected, and those of which records came.
     """
 
     jobs: list[StationJob]
     rejected: list[Rejection]
     hashes: dict[Path, str]
     earthquakes: list[dict[str, object]]
+    known: KnownStations = KnownStations()
 
 
 def find_station_jobs(
@@ -89,7 +93,8 @@ def find_station_jobs(
         found.stations, _shards(folder), settings.processing, settings.spectra, found.event
     )
     earthquakes = with_event(found.earthquakes, found.event and found.event.event)
-    return FoundStations(jobs, list(found.rejected), found.hashes, earthquakes)
+    known = KnownStations.of(found.expected, found.stations, found.waiting)
+    return FoundStations(jobs, list(found.rejected), found.hashes, earthquakes, known)
 
 
 def station_jobs(

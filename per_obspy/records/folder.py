@@ -14,7 +14,7 @@ import obspy
 from obspy import Inventory, Stream, Trace, UTCDateTime
 
 from per_obspy.config import Archives
-from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection
+from per_obspy.errors import CatalogError, NothingUsable, RecordRejected, Rejection, TryLater
 from per_obspy.files import bytes_hash
 from per_obspy.formats.text.itaca_metadata import read_itaca_metadata
 from per_obspy.formats.text.station_table import (
@@ -28,6 +28,12 @@ from per_obspy.processing.notes import taken
 from per_obspy.records.archives.archive_files import LIMITS, archive_files, read_file
 from per_obspy.records.archives.walked import is_archive
 from per_obspy.records.contents.file_list import files_below, is_document
+from per_obspy.records.contents.growing import (
+    FileState,
+    changed_files,
+    file_states,
+    growing_files,
+)
 from per_obspy.records.contents.metadata_files import (
     METADATA,
     kind_of,
@@ -60,6 +66,8 @@ class SourceContents(NamedTuple):
         Hash of every file that was read on the way.
     records : tuple of RecordSpan
         Times of the records, where their headers were read.
+    waiting : tuple of Path
+        Files that are still being written, which are not read.
     """
 
     stations: dict[str, tuple[Path, ...]]
@@ -67,10 +75,14 @@ class SourceContents(NamedTuple):
     rejected: tuple[Rejection, ...]
     hashes: Mapping[Path, str] = MappingProxyType({})
     records: tuple[RecordSpan, ...] = ()
+    waiting: tuple[Path, ...] = ()
 
 
 def find_stations(
-    folder: str | Path, stationxml: str | Path | None = None, limits: Archives = LIMITS
+    folder: str | Path,
+    stationxml: str | Path | None = None,
+    limits: Archives = LIMITS,
+    settle: float = 0.0,
 ) -> SourceContents:
     """
     Find the stations that have records in a folder and its subfolders, from headers only.
@@ -85,6 +97,8 @@ def find_stations(
         stations (CSV) does where only coordinates are missing.
     limits : Archives
         Limits of unpacking.
+    settle : float
+        Age, s, from which a file is read if it does not change; 0: every file is.
 
     Raises
     ------
@@ -93,9 +107,10 @@ def find_stations(
         read.
     NothingUsable
         If the folder is empty or without any record.
+    TryLater
+        If every file is still being written.
     """
-    files, rejected = _files(Path(folder), limits)
-    found = [_read_file(path, limits) for path in files]
+    found, rejected, waiting = _read_files(Path(folder), limits, settle)
     records = _records(found)
     # Metadata that is named comes before that of the folder
     inventories, rows = named_metadata(None if stationxml is None else Path(stationxml))
@@ -107,7 +122,7 @@ def find_stations(
     if not records:
         # A folder without records may fill up; a file that was named should have been one
         nothing = NothingUsable if Path(folder).is_dir() else CatalogError
-        raise nothing(str(folder), _nothing_found(files, rejected))
+        raise nothing(str(folder), _nothing_found(len(found), rejected))
     stations = station_files(records)
     # Tables of coordinates serve the stations that have records
     if rows:
@@ -118,7 +133,39 @@ def find_stations(
         tuple(rejected),
         {file.path: file.hash for file in found if file.hash},
         records,
+        waiting,
     )
+
+
+def _read_files(
+    folder: Path, limits: Archives, settle: float
+) -> "tuple[list[_File], list[Rejection], tuple[Path, ...]]":
+    """Read the files of a folder; return unreadable ones, and those that are still written."""
+    paths, rejected = _paths(folder)
+    states, waiting = _settled(folder, paths, settle)
+    files = _files([path for path in paths if path not in waiting], rejected, limits)
+    if not files and not rejected:
+        raise NothingUsable(str(folder), "the folder is empty")
+    found = [_read_file(path, limits) for path in files]
+    # A file that has changed since is half of one
+    waiting |= changed_files(states)
+    found = [file for file in found if not waiting.intersection((file.path, *file.path.parents))]
+    return found, rejected, tuple(sorted(waiting))
+
+
+def _settled(
+    folder: Path, paths: list[Path], settle: float
+) -> tuple[dict[Path, FileState], set[Path]]:
+    """Return the state of the files that can be read, and the files that are still written."""
+    if settle <= 0:
+        return {}, set()
+    # A folder without a finished file is read later
+    states = file_states(paths)
+    waiting = growing_files(states, settle)
+    if waiting and waiting == set(states):
+        reason = f"its {len(waiting)} files are still being written, try again in {settle:g} s"
+        raise TryLater(f"{folder}: {reason}")
+    return {path: state for path, state in states.items() if path not in waiting}, waiting
 
 
 class _File(NamedTuple):
@@ -253,12 +300,16 @@ def read_station(
     return stream, (*rejected, *integrals, *doubles)
 
 
-def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]:
-    """Return all files, those in archives included, and the archives that cannot be read."""
+def _paths(folder: Path) -> tuple[list[Path], list[Rejection]]:
+    """Return the files of a folder, archives unopened, and whatever else is there."""
     if not folder.exists():
         raise CatalogError(str(folder), "no such folder or file")
     # A file counts as the only one of its folder
-    paths, rejected = ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
+    return ([folder], list[Rejection]()) if folder.is_file() else files_below(folder)
+
+
+def _files(paths: list[Path], rejected: list[Rejection], limits: Archives) -> list[Path]:
+    """Return all files, those in archives included; note the archives that cannot be read."""
     files = []
     for path in paths:
         try:
@@ -267,9 +318,7 @@ def _files(folder: Path, limits: Archives) -> tuple[list[Path], list[Rejection]]
             rejected += unread
         except RecordRejected as rejection:
             rejected.append(_rejected_file(path, rejection))
-    if not files and not rejected:
-        raise NothingUsable(str(folder), "the folder is empty")
-    return files, rejected
+    return files
 
 
 def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
@@ -277,9 +326,9 @@ def _rejected_file(path: Path, rejection: RecordRejected) -> Rejection:
     return Rejection("file", path.name, str(path), None, rejection.reasons)
 
 
-def _nothing_found(files: list[Path], rejected: list[Rejection]) -> str:
+def _nothing_found(files: int, rejected: list[Rejection]) -> str:
     """Return the reason why a folder has no station, with the first fault as an example."""
-    problem = f"none of its {len(files)} files is a record"
+    problem = f"none of its {files} files is a record"
     if not rejected:
         return f"{problem}: there is only metadata"
     return f"{problem}; {rejected[0].name}: {'; '.join(rejected[0].reasons)}"

@@ -28,7 +28,7 @@ from per_obspy.records.earthquakes.choice import (
 )
 from per_obspy.records.earthquakes.groups import EventGroup, event_groups
 from per_obspy.records.event_file import EventFile, read_event, read_event_file
-from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
+from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, find_stations, read_station
 from per_obspy.records.sds import find_sds_stations, read_sds_station
@@ -75,6 +75,10 @@ class Sources(NamedTuple):
         Hash of every file that was read on the way.
     earthquakes : list of dict
         Facts of every earthquake in the folder, see ``records.earthquakes.choice.OneEarthquake``.
+    expected : frozenset of str
+        Names of all stations of metadata and of lists of services, with records or without.
+    waiting : tuple of Path
+        Files of the folder that are still being written, which are not read.
     """
 
     stations: dict[str, StationSource]
@@ -82,6 +86,8 @@ class Sources(NamedTuple):
     rejected: tuple[Rejection, ...]
     hashes: dict[Path, str]
     earthquakes: list[dict[str, object]]
+    expected: frozenset[str] = frozenset()
+    waiting: tuple[Path, ...] = ()
 
 
 def fetched_records(records: config.Records | None, progress: Progress = silent) -> Fetched | None:
@@ -110,11 +116,13 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
     hashes = {event.path: event.hash} if event else {}
     stations: dict[str, StationSource] = {}
     rejected: list[Rejection] = []
+    expected = set[str]()
     # Of several earthquakes in the folder one is screened
     folder = _folder(records, event and event.event)
     for contents, reader in _contents(records, fetched, event and event.event, folder):
         found = _with_usable_names(contents)
         rejected += found.rejected
+        expected |= _expected(found)
         hashes |= found.hashes
         for name, paths in found.stations.items():
             if name in stations:
@@ -122,8 +130,26 @@ def find_sources(records: config.Records, fetched: Fetched | None) -> Sources:
                 continue
             inventory = _selected(found.inventory, name)
             stations[name] = StationSource(paths, _hashes(paths, hashes), inventory, reader)
-    earthquakes = folder.earthquakes if folder else []
-    return Sources(stations, event, tuple(rejected), hashes, earthquakes)
+    earthquakes, waiting = _folder_facts(folder)
+    return Sources(
+        stations, event, tuple(rejected), hashes, earthquakes, frozenset(expected), waiting
+    )
+
+
+def _folder_facts(folder: OneEarthquake | None) -> tuple[list[dict[str, object]], tuple[Path, ...]]:
+    """Return the earthquakes of a folder, and its files that are still being written."""
+    return (folder.earthquakes, folder.contents[0][0].waiting) if folder else ([], ())
+
+
+def _expected(found: SourceContents) -> set[str]:
+    """Return the stations of the metadata and list of a source, with records or without."""
+    codes = [(network.code, place.code) for network in found.inventory or () for place in network]
+    listed = [
+        rejection.name
+        for rejection in found.rejected
+        if rejection.kind == "station" and rejection.source == FDSN
+    ]
+    return {f"{network}.{station}" for network, station in codes} | {*listed, *found.stations}
 
 
 def find_path_sources(paths: Sequence[Path]) -> Sources:
@@ -285,7 +311,7 @@ def _folder(records: config.Records, event: Event | None) -> OneEarthquake | Non
     """Return the records of one earthquake in the folder, None if there is no folder."""
     if not records.folder:
         return None
-    found = find_stations(records.folder, records.stationxml, records.archives)
+    found = find_stations(records.folder, records.stationxml, records.archives, records.settle)
     return one_earthquake(found, records, event)
 
 

@@ -77,3 +77,19 @@ def test_what_the_record_of_a_run_shows_is_seen_from_its_configuration(finished)
     record = json.loads((result.folder / "run.json").read_text())
     assert record["configuration"]["simulation"] == "scenario.toml"
     assert record["inputs"].keys() == {"scenario.toml"}
+
+
+def test_messages_change_no_result_and_are_in_no_file(finished):
+    folder, result = finished
+    # would catch: the address of a service in run.json
+    text = (folder / "run.toml").read_text()
+    (folder / "notified.toml").write_text(
+        f'{text}[notify]\ncommand = ["mail", "duty@example.org"]\n'
+    )
+    again = run(folder / "notified.toml", executor=InProcess())
+    assert again.did_nothing
+    assert RunSettings(folder / "notified.toml", None).settings.notify.command
+    for name in ("run.json", CONFIGURATION):
+        assert "duty@example.org" not in (result.folder / name).read_text()
+    assert result.record["stations"]["expected"] == ["XX.S001"]
+    assert result.record["stations"]["late"] == []

@@ -48,10 +48,11 @@ def found(settings):
 
 
 def test_every_station_has_a_job_with_the_hashes_of_its_files(settings):
-    stages, (jobs, rejected, hashes, earthquakes) = found(settings)
+    stages, (jobs, rejected, hashes, earthquakes, known) = found(settings)
     assert stages == ["simulating records", "finding records"]
     assert [job.station for job in jobs] == ["XX.S001", "XX.S002"]
     assert rejected == []
+    assert known.expected == known.received == ("XX.S001", "XX.S002")
     assert [group["stations"] for group in earthquakes] == [2]
     # hashes of the records and of the event are known, so that no file is read for them again
     for job in jobs:
@@ -116,7 +117,7 @@ def test_simulated_records_that_are_not_whole_are_made_again(settings, fault):
 def test_another_scenario_leaves_no_record_of_this_one(settings, tmp_path):
     found(settings)
     (tmp_path / "scenario.toml").write_text(SCENARIO.replace("stations = 2", "stations = 1"))
-    stages, (jobs, _, hashes, _) = found(settings)
+    stages, (jobs, _, hashes, *_) = found(settings)
     assert stages == ["simulating records", "finding records"]
     assert [job.station for job in jobs] == ["XX.S001"]
     # the status lists just what is there
@@ -126,7 +127,7 @@ def test_another_scenario_leaves_no_record_of_this_one(settings, tmp_path):
 
 
 def test_an_earlier_run_has_its_stations(settings):
-    _, (jobs, _, _, _) = found(settings)
+    _, (jobs, *_) = found(settings)
     done = finished_stations(jobs, 1, None, lambda *_: None)
     (settings.output / "stations" / ".XX.S003.1.part.json").write_text("{")
     again = stations_of_earlier_run(settings.output)

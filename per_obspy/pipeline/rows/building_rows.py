@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -67,12 +68,15 @@ class BuildingRowsDone(NamedTuple):
         Contradictions, repeated contacts and rows that could not be followed.
     failed : bool
         Whether the work of a chunk failed unexpectedly.
+    served : mapping of str to int
+        Number of buildings in whose pairs the record of each station is used.
     """
 
     outputs: list[Path]
     counts: dict[str, int]
     rejected: tuple[Rejection, ...] = ()
     failed: bool = False
+    served: Mapping[str, int] = MappingProxyType({})
 
 
 #: Result where there are no rows.
@@ -80,12 +84,13 @@ NO_ROWS = BuildingRowsDone([], {})
 
 
 class _Found(NamedTuple):
-    """Contacts of all rows in their order, their buildings, number of rows, and rejections."""
+    """Contacts of all rows in their order, buildings, number of rows, rejections, served ones."""
 
     placed: pd.DataFrame
     contacts: Contacts
     rows: int
     rejected: tuple[Rejection, ...]
+    served: Mapping[str, int]
 
 
 def building_rows(
@@ -133,7 +138,8 @@ def building_rows(
     # What was done, and what was left out
     rejected = (*found.rejected, *rows_rejections(parts))
     counts = _counts(found, folder, parts)
-    return BuildingRowsDone(outputs, counts, rejected, any(part.failed for part in parts))
+    failed = any(part.failed for part in parts)
+    return BuildingRowsDone(outputs, counts, rejected, failed, found.served)
 
 
 def _counts(found: _Found, folder: Path, parts: Sequence[RowsPart]) -> dict[str, int]:
@@ -184,7 +190,33 @@ def _found(rows: Rows, risk: Dataset) -> _Found:
     row_id = _row_names(placed, contacts, first)[row]
     flags = joined_names(_raised(chains, placed, first))[row]
     table = placed.contacts.assign(row_id=row_id, flags=flags, rank=ranks)
-    return _Found(table, contacts, first.size, (*contacts.rejected, *joints.rejected))
+    rejected = (*contacts.rejected, *joints.rejected)
+    served = served_buildings(pairs["station"], contacts.buildings)
+    return _Found(table, contacts, first.size, rejected, served)
+
+
+def served_buildings(station: pd.Series, buildings: IntArray) -> dict[str, int]:
+    """
+    Return the number of buildings in whose pairs the record of each station is used.
+
+    Parameters
+    ----------
+    station : (n_pairs,) Series of str
+        Name of the station of each pair, empty for none.
+    buildings : (n_pairs, 2) ndarray of int
+        Numbers of the buildings of each pair.
+
+    Examples
+    --------
+    >>> served_buildings(pd.Series(["A", "A", "B", ""]), np.array([[0, 1], [1, 2], [2, 3], [3, 4]]))
+    {'A': 3, 'B': 2}
+    """
+    codes, names = pd.factorize(station)
+    size = int(buildings.max(initial=0)) + 1
+    # Station and building as one number, each once
+    both = np.unique(codes[:, None] * size + buildings)
+    counts = np.bincount(both // size, minlength=len(names))
+    return {str(name): int(n) for name, n in zip(names, counts, strict=True) if name}
 
 
 def _raised(chains: Chains, placed: PlacedRows, first: IntArray) -> dict[str, BoolArray]:

@@ -49,6 +49,9 @@ from per_obspy.resume import (
     write_status,
 )
 
+#: Source of rejections of stations that a service lists but has no records of.
+FDSN = "FDSN"
+
 
 class Fetched(NamedTuple):
     """
@@ -153,7 +156,7 @@ def _fetch_missing(
     rejected += unusable
     # Stations without a reason are in the cache
     rejected += [
-        Rejection("station", outcome.station, "FDSN", None, outcome.reasons)
+        Rejection("station", outcome.station, FDSN, None, outcome.reasons)
         for outcome in outcomes
         if outcome.reasons
     ]

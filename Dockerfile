@@ -1,0 +1,27 @@
+# per_obspy as a watcher: docs/operation.md. Build: docker build -t per-obspy .
+# All steps are those of workflows/container/install.sh, which CI runs without a container.
+FROM python:3.12-slim
+
+RUN useradd --system --uid 10001 --home-dir /var/cache/per-obspy --create-home per-obspy \
+ && install -d -o per-obspy -g per-obspy /data /var/cache/per-obspy/numba
+ENV NUMBA_CACHE_DIR=/var/cache/per-obspy/numba MPLCONFIGDIR=/var/cache/per-obspy/matplotlib \
+    PATH=/opt/per-obspy/bin:$PATH PYTHONDONTWRITEBYTECODE=1
+
+COPY pyproject.toml README.md LICENSE /src/
+COPY per_obspy /src/per_obspy
+COPY workflows/smoke.toml /src/workflows/smoke.toml
+COPY workflows/container /src/workflows/container
+COPY catalogs/smoke /src/catalogs/smoke
+RUN /src/workflows/container/install.sh install /src /opt/per-obspy
+
+# Kernels are compiled as the user that runs them, who keeps those of another processor too
+USER per-obspy
+RUN /src/workflows/container/install.sh compile /opt/per-obspy /src/workflows
+
+WORKDIR /data
+VOLUME /data
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=1m --timeout=30s --start-period=5m --retries=3 \
+  CMD per-obspy status /data || exit 1
+ENTRYPOINT ["per-obspy"]
+CMD ["watch", "/config/watch.toml"]

@@ -1,0 +1,1 @@
+"""Commands of operation: status and the watcher."""

@@ -1,0 +1,1 @@
+"""Settings of operation: notification and the watcher."""

@@ -1,0 +1,1 @@
+"""Operation: watch for earthquakes, report status, notify."""

@@ -1,0 +1,154 @@
+"""Health of a folder of results: of a watcher, or of the latest run; for people and monitoring."""
+
+import os
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from per_obspy.errors import CatalogError
+from per_obspy.operation.status import STATUS, WatchStatus, read_status
+from per_obspy.resume import StatusError
+from per_obspy.resume import read_status as read_record
+
+#: Record of a run in its folder.
+RECORD = "run.json"
+
+#: s that work may last beyond the time at which a watcher is due.
+LATE = 900.0
+
+
+class Health(NamedTuple):
+    """
+    Health of a folder.
+
+    Attributes
+    ----------
+    state : str
+        ``"fine"``, ``"late"``, ``"failing"``, ``"stopped"``, ``"unfinished"`` or
+        ``"nothing_usable"``.
+    lines : tuple of str
+        Facts in words.
+    facts : dict
+        The same as plain values.
+    """
+
+    state: str
+    lines: tuple[str, ...]
+    facts: dict[str, Any]
+
+
+def folder_health(folder: Path, late: float = LATE, now: datetime | None = None) -> Health:
+    """
+    Return the health of a folder of a watcher or of a run.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``status.json`` or ``run.json``.
+    late : float
+        s after the time at which a watcher is due, from which it counts as late.
+    now : datetime, optional
+        Time with its zone, instead of that of the clock.
+
+    Raises
+    ------
+    CatalogError
+        If the folder has neither, or a damaged one.
+    """
+    if (folder / STATUS).exists():
+        return _watcher(read_status(folder), late, now or datetime.now(UTC))
+    if (folder / RECORD).exists():
+        return _run(folder / RECORD)
+    raise CatalogError(
+        str(folder), f"holds neither {STATUS} of a watcher nor {RECORD} of a run: name its folder"
+    )
+
+
+def _watcher(status: WatchStatus, late: float, now: datetime) -> Health:
+    """Return the health of a watcher."""
+    behind = _seconds_behind(status.next_due, now)
+    # The reason that needs a person first comes first
+    if status.running and not _is_alive(status):
+        state = "stopped"
+    elif status.last_error:
+        state = "failing"
+    else:
+        state = "late" if behind > late else "fine"
+    # Facts in words, errors last
+    lines = [
+        f"watcher: {state}",
+        f"last poll: {status.last_poll or 'none yet'}",
+        f"events open: {status.events_open}",
+        f"next due: {status.next_due or 'never'}" + (f", {behind:.0f} s ago" if behind > 0 else ""),
+    ]
+    if status.last_error:
+        lines.append(f"last error: {status.last_error} ({status.failures} in succession)")
+    if status.last_notification_error:
+        lines.append(f"notification: {status.last_notification_error}")
+    lines.append(f"process: {status.pid} on {status.host}, per_obspy {status.version}")
+    return Health(state, tuple(lines), {"state": state, **status.model_dump(mode="json")})
+
+
+def _seconds_behind(due: str | None, now: datetime) -> float:
+    """Return the time since a watcher was due, s; negative before."""
+    if due is None:
+        return 0.0
+    moment = datetime.fromisoformat(due)
+    # A time without a zone is UTC
+    zoned = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return (now - zoned).total_seconds()
+
+
+def _is_alive(status: WatchStatus) -> bool:
+    """Return whether the process of a watcher exists; on another machine it counts as alive."""
+    if status.host != platform.node() or os.name != "posix" or not status.pid:
+        return True
+    try:
+        os.kill(status.pid, 0)  # signal 0 only asks
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _run(file: Path) -> Health:
+    """Return the health of the latest run of a folder."""
+    try:
+        record = read_record(file)
+    except StatusError as error:
+        raise CatalogError(str(file), f"not the record of a run: {error}") from error
+    # A run whose record is unfinished was killed, or is at work
+    state = str(record.get("state"))
+    known = {"complete": "fine", "unfinished": "unfinished", "nothing_usable": "nothing_usable"}
+    if state not in known:
+        raise CatalogError(str(file), f"state: unknown, got {state!r:.40}")
+    # Pictures that failed are no reason to distrust the tables, but need a look
+    health = "failing" if record.get("failed") or record.get("faults") else known[state]
+    stations = record.get("stations")
+    facts = stations if isinstance(stations, dict) else {}
+    lines = [f"run {record.get('name', '')}: {health}", *_station_lines(facts)]
+    lines += [str(fault) for fault in _list(record.get("faults"))]
+    return Health(health, tuple(lines), {"state": health, "stations": facts})
+
+
+def _station_lines(stations: dict[str, Any]) -> list[str]:
+    """Return the numbers of stations of a run in words; none where its record has none."""
+    if not stations:
+        return []
+    # Damaged records have no lists
+    kinds = ("expected", "received", "late", "rejected")
+    counts = [f"{len(_list(stations.get(kind)))} {kind}" for kind in kinds]
+    lines = [f"stations: {', '.join(counts)}"]
+    if waiting := _list(stations.get("waiting")):
+        lines.append(f"files still being written: {len(waiting)}")
+    share = stations.get("share_of_pairs")
+    if isinstance(share, int | float):
+        lines.append(f"pairs that have a record: {share:.1%}")
+    return lines
+
+
+def _list(found: object) -> list[Any]:
+    """Return a list of a record, empty if it is damaged."""
+    return found if isinstance(found, list) else []
