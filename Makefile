@@ -19,7 +19,7 @@ test: .venv/test
 	@echo "== tests, doctests and README"
 	$(BIN)/python -m pytest -q -n auto --dist loadfile
 	@echo "== the kernels' tests once more without the compiler"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/kernels
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist loadfile tests/kernels
 
 check: .venv/check
 	$(BIN)/python tests/check_density.py
@@ -44,8 +44,7 @@ wheel: .venv/check
 	workflows/container/install.sh compile .venv/wheel workflows
 
 benchmark: .venv/benchmark
-	@for script in start_up formats spectra pounding rows pair_estimates footprints screening; do \
-	  echo "== $$script"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/$$script.py || exit 1; done
+	$(BIN)/python tests/benchmarks/figures.py docs/benchmarks.json
 	@if [ -z "$(RECORDS)" ]; then echo "== processing: left out, name a folder of MiniSEED with RECORDS=..."; \
 	  else echo "== processing"; OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/processing.py "$(RECORDS)"; fi
 
@@ -58,8 +57,8 @@ benchmark: .venv/benchmark
 .venv/run: .venv/bin/python pyproject.toml
 	@echo "== install per_obspy and what it needs (a minute or two)"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
-	@echo "== compile the kernels on a small run (once, one to two and a half minutes)"
-	$(BIN)/per-obspy run workflows/smoke.toml -o .venv/smoke >/dev/null
+	@echo "== compile the kernels (once, one to two minutes)"
+	$(BIN)/per-obspy warm-up
 	@touch $@
 
 .venv/%: .venv/run

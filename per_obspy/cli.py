@@ -17,7 +17,7 @@ import typer
 import per_obspy
 from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
-from per_obspy.commands.init import init
+from per_obspy.commands.init import init, warm_up
 from per_obspy.commands.operation.status import status
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
@@ -56,8 +56,8 @@ app = typer.Typer(
 app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
-    *(run, init, simulate, process, spectra, screen, report, show, plan, events, fetch, info),
-    status,
+    *(run, init, warm_up, simulate, process, spectra, screen),
+    *(report, show, plan, events, fetch, info, status),
 )
 for command in COMMANDS:
     app.command()(command)

@@ -1,4 +1,4 @@
-"""``per-obspy init``: write a first configuration with what a folder holds."""
+"""``per-obspy init`` and ``per-obspy warm-up``: before the first run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -36,3 +36,17 @@ def init(
     lines = write_first_configuration(output, records, pairs, force)
     for line in (*lines, f"{output} is written; next: per-obspy run {output}"):
         print(printable(line))
+
+
+def warm_up() -> None:
+    """
+    Compile all kernels, so that no later command waits for them: for images and clusters.
+
+    They are stored in the package's folder, or in NUMBA_CACHE_DIR if that is set.
+    """
+    from per_obspy.commands.printing import shown_progress
+    from per_obspy.jobs.kernels import compile_kernels
+
+    with shown_progress() as progress:
+        compile_kernels(progress)
+    print("all kernels are compiled")

@@ -2,11 +2,15 @@
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from multiprocessing import parent_process
+from pathlib import Path
 from typing import Any
 
 import numba
+from filelock import FileLock
+from numba.core.caching import FunctionCache
 
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
@@ -24,12 +28,28 @@ OPTIONS: dict[str, Any] = {
 }
 
 
+class SharedCache(FunctionCache):
+    """Compiled code of one kernel on disk, which several processes may save at the same time."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save one signature; without the lock two processes could give two of them one name."""
+        # A folder that cannot be written costs time only: the next start compiles again
+        with suppress(OSError):
+            self._impl.locator.ensure_cache_path()
+            with FileLock(str(Path(self.cache_path) / ".lock")):
+                super().save_overload(sig, data)
+
+
 def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles with some options, stored on disk where that is possible."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
-            return numba.njit(**OPTIONS, **options)(function)
+            kernel = numba.njit(**OPTIONS, **options)(function)
+            # Without the compiler the kernel is the function itself
+            if kernel is not function:
+                kernel._cache = SharedCache(function)
+            return kernel
         except RuntimeError as error:
             # Neither the package's folder nor that of the user can be written
             if "no locator available" not in str(error):

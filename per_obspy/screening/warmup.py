@@ -1,6 +1,10 @@
-"""Compilation of the kernels of screening ahead of use, while stations are still processed."""
+"""
+Compilation of kernels ahead of use: all of them in parts, or those of screening during a run.
 
-from collections.abc import Iterator
+The parts share few kernels, so that processes can compile them next to each other.
+"""
+
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Thread
 
@@ -9,8 +13,18 @@ import pandas as pd
 import xarray as xr
 
 from per_obspy.inventory.checking import checked_pairs
+from per_obspy.pounding.correlation.by_azimuth import worst_azimuth
+from per_obspy.pounding.history.pair_histories import pounding_histories
+from per_obspy.pounding.history.relative import directional_relative_displacement
+from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
+from per_obspy.pounding.history.row_history import pounding_history
+from per_obspy.pounding.history.row_maxima import BuildingRows, row_maxima
+from per_obspy.pounding.structure import Structure
 from per_obspy.progress import Progress
 from per_obspy.screening.risk import risk_table
+from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
+from per_obspy.spectra.elastic import response_spectra
+from per_obspy.spectra.per_pair import azimuth_maxima
 
 #: Stage that the first run waits for.
 COMPILING = "loading kernels (the first run compiles them for a minute)"
@@ -30,6 +44,60 @@ PAIRS = pd.DataFrame(
         "yield_displacement_1": [np.nan, np.nan, 0.02],
     }
 )
+
+
+#: Ground motion of two seconds, m/s², along one and both components, and its sampling interval, s.
+PULSE, INTERVAL = np.sin(np.linspace(0.0, 4.0 * np.pi, 201)), 0.01
+BOTH = np.stack([PULSE, PULSE])
+
+
+def _histories() -> None:
+    """Compile histories of pairs, and the single history of the page."""
+    oscillators = [0.5], 0.05, 1.0, [0.7], 0.05, 1.0
+    pounding_histories(BOTH, INTERVAL, *oscillators, 0.001, 0.65, azimuth=[0.0])
+    structures = [Structure(0.5, 0.05, 1.0), Structure(0.7, 0.05, 1.0)]
+    pounding_history(PULSE, INTERVAL, structures, 0.001, 0.65, free_vibration=False)
+
+
+def _yielding() -> None:
+    """Compile relative displacements of yielding pairs."""
+    pair = [0.5], 0.05, [0.7], 0.05, [0.0]
+    yielding_relative_displacement(BOTH, INTERVAL, *pair, yield_displacement_1=0.02)
+
+
+def _rows() -> None:
+    """Compile histories of rows of buildings."""
+    # Three buildings in touch that yield
+    ones = np.ones(3)
+    row = BuildingRows(
+        first=np.array([0, 3]),
+        period=np.array([0.5, 0.7, 0.6]),
+        damping=0.05 * ones,
+        mass=ones,
+        yield_displacement=0.02 * ones,
+        hardening=0.05 * ones,
+        participation_left=ones,
+        participation_right=ones,
+        gap=0.0 * ones,
+        restitution=0.65 * ones,
+        azimuth=np.zeros(1),
+    )
+    row_maxima(PULSE, PULSE, INTERVAL, row)
+
+
+def _relative() -> None:
+    """Compile relative displacements, correlations and maxima of pairs along azimuths."""
+    pair = [0.5], [0.05], [0.7], [0.05], [0.0]
+    directional_relative_displacement(PULSE, PULSE, INTERVAL, *pair)
+    worst_azimuth(PULSE, PULSE, INTERVAL, *pair[:4], [1.0], [1.0])
+    azimuth_maxima(PULSE, PULSE, INTERVAL, [0.5], [0.05], [0.0])
+
+
+def _spectra() -> None:
+    """Compile spectra of a station, by component and by azimuth."""
+    response_spectra(PULSE, INTERVAL, [0.5], [0.05])
+    azimuthal_per_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])
+    azimuthal_sd_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])
 
 
 @contextmanager
@@ -56,18 +124,34 @@ def compile_screening() -> None:
     risk_table(_station(), checked_pairs(PAIRS, "none"))
 
 
+#: Parts that processes compile next to each other, the longest first; `compile_screening` then
+#: compiles what is left.
+PARTS: dict[str, Callable[[], None]] = {
+    "relative": _relative,
+    "rows": _rows,
+    "yielding": _yielding,
+    "histories": _histories,
+    "spectra": _spectra,
+}
+
+
+def compile_part(name: str) -> str:
+    """Compile one of `PARTS`, or everything that screening needs, and return its name."""
+    PARTS.get(name, compile_screening)()
+    return name
+
+
 def _station() -> xr.Dataset:
     """Return a station with a pulse on both horizontals and constant spectra."""
-    pulse = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
     grid = {"period": [0.1, 1.0], "damping": [0.02, 0.05], "azimuth": [0.0, 90.0]}
     spectra = ("azimuth", "damping", "period"), np.ones((2, 2, 2), dtype=np.float32)
     # The variables of a station that screening reads
     variables = {
-        "acceleration": (("horizontal", "time"), np.stack([pulse, pulse])),
+        "acceleration": (("horizontal", "time"), BOTH),
         "per_azimuthal": spectra,
         "sd_azimuthal": spectra,
         "per_rotd50": (("damping", "period"), np.ones((2, 2), dtype=np.float32)),
-        "sampling_interval": 0.01,
+        "sampling_interval": INTERVAL,
         "shortest_usable_period": 0.01,
         "longest_usable_period": 9.0,
     }

@@ -29,6 +29,18 @@ MEANINGS = {
 #: Words of a hypocentre: degrees, and m.
 PLACE = ("longitude", "latitude", "depth")
 
+#: Attributes of the coordinates of a station, as CF asks for them.
+COORDINATES = {
+    "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
+    "longitude": {"units": "degrees_east", "standard_name": "longitude", "long_name": "longitude"},
+    "elevation": {
+        "units": "m",
+        "standard_name": "surface_altitude",
+        "long_name": "elevation",
+        "positive": "up",
+    },
+}
+
 #: Dimensions, values and attributes of a variable of a Dataset.
 Variable = tuple[str | tuple[str, ...], Any, dict[str, Any]]
 
@@ -134,3 +146,27 @@ def _remarks(stream: Stream, name: str) -> str:
         if text:
             remarks.append(f"{trace.stats.channel}: {text}")
     return "; ".join(remarks)
+
+
+def place_of(trace: Trace) -> dict[str, Variable]:
+    """Return name, coordinates and ground of the station; NaN or no text where unknown."""
+    stats = trace.stats
+    name = f"{stats.network}.{stats.station}"
+    velocity = {
+        "units": "m s-1",
+        "long_name": "mean shear-wave velocity of the upper 30 m of ground",
+    }
+    place: dict[str, Variable] = {
+        "station": ((), name, {"cf_role": "timeseries_id", "long_name": "station"}),
+        "site_class": (
+            (),
+            str(stats.get("site_class", "")),
+            {"long_name": "site class; empty if unknown"},
+        ),
+        "vs30": ((), float(stats.get("vs30", np.nan)), velocity),
+    }
+    # Latitude, longitude and elevation, as far as the metadata have them
+    known = stats.get("coordinates", {})
+    for coordinate, attributes in COORDINATES.items():
+        place[coordinate] = ((), float(known.get(coordinate, np.nan)), dict(attributes))
+    return place

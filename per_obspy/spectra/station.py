@@ -37,20 +37,9 @@ from per_obspy.spectra.record_facts import (
     Variable,
     header_hypocentre,
     peak_motions,
+    place_of,
     record_facts,
 )
-
-#: Attributes of the coordinates of a station, as CF asks for them.
-COORDINATES = {
-    "latitude": {"units": "degrees_north", "standard_name": "latitude", "long_name": "latitude"},
-    "longitude": {"units": "degrees_east", "standard_name": "longitude", "long_name": "longitude"},
-    "elevation": {
-        "units": "m",
-        "standard_name": "surface_altitude",
-        "long_name": "elevation",
-        "positive": "up",
-    },
-}
 
 
 def station_spectra(
@@ -303,32 +292,8 @@ def _motion(motion: FloatArray, azimuths: list[float], trace: Trace) -> xr.Datas
             "horizontal_azimuth": ("horizontal", azimuths, azimuth),
             "sampling_interval": ((), trace.stats.delta, interval),
         },
-        coords={"time": ("time", seconds, time), **_place(trace)},
+        coords={"time": ("time", seconds, time), **place_of(trace)},
     )
-
-
-def _place(trace: Trace) -> dict[str, Variable]:
-    """Return name, coordinates and ground of the station; NaN or no text where unknown."""
-    stats = trace.stats
-    name = f"{stats.network}.{stats.station}"
-    velocity = {
-        "units": "m s-1",
-        "long_name": "mean shear-wave velocity of the upper 30 m of ground",
-    }
-    place: dict[str, Variable] = {
-        "station": ((), name, {"cf_role": "timeseries_id", "long_name": "station"}),
-        "site_class": (
-            (),
-            str(stats.get("site_class", "")),
-            {"long_name": "site class; empty if unknown"},
-        ),
-        "vs30": ((), float(stats.get("vs30", np.nan)), velocity),
-    }
-    # Latitude, longitude and elevation, as far as the metadata have them
-    known = stats.get("coordinates", {})
-    for coordinate, attributes in COORDINATES.items():
-        place[coordinate] = ((), float(known.get(coordinate, np.nan)), dict(attributes))
-    return place
 
 
 def _usable(horizontals: list[Trace], periods: FloatArray) -> xr.Dataset:

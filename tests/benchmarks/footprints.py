@@ -16,6 +16,7 @@ import pyarrow.parquet
 import pyogrio
 import shapely
 from city import city
+from figures import note
 
 
 def write_city(houses: int, path: Path) -> int:
@@ -44,6 +45,8 @@ def main(houses: int) -> None:
         f"{features} features: {count} pairs; {processor:.1f} s processor, {clock:.1f} s, "
         f"{used.ru_maxrss / 1e6:.2f} GB"
     )
+    note(f"{features} outlines to pairs, processor time", processor, "s")
+    note(f"{features} outlines to pairs, memory", used.ru_maxrss / 1e6, "GB")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
+from figures import note
 
 from per_obspy.formats.text.lines import Text, fixed_block
 
@@ -44,6 +45,7 @@ def reader(name: str) -> Callable[..., object]:
 def print_rate(name: str, size: int, seconds: float) -> None:
     """Print one line."""
     print(f"{name:12} {size / 1e6:6.1f} MB {size / 1e6 / seconds:8.1f} MB/s")
+    note(name, size / 1e6 / seconds, "MB/s")
 
 
 def main(samples: int) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
+from figures import note
 from scipy.signal import lfilter
 
 from per_obspy.pounding.correlation.by_azimuth import directional_correlation
@@ -101,9 +102,13 @@ def main() -> None:
         f"  pandas apply            {1e-6 / rows:8.3f} million pairs/s  {rows / ours:8.0f} "
         f"times the time"
     )
+    note("single hit", 1e-6 / ours, "million pairs/s")
+    for peer, each in (("numpy", plain), ("pandas", rows)):
+        note(f"single hit, {peer}", 1e-6 / each, "million pairs/s", peer=peer, of="single hit")
     motion, periods = ground_motion(), np.geomspace(0.1, 5.0, 100)
     surface = best(lambda: critical_gap_surface(motion, DT, periods, periods), 3)
     print(f"critical_gap_surface      {surface:8.3f} s for 100 x 100 periods, {SAMPLES} samples")
+    note("surface of critical gaps, 100 x 100 periods", surface, "s")
     of_a_record(motion)
     chance = best(
         lambda: pounding_probability(
@@ -112,6 +117,7 @@ def main() -> None:
         3,
     )
     print(f"pounding_probability      {5 / chance:8.1f} thousand pairs/s")
+    note("probability", 5 / chance, "thousand pairs/s")
 
 
 def of_a_record(motion: np.ndarray) -> None:
@@ -130,6 +136,7 @@ def of_a_record(motion: np.ndarray) -> None:
         )
         rate = 1e-3 * chosen.shape[1] / each
         print(f"relative displacement     {rate:8.1f} thousand pairs/s, {SAMPLES} samples, {name}")
+        note(f"relative displacement, {name}", rate, "thousand pairs/s")
     pads = 1e-5 * rng.normal(size=(2, SAMPLES // 2))
     padded = np.concatenate([pads[0], motion, pads[1]])
     few = structures[[0, 1, 4], :800]  # so few that no thread is started
@@ -139,9 +146,11 @@ def of_a_record(motion: np.ndarray) -> None:
     ):
         each = best(lambda r=record: azimuth_maxima(r, r[::-1], DT, *few), 9) / 800
         print(f"PER and SD of a building  {1e-3 / each:8.1f} thousand/s, own azimuths, {name}")
+        note(f"PER and SD of a building, {name}", 1e-3 / each, "thousand/s")
         pair = *structures[:4], structures[4:].T
         each = best(lambda r=record, p=pair: directional_correlation(r, r[::-1], DT, *p), 5) / 2000
         print(f"correlation               {1e-3 / each:8.1f} thousand pairs/s, {name}")
+        note(f"correlation, {name}", 1e-3 / each, "thousand pairs/s")
 
 
 if __name__ == "__main__":

@@ -10,11 +10,14 @@ import importlib
 import time
 
 import numpy as np
+from figures import note
 
 from per_obspy.pounding.history.pair_histories import pounding_histories
 from per_obspy.spectra.elastic import per_spectrum
 
 DT, SAMPLES, PAIRS, PEER_PAIRS = 0.01, 12_000, 1024, 4
+#: Figure with which OpenSees is compared.
+LINEAR = "histories, linear"
 YIELDING = {
     "yield_displacement_1": 0.03,
     "hardening_1": 0.05,
@@ -118,13 +121,13 @@ def main():
     peer, ops = None, opensees()
     if ops is not None:
         peer = opensees_rate(ops, acceleration, pairs, PEER_PAIRS)
+        note("histories, linear, OpenSees", peer, "pairs/s", peer="openseespy", of=LINEAR)
         print(
             f"OpenSeesPy, linear, {SAMPLES} samples, record's step: {peer:.1f} pairs/s on one core"
         )
-    print(
-        f"per_spectrum, the yardstick: {yardstick(acceleration) / 1e9:.2f} billion "
-        f"oscillator-steps/s on one core"
-    )
+    steps = yardstick(acceleration) / 1e9
+    note("per_spectrum, the yardstick", steps, "billion steps/s")
+    print(f"per_spectrum, the yardstick: {steps:.2f} billion oscillator-steps/s on one core")
     print(f"{'case':>12} {'pairs/s core':>13} {'impacts':>8} {'x OpenSees':>11}")
     for name, fields in cases.items():
         speed, impacts = rate(acceleration, fields)
@@ -132,6 +135,7 @@ def main():
             f"{name:>12} {speed:13.0f} {impacts:8.1f} "
             f"{speed / peer if peer else float('nan'):11.0f}"
         )
+        note(f"histories, {name}", speed, "pairs/s", remark=f"{impacts:.0f} impacts per pair")
 
 
 if __name__ == "__main__":

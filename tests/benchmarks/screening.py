@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from figures import note
 
 from per_obspy.config import Simulation, load
 from per_obspy.inventory.simulated import simulated_pairs
@@ -124,6 +125,8 @@ def main(sizes: list[int]) -> None:
 
 def _row(count: int, exact: str, seconds: dict[str, float], found: dict[str, float]) -> str:
     way, each = "exact" if exact == "true" else "estimates", found["processors"] / count * 1e6
+    note(f"{count} pairs, {way}", each, "us", remark=f"{seconds['screening']:.1f} s of screening")
+    note(f"{count} pairs, {way}, memory", found["memory"] / 1e9, "GB")
     return (
         f"{count:10} {way:9} {seconds['screening']:7.1f} s {seconds['report']:5.1f} s "
         f"{found['whole']:5.1f} s"

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
+from figures import note
 from obspy.signal.freqattributes import peak_ground_motion
 from scipy.signal import lsim
 
@@ -40,6 +41,10 @@ DT, SAMPLES, DAMPING = 0.005, 12_000, 0.05
 PERIODS = np.geomspace(0.05, 10.0, 100)
 #: Multiply-adds of one step of the PER kernel.
 PER_STEP = 8
+#: Distributions of the peers by the first word of their rows, and the figures of the same job.
+PEERS = {"pyrotd": "pyrotd", "esi-core": "esi-core", "eqsig": "eqsig", "SciPy": "scipy"}
+PEERS["ObsPy"] = "obspy"
+SAMPLED_PER, SAMPLED_SD = "PER at samples", "SD along every azimuth, at samples"
 PEAK_LANES, PEAK_ROUNDS, PEAK_CHAIN = 128, 20_000, 16
 
 
@@ -86,6 +91,10 @@ def row(what: str, seconds: Seconds, *others: str) -> None:
     """Print one line of a table."""
     times = f"{1e3 * seconds.processor:>11.3f} ms {1e3 * seconds.clock:>11.3f} ms"
     print(f"{what:<56}{times}  {'  '.join(others)}", flush=True)
+    peer, of = PEERS.get(what.partition(":")[0].partition(" ")[0], ""), ""
+    if peer:
+        of = SAMPLED_SD if "Rot" in what or "optimized" in what else SAMPLED_PER
+    note(what, 1e3 * seconds.processor, "ms", peer=peer, of=of, remark="; ".join(others))
 
 
 def ratio(seconds: Seconds, ours: Seconds) -> str:

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 
+from figures import note
+
 RUNS = 5
 
 COMMANDS = {
@@ -31,4 +33,6 @@ def fastest(arguments: list[str]) -> float:
 
 if __name__ == "__main__":
     for name, arguments in COMMANDS.items():
-        print(f"{name:24} {fastest(arguments):6.2f} s")
+        seconds = fastest(arguments)
+        print(f"{name:24} {seconds:6.2f} s")
+        note(name, seconds, "s")

@@ -90,5 +90,5 @@ def test_help_is_marked_and_not_wider_than_a_screen():
 
 def test_other_models_are_written_too():
     text = commented(Ensemble, {"name": "e", "output": "o"}, [])
-    assert tomllib.loads(text) == {"name": "e", "output": "o"}
+    assert tomllib.loads(text) == {"name": "e", "output": "o", "report": {}}
     assert "#[[scenario]]" in text

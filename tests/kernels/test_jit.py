@@ -1,9 +1,12 @@
 """Compiler options of all kernels: per_obspy.kernels._jit."""
 
 import math
+from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from numba import config
 from numba.core import caching
 
@@ -82,3 +85,23 @@ def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_wa
     (message,) = caplog.messages
     assert "set NUMBA_CACHE_DIR to a folder that can be written" in message
     assert "\n" not in message
+
+
+@compiled
+@pytest.mark.parametrize("decorator", DECORATORS)
+def test_compiled_code_is_saved_by_one_process_at_a_time(decorator):
+    # catches two processes that save two signatures under one name: one of them is then loaded for
+    # the other, which computes something else
+    @decorator
+    def third(value):
+        return value / 3.0
+
+    folder = Path(third.stats.cache_path)
+    folder.mkdir(parents=True, exist_ok=True)
+    with FileLock(folder / ".lock"):
+        compiling = Thread(target=third, args=(1.0,))
+        compiling.start()
+        compiling.join(5.0)
+        assert compiling.is_alive()
+    compiling.join()
+    assert third(3.0) == 1.0

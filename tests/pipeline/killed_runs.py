@@ -15,10 +15,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from small_run import InProcess, plain_figure, write_smallest_configuration
+from small_run import InProcess, plain_figures, write_smallest_configuration
 
 from per_obspy.files import is_part
-from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
 
 #: Exit code of a process that was killed.
@@ -76,8 +75,12 @@ def faults_after(configuration: Path, expected: dict[str, bytes]) -> list[str]:
 
 def main(folder: Path, events: list[str]) -> None:
     """Kill runs until one completes, and print what was wrong after the kills."""
-    for name in ("draw_overview", "draw_record_to_pair"):
-        setattr(report, name, plain_figure)
+    with plain_figures():
+        kill_and_repeat(folder, events)
+
+
+def kill_and_repeat(folder: Path, events: list[str]) -> None:
+    """Do what `main` promises; figures are short files."""
     # The first run also compiles, so that the other ones are quick
     (folder / "whole").mkdir()
     whole = run(write_smallest_configuration(folder / "whole"), executor=InProcess()).folder

@@ -1,9 +1,15 @@
 """A small simulated run that several test modules share: three stations, sixty pairs, or fewer."""
 
+from collections.abc import Iterator
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from per_obspy.files import written_whole
+from per_obspy.pipeline import report
+from per_obspy.pipeline.results import result_files
 
 SCENARIO = "[scenario]\nstations = 3\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 60\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -42,6 +48,16 @@ def plain_figure(*arguments: object) -> None:
     """Write a figure as a short file: most of the time of a small run goes into its figures."""
     with written_whole(Path(str(arguments[-1]))) as part:
         part.write_bytes(b"a figure")
+
+
+@contextmanager
+def plain_figures() -> Iterator[None]:
+    """Write the figures and the PDF of every run in here as short files."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "draw_overview", plain_figure)
+        patch.setattr(report, "draw_record_to_pair", plain_figure)
+        patch.setattr(result_files, "write_page", plain_figure)
+        yield
 
 
 def write_folder_configuration(folder: Path, output: str, text: str = "") -> Path:

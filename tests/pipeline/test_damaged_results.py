@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
 
-from .small_run import InProcess, plain_figure, write_smallest_configuration
+from .small_run import InProcess, write_smallest_configuration
 
 #: Files of the run, seen from its output folder; their names are the same in every run.
 FILES = (
@@ -33,14 +32,6 @@ FILES = (
     "summary.pdf",
     "risk.kml",
     "spectra.nc",
-    "buildings.columns.csv",
-    "buildings.csv",
-    "buildings.parquet",
-    "report.html",
-    "rows.columns.csv",
-    "rows.parquet",
-    "rows/000000.json",
-    "rows/000000.parquet",
     "pairs.csv",
     "simulated.json",
     "simulated/XX.S001.mseed",
@@ -55,19 +46,13 @@ FILES = (
 )
 
 
-@pytest.fixture(autouse=True)
-def _short_figures(monkeypatch):
-    for name in ("draw_overview", "draw_record_to_pair"):
-        monkeypatch.setattr(report, name, plain_figure)
+pytestmark = pytest.mark.usefixtures("plain_figures")
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("draw_overview", "draw_record_to_pair"):
-            patch.setattr(report, name, plain_figure)
-        run(write_smallest_configuration(folder), executor=InProcess())
+    run(write_smallest_configuration(folder), executor=InProcess())
     return folder
 
 

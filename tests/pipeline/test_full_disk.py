@@ -25,7 +25,6 @@ from per_obspy.records.simulation.earthquake import simulate
 
 from .small_run import (
     InProcess,
-    plain_figure,
     write_configuration,
     write_smallest_configuration,
 )
@@ -64,10 +63,7 @@ def no_room(size: int):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-@pytest.fixture(autouse=True)
-def _short_figures(monkeypatch):
-    for name in ("draw_overview", "draw_record_to_pair"):
-        monkeypatch.setattr(report, name, plain_figure)
+pytestmark = pytest.mark.usefixtures("plain_figures")
 
 
 @pytest.fixture(scope="module")

@@ -15,20 +15,16 @@ import pytest
 
 from per_obspy.errors import Unfinished
 from per_obspy.jobs import chunk, ground_files, station
-from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
 from per_obspy.records.archives import archive_files
 
-from .small_run import InProcess, plain_figure, write_configuration, write_smallest_configuration
+from .small_run import InProcess, write_configuration, write_smallest_configuration
 
 #: Results that must be the same as without a fault.
 COMPARED = ("risk.csv", "risk.parquet", "rejected.csv", "totals.csv", "stations.csv")
 
 
-@pytest.fixture(autouse=True)
-def _short_figures(monkeypatch):
-    for name in ("draw_overview", "draw_record_to_pair"):
-        monkeypatch.setattr(report, name, plain_figure)
+pytestmark = pytest.mark.usefixtures("plain_figures")
 
 
 @pytest.fixture(scope="module")

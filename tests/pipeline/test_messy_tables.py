@@ -20,10 +20,9 @@ from pandas.testing import assert_frame_equal
 from per_obspy import cli, read_pairs
 from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
-from per_obspy.pipeline import report
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
-from .small_run import SPECTRA, plain_figure
+from .small_run import SPECTRA, plain_figures
 
 PAGE = Path(__file__).parents[2] / "docs" / "messy_tables.md"
 JUDGED = ["gap", "height_1", "mass_1", "demand", "probability", "state"]
@@ -72,10 +71,8 @@ def tried(tmp_path_factory):
         table = pd.read_parquet("out/risk.parquet").set_index("pair_id").sort_index()
         return Outcome(*said, table[JUDGED])
 
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, plain_figures():
         patch.chdir(folder)
-        for name in ("draw_overview", "draw_record_to_pair"):
-            patch.setattr(report, name, plain_figure)
         yield tried
 
 

@@ -45,6 +45,9 @@ def _shift(trace):
     trace.data[first:last] += round(0.1 * float(np.abs(trace.data).max()))
 
 
+pytestmark = pytest.mark.usefixtures("plain_figures")
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """A run of stations with a second event, with one horizontal, and with undated film."""

@@ -18,6 +18,8 @@ from per_obspy.spectra.storage import read_spectra
 from .results.test_page import content_of
 from .small_run import SPECTRA, InProcess, write_configuration
 
+pytestmark = pytest.mark.usefixtures("plain_figures")
+
 RESULTS = (
     *("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv"),
     *("rows.parquet", "buildings.parquet", "buildings.csv"),

@@ -2,6 +2,8 @@
 
 from threading import current_thread, main_thread
 
+import pytest
+
 import per_obspy.screening.warmup as warmup
 
 
@@ -23,3 +25,9 @@ def test_the_first_dataset_is_made_before_the_thread(monkeypatch):
         pass
     assert threads[0] is main_thread()
     assert threads[1] is not main_thread()
+
+
+@pytest.mark.parametrize("name", sorted(warmup.PARTS))
+def test_every_part_compiles(name):
+    # catches arguments that a function refuses: the part would then end in an error
+    assert warmup.compile_part(name) == name

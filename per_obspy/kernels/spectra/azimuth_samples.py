@@ -266,8 +266,9 @@ def raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, 
         From `run_azimuth_tiles`.
     oscillator : Oscillator
         Lane, phase of a step (rad), damping (fraction of critical), and share.
-    directions : (4, n_azimuths) ndarray
-        Cosine and sine of the azimuths, then of twice them; a whole number of groups.
+    directions : (5, n_azimuths) ndarray
+        Cosine and sine of the azimuths, of twice them, and their places between the first and the
+        last azimuth of their group, from 0 to 1; a whole number of groups.
     best : (n_azimuths,) ndarray
         Largest squared radius (share 1) or displacement (share 0) along each azimuth, raised in
         place, in the squared unit of the acceleration (over ``omega⁴``).
@@ -313,8 +314,8 @@ def free_displacements(state, dampings, lanes, directions, best):
         Fraction of critical.
     lanes : int
         Number of oscillators that count; the others fill the block up.
-    directions : (4, n_azimuths) ndarray
-        Cosine and sine of the azimuths, then of twice them.
+    directions : (5, n_azimuths) ndarray
+        Cosine and sine of the azimuths, of twice them, and places in their group.
     best : (LANES, n_azimuths) ndarray
         Largest squared displacement of each oscillator along each azimuth, raised in place, in the
         squared unit of the acceleration (over ``omega⁴``).

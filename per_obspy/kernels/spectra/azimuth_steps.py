@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import inlined, kernel
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.oscillator.within_step import radius_bound, rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
@@ -31,30 +31,70 @@ COLUMNS = 17
 
 
 @kernel
-def _bounds(radius, peak, jump, oscillator):
+def _slack(radius, peak, jump, oscillator):
     """
-    Return by how much a square can exceed two samples between them, and ``h⁴ |f''''| / 144``.
+    Return by how much a square can exceed two samples of a tile between them.
 
-    ``(r²)' = -2 z b`` with ``b = 2 xi z + a``, ``(u²)' = 2 u z``, and ``z''' = -2 xi z'' - z'``.
+    ``(r²)' = -2 z b`` with ``b = 2 xi z + a``, ``(u²)' = 2 u z``.
     """
     _, phase, damping, share = oscillator
-    viscosity = 2.0 * damping
-    # Bounds of the first three derivatives of z, times the phase of a step
-    z1, z2_per_phase, square = rate_bounds(radius, peak, jump, damping, phase)
-    z2 = phase * z2_per_phase
-    z3 = phase * (viscosity * z2 + phase * z1)
-    # Second and fourth derivative of the square
+    # Bound of the first derivative of z, times the phase of a step
+    z1, _, square = rate_bounds(radius, peak, jump, damping, phase)
     if share == 0.0:
         square = 2.0 * (phase * radius * radius + radius * z1)  # (u²)'' = 2 z² + 2 u z'
-        fourth = 4.0 * phase * z2 * radius + 3.0 * phase * z1 * z1 + radius * z3
-    else:
-        fourth = (
-            z3 * (viscosity * radius + peak)
-            + 3.0 * z2 * (viscosity * z1 + jump)
-            + 3.0 * z1 * viscosity * z2
+    return 0.125 * phase * square
+
+
+@inlined
+def _squared_rate(u, z, acceleration, rate, viscosity):
+    """Return ``z'² + z''²`` at a state, the squared radius of their free vibration."""
+    first = -(viscosity * z + u + acceleration)
+    second = -(viscosity * first + z + rate)
+    return first * first + second * second
+
+
+@inlined
+def _longer(north, east, next_north, next_east):
+    """Return the length of the longer one of two vectors."""
+    squared = max(north * north + east * east, next_north * next_north + next_east * next_east)
+    return math.sqrt(squared)
+
+
+@kernel
+def _fill_bulges(states, north, east, oscillator, bulges):
+    """
+    Fill ``h⁴ |f''''| / 144`` of each step of a tile, a bound over the step and all azimuths.
+
+    ``q = z'`` and its derivative are a free vibration, whose radius ``Q`` never grows: it bounds
+    ``z'`` and ``z''``, and ``sqrt(1 + 4 xi²) Q`` bounds ``z'''``. It is small where a stiff
+    oscillator follows the ground. Then, with ``b = 2 xi z + a`` and the rate ``p`` of ``a``,
+    ``(u²)'''' = 2 (u z''' + 4 z z'' + 3 z'²)`` and ``(r²)'''' = -2 (z''' b + 3 z'' (2 xi z' + p) +
+    6 xi z' z'' + 2 xi z z''')``. Lengths over both components bound every azimuth.
+    """
+    _, phase, damping, share = oscillator
+    viscosity, third = 2.0 * damping, math.sqrt(1.0 + 4.0 * damping * damping)
+    sag, size = 0.125 * phase * phase, phase * phase * phase * phase / 72.0
+    for i in range(TILE):
+        # States at both ends
+        un, zn, ue, ze = states[0, i], states[1, i], states[2, i], states[3, i]
+        un1, zn1, ue1, ze1 = states[0, i + 1], states[1, i + 1], states[2, i + 1], states[3, i + 1]
+        # Accelerations at both ends, their rates, and Q
+        n0, n1, e0, e1 = north[i], north[i + 1], east[i], east[i + 1]
+        pn, pe = (n1 - n0) / phase, (e1 - e0) / phase
+        rate = math.sqrt(
+            _squared_rate(un, zn, n0, pn, viscosity) + _squared_rate(ue, ze, e0, pe, viscosity)
         )
-        fourth += radius * viscosity * z3
-    return 0.125 * phase * square, 2.0 * phase * fourth / 144.0
+        # Largest u, z and a over the step: ends, and how far a curve leaves its chord
+        z = _longer(zn, ze, zn1, ze1) + sag * rate
+        # Fourth derivative over 2 Q
+        if share == 0.0:
+            u = _longer(un, ue, un1, ue1) + sag * rate
+            fourth = third * u + 4.0 * z + 3.0 * rate
+        else:
+            fourth = third * (_longer(n0, e0, n1, e1) + 2.0 * viscosity * z)
+            fourth += 3.0 * (math.sqrt(pn * pn + pe * pe) + 2.0 * viscosity * rate)
+        # Times Q and the fourth power of the phase of a step
+        bulges[i] = size * rate * fourth
 
 
 @kernel
@@ -74,7 +114,7 @@ def _fill_slopes(states, north, east, oscillator, slopes):
 
 
 @kernel
-def _fill_coefficients(forms, slopes, bulge, coefficients):
+def _fill_coefficients(forms, slopes, bulges, coefficients):
     """
     Fill the three inner Bernstein coefficients of each step, (coefficient, form, step).
 
@@ -82,11 +122,11 @@ def _fill_coefficients(forms, slopes, bulge, coefficients):
     """
     for row in range(3):
         # The deviation from the cubic is the same along every azimuth: it raises the mean only
-        extra = bulge if row == 0 else 0.0
+        extra = 1.0 if row == 0 else 0.0
         for i in range(TILE):
             f0, f1, s0, s1 = forms[row, i], forms[row, i + 1], slopes[row, i], slopes[row, i + 1]
             coefficients[0, row, i] = f0 + 0.25 * s0
-            coefficients[1, row, i] = 0.5 * (f0 + f1) + (s0 - s1) / 6.0 + extra
+            coefficients[1, row, i] = 0.5 * (f0 + f1) + (s0 - s1) / 6.0 + extra * bulges[i]
             coefficients[2, row, i] = f1 - 0.25 * s1
 
 
@@ -122,8 +162,9 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
     oscillator : Oscillator
         Lane, phase of a step (rad), damping (fraction of critical), and share: 1 for the radius, 0
         for the displacement.
-    directions : (4, n_azimuths) ndarray
-        Cosine and sine of the azimuths, then of twice them; a whole number of groups.
+    directions : (5, n_azimuths) ndarray
+        Cosine and sine of the azimuths, of twice them, and their places between the first and the
+        last azimuth of their group, from 0 to 1; a whole number of groups.
     best : (n_azimuths,) ndarray
         Largest squares along each azimuth at the samples.
     steps : (tiles * TILE, COLUMNS) ndarray
@@ -141,7 +182,7 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
     # Memory of one tile
     states, forms = np.empty((4, TILE + 1)), np.empty((3, TILE + 1))
     slopes = np.empty((3, TILE + 1))
-    coefficients, marks = np.empty((3, 3, TILE)), np.empty(TILE)
+    coefficients, bulges, marks = np.empty((3, 3, TILE)), np.empty(TILE), np.empty(TILE)
     floor, least = floor_form(best, directions[2], directions[3])
     count = 0
     for tile in range(peaks.shape[1]):
@@ -149,7 +190,7 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
         peak = math.hypot(peaks[0, tile], peaks[1, tile])
         jump = math.hypot(jumps[0, tile], jumps[1, tile])
         radius = radius_bound(checkpoints[tile, 4, lane], peak, damping, phase)
-        slack, bulge = _bounds(radius, peak, jump, oscillator)
+        slack = _slack(radius, peak, jump, oscillator)
         sampled = checkpoints[tile, 4, lane] if share == 1.0 else checkpoints[tile, 5, lane]
         if sampled + slack <= least:
             continue
@@ -157,14 +198,10 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
         first = tile * TILE
         rerun_tile(north, east, checkpoints, tile, lane, exact, states)
         fill_forms(states, share, forms)
-        _fill_slopes(
-            states,
-            north[first : first + TILE + 1],
-            east[first : first + TILE + 1],
-            oscillator,
-            slopes,
-        )
-        _fill_coefficients(forms, slopes, bulge, coefficients)
+        tile_north, tile_east = north[first : first + TILE + 1], east[first : first + TILE + 1]
+        _fill_slopes(states, tile_north, tile_east, oscillator, slopes)
+        _fill_bulges(states, tile_north, tile_east, oscillator, bulges)
+        _fill_coefficients(forms, slopes, bulges, coefficients)
         # List the steps that exceed the floor along any azimuth
         _mark_steps(coefficients, floor, marks)
         for i in range(TILE):
@@ -185,10 +222,11 @@ def list_steps(north, east, peaks, jumps, checkpoints, oscillator, directions, b
 @kernel
 def _mark_groups(step, edges, floors, marks):
     """
-    Mark the groups of azimuths along which a step may hold more than their smallest maximum.
+    Mark the groups of azimuths along which a step may hold more than a maximum of theirs.
 
     The mark is a positive number; returns how many there are. Over a group ``cos 2(t - t0)``
-    exceeds its larger value at the ends by no more than ``1 - cos`` of half its width.
+    exceeds its chord by no more than ``1 - cos`` of half its width, and the maxima are no smaller
+    than the chord between the floors.
     """
     # Three inner Bernstein coefficients: mean m, difference d, product p
     m0, d0, p0 = step[0], step[1], step[2]
@@ -198,25 +236,35 @@ def _mark_groups(step, edges, floors, marks):
     size_0 = math.sqrt(d0 * d0 + p0 * p0)
     size_1 = math.sqrt(d1 * d1 + p1 * p1)
     size_2 = math.sqrt(d2 * d2 + p2 * p2)
+    # Groups next to each other
     count = 0
-    for j in range(floors.size):
+    for j in range(edges.shape[1]):
         c0, s0, c1, s1, rise = edges[0, j], edges[1, j], edges[2, j], edges[3, j], edges[4, j]
-        # Larger value at the ends of the group, and its rise in between
-        early = m0 + max(d0 * c0 + p0 * s0, d0 * c1 + p0 * s1) + size_0 * rise
-        middle = m1 + max(d1 * c0 + p1 * s0, d1 * c1 + p1 * s1) + size_1 * rise
-        late = m2 + max(d2 * c0 + p2 * s0, d2 * c1 + p2 * s1) + size_2 * rise
-        marks[j] = max(early, middle, late) - floors[j]
+        first, last = floors[0, j], floors[1, j]
+        # Larger excess at the ends of the group, and its rise in between
+        early = m0 + max(d0 * c0 + p0 * s0 - first, d0 * c1 + p0 * s1 - last) + size_0 * rise
+        middle = m1 + max(d1 * c0 + p1 * s0 - first, d1 * c1 + p1 * s1 - last) + size_1 * rise
+        late = m2 + max(d2 * c0 + p2 * s0 - first, d2 * c1 + p2 * s1 - last) + size_2 * rise
+        marks[j] = max(early, middle, late)
         count += marks[j] > 0.0
     return count
 
 
 @kernel
-def _fill_group_floors(best, floors):
-    """Fill the smallest of the largest squares of each group of azimuths."""
+def _fill_group_floors(best, shares, floors):
+    """
+    Fill values at the ends of each group whose chord no largest square of the group is below.
+
+    ``shares`` are the places of the azimuths between the first and the last of their group.
+    """
     for j in range(best.size // GROUP):
-        floors[j] = best[j * GROUP]
-        for k in range(j * GROUP + 1, (j + 1) * GROUP):
-            floors[j] = min(floors[j], best[k])
+        first, last = best[j * GROUP], best[(j + 1) * GROUP - 1]
+        # How far the chord between the outer squares has to be lowered
+        excess = 0.0
+        for k in range(j * GROUP, (j + 1) * GROUP):
+            excess = max(excess, first + shares[k] * (last - first) - best[k])
+        floors[0, j] = first - excess
+        floors[1, j] = last - excess
 
 
 @kernel
@@ -231,8 +279,9 @@ def search_steps(steps, oscillator, directions, edges, best):
     oscillator : Oscillator
         Lane, phase of a step (rad), damping (fraction of critical), and share: 1 for the radius, 0
         for the displacement.
-    directions : (4, n_azimuths) ndarray
-        Cosine and sine of the azimuths, then of twice them; a whole number of groups.
+    directions : (5, n_azimuths) ndarray
+        Cosine and sine of the azimuths, of twice them, and their places between the first and the
+        last azimuth of their group, from 0 to 1; a whole number of groups.
     edges : (5, n_groups) ndarray
         Cosine and sine of twice the first and of twice the last azimuth of each group, and the rise
         of a cosine in between; filled up with zeros to a multiple of the widest vector.
@@ -240,11 +289,11 @@ def search_steps(steps, oscillator, directions, edges, best):
         Largest squared radius or displacement along each azimuth, raised in place, in the squared
         unit of the acceleration (over ``omega⁴``).
     """
-    floors, marks = np.full(edges.shape[1], np.inf), np.empty(edges.shape[1])
+    floors, marks = np.full((2, edges.shape[1]), np.inf), np.empty(edges.shape[1])
     # Problems, one per step and azimuth, that are solved next to each other
     problems, azimuths = np.empty((4, LANES)), np.zeros(LANES, np.int64)
     largest = np.empty(GROUP)
-    _fill_group_floors(best, floors)
+    _fill_group_floors(best, directions[4], floors)
     count = 0
     for number in range(steps.shape[0]):
         step = steps[number]
@@ -255,7 +304,7 @@ def search_steps(steps, oscillator, directions, edges, best):
                 # Solve the problems when another group might not fit
                 if count + GROUP > LANES:
                     raise_to_step_peaks(problems, azimuths, count, oscillator, best)
-                    _fill_group_floors(best, floors)
+                    _fill_group_floors(best, directions[4], floors)
                     count = 0
                 count = _add_problems(
                     step, j * GROUP, directions, best, largest, problems, azimuths, count

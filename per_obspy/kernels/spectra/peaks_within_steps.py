@@ -6,6 +6,8 @@ term of such a condition outweighs all others it has one root at most, which New
 from the chord; every other step is left to `within_step`.
 """
 
+import math
+
 import numpy as np
 
 from per_obspy.kernels._jit import kernel
@@ -31,13 +33,11 @@ def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
     end. Only the first ``count`` are looked at.
     """
     _, phase, damping, share = oscillator
-    squares, doubts = np.zeros(LANES), np.ones(LANES)
+    squares, doubts = np.zeros(LANES), np.zeros(LANES)
     for row in range(4):
         problems[row, count:] = 0.0
-    # Short steps: all problems next to each other
-    if phase <= LONGEST_SPAN:
-        doubts[:] = 0.0
-        _raise_to_roots(problems, phase, damping, share, squares, doubts)
+    # All problems next to each other, in pieces short enough for the series
+    _raise_to_pieces(problems, phase, damping, share, squares, doubts)
     # Doubtful ones alone: at z = 0, for the radius also at 2 xi z + a = 0
     largest, selected, work = np.empty(4), np.zeros(4, np.bool_), workspace()
     selected[0] = share == 1.0
@@ -53,18 +53,38 @@ def raise_to_step_peaks(problems, azimuths, count, oscillator, best):
 
 
 @kernel
-def _raise_to_roots(problems, phase, damping, share, squares, doubts):
-    """Raise the squares to those at the roots of the conditions; mark the lanes in doubt."""
+def _raise_to_pieces(problems, phase, damping, share, squares, doubts):
+    """Raise the squares to those within steps that are cut into pieces of equal length."""
+    pieces = math.ceil(phase / LONGEST_SPAN)
+    span = phase / pieces
     # An even number of terms
-    pairs = (series_terms(phase) + 1) // 2
+    pairs = (series_terms(span) + 1) // 2
     displacement = np.empty((2 * pairs + 2, LANES))
     condition = np.empty((2 * pairs, LANES))
-    roots = np.empty(LANES)
-    _fill_displacement(problems, phase, damping, displacement)
-    for number in range(2 if share == 1.0 else 1):
-        _fill_condition(number, problems, phase, damping, displacement, condition)
-        _find_roots(condition, phase, roots, doubts)
-        _raise_squares(displacement, roots, share, squares)
+    roots, piece = np.empty(LANES), problems.copy()
+    for lane in range(LANES):
+        piece[3, lane] = piece[2, lane] + (piece[3, lane] - piece[2, lane]) / pieces
+    # At the roots of both conditions, piece by piece
+    for number in range(pieces):
+        if number > 0:
+            _advance(displacement, span, piece)
+        _fill_displacement(piece, span, damping, displacement)
+        for kind in range(2 if share == 1.0 else 1):
+            _fill_condition(kind, piece, span, damping, displacement, condition)
+            _find_roots(condition, span, roots, doubts)
+            _raise_squares(displacement, roots, share, squares)
+
+
+@kernel
+def _advance(displacement, span, piece):
+    """Move the problems to the next piece of their step: state, and accelerations at its ends."""
+    spans, u, z = np.full(LANES, span), np.empty(LANES), np.empty(LANES)
+    _evaluate(displacement, spans, u, z)
+    # The acceleration goes on along its straight line
+    for lane in range(LANES):
+        piece[0, lane], piece[1, lane] = u[lane], z[lane]
+        change = piece[3, lane] - piece[2, lane]
+        piece[2, lane], piece[3, lane] = piece[3, lane], piece[3, lane] + change
 
 
 @kernel

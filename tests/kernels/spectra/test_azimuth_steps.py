@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from per_obspy.kernels.oscillator import within_step
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.spectra import azimuth_samples, azimuth_steps
 from per_obspy.kernels.spectra.azimuth_samples import GROUP, Oscillator
 from per_obspy.kernels.spectra.tile_search import LANES, TILE, tile_extremes
 
 ANGLES = np.radians(np.arange(0.0, 180.0, 7.5))
-DIRECTIONS = np.stack([np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)])
+PLACES = np.tile(np.linspace(0.0, 1.0, GROUP), ANGLES.size // GROUP)
+TURNED = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
+DIRECTIONS = np.stack([*TURNED, PLACES])
 #: Values per step of the fine states.
 PARTS = 20
 
@@ -41,7 +42,7 @@ def _checkpoints(ground, phase, damping):
 
 def _edges():
     """Return the edges of the groups of azimuths, filled up with zeros."""
-    firsts, lasts = DIRECTIONS[2:, ::GROUP], DIRECTIONS[2:, GROUP - 1 :: GROUP]
+    firsts, lasts = DIRECTIONS[2:4, ::GROUP], DIRECTIONS[2:4, GROUP - 1 :: GROUP]
     rise = 1.0 - np.cos(ANGLES[GROUP - 1 :: GROUP] - ANGLES[::GROUP])
     edges = np.concatenate([firsts, lasts, rise[np.newaxis]])
     return np.pad(edges, ((0, 0), (0, -rise.size % GROUP)))
@@ -113,7 +114,8 @@ def test_coefficients_of_a_step_are_never_exceeded(phase, share):
     states = random.normal(size=(4, TILE + 1))
     ground = random.normal(size=(2, TILE + 1))
     forms, slopes = np.empty((3, TILE + 1)), np.empty((3, TILE + 1))
-    inner, oscillator = np.empty((3, 3, TILE)), Oscillator(0, phase, damping, share)
+    inner, bulges = np.empty((3, 3, TILE)), np.empty(TILE)
+    oscillator = Oscillator(0, phase, damping, share)
     dense = _dense_step(states, ground, phase, damping, 50)
     for i in range(TILE):  # each step on its own: its end belongs to no other
         ends = np.stack([states[:, i], dense[-1, :, i]], axis=1)
@@ -121,13 +123,52 @@ def test_coefficients_of_a_step_are_never_exceeded(phase, share):
         motion = np.concatenate([ground[:, i : i + 2], np.zeros((2, TILE - 1))], axis=1)
         azimuth_samples.fill_forms(pair, share, forms)
         azimuth_steps._fill_slopes(pair, *motion, oscillator, slopes)
-        peak, jump = np.hypot(*np.abs(motion).max(axis=1)), np.hypot(*(motion[:, 1] - motion[:, 0]))
-        radius = within_step.radius_bound((ends**2).sum(axis=0).max(), peak, damping, phase)
-        _, bulge = azimuth_steps._bounds(radius, peak, jump, oscillator)
-        azimuth_steps._fill_coefficients(forms, slopes, bulge, inner)
+        azimuth_steps._fill_bulges(pair, *motion, oscillator, bulges)
+        azimuth_steps._fill_coefficients(forms, slopes, bulges, inner)
         for angle in np.linspace(0.0, np.pi, 7):
             turned = np.array([1.0, np.cos(2 * angle), np.sin(2 * angle)])
             bound = max((inner[:, :, 0] @ turned).max(), (forms[:, :2].T @ turned).max())
             u = np.cos(angle) * dense[:, 0, i] + np.sin(angle) * dense[:, 2, i]
             z = np.cos(angle) * dense[:, 1, i] + np.sin(angle) * dense[:, 3, i]
             assert (u**2 + share * z**2).max() <= bound * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.5, 1.0])
+def test_a_stiff_oscillator_that_follows_the_ground_hardly_leaves_the_cubic(phase):
+    # catches a bound made of the motion itself, where displacement and ground cancel: the search
+    # of short periods then takes ten times as long. With u = -a and z = -p the radius Q is 2 xi p
+    damping, rate = 0.05, 1e-3
+    ground = np.outer([1.0, 0.5], 1.0 + rate * phase * np.arange(TILE + 1))
+    states = np.zeros((4, TILE + 1))
+    states[0], states[2] = -ground
+    states[1], states[3] = -rate, -0.5 * rate
+    bulges = np.empty(TILE)
+    for share in (0.0, 1.0):
+        oscillator = Oscillator(0, phase, damping, share)
+        azimuth_steps._fill_bulges(states, *ground, oscillator, bulges)
+        # The sizes of displacement and ground, 1.1, times twice Q h⁴ / 144, and a reserve of two
+        assert np.all(bulges <= 2.0 * 1.2 * 2.0 * (2.2 * damping * rate) * phase**4 / 144.0)
+
+
+@pytest.mark.parametrize("width", [0.01, 0.25, 2.0, np.pi])
+def test_marked_groups_hold_every_azimuth_along_which_a_maximum_is_exceeded(width):
+    # catches floors above the maxima inside a group, and a rise that is too small for wide groups
+    random = np.random.default_rng(8)
+    angles = np.linspace(0.0, width, GROUP)
+    places = np.linspace(0.0, 1.0, GROUP)
+    edges = np.zeros((5, GROUP))
+    ends = [np.cos(0.0), np.sin(0.0), np.cos(2 * width), np.sin(2 * width)]
+    edges[:, 0] = [*ends, 1.0 - np.cos(width)]
+    floors, marks = np.full((2, GROUP), np.inf), np.empty(GROUP)
+    cosines, sines = np.cos(2 * angles), np.sin(2 * angles)
+    marked = 0
+    for _ in range(300):
+        step = np.zeros(17)
+        step[:9] = random.normal(size=9)
+        forms = step[:9].reshape(3, 3) @ np.stack([np.ones(GROUP), cosines, sines])
+        # Maxima close to the step, some below and some above it
+        best = forms.max(axis=0) + random.normal() * random.uniform(0.0, 0.1, GROUP)
+        azimuth_steps._fill_group_floors(best, places, floors)
+        marked += azimuth_steps._mark_groups(step, edges, floors, marks)
+        assert marks[0] > 0.0 or np.all(forms.max(axis=0) <= best)
+    assert marked < 300 or width > 0.3  # narrow groups are ruled out as well

@@ -21,7 +21,8 @@ def _alone(problem, phase, damping):
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
 @pytest.mark.parametrize(
-    ("phase", "damping"), [(0.02, 0.0), (0.1, 0.05), (0.45, 0.3), (0.499, 0.0), (2.0, 0.05)]
+    ("phase", "damping"),
+    [(0.02, 0.0), (0.1, 0.05), (0.45, 0.3), (0.499, 0.0), (0.9, 0.0), (2.0, 0.05)],
 )
 def test_peaks_of_a_block_are_those_of_each_step(phase, damping, share):
     # catches lanes mixed up, a root taken for sure where there may be two, and azimuths exchanged

@@ -18,6 +18,8 @@ from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 
 from ..small_run import InProcess, write_configuration
 
+pytestmark = pytest.mark.usefixtures("plain_figures")
+
 TABLES = ("rows.parquet", "buildings.parquet", "buildings.csv", "totals.csv", "rejected.csv")
 
 

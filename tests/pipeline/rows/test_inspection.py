@@ -10,6 +10,8 @@ from per_obspy.report.plan.visits import Teams
 
 from ..small_run import InProcess, write_configuration
 
+pytestmark = pytest.mark.usefixtures("plain_figures")
+
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):

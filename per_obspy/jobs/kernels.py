@@ -1,0 +1,47 @@
+"""Compilation of all kernels in processes, so that no later command waits for them."""
+
+from collections.abc import Iterator
+
+from per_obspy.errors import Unfinished
+from per_obspy.jobs.parallel import Work, results
+from per_obspy.progress import Progress
+from per_obspy.screening.warmup import PARTS, compile_part
+from per_obspy.threads import usable_processors
+
+#: Stage of the progress.
+COMPILING = "compiling kernels"
+
+#: What is left when all parts are compiled: kernels that only whole tables reach.
+REST = "screening"
+
+
+def compile_kernels(progress: Progress) -> None:
+    """
+    Compile all kernels that a command may need; what is compiled already is only loaded.
+
+    Parameters
+    ----------
+    progress : callable
+        Called for every part.
+
+    Raises
+    ------
+    Unfinished
+        If a part cannot be compiled.
+    """
+    total = len(PARTS) + 1
+    progress(COMPILING, 0, total)
+    for done, _ in enumerate(_compiled(), start=1):
+        progress(COMPILING, done, total)
+
+
+def _compiled() -> Iterator[str]:
+    """Yield the names of the parts as they are compiled, the rest last."""
+    work = Work(compile_part, _failed)
+    yield from results(PARTS, work, usable_processors(), None)
+    yield from results([REST], work, 1, None)
+
+
+def _failed(name: str, reason: str) -> str:
+    """Raise the reason for which a part cannot be compiled."""
+    raise Unfinished(f"kernels of {name} cannot be compiled: {reason}")

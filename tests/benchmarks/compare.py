@@ -1,0 +1,56 @@
+"""
+Name the figures that became worse by more than a tenth from one file of benchmarks to another.
+
+    python tests/benchmarks/compare.py OLD NEW
+
+Exit code 1 if there are any, 2 if no figure can be compared. Peers are left out. Only files of one
+machine in the same state compare: the load before each script is printed with its figures.
+"""
+
+import sys
+from pathlib import Path
+
+from figures import LESS_IS_BETTER, Figure, read
+
+#: Smallest ratio that is named.
+WORSE = 1.1
+
+
+def worse(old: list[Figure], new: list[Figure]) -> tuple[list[str], int]:
+    """Return a line per figure that became worse or is missing, and how many were compared."""
+    later = {(one["script"], one["name"]): one for one in new}
+    lines, compared = [], 0
+    for one in old:
+        if one["peer"]:
+            continue
+        place = f"{one['script']}: {one['name']}"
+        other = later.get((one["script"], one["name"]))
+        if other is None or other["unit"] != one["unit"]:
+            lines.append(f"{place}: not in the new file")
+            continue
+        compared += 1
+        ratio = other["value"] / one["value"]
+        ratio = ratio if one["unit"] in LESS_IS_BETTER else 1.0 / ratio
+        if ratio > WORSE:
+            lines.append(
+                f"{place}: {one['value']:g} -> {other['value']:g} {one['unit']}, "
+                f"{ratio:.2f} times worse (load {one['load_before']} -> {other['load_before']})"
+            )
+    return lines, compared
+
+
+def main(old: Path, new: Path) -> int:
+    """Print what became worse, and return the exit code."""
+    before, after = read(old), read(new)
+    machines = {one["machine"] for one in before + after}
+    if len(machines) > 1:
+        print(f"different machines: {'; '.join(sorted(machines))}")
+    lines, compared = worse(before, after)
+    print("\n".join([*lines, f"{compared} figures compared"]))
+    if not compared:
+        return 2
+    return int(bool(lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))

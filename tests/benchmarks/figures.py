@@ -1,0 +1,157 @@
+"""
+Figures of all benchmarks: one JSON file, and ``docs/benchmarks.md`` made of it.
+
+    python tests/benchmarks/figures.py JSON [SCRIPT...]
+
+runs the benchmarks (or only some scripts, whose figures replace those in the file) and writes the
+page. A script calls `note` for every figure; run alone, it only prints.
+"""
+
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent
+PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
+SCRIPTS = ("start_up", "formats", "spectra", "pounding", "rows", "pair_estimates", "footprints")
+
+#: File that takes one line per figure while the scripts run.
+LINES = "PER_OBSPY_FIGURES"
+
+#: Units of which less is better; of all others more is better.
+LESS_IS_BETTER = ("s", "ms", "us", "ns", "GB")
+
+Figure = dict[str, Any]
+
+
+def note(
+    name: str, value: float, unit: str, *, peer: str = "", of: str = "", remark: str = ""
+) -> None:
+    """
+    Note one figure of the script that is run.
+
+    Parameters
+    ----------
+    name : str
+        What was measured; unique within the script.
+    value : float
+        Processor time, a rate, or memory.
+    unit : str
+        Of the value; see `LESS_IS_BETTER`.
+    peer : str
+        Distribution that was measured instead of this package, if any.
+    of : str
+        Figure of this package that does the same job as the peer.
+    remark : str
+        Differences or shares, in words.
+    """
+    path = os.environ.get(LINES)
+    if not path:
+        return
+    figure = {"script": Path(sys.argv[0]).stem, "name": name, "value": float(f"{value:.4g}")}
+    figure |= {"unit": unit, "peer": peer, "peer_version": _version(peer) if peer else ""}
+    with Path(path).open("a", encoding="utf-8") as lines:
+        lines.write(json.dumps({**figure, "of": of, "remark": remark}) + "\n")
+
+
+def _version(distribution: str) -> str:
+    """Return the version of an installed distribution."""
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def machine() -> str:
+    """Return processor, number of processors, system and Python in words."""
+    model = platform.processor() or platform.machine()
+    if Path("/proc/cpuinfo").is_file():
+        named = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text("utf-8"))
+        model = named[1] if named else model
+    system = f"{platform.system()}, Python {platform.python_version()}"
+    return f"{model}, {os.cpu_count()} processors, {system}"
+
+
+def revision() -> str:
+    """Return the git revision of the checkout, with + if it has changes."""
+    git = ["git", "-C", str(FOLDER), "describe", "--always", "--dirty=+", "--exclude=*"]
+    return subprocess.run(git, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def load_average() -> float:
+    """Return how many processes wanted a processor in the last minute; 0 where unknown."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+
+def measured(scripts: Iterable[str], lines: Path) -> list[Figure]:
+    """Run scripts one after the other and return their figures, with date, revision and load."""
+    lines.unlink(missing_ok=True)
+    environment = {**os.environ, LINES: str(lines), "OPENBLAS_NUM_THREADS": "1"}
+    found: list[Figure] = []
+    for script in scripts:
+        print(f"== {script}", flush=True)
+        before = load_average()
+        command = [sys.executable, str(FOLDER / f"{script}.py")]
+        subprocess.run(command, check=True, env=environment)
+        state = {"machine": machine(), "load_before": round(before, 1), "revision": revision()}
+        state["date"] = datetime.now(UTC).strftime("%Y-%m-%d")
+        written = lines.read_text("utf-8").splitlines() if lines.is_file() else []
+        found += [{**json.loads(line), **state} for line in written[len(found) :]]
+    lines.unlink(missing_ok=True)
+    return found
+
+
+def read(path: Path) -> list[Figure]:
+    """Read the figures of a file."""
+    figures: list[Figure] = json.loads(path.read_text("utf-8"))["figures"]
+    return figures
+
+
+def digits(value: float) -> str:
+    """Return three digits of a number, without an exponent where it is large."""
+    return f"{float(f'{value:.3g}'):.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+
+
+def table(figures: list[Figure], script: str) -> str:
+    """Return the figures of a script as a table, after machine, date and versions."""
+    own = [figure for figure in figures if figure["script"] == script]
+    if not own:
+        return "*Not measured in this run.*"
+    values = {figure["name"]: figure["value"] for figure in own}
+    rows = ["| figure | value | relative to ours | remark |", "|---|---|---|---|"]
+    for one in own:
+        ratio = digits(one["value"] / values[one["of"]]) if one["of"] in values else ""
+        value = f"{digits(one['value'])} {one['unit']}"
+        rows.append(f"| {one['name']} | {value} | {ratio} | {one['remark']} |")
+    peers = sorted({f"{one['peer']} {one['peer_version']}" for one in own if one["peer"]})
+    first = own[0]
+    state = f"{first['machine']}; {first['date']}, revision {first['revision']}, "
+    state += f"load before {first['load_before']}" + "".join(f"; {peer}" for peer in peers)
+    return "\n".join([f"*{state}*", "", *rows])
+
+
+def page(figures: list[Figure], template: str) -> str:
+    """Return the page: the template, whose lines ``{{script}}`` become tables."""
+    return re.sub(r"^\{\{(\w+)\}\}$", lambda name: table(figures, name[1]), template, flags=re.M)
+
+
+def main(path: Path, scripts: list[str]) -> None:
+    """Measure, write the JSON file, and the page."""
+    found = measured(scripts or SCRIPTS, path.with_suffix(".lines"))
+    again = {figure["script"] for figure in found}
+    kept = read(path) if scripts and path.is_file() else []
+    figures = [figure for figure in kept if figure["script"] not in again] + found
+    path.write_text(json.dumps({"figures": figures}, indent=1) + "\n", "utf-8")
+    PAGE.write_text(page(figures, TEMPLATE.read_text("utf-8")), "utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
