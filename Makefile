@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test check docs wheel benchmark clean
+.PHONY: demo figures test workflows check docs wheel benchmark clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -20,6 +20,10 @@ test: .venv/test
 	$(BIN)/python -m pytest -q -n auto --dist loadfile
 	@echo "== the kernels' tests once more without the compiler"
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist loadfile tests/kernels
+
+workflows: .venv/test .venv/workflows
+	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"
+	$(BIN)/python -m pytest -q tests/workflows/test_snakefile.py
 
 check: .venv/check
 	$(BIN)/python tests/check_density.py

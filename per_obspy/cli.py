@@ -19,6 +19,7 @@ from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init, warm_up
 from per_obspy.commands.operation.status import status
+from per_obspy.commands.operation.watch import watch
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
@@ -57,7 +58,7 @@ app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
     *(run, init, warm_up, simulate, process, spectra, screen),
-    *(report, show, plan, events, fetch, info, status),
+    *(report, show, plan, events, fetch, info, watch, status),
 )
 for command in COMMANDS:
     app.command()(command)

@@ -196,6 +196,14 @@ class Fdsn(Window):
     connections: int = Field(
         3, ge=1, le=16, description="number of stations requested at the same time"
     )
+    longest_pause: float | None = Field(
+        None,
+        ge=0,
+        description=(
+            "longest pause that a service may demand by Retry-After, s; a service that demands "
+            "more is not asked again in this run; not given: it is asked again after at most 600 s"
+        ),
+    )
 
     @property
     def knows_where_and_when(self) -> bool:
