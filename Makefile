@@ -43,7 +43,8 @@ wheel: .venv/check
 	rm -rf dist .venv/wheel
 	$(BIN)/python -m build --outdir dist . >/dev/null
 	PYTHON=$(PYTHON) EXTRAS= workflows/container/install.sh install "$$(ls dist/*.whl)" .venv/wheel
-	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
+	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py && \
+	  $(CURDIR)/.venv/bin/mypy --strict --config-file= --python-executable $(CURDIR)/.venv/wheel/bin/python smoke.py
 	@echo "== compile the kernels of the wheel, as a container does"
 	workflows/container/install.sh compile .venv/wheel workflows
 
