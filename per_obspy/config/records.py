@@ -314,8 +314,9 @@ class Records(Section):
         ge=0,
         le=86_400,
         description=(
-            "s; a file of the folder that was changed less than this ago, or changes while it is "
-            "read, waits for the next run; for folders that grow; 0: every file is read"
+            "age of a file of the folder, s, from which it is read: one that was changed "
+            "later, or changes while it is read, waits for the next run; 0: every file is "
+            "read"
         ),
     )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")
