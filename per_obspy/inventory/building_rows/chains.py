@@ -145,9 +145,9 @@ def _by_name(
 
 def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
     """Yield the chains of joined contacts; those that close are flagged as rings."""
-    joined = memoryview(joints.joined)
-    done = memoryview(contacts.repeated.copy())
-    by_name = memoryview(np.argsort(contacts.order, kind="stable"))
+    joined = joints.joined.data
+    done = contacts.repeated.copy().data
+    by_name = np.argsort(contacts.order, kind="stable").data
     # Chains begin at a free end; the contacts that remain afterwards are rings
     for pair in by_name:
         for end in (2 * pair, 2 * pair + 1):
@@ -174,9 +174,9 @@ class _Cutter:
 
     def __init__(self, contacts: Contacts, angle: float, longest: int) -> None:
         # Views give plain numbers without a copy
-        self._buildings = memoryview(contacts.buildings.ravel())
-        self._azimuth = memoryview(contacts.azimuth)
-        self._gap = memoryview(contacts.gap)
+        self._buildings = contacts.buildings.ravel().data
+        self._azimuth = contacts.azimuth.data
+        self._gap = contacts.gap.data
         self._angle = angle
         self._longest = longest
 
