@@ -106,4 +106,4 @@ def why_nothing(rejected: Path) -> str:
     with rejected.open(encoding="utf-8", newline="") as file:
         first = next(csv.DictReader(file), None)
     example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
-    return printable(f"nothing usable was left: see {rejected}{example}")
+    return printable(f"no usable record or pair: see {rejected}{example}")

@@ -288,7 +288,7 @@ def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
     folder, record = result.folder, result.record
     if result.did_nothing:
-        print("Nothing to do: the same inputs were run before.")
+        print("Up to date: these inputs were run before.")
     _print_counts(record)
     _print_warnings(record.get("warnings", {}))
     # Agreement with observed pounding, worst pairs, files

@@ -46,7 +46,7 @@ Failed = Callable[[Task, str], Result]
 
 class Work(NamedTuple, Generic[Task, Result]):
     """
-    What is done with every task.
+    Function of every task, with its substitute for failures and the name of a task.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class _Watched(Generic[Task, Result]):
 
     def result(self, task: Task, get: Callable[[], Result]) -> Iterator[Result]:
         """
-        Yield the result of a task, or its substitute; nothing if the machine failed.
+        Yield the result of a task, or its substitute; no result if the machine failed.
 
         Only where the machine cannot write, the other tasks fail too, and all of them stop.
         """
@@ -292,7 +292,7 @@ def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end with an interrupt; fresh ones, for a fork beside threads can hang."""
+    """Process pool that ends with an interrupt; spawned, as a fork with threads can hang."""
 
     def __init__(self, workers: int) -> None:
         self._others = set(active_children())

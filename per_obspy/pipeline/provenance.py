@@ -1,4 +1,4 @@
-"""What identifies a run: its configuration, its input files, and their common key."""
+"""Identity of a run: its configuration, its input files, and their common key."""
 
 import json
 import os
@@ -104,7 +104,7 @@ class RunSettings:
             return
         placed = self._public.model_copy(update={"output": self.folder})
         text = commented(Run, effective_content(placed, self.folder), HEADING)
-        # A file of that name that somebody else wrote is kept
+        # A file of that name that no run has written is kept
         before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
         if before and not before.startswith(f"# {WRITTEN}"):
             raise CatalogError(
@@ -136,7 +136,7 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs.footprints is not None:
         return layer_files(pairs.footprints.file)
     if pairs.catalog is None:
-        # A file beside the table may say how it is read
+        # A file next to the table may describe how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []
     # Stored inventories, all of which the region may touch
     stored = stored_inventories(pairs.catalog)

@@ -3,7 +3,7 @@ One run, from records to report, or one of its stages alone.
 
 Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
 The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
-only then the other results are complete, and a run of the same inputs does nothing.
+only then the other results are complete, and a run of the same inputs is up to date.
 """
 
 from collections.abc import Mapping, Sequence

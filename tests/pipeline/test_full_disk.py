@@ -96,7 +96,7 @@ SIZES = (0, 500, 8_000, 20_000, 40_000)
 
 @pytest.mark.parametrize("size", SIZES)
 def test_a_run_without_room_goes_on_when_there_is_room(call, whole, tmp_path, size):
-    # would catch a table of some stations, a traceback, or "Nothing to do" afterwards
+    # would catch a table of some stations, a traceback, or "Up to date" afterwards
     configuration = write_smallest_configuration(tmp_path, RUN)
     with no_room(size):
         ending = call("run", configuration)

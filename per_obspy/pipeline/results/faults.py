@@ -11,7 +11,7 @@ from per_obspy.files import remove_file
 
 class Report(NamedTuple):
     """
-    What the report has written.
+    Files that the report has written.
 
     Attributes
     ----------

@@ -310,7 +310,7 @@ def _outlines(beside: Path | None, worst: pd.DataFrame) -> list[tuple[str, list[
 
 def _provenance(settings: Run) -> list[tuple[str, str]]:
     """Return how the results were made."""
-    # Everything else is in the files beside the page
+    # Everything else is in the files next to the page
     texts = LANGUAGES[settings.report.language]
     has_map = settings.records is not None and settings.records.shakemap is not None
     notes = [WORDING[settings.report.language]["page_shakemap"]] if has_map else []

@@ -55,7 +55,7 @@ def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> 
     record : Path
         ``run.json``, finished or not.
     region : Region
-        Whose epicentre counts where nothing else is known.
+        Region whose epicentre counts where no event file or record gives one.
     shakemap : Path, optional
         Grid of the map that serves pairs without a station; it names itself, and the earthquake
         where no record does.

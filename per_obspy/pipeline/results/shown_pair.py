@@ -71,7 +71,7 @@ def find_pair(name: str, folder: Path) -> ShownPair:
 
 
 def _simulated(folder: Path) -> bool:
-    """Return whether the record of the results says that the motion is simulated."""
+    """Return whether the motion of the results is simulated, by the file that describes them."""
     for name in ("run.json", "ensemble.json"):
         try:
             return bool(read_status(folder / name).get("simulated", False))

@@ -1,4 +1,4 @@
-"""All layers of a screening: ``risk.gpkg``, the project of QGIS beside it, and GeoParquet."""
+"""All layers of a screening: ``risk.gpkg``, its project of QGIS, and GeoParquet."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -37,7 +37,7 @@ _UNITS = {"pga": "m/s2", "pgv": "m/s", "severity": "m/s", "worst_expected_impact
 
 class MapSources(NamedTuple):
     """
-    Everything that layers show beside the pairs.
+    Contents of the layers other than the pairs.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def write_layers(
         The risk table, in one piece or in several with the same columns; only one is held at a
         time.
     sources : MapSources
-        What there is beside the pairs.
+        Contents of the layers other than the pairs.
     files : tuple of Path
         GeoPackage, project of QGIS, GeoParquet.
     """

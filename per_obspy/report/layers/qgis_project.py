@@ -1,4 +1,4 @@
-"""Project of QGIS that opens the layers of a GeoPackage beside it, coloured."""
+"""Project of QGIS that opens the layers of a GeoPackage in the same folder, coloured."""
 
 import zipfile
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def write_project(
     title : str
         Name of the run.
     data : str
-        Name of the GeoPackage, which lies beside the project: both can be moved together.
+        Name of the GeoPackage in the folder of the project: both can be moved together.
     layers : sequence of ProjectLayer
         The first is drawn on top.
     extent : tuple of float

@@ -35,8 +35,8 @@ def page_document(data: PageData) -> str:
     Return the page as HTML.
 
     Texts of data are only in the block of data, whose letters cannot be markup, and the script sets
-    them as texts. The policy allows the page's own script and style by their hashes and nothing
-    else: no request leaves the browser.
+    them as texts. The policy allows only the page's own script and style, by their hashes: no
+    request leaves the browser.
     """
     content, tables = page_content(data)
     style, script = _asset("page.css"), "\n".join(_asset(name) for name in SCRIPTS)

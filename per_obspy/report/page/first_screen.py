@@ -19,7 +19,7 @@ LONGEST_NAME = 40
 #: Stations in a sentence, and the longest reason of one that is not used, characters.
 NAMED_STATIONS, LONGEST_REASON = 12, 90
 
-#: Longest text on what stands for an earthquake, characters.
+#: Longest text on a scenario or spectrum in place of an earthquake, characters.
 LONGEST_SOURCE = 500
 
 #: Flags that are counted on the first screen, with the keys of their sentences.
@@ -50,7 +50,7 @@ class Event(NamedTuple):
     used, missing : int
         Stations that serve pairs and those that do not.
     source : str
-        Sentences on what stands for the earthquake, instead of all that; empty if there is one.
+        Sentences on a spectrum or on scenarios in place of an earthquake; empty if there is one.
     revision : int
         Number of the revision of these results; 0 if they have none.
     revised : str
@@ -187,7 +187,7 @@ def _place_texts(event: Event, language: Language) -> list[str]:
     """Return epicentre and depth, as far as they are known."""
     if event.place is None:
         return []
-    # Latitude first, as people say it
+    # Latitude first, as in speech
     texts, (longitude, latitude, depth) = LANGUAGES[language], event.place
     place = {"latitude": latitude, "longitude": longitude}
     numbers = {name: written(degrees, 2, language) for name, degrees in place.items()}

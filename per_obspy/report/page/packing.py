@@ -149,7 +149,7 @@ def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
     """
     Return content and tables as one deflated text of letters, digits, ``+``, ``/`` and ``=``.
 
-    Nothing in it can be taken for markup. Its bytes are the length of a JSON text (four bytes,
+    No part of it can be taken for markup. Its bytes are the length of a JSON text (four bytes,
     little endian), the JSON text, and the data of the tables.
 
     Parameters

@@ -1,5 +1,5 @@
 """
-What would have kept a building from being hit, or softened the hits: the measures of its pairs.
+Measures that would have kept a building from being hit, or softened the hits, by its pairs.
 
 In a row in which no gap closes every building moves as if alone. Gaps that are enough for each pair
 are therefore enough for the row, if all of the row are: the measures of the pairs hold.
@@ -13,8 +13,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.values import values
 
-#: Texts of a building that needs nothing, and of one whose own gaps are enough.
-NOTHING = "nothing: its gaps are enough in this record"
+#: Texts of a building without need of a measure, and of one that needs them in other gaps.
+NOTHING = "no measure: its gaps are enough in this record"
 ELSEWHERE = "wider gaps elsewhere in its row: its own are enough for each pair alone"
 
 #: Text of a building with a gap that is not known.

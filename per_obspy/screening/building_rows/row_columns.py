@@ -15,7 +15,7 @@ HISTORY_FLAGS: dict[str, str] = {
 #: All flags of a row.
 FLAGS: dict[str, str] = {**ROW_FLAGS, **HISTORY_FLAGS}
 
-#: Flags of a building beside those of its rows, and the meaning of each.
+#: Flags of a building in addition to those of its rows, and the meaning of each.
 BUILDING_FLAGS: dict[str, str] = {
     "hit_only_in_row": "it is hit in its row at a gap that its pair alone does not close",
     "floor_to_column": "floors of a neighbour may hit its columns: outside the method",

@@ -129,8 +129,8 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     Returns
     -------
     dict of (n_pairs,) ndarray
-        ``population.COLUMNS``. Where the exact demand decides and nothing is uncertain, what the
-        exact history gives.
+        ``population.COLUMNS``. Where the exact demand decides without uncertain inputs, the
+        results of the exact history.
     """
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}

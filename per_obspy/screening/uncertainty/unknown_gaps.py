@@ -3,7 +3,7 @@ Pairs whose gap is unknown: their demand is known, everything that depends on th
 
 Such pairs are computed as if their buildings were too far apart to meet, and the columns that
 depend on the gap are emptied at the end. A pair whose gap is assumed by the configuration
-(``[building] gap``) keeps them; its class says that the gap is unknown.
+(``[building] gap``) keeps them; its risk class remains ``gap unknown``.
 """
 
 import numpy as np
