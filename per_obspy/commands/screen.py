@@ -75,10 +75,10 @@ def screen(
     quiet: Quiet = False,
 ) -> None:
     """
-    Screen pairs: in an ensemble of scenarios, by a design spectrum, or again with a run's stations.
+    Screen pairs by an ensemble of scenarios, a design spectrum, or the stations of a run.
 
-    Of an ensemble and of a run only what has changed is computed. A single run must have been done
-    before.
+    Of an ensemble and of a run only changed parts are computed again. A single run needs results
+    of an earlier ``per-obspy run``.
 
     Example: per-obspy screen workflows/ensemble.toml
     """

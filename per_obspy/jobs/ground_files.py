@@ -1,4 +1,4 @@
-"""Ground motion of a region as files and small tables, which other processes read once each."""
+"""Ground motion of a region as files and small tables, each read once per process."""
 
 from collections.abc import Iterable
 from functools import lru_cache
@@ -129,7 +129,7 @@ def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
 
 
 def read_ground(files: GroundFiles) -> RegionalMotion:
-    """Return the ground motion of a region; a station is read when a pair needs it."""
+    """Return the ground motion of a region; each station is read at its first use."""
     places = [(file.longitude, file.latitude) for file in files.stations]
     longitude, latitude = np.array(places).reshape(-1, 2).T
     names = np.array([file.name for file in files.stations], dtype=object)
@@ -145,14 +145,14 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
 
 @lru_cache(1)
 def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
-    """Return a ShakeMap; a changed one has another key."""
+    """Read a ShakeMap, cached by the key of the ground motion."""
     del key
     return read_shakemap(*files)
 
 
 @lru_cache(STATIONS_KEPT)
 def read_station_once(shard: Path, digest: str) -> xr.Dataset:
-    """Return a station's Dataset with its motion; a changed shard has another hash."""
+    """Read the shard of a station, cached by its hash."""
     content = shard.read_bytes()
     # Its pairs are not at fault, and the next run makes the shard again
     if bytes_hash(content) != digest:

@@ -1,12 +1,12 @@
 """
-Independent tasks on several processes, or on any executor; none of them can stop the others.
+Independent tasks on several processes or any executor; a failure does not stop other tasks.
 
 The exception is a machine that cannot write: the first ``WriteError`` ends the work.
 
 A fault of the data is the result of its task. A fault of the machine (:mod:`per_obspy.machine`, or
 a worker that dies) is none: the task stays undone, and ``Unfinished`` is raised after all others.
 
-A task whose worker dies takes the whole pool with it. What was under way then is done again, each
+A task whose worker dies takes the whole pool with it. Tasks at work then are done again, each
 task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
 """
@@ -103,7 +103,7 @@ def results(
     tasks : iterable
         Tasks, which are taken while the work goes on.
     work : Work
-        What is done with each of them.
+        Function of every task.
     workers : int
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
@@ -157,7 +157,7 @@ def new_and_resumed(
     executor: Executor | None,
 ) -> Iterator[Result]:
     """
-    Yield the result of every task; what an earlier run did is not done again.
+    Yield the result of every task; results of an earlier run are reused.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def new_and_resumed(
     resumed = list[Result]()
 
     def missing() -> Iterator[Task]:
-        """Yield the tasks that have to be done; the others are resumed on the way."""
+        """Yield the tasks without an earlier result, and collect the earlier results."""
         for task in tasks:
             found = earlier(task)
             if found is None:
@@ -271,7 +271,7 @@ def _on(
 
 
 def _done(do: Do[Task, Result], task: Task) -> Result:
-    """Do a task; what an error was raised from is lost on its way out of a process."""
+    """Do a task; raise errors caused by the machine as machine faults: processes drop causes."""
     try:
         return do(task)
     except TryLater:
@@ -282,7 +282,7 @@ def _done(do: Do[Task, Result], task: Task) -> Result:
 
 
 def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
-    """Yield the result of a task that has a process of its own."""
+    """Yield the result of one task, done in a separate process."""
     try:
         with _Pool(1) as pool:
             future = pool.submit(_done, watched.work.do, task)
@@ -299,7 +299,7 @@ class _Pool(ProcessPoolExecutor):
         super().__init__(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """Submit a task; no signal ends the run while it starts a process for it."""
+        """Submit a task, with signals held back while a process starts."""
         with _signals_held():
             return super().submit(do, *arguments, **named)
 

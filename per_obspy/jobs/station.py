@@ -2,7 +2,7 @@
 Work on one station, from its files to its shard; stations are independent of each other.
 
 A shard is a netCDF file with a status file (:mod:`per_obspy.resume`) of its name, which also holds
-what was left out. A station whose status and shard are whole is not done again.
+the rejections. A station whose status and shard are whole is not done again.
 """
 
 import os
@@ -46,9 +46,9 @@ class Products(NamedTuple):
     Attributes
     ----------
     rejected : tuple of Rejection
-        What was left out, with every reason.
+        Rejected inputs, each with its reasons.
     files : tuple of Path
-        The shard and what was written with it; empty if no usable record was left.
+        The shard and all files written with it; empty without a usable record.
     facts : mapping
         Plain values that the status file holds besides.
     """
@@ -73,7 +73,7 @@ def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") ->
 
 
 def _hypocentre(event: "Event | None") -> dict[str, float]:
-    """Return where the earthquake started, degrees and m, if that is known."""
+    """Return the hypocentre, degrees and m, if it is known."""
     origin = event and (event.preferred_origin() or next(iter(event.origins), None))
     if not origin or None in (origin.longitude, origin.latitude, origin.depth):
         return {}
@@ -105,7 +105,7 @@ class StationJob(NamedTuple):
     reader : partial
         How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
     product : callable
-        What is made of the records that were read: see :func:`spectra_shard`.
+        Function that makes the files from the records: see :func:`spectra_shard`.
     key : str
         Hash of everything on which the shard depends; :func:`do_stations` computes it.
     """
@@ -134,7 +134,7 @@ class FinishedStation(NamedTuple):
     shard : Path or None
         Its Dataset; None if no usable record was left.
     rejected : tuple of Rejection
-        What was left out, with every reason.
+        Rejected inputs, each with its reasons.
     resumed : bool
         Whether an earlier run had done it.
     hash : str
@@ -158,12 +158,12 @@ def do_stations(
     jobs: Sequence[StationJob], workers: int, executor: Executor | None = None
 ) -> Iterator[FinishedStation]:
     """
-    Yield every station as it is finished, in parallel; what an earlier run did is not done again.
+    Yield every station as it is finished, in parallel; finished parts of an earlier run are reused.
 
     Parameters
     ----------
     jobs : sequence of StationJob
-        What to do.
+        One job per station.
     workers : int
         Number of processes; one, or a single job, needs none but this.
     executor : Executor, optional
@@ -251,12 +251,12 @@ def _status_file(shard: Path) -> Path:
 
 
 def _from_status(shard: Path, file: Path) -> str:
-    """Return the path of an output seen from the folder of the status file."""
+    """Return the path of an output relative to the folder of the status file."""
     return Path(os.path.relpath(file, shard.parent)).as_posix()
 
 
 def _key(job: StationJob) -> str:
-    """Return the hash of everything on which the products of a station depend."""
+    """Return the hash of all inputs of the products of a station."""
     settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
     files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
     files += [f"{job.event.path.name} {job.event.hash}"] if job.event else []
@@ -268,7 +268,7 @@ def _key(job: StationJob) -> str:
 
 
 def _earlier(job: StationJob) -> FinishedStation | None:
-    """Return the station as an earlier run left it, if it did the same and its files are whole."""
+    """Return the station of an earlier run if its key is the same and its files are complete."""
     try:
         status = read_status(_status_file(job.shard))
         rejected = _stored_rejections(status)
@@ -306,7 +306,7 @@ def _stored_rejections(status: Status) -> tuple[Rejection, ...]:
 
 def earlier_station(status_file: Path) -> FinishedStation:
     """
-    Return a station as an earlier run left it, even if its source has changed since.
+    Return the station of an earlier run, even if its source has changed since.
 
     Parameters
     ----------
@@ -336,6 +336,6 @@ def _name(job: StationJob) -> str:
 
 
 def _failed(job: StationJob, reason: str) -> FinishedStation:
-    """Return a station whose work failed; the next run does it again."""
+    """Return a station after a failure; the next run repeats it."""
     rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
     return FinishedStation(job.station, None, (rejection,), resumed=False, failed=True)

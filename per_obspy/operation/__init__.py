@@ -1,1 +1,1 @@
-"""Operation: watch for earthquakes, report status, notify."""
+"""Unattended operation: watching for earthquakes, status, notification."""

@@ -34,7 +34,7 @@ HEADING = (
 
 class RunSettings:
     """
-    Settings of a run, its output folder, and the folder from which its paths are seen.
+    Settings of a run, its output folder, and the folder to which its paths are relative.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class RunSettings:
 
     def head(self, fetched: Fetched | None, hashes: Mapping[Path, str]) -> dict[str, Any]:
         """
-        Return key, configuration and inputs of a run; files with a known hash are not read.
+        Return key, configuration and inputs of a run; files with a known hash are not hashed again.
 
         The key is the same for every file that holds the same settings.
         """
@@ -87,12 +87,12 @@ class RunSettings:
 
     @property
     def _public(self) -> Run:
-        """Return the settings without those of messages, whose commands may hold secrets."""
+        """Return the settings without section ``[notify]``, whose commands may contain secrets."""
         return self.settings.model_copy(update={"notify": Notify()})
 
     def write(self) -> None:
         """
-        Write the effective configuration into the output folder, unless it is the one that runs.
+        Write the effective configuration into the output folder unless the run reads it from there.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class RunSettings:
 
 
 def _values(settings: Run, folder: Path) -> dict[str, Any]:
-    """Return all settings as plain values, with paths seen from a folder."""
+    """Return all settings as plain values, with paths relative to a folder."""
     values: dict[str, Any] = json.loads(settings.model_dump_json(context={"folder": folder}))
     return values
 

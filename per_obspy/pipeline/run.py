@@ -1,7 +1,7 @@
 """
 One run, from records to report, or one of its stages alone.
 
-Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
+Stations and chunks of the inventory are separate jobs: a killed run continues where it stopped.
 The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
 only then the other results are complete, and a run of the same inputs is up to date.
 """
@@ -132,7 +132,7 @@ def screen(
     progress: Progress = silent,
 ) -> Result:
     """
-    Screen the inventory again with the stations that an earlier run has left, and report.
+    Screen the inventory again with the stations of an earlier run, and write the report.
 
     Only chunks of the inventory that have changed are computed. Parameters and errors are those of
     :func:`run`; it is an error as well if there are no stations.
@@ -169,7 +169,7 @@ def report(
     Raises
     ------
     CatalogError
-        If there is no finished run, or what it left has changed.
+        If there is no finished run, or its files have changed.
     """
     asked = RunSettings(configuration, output)
     settings, folder = asked.settings, asked.folder
@@ -185,7 +185,7 @@ def report(
 
 
 def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
-    """Return the stations of the latest run; none where only a ShakeMap served its pairs."""
+    """Return the stations of the latest run; empty if only a ShakeMap served its pairs."""
     records = settings.records
     has_map = records is not None and records.shakemap is not None
     if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
@@ -194,7 +194,7 @@ def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
-    """Return the stations of which usable records were left."""
+    """Return the stations with usable records."""
     return [station for station in stations if station.shard is not None]
 
 
@@ -223,7 +223,7 @@ def _all_stages(
 
 
 def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations to a record, with what each serves."""
+    """Add expected, received, late and rejected stations to a record, with the pairs of each."""
     used, served = record.pop("used"), record.pop("served")
     record["stations"] = station_facts(known, used, served, record["counts"])
 
@@ -266,7 +266,7 @@ def _finished_record(
     head: dict[str, Any],
     earlier_rows: int | None,
 ) -> Result:
-    """Write the record of a run, with the rows that it lost."""
+    """Write the record of a run, with sentences on losses of rows."""
     lost = losses(settings, record["counts"], earlier_rows)
     # What failed unexpectedly is done again by the next run, and files that waited are taken
     waited = record["stations"]["waiting"]
@@ -312,7 +312,7 @@ def _later_stages(
 
 
 def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
-    """Return the stations that can serve pairs: those without a place cannot."""
+    """Return the names of the stations with known coordinates, which can serve pairs."""
     unplaced = {rejection.name for rejection in found.unplaced}
     return [station.station for station in usable if station.station not in unplaced]
 
@@ -350,7 +350,7 @@ def _write_stations(
 def _intermediate_hashes(
     folder: Path, stations: Sequence[FinishedStation], known: Mapping[Path, str]
 ) -> dict[str, str]:
-    """Return the hashes of the files of the first stage, which other commands or users read."""
+    """Return the hashes of the files of the first stage, which are results too."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
     made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)
@@ -366,7 +366,7 @@ def _intermediate_hashes(
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of the same run if its results and earlier stages are as it left them."""
+    """Return the record of an identical earlier run if its files are unchanged."""
     record = earlier_status(folder / RECORD, key)
     known = record and record.get("intermediate")
     if record is None or not isinstance(known, dict):
@@ -376,7 +376,7 @@ def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def _finished(file: Path) -> dict[str, Any]:
-    """Return the record of a finished run whose risk table and spectra are as it left them."""
+    """Return the record of a finished run if its risk table and spectra are unchanged."""
     try:
         record = read_status(file)
     except StatusError as error:

@@ -33,7 +33,7 @@ def spectra_of(
         Waveform files, archives, or folders of them with StationXML.
     output : Path
         netCDF file. A folder of its name with ``.stations`` keeps one shard per station; those
-        that are still true are not computed again. What was left out goes to ``.rejected.csv``.
+        that are still true are not computed again. Rejections are written to ``.rejected.csv``.
     processing, grid : Processing, Spectra
         Settings.
     run : (int, Executor or None, callable)
@@ -45,7 +45,7 @@ def spectra_of(
     done : list of FinishedStation
         Every station, sorted by name.
     rejected : tuple of Rejection
-        What was left out.
+        Rejected inputs, each with its reasons.
 
     Raises
     ------

@@ -350,7 +350,7 @@ def _known() -> dict[str, Column]:
 
 
 def known_column(name: str) -> Column | None:
-    """Return unit and meaning of a column of the risk table; None if it is carried through."""
+    """Return unit and meaning of a column of the risk table; None for columns of the user."""
     return _known().get(name)
 
 

@@ -26,7 +26,7 @@ SHOWN = 4
 
 
 def record_facts(records: Sequence[RecordInfo], rejected: Sequence[Rejection]) -> Facts:
-    """Return the facts of records that were described one by one."""
+    """Return the facts of a set of records from their descriptions."""
     stations = sorted({_station(record) for record in records})
     places = _places(records)
     title = f"{len(records)} records of {len(stations)} stations, {len(rejected)} rejected"
@@ -41,7 +41,7 @@ def record_facts(records: Sequence[RecordInfo], rejected: Sequence[Rejection]) -
 def _record_lines(
     records: Sequence[RecordInfo], stations: Sequence[str], places: Mapping[str, object]
 ) -> list[tuple[str, str]]:
-    """Return the facts of records, a line each."""
+    """Return one line per fact of a set of records."""
     simulated = sum(record.simulated for record in records)
     lines = [("simulated", f"{simulated} records are SIMULATED.")] if simulated else []
     # Formats with the level of processing

@@ -82,7 +82,7 @@ def _simulated(folder: Path) -> bool:
 
 def draw_pair(pair: ShownPair, path: Path) -> None:
     """
-    Draw a pair: with its record where it has one, else its circles alone.
+    Draw a pair with its record, or its circles alone if no record serves it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Plan of inspection: the worst buildings of a run, in the order in which teams visit them."""
+"""Plan of inspection: order in which teams visit the worst buildings of a run."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -107,7 +107,7 @@ class _Package:
         self.has_places = False
 
     def add(self, layer: Layer) -> None:
-        """Write a layer, or more rows of one."""
+        """Write a layer, or append rows to it."""
         is_new = layer.name not in self.layers
         if is_new:
             kind = geometry_type(layer.shapes)
@@ -144,7 +144,7 @@ def _style(layer: Layer, kind: str, classes: Sequence[str]) -> str:
 
 
 def _other_layers(sources: MapSources, pairs: Path, has_places: bool) -> Iterator[Layer]:
-    """Yield buildings, stations and areas, as far as there are any."""
+    """Yield the layers of buildings, stations and areas that are not empty."""
     if has_places:
         yield from building_layers(pairs, sources.ranked, sources.outlines)
     if not sources.stations.empty:

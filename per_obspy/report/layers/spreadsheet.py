@@ -1,4 +1,4 @@
-"""Results as a workbook for spreadsheets: one sheet per table, no text of which is a formula."""
+"""Results as a workbook: one sheet per table, without formulas."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""The page as one HTML file: its skeleton, style and script with the data."""
+"""Page as one HTML file with its style, script and data."""
 
 import hashlib
 import re
@@ -56,10 +56,10 @@ def page_document(data: PageData) -> str:
 
 
 def _asset(name: str) -> str:
-    """Return a file of the page that comes with the package."""
+    """Read a file of the page from the package."""
     return (files("per_obspy.report.page") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _hash(text: str) -> str:
-    """Return the hash by which a policy allows a script or style."""
+    """Return the hash of a script or style for the content security policy."""
     return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode()}"

@@ -1,4 +1,4 @@
-"""Texts of the page in English, and the choice of a language; numbers are written by it too."""
+"""English texts of the page, and formats of texts and numbers by language."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -328,7 +328,7 @@ def written(value: float, digits: int, language: Language) -> str:
 
 def counted(language: Language, key: str, count: float, **values: str) -> str:
     """
-    Return a text about a number of things, in the singular where the number is one.
+    Return a text about a number of things, in the singular if the number is 1.
 
     Parameters
     ----------
@@ -353,5 +353,5 @@ def counted(language: Language, key: str, count: float, **values: str) -> str:
 
 
 def fixed_phrases(text: str, language: Language) -> str:
-    """Return a sentence of other modules with its fixed phrases in a language."""
+    """Translate the fixed phrases of a sentence from other modules."""
     return in_spanish(text) if language == "es" else text

@@ -28,7 +28,7 @@ def prevention(
     sides: pd.DataFrame, groups: Groups, neighbour: pd.Series
 ) -> dict[str, FloatArray | NDArray[np.object_]]:
     """
-    Return the measures that all sides of a building need, and a sentence about them.
+    Return the measures that protect all sides of each building, with a sentence on them.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def prevention(
 
 
 def _all_known(groups: Groups, column: FloatArray, reduced: FloatArray) -> FloatArray:
-    """Return reduced values, NaN where a side of the building has none."""
+    """Return reduced values, NaN for buildings with a side without a value."""
     return np.where(groups.any(np.isnan(column)), np.nan, reduced)
 
 

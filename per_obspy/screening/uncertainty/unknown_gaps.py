@@ -48,7 +48,7 @@ TEXTS = ("single_hit_status", "fema_p154_flags_unverified")
 
 def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
     """
-    Return completed pairs with a gap in every row and the columns ``MARKS``.
+    Return completed pairs with a substitute for unknown gaps, and the columns ``MARKS``.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
 
 def without_gap(table: pd.DataFrame) -> pd.DataFrame:
     """
-    Return rows of a risk table, empty in columns that depend on an unknown gap, without ``MARKS``.
+    Empty the columns that depend on an unknown gap, and drop the columns ``MARKS``.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ BEGINNINGS = ("up to ", "or ")
 
 
 def _pattern() -> re.Pattern[str]:
-    """Return a pattern of all phrases, the longest first: none hides one that begins alike."""
+    """Return a pattern of all phrases, the longest first, so that longer ones match first."""
     phrases = sorted(SPANISH_PHRASES, key=len, reverse=True)
     parts = [
         f"(?:^|(?<=; )){re.escape(phrase)}" if phrase in BEGINNINGS else re.escape(phrase)
@@ -109,7 +109,7 @@ _PHRASES = _pattern()
 
 def in_spanish(text: str) -> str:
     """
-    Return a text with its fixed phrases in Spanish; numbers, names and other words stay.
+    Translate the fixed phrases of a text into Spanish; numbers, names and other words stay.
 
     Examples
     --------
