@@ -1,1 +1,1 @@
-"""Unattended operation: watching for earthquakes, status, notification."""
+"""Unattended operation: watching for earthquakes, revisions, status, notification."""

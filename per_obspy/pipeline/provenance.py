@@ -71,9 +71,9 @@ class RunSettings:
             path: hashes.get(path) or hash_if_readable(path)
             for path in _input_files(self.settings, fetched)
         }
-        # Where the work is done, in how many processes, and messages change no result
-        anywhere = {"output": self.folder, "workers": 0, "engine": Engine()}
-        placed = self._public.model_copy(update=anywhere)
+        # Where the work is done, in how many processes, watching and messages change no result
+        unused = {"workers": 0, "engine": Engine(), "watch": None}
+        placed = self._public.model_copy(update={"output": self.folder, **unused})
         content = {
             "version": version("per_obspy"),
             "configuration": _values(placed, self.folder),

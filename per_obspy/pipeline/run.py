@@ -45,6 +45,7 @@ from per_obspy.pipeline.stations import (
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent, timed
+from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records
 from per_obspy.resume import (
     StatusError,
@@ -68,6 +69,7 @@ def run(
     output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
+    facts: Mapping[str, object] | None = None,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -82,6 +84,8 @@ def run(
         Where stations are processed; processes of this machine if not given.
     progress : callable
         Called for every stage: name, done, total.
+    facts : mapping, optional
+        Plain values for ``run.json`` that change no result, such as the number of a revision.
 
     Returns
     -------
@@ -112,17 +116,30 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
-        # Otherwise they are hashed while their headers are read
-        drawn = write_drawn_pairs(settings, folder, progress)
-        check_inputs(settings, folder)
-        earlier_rows = _begun(folder, settings, STATIONS)
-        seconds, started = dict[str, float](), now()
-        with timed(seconds, "records"):
-            found = find_station_jobs(settings, folder, fetched, progress)
-            head = head or asked.head(fetched, found.hashes)
-        record = _all_stages(settings, folder, found, executor, progress)
-        record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
-        return _finished_record(settings, folder, record, head, earlier_rows)
+        means = (executor, progress)
+        return _new_run(asked, fetched, head, means, dict(facts or {}))
+
+
+def _new_run(
+    asked: RunSettings,
+    fetched: Fetched | None,
+    head: dict[str, Any] | None,
+    means: tuple[Executor | None, Progress],
+    facts: dict[str, Any],
+) -> Result:
+    """Do a run that was not done before; inputs without a hash are hashed as they are read."""
+    settings, folder, progress = asked.settings, asked.folder, means[1]
+    drawn = write_drawn_pairs(settings, folder, progress)
+    check_inputs(settings, folder)
+    earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
+    seconds, started = dict[str, float](), now()
+    with timed(seconds, "records"):
+        found = find_station_jobs(settings, folder, fetched, progress)
+        head = head or asked.head(fetched, found.hashes)
+    # From here on the folder describes an unfinished run
+    record = facts | _all_stages(settings, folder, found, means, facts)
+    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
+    return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def screen(
@@ -202,17 +219,18 @@ def _all_stages(
     settings: Run,
     folder: Path,
     found: FoundStations,
-    executor: Executor | None,
-    progress: Progress,
+    means: tuple[Executor | None, Progress],
+    facts: Mapping[str, object],
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
+    executor, progress = means
     seconds = dict[str, float]()
     with opened_executor(settings.engine, executor, folder) as used:
         noted = noted_engine(folder / RECORD, used)
         with timed(seconds, "stations"), compiling(progress), noted:
             progress("stations", 0, len(found.jobs))
             stations = finished_stations(found.jobs, settings.workers, used, progress)
-        _begun(folder, settings, SCREENING, found.earthquakes)
+        _begun(folder, settings, SCREENING, found.earthquakes, facts)
         # From here on no record is needed
         rejected = all_rejections(found.rejected, stations)
         record = _later_stages(settings, folder, stations, rejected, used, progress)
@@ -228,10 +246,17 @@ def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
     record["stations"] = station_facts(known, used, served, record["counts"])
 
 
-def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
+def _begun(
+    folder: Path,
+    settings: Run,
+    stage: str,
+    earthquakes: Sequence[Any] = (),
+    facts: Mapping[str, object] | None = None,
+) -> int | None:
     """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
     begun: dict[str, Any] = {
+        **(facts or {}),
         "name": settings.name,
         "state": UNFINISHED,
         "stage": stage,
