@@ -68,9 +68,7 @@ ROWS: tuple[Column, ...] = (
     ),
     _text("station", "station of the record that drives the row; empty without one"),
     _number("gap", "m", "clear distance at this interface"),
-    _count(
-        "impacts", "impacts in the row above 1 mm/s and 1 % of the fastest; empty without a history"
-    ),
+    _count("impacts", "impacts above 1 mm/s and 1 % of the fastest; empty without a history"),
     _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
     _count(
         "impacts_alone", "impacts of the pair alone, counted as in impacts, under the same motion"
@@ -93,9 +91,7 @@ POSITIONS = ("inside", "end", "corner", "single")
 
 #: One row per building, worst first.
 BUILDINGS: tuple[Column, ...] = (
-    _count(
-        "rank", "order of inspection from 1: by severity, amplification, probability, importance"
-    ),
+    _count("rank", "order of inspection, by severity, amplification, probability, importance"),
     _text("building_id", "identifier in the pair table; PAIR#1 or PAIR#2 without one"),
     _number(
         "severity",
