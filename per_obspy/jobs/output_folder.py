@@ -56,7 +56,7 @@ class Result(NamedTuple):
 
 
 def recorded(file: Path, record: dict[str, Any]) -> Result:
-    """Write the record of a run with its key and outputs, after everything else."""
+    """Write ``run.json`` or ``ensemble.json`` with key and outputs, after all other files."""
     facts = {name: value for name, value in record.items() if name not in ("key", "outputs")}
     written = write_status(file, record["key"], record["outputs"], facts, indent=1)
     return Result(file.parent, written, did_nothing=False)

@@ -118,7 +118,7 @@ def _run(file: Path) -> Health:
     try:
         record = read_record(file)
     except StatusError as error:
-        raise CatalogError(str(file), f"not the record of a run: {error}") from error
+        raise CatalogError(str(file), f"cannot be read as run.json: {error}") from error
     # A run whose record is unfinished was killed, or is at work
     state = str(record.get("state"))
     known = {"complete": "fine", "unfinished": "unfinished", "nothing_usable": "nothing_usable"}

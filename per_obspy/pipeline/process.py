@@ -127,14 +127,14 @@ def _structure(job: StationJob) -> Path:
 
 
 def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the processed records of a station as its shard, structures in another file."""
+    """Write the processed records of a station as its station file, structures in another file."""
     ground, structure = kept_apart(taken(stream))
     clean, unfit = process_station(chain(taken(ground), structure), job.processing, event)
     return _write_records(job, clean, unfit, _write_structure(job, structure, event))
 
 
 def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the shard as :func:`records_shard` does, and draw one page per record."""
+    """Write the station file as :func:`records_shard` does, and draw one page per record."""
     clean, unfit = process_station(stream, job.processing, event)
     # Each page shows a record before and after
     pages = job.shard.with_suffix(".pdf")
@@ -149,7 +149,7 @@ def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) ->
 def _write_records(
     job: StationJob, clean: Stream, unfit: Sequence[Rejection], structure: Products
 ) -> Products:
-    """Write the usable records of a station as its shard; return all products of the station."""
+    """Write the usable records of a station as its station file; return all its products."""
     rejected = (*unfit, *structure.rejected)
     if not clean:
         return Products(rejected, structure.files)

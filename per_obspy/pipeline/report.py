@@ -104,7 +104,7 @@ def reported(
     folder : Path
         Of the results; without a risk table only the spectra can be reported.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     progress : callable
         Called when it begins and ends.
     """

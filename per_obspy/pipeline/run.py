@@ -241,7 +241,7 @@ def _all_stages(
 
 
 def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations to a record, with the pairs of each."""
+    """Add expected, received, late and rejected stations, with their pairs, to ``run.json``."""
     used, served = record.pop("used"), record.pop("served")
     record["stations"] = station_facts(known, used, served, record["counts"])
 
@@ -291,7 +291,7 @@ def _finished_record(
     head: dict[str, Any],
     earlier_rows: int | None,
 ) -> Result:
-    """Write the record of a run, with sentences on losses of rows."""
+    """Write ``run.json``, with sentences on losses of rows."""
     lost = losses(settings, record["counts"], earlier_rows)
     # What failed unexpectedly is done again by the next run, and files that waited are taken
     waited = record["stations"]["waiting"]
@@ -391,7 +391,7 @@ def _intermediate_hashes(
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of an identical earlier run if its files are unchanged."""
+    """Return ``run.json`` of an identical earlier run if its files are unchanged."""
     record = earlier_status(folder / RECORD, key)
     known = record and record.get("intermediate")
     if record is None or not isinstance(known, dict):
@@ -401,11 +401,11 @@ def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def _finished(file: Path) -> dict[str, Any]:
-    """Return the record of a finished run if its risk table and spectra are unchanged."""
+    """Return ``run.json`` of a finished run if its risk table and spectra are unchanged."""
     try:
         record = read_status(file)
     except StatusError as error:
-        raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+        raise CatalogError(str(file), "no finished run here: run `per-obspy run` first") from error
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
@@ -413,5 +413,5 @@ def _finished(file: Path) -> dict[str, Any]:
     needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
-        raise CatalogError(str(changed[0]), "not as the run left it: run again")
+        raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")
     return record

@@ -90,7 +90,7 @@ def screened(
     folder : Path
         Of the results.
     stations : sequence of FinishedStation
-        With shards; if there is none and no ShakeMap, only ``rejected.csv`` is written.
+        With station files; if there is none and no ShakeMap, only ``rejected.csv`` is written.
     rejected : iterable of Rejection
         Rejections of the earlier stages.
     executor : Executor, optional

@@ -1,4 +1,4 @@
-"""First stage: write one shard of spectra per station from found or simulated records."""
+"""First stage: one station file with spectra per station, from found or simulated records."""
 
 import shutil
 from collections.abc import Mapping, Sequence
@@ -105,14 +105,14 @@ def station_jobs(
     event: EventFile | None = None,
 ) -> list[StationJob]:
     """
-    Return one job per station, sorted by name, which makes a shard of spectra.
+    Return one job per station, sorted by name, which writes a station file.
 
     Parameters
     ----------
     stations : mapping
         ``"NET.STA"`` -> files, metadata and reader.
     shards : Path
-        Folder of the shards.
+        Folder of the station files.
     processing, spectra : Processing, Spectra
         Settings.
     event : EventFile, optional
@@ -121,7 +121,7 @@ def station_jobs(
     Raises
     ------
     CatalogError
-        If the shard of a station would not be in that folder, because a link leads out of it.
+        If a station file would be outside of that folder, because a link leads out of it.
     """
     return [
         StationJob(
@@ -216,12 +216,12 @@ def stations_of_earlier_run(folder: Path) -> list[FinishedStation]:
     statuses = sorted(path for path in _shards(folder).glob("*.json") if not is_part(path))
     found = [earlier_station(status) for status in statuses]
     if not found:
-        raise CatalogError(str(_shards(folder)), "no stations here: a whole run comes first")
+        raise CatalogError(str(_shards(folder)), "contains no stations: run `per-obspy run` first")
     return found
 
 
 def _shards(folder: Path) -> Path:
-    """Return the folder of the shards of a run."""
+    """Return the folder of the station files of a run."""
     return folder / "stations"
 
 

@@ -1,7 +1,7 @@
 """
 A disk that is full, or a file that cannot be written, ends every command alike.
 
-One line names the file, the reason and what helps; the exit code is 75; no half file stays, and
+One line names the file, the reason and the remedy; the exit code is 75; no half file stays, and
 the same command succeeds when there is room.
 """
 
@@ -90,7 +90,7 @@ def check_ending(called, folder):
     assert not [path for path in folder.rglob("*") if is_part(path)]
 
 
-#: Largest file (bytes): the first write, the simulated records, the shard, and tables fail.
+#: Largest file (bytes): the first write, the simulated records, the station file, and tables fail.
 SIZES = (0, 500, 8_000, 20_000, 40_000)
 
 

@@ -46,7 +46,7 @@ def no_memory(*_, **__):
     raise MemoryError("an array")
 
 
-#: What fails, and how: at a record, a shard, a chunk, and when a chunk reads a shard.
+#: What fails, and how: at a record, a station file, a chunk, and when a chunk reads a station file.
 FAULTS = {
     "record not opened": (archive_files, "_archive_of", system_error(errno.EMFILE)),
     "shard not read back": (station, "_read_shard", system_error(errno.EIO)),

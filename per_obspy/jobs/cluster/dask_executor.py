@@ -119,7 +119,7 @@ class DaskExecutor(ElasticExecutor):
         return max(FEWEST_AHEAD, AHEAD * sum(self.workers.fit().values()))
 
     def facts(self) -> dict[str, Any]:
-        """Return scheduler, workers and events as plain values, for the record of a run."""
+        """Return scheduler, workers and events as plain values, for ``run.json``."""
         return {"dask": self.address, **self.workers.facts()}
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:

@@ -160,7 +160,7 @@ def spectra_facts(path: Path) -> Facts:
 
 def _dataset_facts(found: "xr.Dataset") -> Facts:
     """Return the facts of spectra of one station or several."""
-    # A shard holds one station, the file of a run all of them
+    # A station file holds one station, the file of a run all of them
     column = found["station_name" if "station_name" in found else "station"]
     names = np.atleast_1d(column.to_numpy()).astype(str).tolist()
     place = [np.atleast_1d(found[name]).tolist() for name in ("longitude", "latitude")]

@@ -64,7 +64,7 @@ def write_run_page(
     folder : Path
         Of the results; its tables of stations, rejections and buildings are read.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     found : (PairTally, DataFrame, DataFrame)
         Counts of all pairs, the worst pairs, and totals by area.
     simulated : bool

@@ -35,7 +35,7 @@ def page_drawings(
     worst : DataFrame
         Pairs of the page with all columns of the risk table.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     """
     if "probability" not in worst or "derived" not in worst:
         return PageDrawings({}, {}, 0, 0)

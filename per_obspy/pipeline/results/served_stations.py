@@ -105,7 +105,7 @@ def _share(part: int, whole: int) -> float:
 
 
 def earlier_facts(record: Path) -> tuple[list[Any], KnownStations]:
-    """Return the earthquakes and stations of the run that wrote a record; empty without one."""
+    """Return the earthquakes and stations in ``run.json``; empty without such a file."""
     try:
         found = read_status(record)
     except StatusError:
