@@ -19,6 +19,7 @@ from per_obspy.commands.endings import NOTHING_USABLE, TRY_LATER, WRONG_INPUT
 from per_obspy.commands.info import info
 from per_obspy.commands.init import init, warm_up
 from per_obspy.commands.operation.status import status
+from per_obspy.commands.operation.watch import watch
 from per_obspy.commands.pairs import catalog, pairs
 from per_obspy.commands.plan import plan
 from per_obspy.commands.records import events, fetch
@@ -27,6 +28,7 @@ from per_obspy.commands.screen import screen
 from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
+from per_obspy.full_vectors import use_full_vectors
 from per_obspy.machine import machine_fault
 from per_obspy.termination import (
     INTERRUPTED,
@@ -38,6 +40,9 @@ from per_obspy.termination import (
 
 #: Words for the ends by a signal.
 SIGNALLED = {INTERRUPTED: "interrupted", TERMINATED: "terminated"}
+
+#: Commands that compute for long.
+_LONG = {"run", "process", "spectra", "screen", "warm-up"}
 
 #: Errors of writing, rather than of opening files or starting processes.
 _ROOMLESS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
@@ -57,7 +62,7 @@ app.add_typer(pairs, name="pairs")
 app.add_typer(catalog, name="catalog")
 COMMANDS = (
     *(run, init, warm_up, simulate, process, spectra, screen),
-    *(report, show, plan, events, fetch, info, status),
+    *(report, show, plan, events, fetch, info, watch, status),
 )
 for command in COMMANDS:
     app.command()(command)
@@ -117,10 +122,17 @@ def _failed_output(error: OSError) -> int:
     return _failed(WriteError("standard output", reason), TRY_LATER)
 
 
+def _compute() -> None:
+    """Run a command, with the widest vectors that pay if it computes for long."""
+    if _LONG.intersection(sys.argv[1:2]):
+        use_full_vectors()
+    app()
+
+
 def _exit_code() -> int:
     """Run a command and return its exit code."""
     try:
-        app()
+        _compute()
     except KeyboardInterrupt:
         return INTERRUPTED
     except TryLater as error:

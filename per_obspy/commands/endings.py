@@ -38,6 +38,16 @@ Strict = Annotated[
 ]
 
 
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        "--dask",
+        metavar="ADDRESS | FILE | local[:N]",
+        help="Work on a Dask cluster: its scheduler, or N processes here; needs per_obspy[dask].",
+    ),
+]
+
+
 def named_path(text: str | Path) -> Path:
     """Return a path that was given by name: an empty one would be the folder of the shell."""
     if not str(text).strip():

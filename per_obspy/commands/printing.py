@@ -1,5 +1,6 @@
 """Print tables and progress."""
 
+import logging
 import sys
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
@@ -8,6 +9,7 @@ from per_obspy.errors import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import TextIO
 
     from per_obspy.progress import Progress
 
@@ -58,7 +60,7 @@ def shown_progress() -> "Iterator[Progress]":
 
     # A terminal gets one bar per stage, made when the stage begins
     tasks: dict[str, TaskID] = {}
-    with Bars(console=console) as bars:
+    with Bars(console=console) as bars, _notes(sys.stderr):
 
         def move(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
@@ -66,6 +68,23 @@ def shown_progress() -> "Iterator[Progress]":
             bars.update(tasks[stage], completed=done, total=total)
 
         yield move
+
+
+@contextmanager
+def _notes(stream: "TextIO") -> "Iterator[None]":
+    """Print what a cluster reports meanwhile: where its dashboard is, and faults of workers."""
+    log, handler = logging.getLogger("per_obspy.cluster"), logging.StreamHandler(stream)
+    handler.setFormatter(logging.Formatter("per-obspy: %(message)s"))
+    # Warnings have their line already
+    handler.addFilter(lambda event: event.levelno == logging.INFO)
+    before = log.level
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(before)
 
 
 def _print_line(stage: str, done: int, total: int) -> None:

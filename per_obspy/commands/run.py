@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Dask,
     Language,
     Strict,
     named_path,
@@ -91,6 +92,7 @@ def run(
     ] = None,
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
     changes: Changes = None,
+    dask: Dask = None,
     language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
@@ -109,6 +111,7 @@ def run(
 
     Example: per-obspy run records pairs.csv -o out --set screening.exact=false
     """
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.operation.notified_run import notified_run
     from per_obspy.pipeline.inputs.arguments import requested_run
 
@@ -116,11 +119,11 @@ def run(
     for name in (first, first if second is None else second):
         named_path(name)
     spoken = [f"report.language={language}"] if language else []
-    with logged(log, log_format, quiet) as progress:
+    with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
         asked = requested_run(first, second, output, [*(changes or ()), *spoken])
         if asked.line and not quiet:
             print(printable(asked.line), file=sys.stderr)
-        result = notified_run(asked.configuration, output, progress)
+        result = notified_run(asked.configuration, output, progress, executor)
         log_ending(result.record)
     print_and_end(result, as_json, print_nothing if quiet else print_result, strict)
 
@@ -181,6 +184,7 @@ def spectra(
         float,
         typer.Option(min=0.01, max=100.0, help="Of the oscillator in the state-space figure, s."),
     ] = 1.0,
+    dask: Dask = None,
     as_json: AsJson = False,
     log: LogFile = None,
     log_format: LogForm = LogFormat.text,
@@ -192,6 +196,7 @@ def spectra(
     Example: per-obspy spectra RSN6_ELC180.AT2 -o spectra.nc --plot
     """
     from per_obspy.config import Processing, Spectra, checked
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.spectra import plot_station, spectra_of
 
     # The grid, checked as in a configuration
@@ -201,10 +206,9 @@ def spectra(
     grid = checked(Spectra, given)
 
     # Spectra of all stations, and figures of each on request
-    with logged(log, log_format, quiet) as progress:
-        done, rejected = spectra_of(
-            sources, output, Processing(), grid, usable_processors(), progress
-        )
+    with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
+        where = (usable_processors(), executor, progress)
+        done, rejected = spectra_of(sources, output, Processing(), grid, where)
     shards = [station.shard for station in done if station.shard]
     files = [str(output)] if shards else []
     for shard in shards if plot else []:
@@ -242,6 +246,7 @@ def process(
     report: Annotated[
         bool, typer.Option("--report", help="Draw a page a record, one PDF a station.")
     ] = False,
+    dask: Dask = None,
     as_json: AsJson = False,
     log: LogFile = None,
     log_format: LogForm = LogFormat.text,
@@ -253,14 +258,14 @@ def process(
     Example: per-obspy process shared/records -o processed --report
     """
     from per_obspy.config import Processing, load
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.process import process_records
 
     # Process every station
     chosen = load(settings, Processing) if settings else Processing()
-    with logged(log, log_format, quiet) as progress:
-        result = process_records(
-            sources, output, chosen, event, report, (usable_processors(), progress)
-        )
+    with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
+        where = (usable_processors(), executor, progress)
+        result = process_records(sources, output, chosen, event, report, where)
 
     # Print counts and files, for machines or people
     stations = sum(station.shard is not None for station in result.done)

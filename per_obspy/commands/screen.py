@@ -9,6 +9,7 @@ import typer
 
 from per_obspy.commands.endings import (
     AsJson,
+    Dask,
     Language,
     Strict,
     output_option,
@@ -65,6 +66,7 @@ def screen(
         Path, typer.Argument(help="TOML file: a run, a spectrum and pairs, or scenarios.")
     ],
     output: Annotated[Path | None, output_option("Folder of the results.")] = None,
+    dask: Dask = None,
     language: Language = None,
     strict: Strict = False,
     as_json: AsJson = False,
@@ -81,20 +83,25 @@ def screen(
     Example: per-obspy screen workflows/ensemble.toml
     """
     from per_obspy.config import Design, Ensemble, screening_kind
+    from per_obspy.jobs.executor import dask_executor
     from per_obspy.pipeline.ensemble import screen_scenarios
     from per_obspy.pipeline.run import screen as screen_again
 
+    # The kind decides which options hold
     kind = screening_kind(configuration)
     if strict and kind in (Design, Ensemble):
         raise typer.BadParameter("only a run compares its rows", param_hint="--strict")
-    with logged(log, log_format, quiet) as progress:
+    if dask is not None and kind is Design:
+        raise typer.BadParameter("a design spectrum needs no cluster", param_hint="--dask")
+    with logged(log, log_format, quiet) as progress, dask_executor(dask) as executor:
         if kind is Design:
             design = _screened_by_spectrum(configuration, output, language)
         elif kind is Ensemble:
-            result = screen_scenarios(configuration, output, progress=progress, language=language)
+            result = screen_scenarios(configuration, output, executor, progress, language)
             log_ending(result.record)
         else:
-            result = screen_again(_in_language(configuration, language), output, progress=progress)
+            settings = _in_language(configuration, language)
+            result = screen_again(settings, output, executor, progress)
             log_ending(result.record)
     # Results are printed when no line of the log can come between
     if kind is Design:

@@ -6,8 +6,10 @@ or one section. Paths in a configuration are relative to the folder of its file.
 """
 
 from per_obspy.config.building_rows import Rows
+from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble, EnsembleScenario
 from per_obspy.config.operation.notify import Notify
+from per_obspy.config.operation.watch import Reach, Watch
 from per_obspy.config.pairs import Pairs, TableForm
 from per_obspy.config.processing import Check, Checks, Processing, Spectra
 from per_obspy.config.records import Archives, Asdf, Columns, Fdsn, Records, Sds, Window
@@ -33,6 +35,7 @@ __all__ = [
     "Codes",
     "Columns",
     "Design",
+    "Engine",
     "Ensemble",
     "EnsembleScenario",
     "Fdsn",
@@ -40,6 +43,7 @@ __all__ = [
     "Notify",
     "Pairs",
     "Processing",
+    "Reach",
     "Records",
     "RelativePath",
     "Rows",
@@ -54,6 +58,7 @@ __all__ = [
     "States",
     "TableForm",
     "Totals",
+    "Watch",
     "Window",
     "checked",
     "in_language",

@@ -196,6 +196,14 @@ class Fdsn(Window):
     connections: int = Field(
         3, ge=1, le=16, description="number of stations requested at the same time"
     )
+    longest_pause: float | None = Field(
+        None,
+        ge=0,
+        description=(
+            "longest pause that a service may demand by Retry-After, s; a service that demands "
+            "more is not asked again in this run; not given: it is asked again after at most 600 s"
+        ),
+    )
 
     @property
     def knows_where_and_when(self) -> bool:
@@ -306,8 +314,9 @@ class Records(Section):
         ge=0,
         le=86_400,
         description=(
-            "s; a file of the folder that was changed less than this ago, or changes while it is "
-            "read, waits for the next run; for folders that grow; 0: every file is read"
+            "age of a file of the folder, s, from which it is read: one that was changed "
+            "later, or changes while it is read, waits for the next run; 0: every file is "
+            "read"
         ),
     )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")

@@ -9,8 +9,10 @@ from pydantic import (
 )
 
 from per_obspy.config.building_rows import Rows
+from per_obspy.config.engine import Engine
 from per_obspy.config.ensemble import Ensemble
 from per_obspy.config.operation.notify import Notify
+from per_obspy.config.operation.watch import Watch
 from per_obspy.config.pairs import Pairs
 from per_obspy.config.processing import Processing, Spectra
 from per_obspy.config.records import Records
@@ -39,6 +41,8 @@ class Run(Section):
     report: ReportTexts = ReportTexts()
     rows: Rows = Rows()
     notify: Notify = Notify()
+    engine: Engine = Engine()
+    watch: Watch | None = Field(None, description="earthquakes that `per-obspy watch` looks for")
     csv_rows: int = Field(
         100_000,
         ge=1,

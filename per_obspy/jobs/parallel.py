@@ -76,6 +76,19 @@ AHEAD = 2
 AHEAD_ELSEWHERE = 64
 
 
+def _ahead_elsewhere() -> int:
+    """Return how many tasks are kept ahead of the results of an executor of unknown size."""
+    return AHEAD_ELSEWHERE
+
+
+class ElasticExecutor(Executor):
+    """Executor whose number of workers changes while the work goes on."""
+
+    def ahead(self) -> int:
+        """Return how many tasks are kept ahead of the results just now."""
+        raise NotImplementedError
+
+
 def results(
     tasks: Iterable[Task],
     work: Work[Task, Result],
@@ -117,8 +130,9 @@ def _all_results(
 ) -> Iterator[Result]:
     """Yield the results of all tasks in which the machine does not fail."""
     if executor is not None:
-        for task in (yield from _on(executor, tasks, watched, AHEAD_ELSEWHERE)):
-            watched.note(task, DIED)
+        ahead = executor.ahead if isinstance(executor, ElasticExecutor) else _ahead_elsewhere
+        for task in (yield from _on(executor, tasks, watched, ahead)):
+            watched.note(task, watched.broken or DIED)
         return
     remaining = iter(tasks)
     first = list(islice(remaining, 2))
@@ -129,7 +143,8 @@ def _all_results(
     remaining = chain(first, remaining)
     for head in remaining:  # a pool, and another one after each worker that died
         with _Pool(workers) as pool:
-            unfinished = yield from _on(pool, chain([head], remaining), watched, AHEAD * workers)
+            waiting = chain([head], remaining)
+            unfinished = yield from _on(pool, waiting, watched, lambda: AHEAD * workers)
         for task in unfinished:
             yield from _alone(task, watched)
 
@@ -177,6 +192,7 @@ class _Watched(Generic[Task, Result]):
 
     def __init__(self, work: Work[Task, Result], faults: list[str]) -> None:
         self.work = work
+        self.broken = ""
         self._faults = faults
 
     def note(self, task: Task, reason: str) -> None:
@@ -192,7 +208,10 @@ class _Watched(Generic[Task, Result]):
         found: Result | None
         try:
             found = get()
-        except (BrokenExecutor, WriteError):
+        except BrokenExecutor as error:
+            self.broken = str(error)
+            raise
+        except WriteError:
             raise
         except TryLater as error:
             self.note(task, str(error))
@@ -217,7 +236,7 @@ def _on(
     executor: Executor,
     tasks: Iterable[Task],
     watched: _Watched[Task, Result],
-    ahead: int,
+    ahead: Callable[[], int],
 ) -> Generator[Result, None, list[Task]]:
     """Yield results until all tasks are done or the executor is broken; return its tasks then."""
     remaining, unfinished = iter(tasks), list[Task]()
@@ -225,11 +244,12 @@ def _on(
     unwritten: WriteError | None = None
     while True:
         # Keep the executor busy, but only a few tasks ahead of the results
-        room = 0 if unfinished else ahead - len(pending)
-        for task in islice(remaining, room):
+        room = 0 if unfinished else ahead() - len(pending)
+        for task in islice(remaining, max(room, 0)):
             try:
                 pending[executor.submit(_done, watched.work.do, task)] = task
-            except BrokenExecutor:
+            except BrokenExecutor as error:
+                watched.broken = str(error)
                 unfinished.append(task)
                 break
         if not pending:

@@ -1,1 +1,1 @@
-"""Operation: watch for earthquakes, report status, notify."""
+"""Operation: watch for earthquakes, keep revisions, report status, notify."""

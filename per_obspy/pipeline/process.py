@@ -1,6 +1,7 @@
 """Processed records of some sources as files: MiniSEED, the table of corners, a page per record."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -8,9 +9,10 @@ from typing import NamedTuple
 from obspy import Stream
 from obspy.core.event import Event
 
-from per_obspy.config import Processing, Spectra
+from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_dead_parts, remove_file
+from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
@@ -53,7 +55,7 @@ def process_records(
     settings: Processing,
     event: Path | None,
     report: bool,
-    run: tuple[int, Progress],
+    run: tuple[int, Executor | None, Progress],
 ) -> Processed:
     """
     Write the processed records of every station in some files and folders.
@@ -72,8 +74,9 @@ def process_records(
         QuakeML file.
     report : bool
         Whether to draw ``stations/NET.STA.pdf`` as well, one page per record.
-    run : (int, callable)
-        Number of processes, and the function that is called for every station.
+    run : (int, Executor or None, callable)
+        Number of processes, where to work instead, and the function that is called for every
+        station.
 
     Returns
     -------
@@ -95,8 +98,9 @@ def process_records(
             found.stations, folder / STATIONS, settings, Spectra(), event=earthquake
         )
     ]
-    workers, progress = run
-    done = finished_stations(jobs, workers, None, progress)
+    workers, executor, progress = run
+    with opened_executor(Engine(), executor, folder) as used:
+        done = finished_stations(jobs, workers, used, progress)
 
     # Tables of all records
     rejected = all_rejections(found.rejected, done)

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from per_obspy.config import Notify, Run, load
+from per_obspy.config import Engine, Notify, Run, load
 from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
@@ -71,8 +71,9 @@ class RunSettings:
             path: hashes.get(path) or hash_if_readable(path)
             for path in _input_files(self.settings, fetched)
         }
-        # Neither the number of processes nor messages change a result
-        placed = self._public.model_copy(update={"output": self.folder, "workers": 0})
+        # Where the work is done, in how many processes, watching and messages change no result
+        unused = {"workers": 0, "engine": Engine(), "watch": None}
+        placed = self._public.model_copy(update={"output": self.folder, **unused})
         content = {
             "version": version("per_obspy"),
             "configuration": _values(placed, self.folder),

@@ -14,6 +14,7 @@ from typing import Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
 from per_obspy.files import file_hash, is_part, remove_file
+from per_obspy.jobs.executor import engine_facts, noted_engine, opened_executor
 from per_obspy.jobs.output_folder import (
     Result,
     file_hashes,
@@ -44,6 +45,7 @@ from per_obspy.pipeline.stations import (
     stations_of_earlier_run,
 )
 from per_obspy.progress import Progress, silent, timed
+from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.records.sources import fetched_records
 from per_obspy.resume import (
     StatusError,
@@ -67,6 +69,7 @@ def run(
     output: str | Path | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
+    facts: Mapping[str, object] | None = None,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -81,6 +84,8 @@ def run(
         Where stations are processed; processes of this machine if not given.
     progress : callable
         Called for every stage: name, done, total.
+    facts : mapping, optional
+        Plain values for ``run.json`` that change no result, such as the number of a revision.
 
     Returns
     -------
@@ -111,17 +116,30 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
-        # Otherwise they are hashed while their headers are read
-        drawn = write_drawn_pairs(settings, folder, progress)
-        check_inputs(settings, folder)
-        earlier_rows = _begun(folder, settings, STATIONS)
-        seconds, started = dict[str, float](), now()
-        with timed(seconds, "records"):
-            found = find_station_jobs(settings, folder, fetched, progress)
-            head = head or asked.head(fetched, found.hashes)
-        record = _all_stages(settings, folder, found, executor, progress)
-        record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
-        return _finished_record(settings, folder, record, head, earlier_rows)
+        means = (executor, progress)
+        return _new_run(asked, fetched, head, means, dict(facts or {}))
+
+
+def _new_run(
+    asked: RunSettings,
+    fetched: Fetched | None,
+    head: dict[str, Any] | None,
+    means: tuple[Executor | None, Progress],
+    facts: dict[str, Any],
+) -> Result:
+    """Do a run that was not done before; inputs without a hash are hashed as they are read."""
+    settings, folder, progress = asked.settings, asked.folder, means[1]
+    drawn = write_drawn_pairs(settings, folder, progress)
+    check_inputs(settings, folder)
+    earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
+    seconds, started = dict[str, float](), now()
+    with timed(seconds, "records"):
+        found = find_station_jobs(settings, folder, fetched, progress)
+        head = head or asked.head(fetched, found.hashes)
+    # From here on the folder describes an unfinished run
+    record = facts | _all_stages(settings, folder, found, means, facts)
+    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
+    return _finished_record(settings, folder, record, head, earlier_rows)
 
 
 def screen(
@@ -151,8 +169,9 @@ def screen(
         head = asked.head(None, {})
         head["key"] = f"screening of stations as they were at {started}"
         rejected = all_rejections([], stations)
-        with compiling(progress):
-            record = _later_stages(settings, folder, stations, rejected, executor, progress)
+        # On a cluster the folder is shared until the report is written
+        with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
+            record = _later_stages(settings, folder, stations, rejected, used, progress)
         record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
         _add_stations(record, known)
         return _finished_record(settings, folder, record, head, earlier_rows)
@@ -200,18 +219,21 @@ def _all_stages(
     settings: Run,
     folder: Path,
     found: FoundStations,
-    executor: Executor | None,
-    progress: Progress,
+    means: tuple[Executor | None, Progress],
+    facts: Mapping[str, object],
 ) -> dict[str, Any]:
     """Do the stations and the stages after them, and return their part of ``run.json``."""
+    executor, progress = means
     seconds = dict[str, float]()
-    with timed(seconds, "stations"), compiling(progress):
-        progress("stations", 0, len(found.jobs))
-        stations = finished_stations(found.jobs, settings.workers, executor, progress)
-    _begun(folder, settings, SCREENING, found.earthquakes)
-    # From here on no record is needed
-    rejected = all_rejections(found.rejected, stations)
-    record = _later_stages(settings, folder, stations, rejected, executor, progress)
+    with opened_executor(settings.engine, executor, folder) as used:
+        noted = noted_engine(folder / RECORD, used)
+        with timed(seconds, "stations"), compiling(progress), noted:
+            progress("stations", 0, len(found.jobs))
+            stations = finished_stations(found.jobs, settings.workers, used, progress)
+        _begun(folder, settings, SCREENING, found.earthquakes, facts)
+        # From here on no record is needed
+        rejected = all_rejections(found.rejected, stations)
+        record = _later_stages(settings, folder, stations, rejected, used, progress)
     record["earthquakes"] = found.earthquakes
     _add_stations(record, found.known)
     record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
@@ -224,10 +246,17 @@ def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
     record["stations"] = station_facts(known, used, served, record["counts"])
 
 
-def _begun(folder: Path, settings: Run, stage: str, earthquakes: Sequence[Any] = ()) -> int | None:
+def _begun(
+    folder: Path,
+    settings: Run,
+    stage: str,
+    earthquakes: Sequence[Any] = (),
+    facts: Mapping[str, object] | None = None,
+) -> int | None:
     """Record a run as unfinished, and return the number of rows of the pair tables before it."""
     rows = number_of_rows(folder / RECORD)
     begun: dict[str, Any] = {
+        **(facts or {}),
         "name": settings.name,
         "state": UNFINISHED,
         "stage": stage,
@@ -281,7 +310,7 @@ def _later_stages(
     """Do the stages after the stations and return their part of ``run.json``."""
     seconds, usable = dict[str, float](), _usable(stations)
     # The risk table, then everything that is read from it
-    with timed(seconds, "screening"):
+    with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
         found = screened(settings, folder, usable, rejected, executor, progress)
         table = _write_stations(usable, rejected, found, folder)
     with timed(seconds, "report"):
@@ -297,6 +326,7 @@ def _later_stages(
         "faults": made.faults,
         "used": _names_of(usable, found),
         "served": found.served,
+        **engine_facts(executor),
         "simulated": simulated_motion(settings, usable),
         "warnings": table.warnings,
         "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},

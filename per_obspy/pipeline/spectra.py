@@ -1,11 +1,13 @@
 """Spectra of some records alone, without pairs: one netCDF file and figures."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 
-from per_obspy.config import Processing, Spectra
+from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
 from per_obspy.files import remove_dead_parts
+from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.progress import Progress
@@ -20,8 +22,7 @@ def spectra_of(
     output: Path,
     processing: Processing,
     grid: Spectra,
-    workers: int,
-    progress: Progress,
+    run: tuple[int, Executor | None, Progress],
 ) -> tuple[list[FinishedStation], tuple[Rejection, ...]]:
     """
     Write the spectra of every station in some files and folders into one netCDF file.
@@ -35,10 +36,9 @@ def spectra_of(
         that are still true are not computed again. What was left out goes to ``.rejected.csv``.
     processing, grid : Processing, Spectra
         Settings.
-    workers : int
-        Number of processes.
-    progress : callable
-        Called for every station.
+    run : (int, Executor or None, callable)
+        Number of processes, where to work instead, and the function that is called for every
+        station.
 
     Returns
     -------
@@ -56,7 +56,9 @@ def spectra_of(
     remove_dead_parts(shards)
     found = find_path_sources(sources)
     jobs = station_jobs(found.stations, shards, processing, grid)
-    done = finished_stations(jobs, workers, None, progress)
+    workers, executor, progress = run
+    with opened_executor(Engine(), executor, output.absolute().parent) as used:
+        done = finished_stations(jobs, workers, used, progress)
     rejected = all_rejections(found.rejected, done)
     write_rejected(rejected, output.with_suffix(".rejected.csv"))
     # The file of the region needs a station with usable records

@@ -3,12 +3,13 @@ Parts of the risk table on disk, each in its order, and their rows joined in the
 
 Only the columns of the order are sorted as a whole, by DuckDB, whose memory is bounded and which
 leaves to the disk rows that do not fit. As every part is in that order already, the next rows of
-the whole are always the next rows of the parts: they are read once, and only some thousands of
-each part at a time.
+the whole are always the next rows of the parts: only some thousands of each part are read at a
+time. Many parts are merged in several passes, so that memory does not grow with their number.
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 import duckdb
@@ -28,8 +29,11 @@ from per_obspy.tables.table_files import as_arrow
 #: Memory of the database for ordering.
 MEMORY = "1GB"
 
-#: Rows of a part that are read together: of a hundred parts they need about 800 MB.
+#: Rows of a part that are read together, about 8 MB.
 TOGETHER = 10_000
+
+#: Parts that are read side by side; more of them are merged to longer ones first.
+MOST_PARTS = 64
 
 #: Column with the number of the part to which a row belongs.
 _PART = "order_part"
@@ -140,14 +144,46 @@ def joined_rows(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator
     size : int
         Number of rows.
     """
+    with temporary_folder(parts[0].parent) as room:
+        for level in count():
+            if len(parts) <= MOST_PARTS:
+                break
+            parts = _merged_groups(parts, schema, room / str(level))
+        yield from _merged(parts, schema, size)
+
+
+def _merged_groups(parts: Sequence[Path], schema: pa.Schema, room: Path) -> list[Path]:
+    """Merge many parts to fewer and longer ones in a folder of their own."""
+    room.mkdir()
+    # Columns of the order are needed once more, with the number of the longer part
+    keys = [pq.read_schema(parts[0].absolute()).field(name) for name in KEYS]
+    kept, merged = pa.schema([*schema, *keys]), []
+    whole = kept.append(pa.field(_PART, pa.int64()))
+    for number, first in enumerate(range(0, len(parts), MOST_PARTS)):
+        merged.append(room / f"{number:06}.parquet")
+        with pq.ParquetWriter(merged[-1], whole, use_dictionary=text_columns(whole)) as writer:
+            # As a part of a chunk: in its order, a few thousand rows per group
+            for rows in _merged(parts[first : first + MOST_PARTS], kept, TOGETHER):
+                numbers = pa.array(np.full(rows.num_rows, number))
+                writer.write_table(rows.append_column(whole.field(_PART), numbers))
+    return merged
+
+
+def _merged(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
+    """Yield the rows of few parts in their order, so many at a time."""
+    rows = {_number(part): _Rows(part, schema) for part in parts}
     # Order of the whole: for each row the part in which it is the next one
     with bounded_database(parts[0].parent) as database:
         database.register("parts", parquet_rows(parts, [_PART, *KEYS, "pair_id"]))
-        found = database.execute(_ORDER).fetchnumpy()
-    order = np.asarray(found[_PART], dtype=np.int64)
-    rows = {_number(part): _Rows(part, schema) for part in parts}
-    for first in range(0, order.size, size):
-        yield _next_rows(rows, order[first : first + size])
+        left = np.empty(0, np.int64)
+        for batch in batches(database, _ORDER, size):
+            left = np.concatenate([left, np.asarray(batch[_PART], dtype=np.int64)])
+            # The database gives batches of fewer rows than are asked for
+            while left.size >= size:
+                yield _next_rows(rows, left[:size])
+                left = left[size:]
+        if left.size:
+            yield _next_rows(rows, left)
 
 
 def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
@@ -180,8 +216,8 @@ def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
     """Yield the row groups of a part with the columns of the whole."""
     for index in range(pq.read_metadata(part.absolute()).num_row_groups):
         with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
-            table = file.read_row_group(index, use_threads=False)
-        table = table.drop_columns([*KEYS, _PART])
+            names = [name for name in schema.names if name in file.schema_arrow.names]
+            table = file.read_row_group(index, columns=names, use_threads=False)
         yield table if table.schema.equals(schema) else _conforming(table, schema)
 
 

@@ -134,13 +134,19 @@ def _write_rows(
     ):
         for piece in chain([first], rows):
             writer.write_table(piece)
-            states.update(piece["state"].to_pylist())
-            stations.update(piece["station"].to_pylist())
+            _count(piece["state"], states)
+            _count(piece["station"], stations)
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
                 _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
     return states, stations
+
+
+def _count(column: pa.ChunkedArray, counter: Counter[str]) -> None:
+    """Count the values of a column."""
+    for value, count in zip(*column.value_counts().flatten(), strict=True):
+        counter[value.as_py()] += count.as_py()
 
 
 def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:

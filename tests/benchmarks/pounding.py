@@ -62,7 +62,10 @@ def opensees():
     try:
         return importlib.import_module("openseespy.opensees")
     except (ImportError, RuntimeError) as problem:
-        print(f"OpenSeesPy cannot be imported, no comparison: {problem}")
+        print(
+            f"OpenSeesPy cannot be imported, no comparison: {problem}; it is part of the extra "
+            "benchmark and needs Debian's libblas3 and liblapack3"
+        )
         return None
 
 

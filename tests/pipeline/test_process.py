@@ -24,7 +24,7 @@ from per_obspy.spectra.station import station_spectra
 from per_obspy.tables.processed import COLUMNS
 
 RATE, COUNT = 50.0, 3000
-ONE = (1, silent)
+ONE = (1, None, silent)
 
 
 def motion(seed):

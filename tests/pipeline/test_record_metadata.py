@@ -63,7 +63,7 @@ def test_everything_reaches_the_field_and_the_table(folder: Path):
 
 
 def test_processed_records_keep_all_of_it(folder: Path, tmp_path: Path):
-    process_records([folder], tmp_path, Processing(), None, False, (1, silent))
+    process_records([folder], tmp_path, Processing(), None, False, (1, None, silent))
     (trace, *_) = json.loads((tmp_path / "stations" / "TK.4414.json").read_text())["traces"]
     assert trace["coordinates_source"] == "stations.csv"
     assert "header 38.4069" in trace["coordinates_conflict"]

@@ -116,7 +116,9 @@ def test_simulated_motion_is_marked_everywhere(finished):
 def test_simulated_records_of_a_folder_are_marked_like_those_of_a_scenario(copied, tmp_path):
     # the folder of `per-obspy simulate`, copied, and what `per-obspy process` makes of it
     shutil.copytree(copied / "out" / "simulated", copied / "raw")
-    process_records([copied / "raw"], copied / "clean", Processing(), None, False, (1, silent))
+    process_records(
+        [copied / "raw"], copied / "clean", Processing(), None, False, (1, None, silent)
+    )
     for source in ("raw", "clean"):
         shutil.rmtree(tmp_path / "records", ignore_errors=True)
         shutil.copytree(copied / source, copied / "records")

@@ -29,7 +29,7 @@ def records(tmp_path_factory):
 
 
 def spectra(records, folder):
-    return spectra_of([records], folder / "spectra.nc", Processing(), GRID, 1, silent)
+    return spectra_of([records], folder / "spectra.nc", Processing(), GRID, (1, None, silent))
 
 
 def test_one_file_holds_the_spectra_of_all_shards(records, tmp_path):
@@ -62,10 +62,9 @@ def test_a_part_file_of_a_killed_process_is_removed(records, tmp_path):
 def test_files_of_a_station_in_several_sources_are_joined(records, tmp_path):
     sources = [records / "XX.S001.mseed", records / "stations.xml", records]
     with pytest.raises(CatalogError, match="there is only metadata"):
-        spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, 1, silent)
-    done, _ = spectra_of(
-        [records, records / "XX.S001.mseed"], tmp_path / "a.nc", Processing(), GRID, 1, silent
-    )
+        spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, (1, None, silent))
+    sources = [records, records / "XX.S001.mseed"]
+    done, _ = spectra_of(sources, tmp_path / "a.nc", Processing(), GRID, (1, None, silent))
     # metadata of the folder serves the single file
     assert [station.shard is not None for station in done] == [True, True]
 

@@ -18,7 +18,8 @@ from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 from obspy import Inventory, Stream, UTCDateTime
-from obspy.core.event import Catalog, Event
+from obspy.core.event import Catalog, Event, Origin
+from obspy.geodetics import locations2degrees
 
 from per_obspy.records.simulation.earthquake import Simulation
 
@@ -47,6 +48,13 @@ class FdsnServer(ThreadingHTTPServer):
         self.stream = simulation.stream
         self.inventory = _begun(simulation.inventory)
         self.event = simulation.event
+        # Further earthquakes by identifier, those that were deleted, and when each changed
+        self.events: dict[str, Event] = {"xx1": simulation.event}
+        self.deleted: set[str] = set()
+        self.updated: dict[str, UTCDateTime] = {}
+        # Stations without records yet, and the time at which all records end for now
+        self.silent: set[str] = set()
+        self.records_until: UTCDateTime | None = None
         # Requests in the order of arrival, and faults in the order of their use
         self.requests: list[Request] = []
         self.times: list[float] = []
@@ -95,9 +103,12 @@ def serving(simulation: Simulation) -> Iterator[FdsnServer]:
     with FdsnServer(simulation) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
-        yield server
-        server.shutdown()
-        thread.join()
+        # Also after an error, so that no thread keeps the program
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -141,17 +152,28 @@ class _Handler(BaseHTTPRequestHandler):
         selected = Stream()
         for network, station, location, channel in _combinations(parameters):
             selected += self.server.stream.select(network, station, location, channel)
+        for trace in selected.copy():
+            if trace.stats.station in self.server.silent:
+                selected.remove(next(t for t in selected if t.id == trace.id))
         start, end = UTCDateTime(parameters["starttime"]), UTCDateTime(parameters["endtime"])
+        end = min(end, self.server.records_until or end)
         return mseed(selected.slice(start, end).copy())
 
     def _event(self, parameters: dict[str, str]) -> bytes:
-        event = self.server.event
-        if parameters.get("format") == "text":
-            return _event_text(event).encode()
-        if parameters["eventid"] != "xx1":
+        events = self.server.events
+        events = {name: event for name, event in events.items() if name not in self.server.deleted}
+        if "eventid" not in parameters:
+            listed = {
+                name: event
+                for name, event in events.items()
+                if _is_listed(event, parameters, self.server.updated.get(name))
+            }
+            limit = int(parameters.get("limit", len(listed)))
+            return _event_text(dict(list(listed.items())[:limit])).encode()
+        if parameters["eventid"] not in events:
             return b""
         content = BytesIO()
-        Catalog([event]).write(content, format="QUAKEML")
+        Catalog([events[parameters["eventid"]]]).write(content, format="QUAKEML")
         return content.getvalue()
 
     def reply(
@@ -172,13 +194,36 @@ class _Handler(BaseHTTPRequestHandler):
         """Stay quiet."""
 
 
-def _event_text(event: Event) -> str:
-    """Return a list of one event, as the text format has it."""
-    origin, magnitude = event.origins[0], event.magnitudes[0]
-    place = f"{origin.latitude}|{origin.longitude}|{origin.depth / 1000}"
+def _is_listed(event: Event, parameters: dict[str, str], updated: UTCDateTime | None) -> bool:
+    """Return whether an earthquake is in the answer to a query, by the FDSN specification."""
+    origin, magnitudes = event.origins[0], event.magnitudes
+    if "minmagnitude" in parameters and not magnitudes:
+        return False
+    conditions = {
+        "starttime": lambda value: origin.time >= UTCDateTime(value),
+        "minmagnitude": lambda value: magnitudes[0].mag >= float(value),
+        "updatedafter": lambda value: updated is None or updated >= UTCDateTime(value),
+        "maxradius": lambda value: _degrees(origin, parameters) <= float(value),
+    }
+    return all(conditions[name](parameters[name]) for name in conditions.keys() & parameters.keys())
+
+
+def _degrees(origin: Origin, parameters: dict[str, str]) -> float:
+    """Return the distance of an epicentre from the centre of a query."""
+    centre = float(parameters["latitude"]), float(parameters["longitude"])
+    return float(locations2degrees(origin.latitude, origin.longitude, *centre))
+
+
+def _event_text(events: dict[str, Event]) -> str:
+    """Return a list of events, as the text format has it."""
     head = "#EventID|Time|Latitude|Longitude|Depth/km|Author|Catalog|Contributor|ContributorID"
-    row = f"xx1|{origin.time}|{place}|A|B|C|xx1|Mw|{magnitude.mag}|A|Nowhere"
-    return f"{head}|MagType|Magnitude|MagAuthor|EventLocationName\n{row}\n"
+    rows = [f"{head}|MagType|Magnitude|MagAuthor|EventLocationName"]
+    for name, event in events.items():
+        origin = event.origins[0]
+        size = event.magnitudes[0].mag if event.magnitudes else ""
+        place = f"{origin.latitude}|{origin.longitude}|{origin.depth / 1000}"
+        rows.append(f"{name}|{origin.time}|{place}|A|B|C|{name}|Mw|{size}|A|Nowhere")
+    return "\n".join([*rows, ""]) if events else ""
 
 
 def _begun(inventory: Inventory) -> Inventory:

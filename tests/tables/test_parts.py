@@ -56,6 +56,46 @@ def test_the_whole_is_in_order(tmp_path, monkeypatch, size, cuts):
     )
 
 
+@pytest.mark.parametrize("most", [2, 3])
+def test_parts_merged_in_several_passes_are_in_the_same_order(tmp_path, monkeypatch, most):
+    # Mutations: parts of one pass one after the other; keys of the order lost after a pass.
+    monkeypatch.setattr(parts, "TOGETHER", 7)
+    monkeypatch.setattr(parts, "MOST_PARTS", most)
+    whole = table(200, seed=2)
+    # one part has a column that the others lack
+    pieces = [whole.iloc[first : first + 20] for first in range(0, 200, 20)]
+    pieces[4] = pieces[4].assign(remark="x")
+    expected = in_order(pd.concat(pieces))[[*whole, "remark"]]
+    found = read(written(tmp_path, pieces), 30)
+    pd.testing.assert_frame_equal(found, expected, check_dtype=False)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        f"{number:06}.parquet" for number in range(10)
+    ]
+
+
+def test_memory_does_not_grow_with_the_number_of_parts(tmp_path, monkeypatch):
+    # would catch every part held open with its rows: 200 parts here, of a world 10 000
+    monkeypatch.setattr(parts, "MOST_PARTS", 4)
+    held, most = set(), []
+    take = parts._Rows.take
+
+    def counted(rows, number):
+        held.add(rows)
+        most.append(len(held))
+        return take(rows, number)
+
+    def begun(files, schema, size, merged=parts._merged):
+        held.clear()
+        yield from merged(files, schema, size)
+
+    monkeypatch.setattr(parts._Rows, "take", counted)
+    monkeypatch.setattr(parts, "_merged", begun)
+    whole = table(60, seed=3)
+    pieces = [whole.iloc[first : first + 2] for first in range(0, 60, 2)]
+    assert len(read(written(tmp_path, pieces), 1000)) == 60
+    assert max(most) <= 4
+
+
 def test_parts_with_other_columns_and_types(tmp_path):
     # Mutation: the first part decides the columns of all.
     first, second = (

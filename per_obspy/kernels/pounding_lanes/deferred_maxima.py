@@ -54,11 +54,15 @@ class Record(NamedTuple):
         Number of steps into which each sampling interval is cut.
     duration : float
         Of a step, s.
+    sizes : (2, n_groups) ndarray
+        Integrals of the size of both components over groups of samples, m/s; see
+        ``remaining_motion``.
     """
 
     components: NDArray[np.float64]
     refinement: int
     duration: float
+    sizes: NDArray[np.float64]
 
 
 @lean

@@ -8,17 +8,26 @@ from per_obspy.kernels.pounding_lanes.deferred_maxima import (
     search_deferred,
     write_lane,
 )
-from per_obspy.kernels.pounding_lanes.lanes import PAIR_LANES, TILE_STEPS, sweep_tile
+from per_obspy.kernels.pounding_lanes.lanes import (
+    AXIS_COSINE,
+    AXIS_SINE,
+    PAIR_LANES,
+    TILE_STEPS,
+    sweep_tile,
+)
 from per_obspy.kernels.pounding_lanes.pair_rows import (
     load_pair,
     rest_pair,
     write_constants,
     write_phase,
 )
+from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES, remains_still
 from per_obspy.kernels.pounding_lanes.step_by_step import treat_flagged_lane
 
 #: Sampling intervals of free vibration between two checks whether a pair is settled.
 SETTLING_STEPS = 16
+#: Groups of samples of the record between two checks whether the rest of it counts.
+GROUPS_BETWEEN_CHECKS = 8
 
 
 @lean
@@ -54,6 +63,37 @@ def advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, ste
 
 
 @lean
+def _is_over(pair, row, record, group):
+    """Return whether no result of a pair changes from a group of samples on."""
+    duration = GROUP_SAMPLES * record.refinement * record.duration
+    cosine, sine = pair[AXIS_COSINE], pair[AXIS_SINE]
+    return remains_still(row, cosine, sine, record.sizes, duration, group)
+
+
+@lean
+def retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, group):
+    """
+    Rest the lanes whose result no longer changes in the rest of the record.
+
+    Return the number of the others.
+    """
+    active = 0
+    for lane in range(PAIR_LANES):
+        if free_steps[lane] >= 0:
+            # maxima of deferred tiles are larger still: a lane that is over now is over with them
+            read_lane(lanes, lane, pair)
+            load_pair(pair, rows[lane])
+            if _is_over(pair, rows[lane], record, group):
+                search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
+                free_steps[lane] = -1
+                rest_pair(pair)
+                write_lane(lanes, lane, pair)
+            else:
+                active += 1
+    return active
+
+
+@lean
 def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):
     """
     Rest the lanes whose result is final after so many sampling intervals of free vibration.
@@ -67,7 +107,10 @@ def retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elaps
             search_deferred(lanes, lane, pair, rows[lane], deferred[lane], record, grounds[1])
             read_lane(lanes, lane, pair)
             load_pair(pair, rows[lane])
-            if elapsed >= free_steps[lane] or is_settled(rows[lane]):
+            is_over = is_settled(rows[lane])
+            if not is_over:
+                is_over = _is_over(pair, rows[lane], record, record.sizes.shape[1])
+            if elapsed >= free_steps[lane] or is_over:
                 free_steps[lane] = -1
                 rest_pair(pair)
                 write_lane(lanes, lane, pair)
@@ -113,9 +156,19 @@ def run_block(record, lanes, flags, grounds, pair, deferred, rows, logs, cosine,
         Whether all pairs reached the end: no step had too many events.
     """
     prepare_block(lanes, pair, rows, cosine, sine, free_steps, record.duration)
-    # the record
+    # the record, as far as any pair needs it
     last = (record.components.shape[1] - 1) * record.refinement
-    is_through = advance_block(lanes, flags, pair, rows, logs, deferred, record, grounds, 0, last)
+    group = 0
+    is_through = True
+    active = PAIR_LANES
+    while active and group < record.sizes.shape[1]:
+        step = group * GROUP_SAMPLES * record.refinement
+        group = min(group + GROUPS_BETWEEN_CHECKS, record.sizes.shape[1])
+        end = min(group * GROUP_SAMPLES * record.refinement, last)
+        is_through &= advance_block(
+            lanes, flags, pair, rows, logs, deferred, record, grounds, step, end
+        )
+        active = retire_still_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, group)
     # free vibration, until every pair is settled
     elapsed = 0
     while retire_lanes(lanes, pair, rows, deferred, record, grounds, free_steps, elapsed):

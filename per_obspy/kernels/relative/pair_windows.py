@@ -16,8 +16,6 @@ import numpy as np
 from per_obspy.kernels._jit import kernel
 from per_obspy.kernels.relative.relative_samples import PAIR_LANES
 
-#: Largest remainder of a motion that is not computed, over the largest one.
-FORGOTTEN = 1e-12
 #: Tiles of a group, whose bounds are computed together.
 GROUP = 4
 #: A window of more than this part of the record is taken for the whole of it.
@@ -105,12 +103,13 @@ def expected_motion(block, bounds, part, floors):
 
 
 @kernel
-def find_pair_windows(duration, block, bounds, floors, windows):
+def find_pair_windows(duration, block, bounds, floors, forgotten, windows):
     """
     Fill the windows of a block, and zero floors of pairs of which all of the record counts.
 
     Rows of ``windows`` (2, lanes): the group before which the pair may be taken to be at rest, and
-    the last group that may reach a floor.
+    the last group that may reach a floor. ``forgotten`` is the largest remainder of a motion that
+    is not computed, over the floor.
     """
     number = bounds.shape[1]
     first, last = np.full(PAIR_LANES, float(number)), np.full(PAIR_LANES, -1.0)
@@ -127,7 +126,8 @@ def find_pair_windows(duration, block, bounds, floors, windows):
             last[lane] = this if reached else last[lane]
     # Back to where the motion before is forgotten
     for lane in range(PAIR_LANES):
-        start = _start(int(first[lane]), duration, block[lane], bounds[:, :, lane], floors[:, lane])
+        negligible = forgotten * floors[:, lane]
+        start = _start(int(first[lane]), duration, block[lane], bounds[:, :, lane], negligible)
         windows[0, lane], windows[1, lane] = start, int(last[lane])
         # A wide window becomes the whole record
         if last[lane] - start > WHOLE * number:
@@ -136,7 +136,7 @@ def find_pair_windows(duration, block, bounds, floors, windows):
 
 
 @kernel
-def _start(first, duration, pair, bounds, floors):
+def _start(first, duration, pair, bounds, negligible):
     """Return the last group before which the motion is forgotten by the first one that counts."""
     decay_1 = math.exp(-pair[1] * pair[0] * duration)
     decay_2 = math.exp(-pair[4] * pair[3] * duration)
@@ -145,8 +145,8 @@ def _start(first, duration, pair, bounds, floors):
     while 0 < start < bounds.shape[1]:
         # What is left of the motion before, at the first group that counts
         rest_1, rest_2 = left_1 * bounds[0, start], left_2 * bounds[1, start]
-        forgotten = rest_1 + rest_2 <= FORGOTTEN * floors[0]
-        if forgotten and pair[0] * rest_1 + pair[3] * rest_2 <= FORGOTTEN * floors[1]:
+        is_near = rest_1 + rest_2 <= negligible[0]
+        if is_near and pair[0] * rest_1 + pair[3] * rest_2 <= negligible[1]:
             break
         left_1 *= decay_1
         left_2 *= decay_2

@@ -2,10 +2,10 @@
 Largest relative displacement and velocity of many pairs under one record.
 
 Displacements are exact for piecewise-linear ground acceleration. Every pair is driven along its own
-azimuth. A pass over the samples stores the states before each tile of steps and the largest values
-in it; only tiles that could hold a larger displacement between samples are searched again, pair by
-pair. Parts of the record that cannot hold the largest values are left out. Structures that are
-equal in everything never separate and are left out.
+azimuth. A pass over the samples stores the states before each tile of steps and bounds of the
+displacement in it; the tiles of the largest bounds are searched, pair by pair, and then those whose
+bounds exceed what was found. Parts of the record that cannot hold the largest values are left out.
+Structures that are equal in everything never separate and are left out.
 """
 
 import math
@@ -53,7 +53,7 @@ REACHED = 1.0 - 1e-9
 
 
 @kernel
-def relative_maxima(north, east, dt, pairs, largest):
+def relative_maxima(north, east, dt, pairs, forgotten, both_sides, largest):
     """
     Fill the largest relative displacements and velocities of pairs, free vibration included.
 
@@ -81,6 +81,9 @@ def relative_maxima(north, east, dt, pairs, largest):
     best = np.empty((PAIR_LANES, 3))
     floors = np.empty((2, PAIR_LANES))
     largest[:] = 0.0
+    # No displacement exceeds an infinite maximum
+    unwanted = 0.0 if both_sides else np.inf
+    largest[1] = unwanted
     pending = _unequal_pairs(pairs)
     # The second round begins with what the first has reached
     for again in range(2):
@@ -94,7 +97,10 @@ def relative_maxima(north, east, dt, pairs, largest):
             expected_motion(block, bounds, EXPECTED, floors)
             if again:
                 _reached(largest, chosen, floors)
-            _run_block(ground, dt, block, chosen.size, inputs, bounds, floors, checkpoints, best)
+            best[:] = 0.0
+            best[:, 1] = unwanted
+            limits = floors, forgotten
+            _run_block(ground, dt, block, chosen.size, inputs, bounds, limits, checkpoints, best)
             for lane in range(chosen.size):
                 largest[:, chosen[lane]] = best[lane]
                 if not again and _is_short(best[lane], floors[:, lane]):
@@ -121,19 +127,19 @@ def _is_short(best, floors):
 
 
 @kernel
-def _run_block(ground, dt, block, count, inputs, bounds, floors, checkpoints, best):
-    """Fill the largest values of a block, (lanes, 3), from the part of the record that counts."""
+def _run_block(ground, dt, block, count, inputs, bounds, limits, checkpoints, best):
+    """Raise the largest values of a block, (lanes, 3), to the part of the record that counts."""
     table = np.zeros((PAIR_ROWS, PAIR_LANES))
     windows = np.empty((2, PAIR_LANES), np.int64)
     moving = np.empty(PAIR_LANES, np.bool_)
     for lane in range(PAIR_LANES):
         pack_pair(block[lane], dt, table, lane)
-    find_pair_windows(GROUP * TILE * dt, block, bounds, floors, windows)
+    floors, forgotten = limits
+    find_pair_windows(GROUP * TILE * dt, block, bounds, floors, forgotten, windows)
     # From groups to tiles; copies are not counted
     windows[0] *= GROUP
     windows[1] = np.minimum((windows[1] + 1) * GROUP, inputs.shape[0]) - 1
     windows[1, count:] = -1
-    best[:] = 0.0
     tiles = inputs.shape[0]
     _shake(ground, dt, block, table, checkpoints, inputs, windows, best)
     # Free vibration of those that count up to the end
@@ -213,16 +219,23 @@ def _drop_settled(steps, dt, block, table, moving, best):
 
 @kernel
 def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
-    """Raise the largest values to the samples of the tiles, then to the peaks between them."""
-    _raise_to_samples(block, checkpoints, inputs.shape[0], first, windows, best)
-    # Limits of the samples of tiles that need no search, from bounds over all tiles
+    """Raise the largest values to those of the tiles, samples and peaks between them."""
+    highest = _raise_velocities(block, checkpoints, inputs.shape[0], first, windows, best)
+    # The tiles of the largest bounds first: few others remain
+    for lane in range(PAIR_LANES):
+        for side in range(2):
+            tile = highest[side, lane]
+            if tile >= 0:
+                part = ground[:, tile * TILE : (tile + 1) * TILE + 1]
+                _search(part, dt, block[lane], table, lane, checkpoints[tile], inputs[tile], best)
+    # Limits of the bounds of tiles that need no search, from margins over all tiles
     limits = np.empty((2, PAIR_LANES))
     strongest = strongest_inputs(inputs)
     for lane in range(PAIR_LANES):
         radii = largest_radii(block[lane], table, lane, strongest)
-        margin, _ = tile_margins(block[lane], dt, radii, strongest)
+        _, margin = tile_margins(block[lane], dt, radii, strongest)
         limits[0, lane], limits[1, lane] = best[lane, 0] - margin, best[lane, 1] - margin
-    # Tiles whose samples come close enough to the largest values
+    # Tiles whose bounds come close enough to the largest values
     for tile in range(inputs.shape[0]):
         near = 0
         for lane in range(PAIR_LANES):
@@ -236,27 +249,42 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
 
 
 @kernel
-def _raise_to_samples(block, checkpoints, tiles, first, windows, best):
-    """Raise the largest values to the samples of the tiles that count."""
+def _raise_velocities(block, checkpoints, tiles, first, windows, best):
+    """
+    Raise the largest velocities to the samples of the tiles that count.
+
+    Return the tiles that count of the largest bounds of displacements that are wanted, (2, lanes);
+    -1 where no bound exceeds what was reached.
+    """
     sampled = np.zeros((3, PAIR_LANES))
+    highest = np.full((2, PAIR_LANES), -1.0)
+    # What was reached before
+    for lane in range(PAIR_LANES):
+        sampled[0, lane], sampled[1, lane] = best[lane, 0], best[lane, 1]
     for tile in range(tiles):
+        number = float(tile)
         for lane in range(PAIR_LANES):
-            # Largest motion of a pair at rest is not below 0
+            # Largest velocity of a pair at rest is not below 0
             counts = windows[0, lane] <= first + tile <= windows[1, lane]
             part = 1.0 if counts else 0.0
-            sampled[0, lane] = max(sampled[0, lane], part * checkpoints[tile, GREATEST, lane])
-            sampled[1, lane] = max(sampled[1, lane], -part * checkpoints[tile, LEAST, lane])
+            high, low = (
+                part * checkpoints[tile, GREATEST, lane],
+                -part * checkpoints[tile, LEAST, lane],
+            )
+            highest[0, lane] = number if high > sampled[0, lane] else highest[0, lane]
+            highest[1, lane] = number if low > sampled[1, lane] else highest[1, lane]
+            sampled[0, lane] = max(sampled[0, lane], high)
+            sampled[1, lane] = max(sampled[1, lane], low)
             sampled[2, lane] = max(sampled[2, lane], part * checkpoints[tile, APPROACH, lane])
     # Velocities are over the frequency of structure 1
     for lane in range(PAIR_LANES):
-        best[lane, 0] = max(best[lane, 0], sampled[0, lane])
-        best[lane, 1] = max(best[lane, 1], sampled[1, lane])
         best[lane, 2] = max(best[lane, 2], block[lane, 0] * sampled[2, lane])
+    return highest.astype(np.int64)
 
 
 @kernel
 def _search_lanes(ground, dt, block, table, now, windows, limits, best):
-    """Search a tile (checkpoint, inputs, number) of all pairs whose samples are above limits."""
+    """Search a tile (checkpoint, inputs, number) of all pairs whose bounds are above limits."""
     checkpoint, inputs, tile = now  # the tile
     for lane in range(PAIR_LANES):
         near = checkpoint[GREATEST, lane] > limits[0, lane]
@@ -274,7 +302,9 @@ def _search(ground, dt, pair, table, lane, checkpoint, inputs, best):
     u2, z2 = state_of(1, table, lane, checkpoint[2, lane], checkpoint[3, lane], acceleration)
     before = (u1, z1, u2, z2)
     # The bound of this tile alone
-    margin, cubic_margin = tile_margins(pair, dt, present_radii(pair, before), inputs)
+    _, margin = tile_margins(pair, dt, present_radii(pair, before), inputs)
     high = checkpoint[GREATEST, lane] + margin > best[lane, 0]
     if high or margin - checkpoint[LEAST, lane] > best[lane, 1]:
-        search_pair_tile(pair, dt, ground[0], ground[1], before, cubic_margin, best[lane])
+        search_pair_tile(pair, dt, ground[0], ground[1], before, margin, best[lane])
+        # It is not searched again
+        checkpoint[GREATEST, lane], checkpoint[LEAST, lane] = -np.inf, np.inf

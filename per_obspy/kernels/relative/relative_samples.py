@@ -1,9 +1,13 @@
 r"""
-Relative motion of a block of pairs at the samples: 23 multiply-adds and comparisons per step.
+Relative motion of a block of pairs at the samples: 26 multiply-adds and comparisons per step.
 
 Time runs outside, pairs inside, four steps at a time. The relative displacement ``q1 u1 - q2 u2``
 and the relative velocity are linear forms of the shifted states of both structures and the
 acceleration. A pair starts at rest before the tile from which its motion counts.
+
+The cubic through values d and slopes v at the ends of a step is bounded by its Bernstein
+coefficients, ``d + dt v / 3`` at its start and ``d - dt v / 3`` at its end; near a peak these
+exceed it by a third of what the peak exceeds the samples at most.
 """
 
 import numpy as np
@@ -17,16 +21,19 @@ PAIR_LANES = 32
 
 #: Rows of a block's table, one column per pair: two step matrices; the direction; the forms of the
 #: relative displacement, and of the relative velocity over the frequency of structure 1; both
-#: states and the acceleration; the largest and smallest relative displacement and the largest
-#: relative velocity of a tile; the squares of the largest states, and of relative displacement and
-#: velocity, before tiles; the frame of each structure. One table, because the compiler would have
-#: to prove of several arrays that they do not overlap.
-DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, STATE_PEAKS, FRAME = 8, 10, 15, 20, 25, 28, 31
-PAIR_ROWS = 41
+#: states and the acceleration; the largest and smallest Bernstein coefficients of the relative
+#: displacement and the largest relative velocity of a tile; the squares of the largest states, and
+#: of relative displacement and velocity, before tiles; a third of a step, as phase of structure 1;
+#: the frame of each structure. One table, because the compiler would have to prove of several
+#: arrays that they do not overlap.
+DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, STATE_PEAKS = 8, 10, 15, 20, 25, 28
+THIRD, FRAME = 31, 32
+PAIR_ROWS = 42
 #: Rows that a step uses.
 LOCAL = FRAME
 #: Rows of a tile's checkpoint: the states before the tile (0 to 3), the largest and the smallest
-#: relative displacement, and the largest relative velocity over the frequency of structure 1.
+#: Bernstein coefficient of the relative displacement, and the largest relative velocity over the
+#: frequency of structure 1.
 GREATEST, LEAST, APPROACH, PAIR_CHECKPOINT_ROWS = 4, 5, 6, 7
 
 
@@ -38,6 +45,7 @@ def pack_pair(pair, dt, table, lane):
     ``pair`` (8,): circular frequency, damping and participation of structure 1, then of 2; cosine
     and sine of the azimuth.
     """
+    table[THIRD, lane] = pair[0] * dt / 3.0
     table[DIRECTION, lane] = pair[6]
     table[DIRECTION + 1, lane] = pair[7]
     table[DISTANCE + 4, lane] = table[SLOPE + 4, lane] = 0.0
@@ -133,9 +141,10 @@ def _open_tile(north, east, tile, windows, t, checkpoint):
         slope = (t[15, lane] * u + t[16, lane] * z) + (
             t[17, lane] * w + (t[18, lane] * y + t[19, lane] * p)
         )
-        # Start of the tile: states, acceleration, largest and smallest relative displacement
+        # Start of the tile: states, acceleration, first Bernstein coefficient, velocity
         t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p
-        t[25, lane], t[26, lane], t[27, lane] = distance, distance, slope
+        first = distance + t[31, lane] * slope
+        t[25, lane], t[26, lane], t[27, lane] = max(distance, first), min(distance, first), slope
         # Squares of the largest states before tiles that count, for the bounds
         counts = 1.0 if windows[0, lane] <= tile <= windows[1, lane] else 0.0
         t[28, lane] = max(t[28, lane], counts * (u * u + z * z))
@@ -172,13 +181,16 @@ def _run_tile(north, east, first, t):
             u, z, w, y, d3, v3 = _moved(t, lane, u, z, w, y, p2, p3)
             u, z, w, y, d4, v4 = _moved(t, lane, u, z, w, y, p3, p4)
             t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p4
-            # Largest relative displacement
-            early = max(d1, d2)
-            late = max(d3, d4)
+            # Distance of the Bernstein coefficients from the samples
+            s1, s2 = abs(t[31, lane] * v1), abs(t[31, lane] * v2)
+            s3, s4 = abs(t[31, lane] * v3), abs(t[31, lane] * v4)
+            # Largest of them
+            early = max(d1 + s1, d2 + s2)
+            late = max(d3 + s3, d4 + s4)
             t[25, lane] = max(t[25, lane], early, late)
-            # Smallest relative displacement
-            early = min(d1, d2)
-            late = min(d3, d4)
+            # Smallest of them
+            early = min(d1 - s1, d2 - s2)
+            late = min(d3 - s3, d4 - s4)
             t[26, lane] = min(t[26, lane], early, late)
             # Largest relative velocity
             early = max(v1, v2)

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from per_obspy import checks
 from per_obspy.checks import ArrayLike, FloatArray
+from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS, count_impacts
-from per_obspy.kernels.pounding_events.motion import IMPACTS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
+from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES
 from per_obspy.pounding.history.tables import free_samples, refinement
 from per_obspy.threads import map_in_threads
 
@@ -112,11 +113,41 @@ def free_vibration_steps(fields: dict[str, FloatArray], dt: float) -> NDArray[np
     return np.array([free_samples(period, dt) for period in longest], dtype=np.int64)
 
 
-def pair_blocks(parts: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the pairs of each block: at most 32, of equal refinement."""
+def records_in_steps(components: FloatArray, parts: ArrayLike, dt: float) -> dict[int, Record]:
+    """
+    Return a record for the kernels of histories, by its steps per sampling interval.
+
+    Parameters
+    ----------
+    components : (2, n_samples) ndarray
+        North and east acceleration, m/s².
+    parts : array_like of int
+        Numbers of steps into which each sampling interval is cut.
+    dt : float
+        Sampling interval, s.
+    """
+    # integrals of the size, by the trapezoidal rule: an upper bound
+    size = np.abs(components)
+    over_steps = 0.5 * dt * (size[:, :-1] + size[:, 1:])
+    starts = np.arange(0, over_steps.shape[1], GROUP_SAMPLES)
+    sizes = np.add.reduceat(over_steps, starts, axis=1) if starts.size else np.zeros((2, 0))
+    numbers = np.unique(parts).tolist()
+    return {number: Record(components, number, dt / number, sizes) for number in numbers}
+
+
+def pair_blocks(parts: NDArray[np.int64], rows: FloatArray) -> list[NDArray[np.int64]]:
+    """
+    Return the pairs of each block: at most 32, of equal refinement.
+
+    Pairs whose histories end at about the same time are in one block: with and without a gap, and
+    by how long they remember.
+    """
     blocks = []
+    memory = rows[:, :, columns.DAMPING_RATE].min(axis=1)
+    order = np.lexsort((memory, rows[:, 0, columns.GAP] > 0.0))
     for part in np.unique(parts):
-        same = np.flatnonzero(parts == part)
+        # in this order
+        same = order[parts[order] == part]
         blocks += [same[start : start + PAIR_LANES] for start in range(0, same.size, PAIR_LANES)]
     return blocks
 
@@ -164,6 +195,7 @@ def run_blocks(
         If a step has more events than any record causes.
     """
     counts = np.zeros(len(rows), dtype=np.int64)
+    records = records_in_steps(components, parts, dt)
 
     def run(block: NDArray[np.int64]) -> None:
         """Run one block of pairs, filled up with repetitions that have no free vibration."""
@@ -172,7 +204,7 @@ def run_blocks(
         # Their free vibration and direction
         free = np.where(np.arange(PAIR_LANES) < block.size, free_steps[filled], -1)
         direction = np.cos(azimuth[filled]), np.sin(azimuth[filled])
-        record = Record(components, steps, dt / steps)
+        record = records[steps]
 
         # Results of the block, without the repetitions
         found = _run_logged(kernel, lane_rows, record, rows[filled], (*direction, free))
@@ -180,7 +212,7 @@ def run_blocks(
             raise RuntimeError(f"no end of events in a step among the pairs {block.tolist()}")
         rows[block], counts[block] = (result[: block.size] for result in found)
 
-    map_in_threads(run, pair_blocks(parts))
+    map_in_threads(run, pair_blocks(parts, rows))
     return counts
 
 
@@ -202,7 +234,7 @@ def _run_logged(
         memory = *_working_memory(lane_rows), own, logs
         if not kernel(record, *memory, cosine, sine, free.copy()):
             return None
-        impacts = int(own[:, 0, IMPACTS].max())
+        impacts = int(own[:, 0, columns.IMPACTS].max())
     return own, count_impacts(own, logs)
 
 

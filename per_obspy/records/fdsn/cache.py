@@ -67,12 +67,15 @@ class Fetched(NamedTuple):
         Circle, window and channels of the request.
     rejected : tuple of Rejection
         Stations and services that failed, with every reason.
+    is_complete : bool
+        Whether every service and station answered, with records or that there are none.
     """
 
     folder: Path
     event: EventFile | None
     wanted: Wanted
     rejected: tuple[Rejection, ...]
+    is_complete: bool = True
 
 
 def fetch(
@@ -122,7 +125,7 @@ def fetch(
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
         write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
-    fetched = fetched._replace(rejected=tuple(rejected))
+    fetched = fetched._replace(rejected=tuple(rejected), is_complete=complete)
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"no station could be fetched; {'; '.join(rejected[0].reasons)}")
     return fetched
@@ -131,7 +134,9 @@ def fetch(
 def _pool(request: config.Fdsn) -> WebPool:
     """Return connections with the patience of a request."""
     limits = (request.longest_answer, request.largest_answer)
-    return web_pool(request.timeout, request.retries, request.wait, *limits)
+    pool = web_pool(request.timeout, request.retries, request.wait, *limits)
+    pause = request.longest_pause
+    return pool if pause is None else pool._replace(longest_pause=pause)
 
 
 def _requested(pool: WebPool, request: config.Fdsn, event: Path | None) -> Fetched:
@@ -190,12 +195,13 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
     A station whose files are not as they were fetched is a rejection.
     """
     # A station has records, or a status whose records are gone
-    names = {path.stem for path in fetched.folder.glob("*.mseed") if not is_part(path)}
-    names |= {path.stem for path in fetched.folder.glob("*.json") if not is_part(path)}
+    names_with_records = _stems(fetched.folder, "*.mseed")
+    names = names_with_records | _stems(fetched.folder, "*.json")
     damaged = [row for name in sorted(names) if (row := _damage(fetched.folder, name))]
     rejected = (*fetched.rejected, *damaged)
     broken = {row.name for row in damaged}
-    if not names - broken:
+    # Metadata alone are no station
+    if names_with_records <= broken:
         return SourceContents({}, None, rejected)
     found = find_stations(fetched.folder)
     inside = stations_inside(found.inventory or Inventory(), fetched.wanted)
@@ -206,6 +212,11 @@ def fetched_stations(fetched: Fetched) -> SourceContents:
         if whole and name in inside and name not in broken:
             stations[name] = whole
     return SourceContents(stations, found.inventory, rejected, found.hashes)
+
+
+def _stems(folder: Path, pattern: str) -> set[str]:
+    """Return the names of stations that have a whole file of a kind in a folder."""
+    return {path.stem for path in folder.glob(pattern) if not is_part(path)}
 
 
 def _damage(folder: Path, name: str) -> Rejection | None:

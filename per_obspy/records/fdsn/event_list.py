@@ -12,7 +12,7 @@ from obspy import UTCDateTime
 from obspy.core.event import Event
 from obspy.geodetics import locations2degrees
 
-from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError
+from per_obspy.errors import CatalogError, PerError, RecordRejected, ServiceError, shortened
 from per_obspy.files import bytes_hash, written_whole
 from per_obspy.names import LONGEST_CODE, code_problem, inside, public_url
 from per_obspy.records.event_file import read_event
@@ -100,6 +100,53 @@ def find_events(source: str, query: Mapping[str, str]) -> list[EventRow]:
     return sorted(rows, key=lambda row: row.time, reverse=True)
 
 
+def listed_events(
+    pool: WebPool, provider: str, query: Mapping[str, str]
+) -> tuple[list[EventRow], list[str]]:
+    """
+    List earthquakes of an FDSN event service; a line that cannot be read costs no other line.
+
+    Parameters
+    ----------
+    pool : WebPool
+        From :func:`per_obspy.records.fdsn.web.web_pool`.
+    provider : str
+        FDSN event service: base URL or ObsPy's name.
+    query : mapping
+        Its parameters.
+
+    Returns
+    -------
+    rows : list of EventRow
+        In the order of the service.
+    problems : list of str
+        One per line that cannot be read.
+
+    Raises
+    ------
+    CatalogError
+        If the service is unknown.
+    ServiceError
+        If the service does not answer, or its answer is no list.
+    """
+    url = f"{base_url(provider)}/fdsnws/event/1/query"
+    try:
+        cells = _text_cells(answer(pool, url, {**query, "format": "text"}))
+    except NotFound:
+        return [], []
+    except (ValueError, csv.Error) as error:
+        reason = f"answer is no list of events: {_reason(error)}"
+        raise ServiceError(f"{public_url(url)}: {reason}") from error
+    # Each line is read alone
+    rows, problems = [], []
+    for line in cells:
+        try:
+            rows.append(_text_row(line))
+        except (ValueError, TypeError, IndexError) as error:
+            problems.append(f"{public_url(url)}: {shortened('|'.join(line), 80)}: {_reason(error)}")
+    return rows, problems
+
+
 def selection(source: str, query: Mapping[str, str]) -> Callable[[EventRow], bool]:
     """
     Return a function that selects the earthquakes of a query, as an FDSN event service does.
@@ -177,16 +224,13 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     ServiceError
         If the service does not answer, or its answer is not the event.
     """
-    path = inside(cache, f"event-{_file_name(event_id)}.xml")
+    path = inside(cache, f"event-{file_name(event_id)}.xml")
     status_file = path.with_suffix(".json")
     if path.is_file() and earlier_status(status_file, digest(event_id)) is not None:
         return path
     # Anything but a whole file is fetched
     url = f"{base_url(provider)}/fdsnws/event/1/query"
-    try:
-        content = answer(pool, url, {"eventid": event_id, "format": "xml"})
-    except NotFound:
-        content = b""
+    content = event_content(pool, provider, event_id)
     if not content:
         raise CatalogError(public_url(url), f"has no event {event_id}")
     # Only an answer that can be read as one event stays in the cache
@@ -201,8 +245,33 @@ def fetched_event(pool: WebPool, provider: str, event_id: str, cache: Path) -> P
     return path
 
 
-def _file_name(event_id: str) -> str:
-    """Return the file name of an event, safe for any letters in its identifier."""
+def event_content(pool: WebPool, provider: str, event_id: str) -> bytes:
+    """
+    Return the QuakeML of an event as its service sends it; empty if it has no such event.
+
+    Raises
+    ------
+    CatalogError
+        If the service is unknown.
+    ServiceError
+        If the service does not answer.
+    """
+    url = f"{base_url(provider)}/fdsnws/event/1/query"
+    try:
+        return answer(pool, url, {"eventid": event_id, "format": "xml"})
+    except NotFound:
+        return b""
+
+
+def file_name(event_id: str) -> str:
+    """
+    Return a name of a file for an identifier, whatever letters that has.
+
+    Examples
+    --------
+    >>> file_name("us7000abcd"), file_name("../x")
+    ('us7000abcd', '---x-551622b6')
+    """
     if not code_problem("", event_id):
         return event_id
     # Identifiers that differ in other letters only must not share a file
@@ -216,7 +285,7 @@ def _rows_of_file(path: Path) -> list[EventRow]:
     try:
         if content.lstrip()[:1] == b"{":
             return _feed_rows(content)
-        return [_quakeml_row(event) for event in read_with_obspy(obspy.read_events, path)]
+        return [quakeml_row(event) for event in read_with_obspy(obspy.read_events, path)]
     except (RecordRejected, ValueError, KeyError, TypeError, IndexError) as error:
         raise CatalogError(str(path), f"is no list of events: {_reason(error)}") from error
 
@@ -262,14 +331,19 @@ def _feed_row(feature: dict[str, Any]) -> EventRow:
 
 def _text_rows(content: bytes) -> list[EventRow]:
     """Return the earthquakes in the text format of fdsnws-event 1.2: 13 columns or more."""
-    if not content:
-        return []
+    return [_text_row(row) for row in _text_cells(content)]
+
+
+def _text_cells(content: bytes) -> list[list[str]]:
+    """Return the cells of every line of the text format below its header."""
     lines = content.decode("utf-8").splitlines()
+    if not lines:
+        return []
     header, *rows = csv.reader(lines, delimiter="|", quoting=csv.QUOTE_NONE)
     # A web page or an error text of the service has another first line
-    if not header[0].lstrip("# ").startswith("EventID"):
+    if not header or not header[0].lstrip("# ").startswith("EventID"):
         raise ValueError(f"the first line is {'|'.join(header):.80}")
-    return [_text_row(row) for row in rows if row]
+    return [row for row in rows if row]
 
 
 def _text_row(row: list[str]) -> EventRow:
@@ -290,7 +364,7 @@ def _text_row(row: list[str]) -> EventRow:
     )
 
 
-def _quakeml_row(event: Event) -> EventRow:
+def quakeml_row(event: Event) -> EventRow:
     """Return one earthquake of a QuakeML file, from its preferred origin and magnitude."""
     name = str(event.resource_id)
     if not event.origins:

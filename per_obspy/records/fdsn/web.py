@@ -4,6 +4,7 @@ Answers of web services, bounded in time and size.
 A request is repeated when its fault may pass, else refused in one line.
 """
 
+import math
 import re
 import threading
 import time
@@ -30,6 +31,9 @@ LONGEST_ANSWER, LARGEST_ANSWER = 600.0, 256 * 2**20
 
 _NO_CONTENT, _NOT_FOUND, _TOO_LARGE, _URI_TOO_LONG = 204, 404, 413, 414
 
+#: Answers of event services to the identifier of a deleted earthquake.
+_DELETED = (409, 410)
+
 _REDIRECTIONS, _MOST_REDIRECTIONS = (301, 302, 303, 307, 308), 5
 
 #: Bytes that are read at once, and of a page that explains an error.
@@ -37,14 +41,14 @@ _PIECE, _PAGE = 2**16, 2**12
 
 
 class NotFound(ServiceError):
-    """A service does not have the subject of a request, or does not exist (404)."""
+    """A service lacks or has deleted a subject, or does not exist (404, 409, 410)."""
 
 
 class RequestTooLarge(ServiceError):
     """A service refuses to answer that much at once."""
 
 
-class _Passing(ServiceError):
+class PassingFault(ServiceError):
     """A fault that may pass, with the pause in s that the service demands, None if it does not."""
 
     def __init__(self, message: str, pause: float | None = None) -> None:
@@ -66,6 +70,8 @@ class WebPool(NamedTuple):
         s.
     largest : int
         Bytes.
+    longest_pause : float
+        s; a service that demands a longer pause is given up at once.
     """
 
     connections: urllib3.PoolManager
@@ -73,6 +79,7 @@ class WebPool(NamedTuple):
     wait: float
     longest: float
     largest: int
+    longest_pause: float = math.inf
 
 
 class Answer(NamedTuple):
@@ -142,9 +149,9 @@ def whole_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answ
     for attempt in range(1, pool.retries + 2):
         try:
             return _within(pool, url, lambda: _attempt(pool, url, parameters))
-        except _Passing as fault:
-            if attempt > pool.retries:
-                raise ServiceError(str(fault)) from fault
+        except PassingFault as fault:
+            if attempt > pool.retries or (fault.pause or 0.0) > pool.longest_pause:
+                raise
             time.sleep(_pause(pool.wait, attempt, fault.pause))
     raise AssertionError  # the last attempt returns or raises
 
@@ -190,7 +197,7 @@ def _attempt(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answer:
         raise ServiceError(f"{shown}: is no address") from error
     except (urllib3.exceptions.HTTPError, ValueError) as error:
         cause = getattr(error, "reason", None) or error
-        raise _Passing(f"{shown}: no answer: {_one_line(str(cause))}") from error
+        raise PassingFault(f"{shown}: no answer: {_one_line(str(cause))}") from error
 
 
 def _redirected(pool: WebPool, url: str, parameters: Mapping[str, str]) -> urllib3.BaseHTTPResponse:
@@ -253,8 +260,9 @@ def _read(pool: WebPool, response: urllib3.BaseHTTPResponse, shown: str, until: 
 
 def _refusal(response: urllib3.BaseHTTPResponse, shown: str) -> ServiceError:
     """Return the error of a response whose status is one."""
-    if response.status == _NOT_FOUND:
-        return NotFound(f"{shown}: not found (HTTP 404)")
+    if response.status in (_NOT_FOUND, *_DELETED):
+        kind = "not found" if response.status == _NOT_FOUND else "deleted"
+        return NotFound(f"{shown}: {kind} (HTTP {response.status})")
     if response.status in (_TOO_LARGE, _URI_TOO_LONG):
         problem = f"refuses to answer so much at once (HTTP {response.status})"
         return RequestTooLarge(f"{shown}: {problem}")
@@ -262,7 +270,7 @@ def _refusal(response: urllib3.BaseHTTPResponse, shown: str) -> ServiceError:
     page = _one_line(response.read1(_PAGE).decode("utf-8", "replace"))
     message = f"{shown}: HTTP {response.status}: {page}"
     if response.status in PASSING_FAULTS:
-        return _Passing(message, _demanded_pause(response.headers.get("Retry-After")))
+        return PassingFault(message, _demanded_pause(response.headers.get("Retry-After")))
     return ServiceError(message)
 
 

@@ -5,8 +5,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
-from per_obspy.kernels.pounding_lanes.deferred_maxima import Record
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
+from per_obspy.pounding.history.pair_blocks import records_in_steps
 from per_obspy.pounding.history.rows.row_blocks import run_logged_block
 
 
@@ -30,7 +30,7 @@ def test_events_and_lanes_agree():
     assert run_row_by_events(*ground, 0.6, 0.8, 0.02, 1, row, log, 64)
     angle, free = np.array([np.arctan2(0.8, 0.6)]), np.array([64])
     lines, logs = run_logged_block(
-        Record(ground, 1, 0.02), start_of(3), np.array([0, 3]), angle, free
+        records_in_steps(ground, [1], 0.02)[1], start_of(3), np.array([0, 3]), angle, free
     )
     used = int(row[:, columns.IMPACTS].sum())
     assert used > 3

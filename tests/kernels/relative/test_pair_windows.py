@@ -56,7 +56,7 @@ def test_windows_hold_the_strong_motion_and_leave_out_the_rest(pair):
     block, bounds = _bounds(pair)
     floors, windows = np.empty((2, PAIR_LANES)), np.empty((2, PAIR_LANES), dtype=np.int64)
     expected_motion(block, bounds, 0.1, floors)
-    find_pair_windows(STEPS * DT, block, bounds, floors, windows)
+    find_pair_windows(STEPS * DT, block, bounds, floors, 1e-12, windows)
     start, last = windows[:, 0]
     # the motion before is forgotten after some groups only
     assert 0 <= start <= 9
@@ -70,9 +70,11 @@ def test_maxima_do_not_depend_on_what_was_expected(expected, monkeypatch):
     pairs = np.array([[*pair, 0.6, 0.8] for pair in PAIRS[:1]]).T.copy()
     largest, found = np.empty((3, 1)), np.empty((3, 1))
     short = GROUND[:, 8 * STEPS : 12 * STEPS + 1].copy()
-    relative_maxima(short[0], short[1], DT, pairs, largest)
+    relative_maxima(short[0], short[1], DT, pairs, 1e-12, True, largest)
     monkeypatch.setattr(module, "EXPECTED", expected)
-    getattr(relative_maxima, "py_func", relative_maxima)(short[0], short[1], DT, pairs, found)
+    getattr(relative_maxima, "py_func", relative_maxima)(
+        short[0], short[1], DT, pairs, 1e-12, True, found
+    )
     # what is forgotten is 1e-12 of the floor
     np.testing.assert_allclose(found, largest, rtol=1e-10)
 
@@ -81,8 +83,8 @@ def test_weak_motion_before_and_after_changes_nothing():
     # mutation: a window that begins with the strong motion, a lane at rest too late
     pairs = np.array([[*pair, 0.6, 0.8] for pair in PAIRS]).T.copy()
     whole, padded = np.empty((3, 3)), np.empty((3, 3))
-    relative_maxima(GROUND[0], GROUND[1], DT, pairs, whole)
+    relative_maxima(GROUND[0], GROUND[1], DT, pairs, 1e-12, True, whole)
     pads = np.zeros((2, 40 * STEPS))
     longer = np.concatenate([pads, GROUND, pads], axis=1)
-    relative_maxima(longer[0], longer[1], DT, pairs, padded)
+    relative_maxima(longer[0], longer[1], DT, pairs, 1e-12, True, padded)
     np.testing.assert_allclose(padded, whole, rtol=1e-11)

@@ -40,11 +40,16 @@ def test_shifted_states_are_the_states(period, plain_states):
     states = [plain_states(along, pair[row] * DT, pair[row + 1]) / pair[row] ** 2 for row in (0, 3)]
     distance = pair[2] * states[0][:, 0] - pair[5] * states[1][:, 0]
     tolerance = 1e-13 * np.abs(distance).max()  # rounding of 128 steps
-    tiles = distance[: TILE + 1], distance[TILE:]
-    greatest, least = checkpoints[:, GREATEST, LANE], checkpoints[:, LEAST, LANE]
-    np.testing.assert_allclose(greatest, [tile.max() for tile in tiles], atol=tolerance)
-    np.testing.assert_allclose(least, [tile.min() for tile in tiles], atol=tolerance)
     slope = pair[2] * states[0][:, 1] - pair[5] * states[1][:, 1] * pair[3] / pair[0]
+    # the cubics of all steps are within these bounds, by their Bernstein coefficients
+    greatest, least = checkpoints[:, GREATEST, LANE], checkpoints[:, LEAST, LANE]
+    reach = pair[0] * DT / 3.0 * slope
+    for k, tile in enumerate((slice(0, TILE + 1), slice(TILE, 2 * TILE + 1))):
+        inner = np.stack([(distance + reach)[tile][:-1], (distance - reach)[tile][1:]])
+        assert greatest[k] >= max(distance[tile].max(), inner.max()) - tolerance
+        assert least[k] <= min(distance[tile].min(), inner.min()) + tolerance
+        assert greatest[k] <= (distance + abs(reach))[tile].max() + tolerance
+        assert least[k] >= (distance - abs(reach))[tile].min() - tolerance
     tiles = slope[: TILE + 1], slope[TILE:]
     fastest = checkpoints[:, APPROACH, LANE]
     np.testing.assert_allclose(fastest, [tile.max() for tile in tiles], atol=tolerance)

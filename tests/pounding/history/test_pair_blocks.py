@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from per_obspy.kernels.pounding_events.motion import ROW_COLUMNS
 from per_obspy.kernels.pounding_lanes.lanes import PAIR_LANES
 from per_obspy.pounding.history.pair_blocks import (
     CACHE_LINE,
@@ -71,7 +72,8 @@ def test_two_walls_are_refused():
 @given(st.lists(st.sampled_from([1, 2, 8]), max_size=200))
 def test_every_pair_is_in_one_block_with_its_equals(parts):
     parts = np.array(parts, dtype=np.int64)
-    blocks = pair_blocks(parts)
+    rows = np.random.default_rng(0).random((parts.size, 2, ROW_COLUMNS))
+    blocks = pair_blocks(parts, rows)
     members = [index for block in blocks for index in block]
     assert sorted(members) == list(range(parts.size))
     assert all(len(block) <= PAIR_LANES and len(set(parts[block])) == 1 for block in blocks)

@@ -11,7 +11,7 @@ from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_S
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
 from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
-from per_obspy.pounding.history.pair_blocks import aligned
+from per_obspy.pounding.history.pair_blocks import aligned, records_in_steps
 from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]
@@ -94,11 +94,12 @@ def run_row_blocks(
     """
     # Impacts that count, building by building
     counts = np.zeros(len(lines), dtype=np.int64)
+    records = records_in_steps(ground, parts, dt)
 
     def run(block: IntArray) -> None:
         """Run the rows of one block."""
         # Its buildings, one row after the other
-        record = Record(ground, int(parts[block[0]]), dt / int(parts[block[0]]))
+        record = records[int(parts[block[0]])]
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
         starts = np.concatenate([[0], np.cumsum(np.diff(first)[block])])
         own, logs = run_logged_block(

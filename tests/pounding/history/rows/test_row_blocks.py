@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from per_obspy.kernels.pounding_events import contact as log_columns
 from per_obspy.kernels.pounding_events import motion as columns
-from per_obspy.kernels.pounding_lanes.deferred_maxima import Record
+from per_obspy.pounding.history.pair_blocks import records_in_steps
 from per_obspy.pounding.history.rows.row_blocks import packed_rows, run_logged_block
 
 
@@ -43,7 +43,7 @@ def test_momentum_and_energy_close_at_every_impact(gap):
     # catches: a mass of the neighbour, an impact that is applied and not logged
     start, firsts = rows_at_rest([5, 4], gap, seed=2)
     noise = np.convolve(np.random.default_rng(3).normal(size=400), np.ones(5) / 5, mode="same")
-    record = Record(np.stack([6.0 * noise, np.zeros(400)]), 1, 0.02)
+    record = records_in_steps(np.stack([6.0 * noise, np.zeros(400)]), [1], 0.02)[1]
     none = np.zeros(2, dtype=np.int64)
     lines, logs = run_logged_block(record, start, firsts, np.zeros(2), none)
     for first, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
@@ -78,7 +78,7 @@ def test_a_step_without_end_is_an_error(size):
     # catches: maxima of a history that stopped
     start, firsts = rows_at_rest([size], 0.001, seed=4)
     start[:, columns.BOUNCE_LIMIT] = 0.0
-    record = Record(np.stack([np.sin(np.arange(60.0)), np.zeros(60)]), 1, 0.02)
+    record = records_in_steps(np.stack([np.sin(np.arange(60.0)), np.zeros(60)]), [1], 0.02)[1]
     with pytest.raises(RuntimeError, match="no end of events"):
         run_logged_block(record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64))
 
@@ -86,7 +86,9 @@ def test_a_step_without_end_is_an_error(size):
 def test_a_log_that_is_too_short_grows(monkeypatch):
     # catches: impacts beyond the room that are counted from memory that holds none
     start, firsts = rows_at_rest([4], 0.01, seed=5)
-    record = Record(np.stack([5 * np.sin(np.arange(200.0) / 8), np.zeros(200)]), 1, 0.02)
+    record = records_in_steps(
+        np.stack([5 * np.sin(np.arange(200.0) / 8), np.zeros(200)]), [1], 0.02
+    )[1]
     arguments = record, start, firsts, np.zeros(1), np.zeros(1, dtype=np.int64)
     lines, logs = run_logged_block(*arguments)
     used = int(lines[:, columns.IMPACTS].sum())

@@ -1,0 +1,109 @@
+"""Executor of a run: the processes of this machine, one that was given, or a Dask cluster."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from per_obspy.config.engine import Engine, checked_address
+from per_obspy.errors import CatalogError
+from per_obspy.resume import StatusError, read_status, write_status
+
+
+@contextmanager
+def dask_executor(address: str | None) -> Iterator[Executor | None]:
+    """
+    Yield the executor of a Dask cluster for one command; None without an address.
+
+    Parameters
+    ----------
+    address : str or None
+        ``local``, ``local:N``, ``PROTOCOL://HOST:PORT``, ``HOST:PORT``, or a scheduler file.
+
+    Yields
+    ------
+    Executor or None
+        For any function of the pipeline; the cluster is connected when there is work for it.
+
+    Raises
+    ------
+    CatalogError
+        If the address is none.
+    MissingExtra
+        If Dask is not installed.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        checked = checked_address(address, Path.cwd())
+    except ValueError as error:
+        raise CatalogError("--dask", str(error)) from error
+    from per_obspy.jobs.cluster.dask_executor import DaskExecutor
+
+    with DaskExecutor(checked) as executor:
+        yield executor
+
+
+@contextmanager
+def opened_executor(
+    engine: Engine, given: Executor | None, folder: Path
+) -> Iterator[Executor | None]:
+    """
+    Yield the executor of a run while its folder is shared with the workers.
+
+    Parameters
+    ----------
+    engine : Engine
+        Settings; its cluster is used if no executor is given.
+    given : Executor or None
+        Where to work instead.
+    folder : Path
+        Of the results.
+
+    Raises
+    ------
+    MissingExtra
+        If Dask is not installed.
+    TryLater
+        If the cluster has no scheduler or no usable worker.
+    """
+    if given is None and engine.dask is not None:
+        with dask_executor(engine.dask) as found, opened_executor(engine, found, folder):
+            yield found
+        return
+    sharing = getattr(given, "sharing", None)
+    if sharing is None:
+        yield given
+        return
+    with sharing(folder.resolve(), engine):
+        yield given
+
+
+def engine_facts(executor: Executor | None) -> dict[str, Any]:
+    """Return workers and events of a cluster for ``run.json``; empty for other executors."""
+    facts = getattr(executor, "facts", None)
+    return {"engine": facts()} if facts else {}
+
+
+@contextmanager
+def noted_engine(record: Path, executor: Executor | None) -> Iterator[None]:
+    """Add workers and events of a cluster to the record of a run that an error ends."""
+    try:
+        yield
+    except Exception:
+        facts = engine_facts(executor)
+        if facts:
+            _add(record, facts)
+        raise
+
+
+def _add(record: Path, facts: dict[str, Any]) -> None:
+    """Add facts to the record of an unfinished run, if it can be read and written."""
+    try:
+        known = read_status(record)
+        others = {name: one for name, one in known.items() if name not in ("key", "outputs")}
+        write_status(record, known["key"], known["outputs"], {**others, **facts}, indent=1)
+    except (StatusError, OSError):
+        return  # the error that ended the run counts

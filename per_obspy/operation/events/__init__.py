@@ -1,0 +1,1 @@
+"""Watched earthquakes: their list, their state, the runs that are due, and their revisions."""

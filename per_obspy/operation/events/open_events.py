@@ -1,0 +1,190 @@
+"""Open earthquakes: those of the list that matter, until they are deleted or move away."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+import numpy as np
+
+from per_obspy.config import Watch
+from per_obspy.errors import shortened
+from per_obspy.files import content_hash
+from per_obspy.operation.events.event_feed import Feed, present_event
+from per_obspy.operation.events.relevance import Places, distances, matters
+from per_obspy.operation.events.state import EventState, changed, iso, moment
+from per_obspy.records.fdsn.event_list import EventRow
+
+log = logging.getLogger(__name__)
+
+#: Facts by which an earthquake counts as changed.
+FACTS = ("time", "latitude", "longitude", "depth", "magnitude")
+
+#: Reason of an earthquake that its service or file no longer has.
+DELETED = "deleted at its source"
+
+
+class Listed(NamedTuple):
+    """An earthquake of a list, why it does not matter (empty if it does), and its file."""
+
+    row: EventRow
+    reason: str
+    file: str
+
+
+def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
+    """
+    Return for each earthquake why it does not matter; empty for those that do.
+
+    Parameters
+    ----------
+    watch : Watch
+        With the table of magnitudes; one that is unknown is assumed.
+    places : Places
+        Of the inventory.
+    rows : list of EventRow
+        Facts of the earthquakes.
+    """
+    longitude = np.array([row.longitude for row in rows], dtype=np.float64)
+    latitude = np.array([row.latitude for row in rows], dtype=np.float64)
+    found = distances(places, longitude, latitude) if rows else np.empty(0)
+    return [
+        _reason(watch, row, distance) for row, distance in zip(rows, found.tolist(), strict=True)
+    ]
+
+
+def _reason(watch: Watch, row: EventRow, distance: float) -> str:
+    """Return why an earthquake at a distance does not matter; empty if it does."""
+    magnitude = watch.assumed_magnitude if row.magnitude is None else row.magnitude
+    if matters(watch.magnitudes, distance, magnitude):
+        return ""
+    known = "assumed magnitude" if row.magnitude is None else "magnitude"
+    return f"{known} {magnitude:g} at {distance / 1000:.0f} km does not matter (watch.magnitudes)"
+
+
+def with_facts(state: EventState, row: EventRow) -> EventState:
+    """Return the state of an earthquake with new facts, under its own identifier."""
+    facts = {**row._asdict(), "event_id": state.event_id}
+    return changed(state, **facts, magnitude_assumed=row.magnitude is None)
+
+
+def closed(state: EventState, reason: str) -> EventState:
+    """Return the state of an earthquake that is closed; its results stay."""
+    return changed(state, state="closed", reason=reason, not_before=None, failures=0)
+
+
+def listed_states(
+    watch: Watch, places: Places, states: Mapping[str, EventState], feed: Feed, now: datetime
+) -> Iterator[EventState]:
+    """
+    Yield the states that a list opens, updates, closes or opens again.
+
+    Parameters
+    ----------
+    watch : Watch
+        Which earthquakes matter.
+    places : Places
+        Of the inventory.
+    states : mapping
+        Identifier -> state of every earthquake known so far.
+    feed : Feed
+        What is listed as new or changed.
+    now : datetime
+        With its zone.
+    """
+    rows = list(feed.rows.values())
+    for row, reason in zip(rows, judged(watch, places, rows), strict=True):
+        listed = Listed(row, reason, feed.files.get(row.event_id, ""))
+        known = states.get(row.event_id)
+        state = _opened(watch, listed, now) if known is None else _updated(known, listed, now)
+        if state is not None:
+            yield state
+    # A file that is gone is that of an earthquake that was deleted
+    for state in states.values() if watch.folder is not None else ():
+        assert watch.folder is not None
+        if state.state == "open" and not (watch.folder / state.file).exists():
+            yield closed(state, DELETED)
+
+
+def _digest(row: EventRow) -> str:
+    """Return a hash of the facts of an earthquake by which it counts as changed."""
+    return content_hash({name: getattr(row, name) for name in FACTS})[:16]
+
+
+def _opened(watch: Watch, listed: Listed, now: datetime) -> EventState | None:
+    """Return the state of an earthquake that is listed first, None if it does not matter."""
+    row = listed.row
+    # Old ones are listed where a watcher begins, or their magnitude is revised
+    is_old = moment(row.time) < now - timedelta(seconds=watch.oldest)
+    if listed.reason or is_old:
+        return None
+    log.info("%s: opened, %s", shortened(row.event_id, 80), in_words(row))
+    return EventState(
+        **row._asdict(),
+        magnitude_assumed=row.magnitude is None,
+        first_seen=iso(now),
+        confirmed=iso(now),
+        file=listed.file,
+        listed=_digest(row),
+    )
+
+
+def _updated(known: EventState, listed: Listed, now: datetime) -> EventState | None:
+    """Return the new state of a known earthquake, None if it has not changed."""
+    digest = _digest(listed.row)
+    if known.state != "closed" and digest == known.listed:
+        return None
+    if known.state == "closed" and listed.reason:
+        return None
+    state = with_facts(known, listed.row)
+    state = changed(state, listed=digest, confirmed=iso(now), file=listed.file or known.file)
+    if listed.reason:
+        return closed(state, listed.reason)
+    # One that comes back, or changes, is screened again
+    log.info("%s: %s", shortened(known.event_id, 80), _change(known, listed.row))
+    is_closed = known.state == "closed"
+    return changed(
+        state, state="open" if is_closed else known.state, reason="", changed=True, not_before=None
+    )
+
+
+def _change(known: EventState, row: EventRow) -> str:
+    """Return in words how a known earthquake comes back or changes."""
+    if known.state == "closed":
+        return f"opened again, {in_words(row)}"
+    return f"updated, {in_words(row)}, before: {in_words(known.facts)}"
+
+
+def in_words(row: EventRow) -> str:
+    """
+    Return magnitude, place and time of an earthquake in words.
+
+    Examples
+    --------
+    >>> in_words(EventRow("x", "2026-11-23T01:00:00", 14.6, -90.5, None, None, "", "Guatemala"))
+    'magnitude unknown, 14.600 -90.500 Guatemala, 2026-11-23T01:00:00'
+    """
+    size = "unknown" if row.magnitude is None else f"{row.magnitude:g}"
+    place = f"{row.latitude:.3f} {row.longitude:.3f} {row.place}".strip()
+    return f"magnitude {size}, {place}, {row.time[:19]}"
+
+
+def present_state(watch: Watch, places: Places, state: EventState, now: datetime) -> EventState:
+    """
+    Return the state of an open earthquake by what its service or file has of it now.
+
+    Raises
+    ------
+    PerError
+        If the service does not answer, or its answer is not the earthquake.
+    """
+    present = present_event(watch, state.event_id, state.file)
+    if present is None:
+        return closed(state, DELETED)
+    row, confirmed = present.row, changed(state, confirmed=iso(now))
+    if all(getattr(row, name) == getattr(state, name) for name in FACTS):
+        return confirmed
+    # Moved or of another size
+    (reason,) = judged(watch, places, [row])
+    updated = with_facts(confirmed, row)
+    return closed(updated, reason) if reason else changed(updated, changed=True)

@@ -1,0 +1,242 @@
+"""
+State of a watched folder and of each earthquake in it, as JSON files that are always whole.
+
+A folder that is watched into holds ``watch.json``, ``status.json`` and ``events/ID/``. The folder
+of an earthquake holds ``event.json`` (its state), ``event.xml`` (QuakeML as it was screened
+last), ``records/``, ``work/`` (the output folder of its runs), ``revisions/`` and ``latest``.
+"""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from per_obspy.config.section import Moment, Section
+from per_obspy.errors import CatalogError, reason_of, shortened
+from per_obspy.files import written_whole
+from per_obspy.names import inside
+from per_obspy.records.fdsn.event_list import EventRow, file_name
+
+#: State files of a watched folder and of an earthquake.
+WATCH, EVENT = "watch.json", "event.json"
+
+#: Bytes of the largest state file that is read.
+LARGEST = 1 << 24
+
+
+class _State(Section):
+    """A group of values that a later version of the program may extend."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+
+StateType = TypeVar("StateType", bound=_State)
+
+
+class EventState(_State):
+    """
+    State of one earthquake.
+
+    Attributes
+    ----------
+    event_id : str
+        As its service names it, or of its file.
+    state : str
+        ``"open"``: runs are due; ``"closed"``: deleted, or no longer strong or near enough;
+        ``"finished"``: too old for further runs.
+    reason : str
+        Why it is closed.
+    first_seen : str
+        Time at which it was opened first, ISO 8601, UTC.
+    time : str
+        Origin time, ISO 8601, UTC.
+    latitude, longitude : float
+        Of the epicentre, degrees.
+    depth : float or None
+        m.
+    magnitude : float or None
+    magnitude_type, place : str
+    magnitude_assumed : bool
+        Whether it matters only because of the magnitude that is assumed where none is known.
+    file : str
+        QuakeML file in the watched folder of QuakeML; empty if a service lists it.
+    listed : str
+        Hash of its facts in the latest list.
+    confirmed : str
+        Time at which its service or file had it last.
+    done : dict
+        Delay of each run that was done, s, as text -> its time.
+    changed : bool
+        Whether the earthquake has changed since its latest run.
+    complete : bool
+        Whether the services of records answered everything at its latest run.
+    arrivals : str
+        Hash of the names, sizes and times of the record files at its latest run.
+    revision : int
+        Number of its newest revision, 0 if there is none.
+    failures : int
+        Number of failures in succession.
+    not_before : str or None
+        Time before which no run is tried again.
+    last_error : str or None
+        Reason of the latest failure.
+    """
+
+    event_id: str
+    state: Literal["open", "closed", "finished"] = "open"
+    reason: str = ""
+    first_seen: Moment
+    time: Moment
+    latitude: float = Field(ge=-90, le=90)
+    longitude: float = Field(ge=-180, le=180)
+    depth: float | None = None
+    magnitude: float | None = None
+    magnitude_type: str = ""
+    place: str = ""
+    magnitude_assumed: bool = False
+    file: str = ""
+    listed: str = ""
+    confirmed: Moment
+    done: dict[str, Moment] = Field(default_factory=dict)
+    changed: bool = True
+    complete: bool = True
+    arrivals: str = ""
+    revision: int = Field(0, ge=0)
+    failures: int = Field(0, ge=0)
+    not_before: Moment | None = None
+    last_error: str | None = None
+
+    @property
+    def facts(self) -> EventRow:
+        """Facts of the earthquake, as a list has them."""
+        values = {name: getattr(self, name) for name in EventRow._fields}
+        return EventRow(**values)
+
+
+class WatchState(_State):
+    """
+    State of a watched folder.
+
+    Attributes
+    ----------
+    last_poll : str or None
+        Time of the latest look at the list of earthquakes that succeeded, ISO 8601, UTC.
+    since : str or None
+        Time from which on changes are asked for; None: everything is asked for.
+    failures : int
+        Number of looks in succession that failed.
+    not_before : str or None
+        Time before which the list is not asked for again.
+    last_error : str or None
+        Why the latest look failed.
+    seen : dict
+        File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
+    """
+
+    last_poll: Moment | None = None
+    since: Moment | None = None
+    failures: int = Field(0, ge=0)
+    not_before: Moment | None = None
+    last_error: str | None = None
+    seen: dict[str, tuple[int, int]] = Field(default_factory=dict)
+
+
+def moment(text: str) -> datetime:
+    """
+    Return a stored time; one without a zone is UTC.
+
+    Examples
+    --------
+    >>> moment("2026-11-23T01:00:00").isoformat()
+    '2026-11-23T01:00:00+00:00'
+    """
+    time = datetime.fromisoformat(text)
+    return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
+
+
+def iso(time: datetime) -> str:
+    """Return a time in ISO 8601, UTC, to the millisecond."""
+    return time.astimezone(UTC).isoformat(timespec="milliseconds")
+
+
+def event_folder(folder: Path, event_id: str) -> Path:
+    """
+    Return the folder of an earthquake, whatever letters its identifier has.
+
+    Examples
+    --------
+    >>> event_folder(Path("watched"), "../../etc").as_posix()
+    'watched/events/------etc-d5b8d71e'
+    """
+    return inside(folder / "events", file_name(event_id))
+
+
+def write_event_state(folder: Path, state: EventState) -> None:
+    """Write the state of an earthquake, whole or not at all, into its folder."""
+    _write(folder / EVENT, state)
+
+
+def write_watch_state(folder: Path, state: WatchState) -> None:
+    """Write the state of a watched folder, whole or not at all."""
+    _write(folder / WATCH, state)
+
+
+def read_watch_state(folder: Path) -> WatchState:
+    """Return the state of a watched folder; an empty one if there is none or it is damaged."""
+    # Without it everything is asked for again
+    try:
+        return _read(folder / WATCH, WatchState)
+    except CatalogError:
+        return WatchState()
+
+
+def read_event_states(folder: Path) -> tuple[dict[str, EventState], list[str]]:
+    """
+    Return the state of every earthquake of a watched folder.
+
+    Returns
+    -------
+    states : dict
+        Identifier -> state.
+    problems : list of str
+        One per state that cannot be read; its earthquake is opened again when it is listed.
+    """
+    states, problems = dict[str, EventState](), list[str]()
+    for file in sorted(folder.glob(f"events/*/{EVENT}")):
+        try:
+            state = _read(file, EventState)
+        except CatalogError as error:
+            problems.append(str(error))
+        else:
+            states[state.event_id] = state
+    return states, problems
+
+
+def changed(known: EventState, /, **values: Any) -> EventState:
+    """Return a state with other values, which are checked."""
+    return EventState(**{**known.model_dump(), **values})
+
+
+def _write(file: Path, state: _State) -> None:
+    """Write a state as JSON."""
+    text = json.dumps(state.model_dump(mode="json"), indent=1)
+    with written_whole(file) as part:
+        part.write_text(f"{text}\n", encoding="utf-8")
+
+
+def _read(file: Path, kind: type[StateType]) -> StateType:
+    """Return a state from its file; raise ``CatalogError`` if it cannot be read."""
+    # A file of another program may be of any size
+    try:
+        with file.open(encoding="utf-8") as text:
+            return kind.model_validate_json(text.read(LARGEST))
+    except ValidationError as error:
+        fault = error.errors()[0]
+        place = ".".join(map(str, fault["loc"]))
+        problem = f"damaged: {place}: {fault['msg']}, expected the state of a watcher"
+        raise CatalogError(str(file), problem) from error
+    except (OSError, ValueError) as error:
+        problem = f"cannot be read: {shortened(reason_of(error), 200)}"
+        raise CatalogError(str(file), problem) from error

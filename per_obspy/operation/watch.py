@@ -1,0 +1,409 @@
+"""
+Watch for earthquakes: look at their list, do the runs that are due, and keep revisions.
+
+One pass looks at the list once and does everything that is due. The daemon is a loop of passes.
+Whatever ends a pass, the next one goes on: state files are written whole, after everything that
+they describe. A failure of one earthquake stops no other.
+"""
+
+import logging
+from collections.abc import Callable
+from concurrent.futures import Executor
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import NamedTuple
+
+from per_obspy import termination
+from per_obspy.config import Run, Watch
+from per_obspy.errors import (
+    CatalogError,
+    MachineFault,
+    PerError,
+    ServiceError,
+    TryLater,
+    shortened,
+)
+from per_obspy.jobs.output_folder import locked_folder
+from per_obspy.machine import machine_fault
+from per_obspy.operation.events.due import Task, due_task, is_paused, next_due, pause
+from per_obspy.operation.events.event_feed import Feed, noted_poll, read_feed
+from per_obspy.operation.events.event_run import Watcher, arrivals_of, done_task
+from per_obspy.operation.events.open_events import listed_states, present_state
+from per_obspy.operation.events.relevance import Circle, circle_around, inventory_places
+from per_obspy.operation.events.revisions import point_latest
+from per_obspy.operation.events.state import (
+    EventState,
+    WatchState,
+    changed,
+    event_folder,
+    iso,
+    moment,
+    read_event_states,
+    read_watch_state,
+    write_event_state,
+    write_watch_state,
+)
+from per_obspy.operation.notified_run import notify_failure, notify_result
+from per_obspy.operation.status import WatchStatus, write_status
+from per_obspy.progress import Progress, silent
+from per_obspy.records.fdsn.web import PassingFault
+
+log = logging.getLogger(__name__)
+
+#: Reason of another run of an earthquake whose records are not complete.
+INCOMPLETE = "services of records did not answer everything: asked again"
+
+
+def utc_now() -> datetime:
+    """Return the time of the machine, UTC."""
+    return datetime.now(UTC)
+
+
+class Clock(NamedTuple):
+    """
+    Time and waiting, which tests replace.
+
+    Attributes
+    ----------
+    now : callable
+        Returns the time, with its zone.
+    wait : callable
+        Waits for some seconds, and returns whether the program shall end.
+    """
+
+    now: Callable[[], datetime] = utc_now
+    wait: Callable[[float], bool] = termination.pause
+
+
+class Pass(NamedTuple):
+    """
+    Outcome of one pass.
+
+    Attributes
+    ----------
+    errors : tuple of PerError
+        Why the list could not be read, and the failure of each earthquake.
+    open_events : int
+        Number of earthquakes with runs to come.
+    next_due : datetime
+        Time of the next poll or run.
+    """
+
+    errors: tuple[PerError, ...]
+    open_events: int
+    next_due: datetime
+
+
+def watch_once(
+    settings: Run,
+    clock: Clock | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> Pass:
+    """
+    Look at the list of earthquakes once, do everything that is due, and end.
+
+    Parameters
+    ----------
+    settings : Run
+        From :func:`per_obspy.operation.events.event_settings.read_settings`.
+    clock : Clock, optional
+        That of the machine if not given.
+    progress : callable
+        Called for every stage of every run.
+    executor : Executor, optional
+        Where stations and chunks are done, if not in processes of this machine.
+
+    Raises
+    ------
+    CatalogError
+        If the inventory cannot be read, or the folder cannot be used.
+    FolderInUse
+        If another watcher holds the folder.
+    WriteError
+        If the state cannot be written.
+    """
+    used = clock or Clock()
+    folder = settings.output.resolve()
+    with locked_folder(folder):
+        return _one_pass(_watcher(settings, folder, (used, progress, executor)), running=False)
+
+
+def watch_forever(
+    settings: Run,
+    clock: Clock | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> None:
+    """
+    Do pass after pass until the program is asked to end; parameters and errors of `watch_once`.
+
+    A pass that fails is tried again after a pause, which grows up to an hour.
+    """
+    used = clock or Clock()
+    folder, failures, end = settings.output.resolve(), 0, False
+    with locked_folder(folder):
+        watcher = _watcher(settings, folder, (used, progress, executor))
+        while not end:
+            try:
+                found = _one_pass(watcher, running=True)
+                failures, seconds = 0, (found.next_due - used.now()).total_seconds()
+            except TryLater as error:
+                # The state could not be written: all else is kept, and done again
+                failures += 1
+                log.error("%s", error)
+                seconds = pause(failures)
+            end = termination.requested() or used.wait(min(max(seconds, 1.0), _poll(settings)))
+
+
+def _poll(settings: Run) -> float:
+    """Return the time between two polls, s."""
+    assert settings.watch is not None
+    return settings.watch.poll
+
+
+def _watcher(
+    settings: Run, folder: Path, means: tuple[Clock, Progress, Executor | None]
+) -> Watcher:
+    """Return everything that the passes share."""
+    clock, progress, executor = means
+    places = inventory_places(settings, folder)
+    return Watcher(settings, folder, places, clock.now, progress, executor)
+
+
+def _one_pass(watcher: Watcher, running: bool) -> Pass:
+    """Look at the list, do what is due, and write the status; a failure is an error of the pass."""
+    states, problems = read_event_states(watcher.folder)
+    for problem in problems:
+        log.warning("%s", problem)
+    # A power cut may have come between a revision and the link to it
+    for event_id in states:
+        point_latest(event_folder(watcher.folder, event_id))
+    errors = list[PerError]()
+    state = _polled(watcher, states, errors)
+    _confirm(watcher, states, errors)
+    while not termination.requested() and (found := _most_urgent(watcher, states)):
+        event_id, task = found
+        states[event_id] = _attempt(watcher, states[event_id], task, errors)
+        # A new and larger earthquake does not wait for the runs of all others
+        if _is_over(watcher, state):
+            state = _polled(watcher, states, errors)
+    return _ended(watcher, states, state, errors, running)
+
+
+def _is_over(watcher: Watcher, state: WatchState) -> bool:
+    """Return whether the time between two polls has passed, or the clock was put back."""
+    now = watcher.now()
+    if state.last_poll is None or is_paused(now, state.not_before):
+        return False
+    elapsed = (now - moment(state.last_poll)).total_seconds()
+    return not 0.0 <= elapsed < _poll(watcher.settings)
+
+
+def _polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> WatchState:
+    """Look at the list of earthquakes, and write what it changes; a failure is noted."""
+    watch, now = _watch_of(watcher), watcher.now()
+    state = read_watch_state(watcher.folder)
+    if is_paused(now, state.not_before):
+        errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
+        return state
+    try:
+        feed = read_feed(watch, state, _circle(watcher), now)
+    except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for the list
+        fault = _fault(error)
+        errors.append(fault)
+        state = _failed_poll(state, fault, now)
+    else:
+        errors += _problems(watch, feed)
+        for known in listed_states(watch, watcher.places, states, feed, now):
+            _keep(watcher, states, known)
+        # The list comes last: what it opened is written
+        state = noted_poll(state, feed, now)
+    write_watch_state(watcher.folder, state)
+    return state
+
+
+def _watch_of(watcher: Watcher) -> Watch:
+    """Return the section of the watcher."""
+    assert watcher.settings.watch is not None
+    return watcher.settings.watch
+
+
+def _circle(watcher: Watcher) -> Circle:
+    """Return the circle in which an earthquake can matter."""
+    reach = max(reach.distance for reach in _watch_of(watcher).magnitudes)
+    return circle_around(watcher.places, reach)
+
+
+def _problems(watch: Watch, feed: Feed) -> list[PerError]:
+    """Return an error per line or file of a list that cannot be read."""
+    # Lines of a service may be mended there, files of a folder by its user
+    if watch.folder is None:
+        return [ServiceError(problem) for problem in feed.problems]
+    return [CatalogError(str(watch.folder), problem) for problem in feed.problems]
+
+
+def _failed_poll(state: WatchState, fault: PerError, now: datetime) -> WatchState:
+    """Return the state after a list that could not be read."""
+    failures = state.failures + 1
+    update = {
+        "failures": failures,
+        "not_before": _after(now, failures, fault),
+        "last_error": shortened(str(fault)),
+    }
+    return state.model_copy(update=update)
+
+
+def _after(now: datetime, failures: int, fault: PerError | None) -> str:
+    """Return the time after the pause that follows some failures in succession."""
+    demanded = fault.pause if isinstance(fault, PassingFault) else None
+    return iso(now + timedelta(seconds=pause(failures, demanded)))
+
+
+def _fault(error: Exception) -> PerError:
+    """Return an error that a user can meet for any error; one of the program is logged whole."""
+    # A missing file of the configuration is a wrong name, as for other commands
+    fault = machine_fault(error, missing=not isinstance(error, PerError))
+    if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):
+        return error
+    if fault is not None:
+        return fault
+    log.error("an error of the program", exc_info=error)
+    return MachineFault(shortened(f"{type(error).__name__}: {error}"))
+
+
+def _keep(watcher: Watcher, states: dict[str, EventState], state: EventState) -> None:
+    """Write the state of an earthquake, and remember it."""
+    write_event_state(event_folder(watcher.folder, state.event_id), state)
+    before = states.get(state.event_id)
+    if state.state == "closed" and (before is None or before.state != "closed"):
+        log.info("%s: closed: %s", shortened(state.event_id, 80), state.reason)
+    states[state.event_id] = state
+
+
+def _confirm(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> None:
+    """Ask for the open earthquakes that no list has confirmed for a while."""
+    watch = _watch_of(watcher)
+    for state in list(states.values()):
+        now = watcher.now()
+        elapsed = (now - moment(state.confirmed)).total_seconds()
+        recent = 0.0 <= elapsed < watch.confirm
+        if state.state != "open" or recent or is_paused(now, state.not_before):
+            continue
+        try:
+            present = present_state(watch, watcher.places, state, now)
+        except Exception as error:  # noqa: BLE001 - the other earthquakes are confirmed
+            errors.append(_fault(error))
+            # The service of all others fails as well
+            return
+        _keep(watcher, states, present)
+
+
+def _most_urgent(watcher: Watcher, states: dict[str, EventState]) -> tuple[str, Task] | None:
+    """Return the earthquake whose run comes next: those without a result first, larger first."""
+    now, watch = watcher.now(), _watch_of(watcher)
+    arrivals = arrivals_of(watcher.settings)
+    # The identifier makes the order certain
+    found = []
+    for state in states.values():
+        task = due_task(now, state, watch.delays, _has_arrivals(state, arrivals, now, watch.poll))
+        if task is not None:
+            found.append((state.revision > 0, -(state.magnitude or 0.0), state.event_id, task))
+    if not found:
+        return None
+    *_, event_id, task = min(found, key=lambda entry: entry[:3])
+    return event_id, task
+
+
+def _has_arrivals(state: EventState, arrivals: str, now: datetime, poll: float) -> bool:
+    """Return whether record files have changed since the latest run, which is some time ago."""
+    if arrivals == state.arrivals or not state.done:
+        return False
+    latest = max(moment(time) for time in state.done.values())
+    return not 0.0 <= (now - latest).total_seconds() < poll
+
+
+def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerError]) -> EventState:
+    """Do the run of an earthquake, write its state, and notify people; a failure is noted."""
+    name = shortened(state.event_id, 80)
+    log.info("%s: run at %g s for %s", name, task.delay, " and ".join(task.reasons))
+    try:
+        done = done_task(watcher, state, task)
+    except Exception as error:  # noqa: BLE001 - the other earthquakes have their runs
+        fault = _fault(error)
+        errors.append(fault)
+        log.error("%s: %s", name, fault)
+        return _failure(watcher, _failed(state, str(fault), watcher.now(), fault))
+    log.info("%s: %s", name, done.line)
+    # What is missing because a service failed is asked for again after a pause
+    if done.state.complete:
+        after = changed(done.state, failures=0, not_before=None, last_error=None)
+    else:
+        after = _failed(done.state, INCOMPLETE, watcher.now(), None)
+    _keep(watcher, {state.event_id: state}, after)
+    if done.result is not None:
+        notify_result(watcher.settings.notify, done.result, _label(watcher, state))
+    return after
+
+
+def _failure(watcher: Watcher, state: EventState) -> EventState:
+    """Write the state of an earthquake whose run failed, and notify people."""
+    _keep(watcher, {state.event_id: state}, state)
+    work = event_folder(watcher.folder, state.event_id) / "work"
+    reason = state.last_error or ""
+    notify_failure(watcher.settings.notify, work, _label(watcher, state), reason)
+    return state
+
+
+def _label(watcher: Watcher, state: EventState) -> str:
+    """Return the title of messages about an earthquake."""
+    return f"{watcher.settings.name}: {state.event_id}"
+
+
+def _failed(state: EventState, reason: str, now: datetime, fault: PerError | None) -> EventState:
+    """Return the state of an earthquake after a failure: it is tried again after a pause."""
+    failures = state.failures + 1
+    return changed(
+        state,
+        failures=failures,
+        not_before=_after(now, failures, fault),
+        last_error=shortened(reason),
+    )
+
+
+def _ended(
+    watcher: Watcher,
+    states: dict[str, EventState],
+    state: WatchState,
+    errors: list[PerError],
+    running: bool,
+) -> Pass:
+    """Close the pass: earthquakes that are too old are finished, and the status is written."""
+    now, watch = watcher.now(), _watch_of(watcher)
+    for known in list(states.values()):
+        if _is_finished(known, watch, now):
+            _keep(watcher, states, changed(known, state="finished"))
+    # The next look at the list, or a run before it
+    following = now + timedelta(seconds=watch.poll)
+    for known in states.values():
+        due = next_due(now, known, watch.delays)
+        following = min(following, due or following)
+    count = sum(known.state == "open" for known in states.values())
+    # For `per-obspy status` and monitoring
+    status = WatchStatus(
+        last_poll=state.last_poll,
+        events_open=count,
+        last_error=shortened(str(errors[0])) if errors else None,
+        next_due=iso(following),
+        failures=max([state.failures, *(known.failures for known in states.values())]),
+        running=running,
+    )
+    write_status(watcher.folder, status)
+    return Pass(tuple(errors), count, following)
+
+
+def _is_finished(state: EventState, watch: Watch, now: datetime) -> bool:
+    """Return whether no run of an open earthquake is to come."""
+    age = (now - moment(state.time)).total_seconds()
+    is_old = age > max(watch.oldest, watch.delays[-1])
+    return state.state == "open" and is_old and due_task(now, state, watch.delays) is None

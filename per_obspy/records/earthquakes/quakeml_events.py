@@ -1,0 +1,85 @@
+"""Earthquakes of QuakeML files and answers, and QuakeML with what their screening depends on."""
+
+from io import BytesIO
+from pathlib import Path
+
+import obspy
+from obspy.core.event import Catalog, Event, Magnitude, Origin, ResourceIdentifier
+
+from per_obspy.errors import CatalogError, RecordRejected, reason_of
+from per_obspy.records.fdsn.event_list import EventRow, file_name, quakeml_row
+from per_obspy.records.obspy_readers import read_bytes_with_obspy
+
+#: Bytes of the largest QuakeML file that is read.
+LARGEST_FILE = 64 * 2**20
+
+
+def read_quakeml(path: Path) -> dict[str, Event]:
+    """
+    Read the earthquakes of a QuakeML file by identifier.
+
+    Raises
+    ------
+    CatalogError
+        If it cannot be read, is too large, is no QuakeML, or an earthquake of it has no place.
+    """
+    # ObsPy needs many times the size of a file in memory
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise CatalogError(str(path), f"is larger than {LARGEST_FILE} bytes")
+        events = events_of(path.read_bytes(), str(path))
+        return {quakeml_row(event).event_id: event for event in events}
+    except RecordRejected as error:
+        raise CatalogError(str(path), f"is no QuakeML: {'; '.join(error.reasons)}") from error
+    except OSError as error:
+        raise CatalogError(str(path), f"cannot be read: {reason_of(error)}") from error
+
+
+def quakeml_rows(path: Path) -> dict[str, EventRow]:
+    """Return the facts of the earthquakes of a QuakeML file; errors of :func:`read_quakeml`."""
+    return {name: quakeml_row(event) for name, event in read_quakeml(path).items()}
+
+
+def events_of(content: bytes, source: str) -> list[Event]:
+    """Return the earthquakes of QuakeML; raise ``RecordRejected`` if it is none."""
+    return list(read_bytes_with_obspy(obspy.read_events, content, source, format="QUAKEML"))
+
+
+def plain_quakeml(event: Event, event_id: str) -> bytes:
+    """
+    Return the preferred origin and magnitude of an earthquake as QuakeML.
+
+    The bytes depend on time, place and magnitude alone, so that no station is computed again when
+    a service changes other facts.
+
+    Parameters
+    ----------
+    event : Event
+        With an origin.
+    event_id : str
+        For its resource identifier.
+    """
+    name = f"smi:local/{file_name(event_id)}"
+    found = event.preferred_origin() or event.origins[0]
+    origin = Origin(
+        resource_id=ResourceIdentifier(f"{name}/origin"),
+        time=found.time,
+        latitude=found.latitude,
+        longitude=found.longitude,
+        depth=found.depth,
+    )
+    size = event.preferred_magnitude() or next(iter(event.magnitudes), None)
+    magnitudes = [] if size is None else [_plain_magnitude(size, name)]
+    # ObsPy's own identifiers would be random
+    identifier = ResourceIdentifier(f"{name}/event")
+    plain = Event(resource_id=identifier, origins=[origin], magnitudes=magnitudes)
+    catalog = Catalog([plain], resource_id=ResourceIdentifier(f"{name}/catalog"))
+    content = BytesIO()
+    catalog.write(content, format="QUAKEML")
+    return content.getvalue()
+
+
+def _plain_magnitude(size: Magnitude, name: str) -> Magnitude:
+    """Return value and type of a magnitude."""
+    identifier = ResourceIdentifier(f"{name}/magnitude")
+    return Magnitude(resource_id=identifier, mag=size.mag, magnitude_type=size.magnitude_type)

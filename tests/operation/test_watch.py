@@ -1,0 +1,440 @@
+"""A watcher and a service on loopback, by a clock of the test: every result is kept.
+
+Tests ``per_obspy.operation.events.event_feed``, ``per_obspy.operation.events.event_run`` and
+``per_obspy.operation.events.open_events`` as well.
+"""
+
+import json
+import os
+import shutil
+import time
+import tracemalloc
+from pathlib import Path
+
+import obspy
+import pandas as pd
+import pytest
+from fdsn_server import FdsnServer, content, serving, status
+from watched_city import (
+    FakeClock,
+    city_earthquake,
+    other_event,
+    quick_run,
+    settings_of,
+    write_city,
+)
+
+from per_obspy.errors import CatalogError, FolderInUse, ServiceError, TryLater, WriteError
+from per_obspy.files import file_hash
+from per_obspy.operation import watch
+from per_obspy.operation.events import event_feed, event_run
+from per_obspy.operation.events.state import read_event_states
+from per_obspy.operation.status import read_status
+from per_obspy.operation.watch import watch_forever, watch_once
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return city_earthquake(stations=2)
+
+
+@pytest.fixture
+def server(simulation):
+    with serving(simulation) as running:
+        yield running
+
+
+@pytest.fixture
+def clock():
+    return FakeClock()
+
+
+class City:
+    """A watched city in a folder."""
+
+    def __init__(self, folder: Path, server: FdsnServer, clock: FakeClock) -> None:
+        self.clock, self.folder = clock, folder / "out"
+        self.settings = settings_of(write_city(folder, server))
+
+    def at(self, seconds: float, **changes: object) -> watch.Pass:
+        """Return the outcome of one pass, so many seconds after the origin time."""
+        section = self.settings.watch.model_copy(update=changes)
+        settings = self.settings.model_copy(update={"watch": section})
+        return watch_once(settings, self.clock.at(seconds))
+
+    def state(self, name: str = "xx1"):
+        return read_event_states(self.folder)[0][name]
+
+    def event(self, name: str = "xx1") -> Path:
+        return self.folder / "events" / name
+
+    def revisions(self, name: str = "xx1") -> list[str]:
+        return sorted(path.name for path in self.event(name).glob("revisions/*"))
+
+    def changes(self) -> list[tuple[str, ...]]:
+        table = pd.read_csv(self.event() / "latest" / "changes.csv", dtype=str).fillna("")
+        return list(table.itertuples(index=False, name=None))
+
+
+@pytest.fixture
+def city(tmp_path, server, clock, monkeypatch):
+    monkeypatch.setattr(event_run, "run", quick_run)
+    monkeypatch.setattr(event_feed, "_PATIENCE", (10.0, 1, 0.01, 10.0, 64 * 2**20))
+    return City(tmp_path, server, clock)
+
+
+def magnified(simulation, magnitude: float):
+    event = simulation.event.copy()
+    event.magnitudes[0].mag = magnitude
+    return event
+
+
+def test_life_of_an_earthquake(city, server, simulation):
+    server.silent = {"S002"}
+    assert city.at(30).errors == ()
+    assert city.revisions() == []
+    # The first result comes with the stations that there are
+    city.at(61)
+    assert city.revisions() == ["0001"]
+    first = {path: file_hash(path) for path in city.event().glob("revisions/0001/*")}
+    # A station that arrives late
+    server.silent = set()
+    city.at(301)
+    assert city.revisions() == ["0001", "0002"]
+    assert ("station", "XX.S002", "state", "absent", "used") in city.changes()
+    # A magnitude that is revised, without a delay
+    server.events["xx1"] = magnified(simulation, 7.2)
+    city.at(400)
+    assert city.revisions() == ["0001", "0002", "0003"]
+    assert ("event", "xx1", "magnitude", "6.5", "7.2") in city.changes()
+    assert ("pair", "XX.S001", "state", "no", "yes") in city.changes()
+    assert str((city.event() / "latest").readlink()) == "revisions/0003"
+    # Without anything new there is no new revision
+    city.at(901)
+    assert city.revisions() == ["0001", "0002", "0003"]
+    assert {path: file_hash(path) for path in first} == first
+    facts = json.loads((city.event() / "latest" / "run.json").read_text())
+    assert (facts["event_id"], facts["revision"]) == ("xx1", 3)
+
+
+def test_unchanged_files_of_revisions_share_their_room(city, server, simulation):
+    city.at(61)
+    server.events["xx1"] = magnified(simulation, 6.6)
+    city.at(301)
+    stations = [city.event() / "revisions" / name / "stations.csv" for name in city.revisions()]
+    assert len(stations) == 2
+    assert stations[0].samefile(stations[1])
+    # Never with the folder in which runs write
+    assert not stations[0].samefile(city.event() / "work" / "stations.csv")
+
+
+def test_a_deleted_earthquake_is_closed_and_comes_back(city, server):
+    city.at(61)
+    server.deleted = {"xx1"}
+    city.at(1200)
+    assert (city.state().state, city.state().reason) == ("closed", "deleted at its source")
+    assert city.revisions() == ["0001"]
+    assert city.at(1300).open_events == 0
+    server.deleted = set()
+    city.at(1400)
+    assert city.state().state == "open"
+
+
+@pytest.mark.parametrize("fault", [status(404), status(409), status(410)])
+def test_services_say_in_several_ways_that_an_earthquake_is_deleted(city, server, fault):
+    city.at(30)
+    server.fail("event", "*", status(204), fault)
+    city.at(61)
+    assert city.state().reason == "deleted at its source"
+
+
+def test_a_service_that_fails_deletes_nothing(city, server):
+    city.at(30)
+    server.fail("event", "*", *[status(500)] * 4)
+    assert isinstance(city.at(61).errors[0], ServiceError)
+    assert city.state().state == "open"
+
+
+@pytest.mark.parametrize(
+    ("event", "reason"),
+    [
+        (other_event(longitude=40.0), "magnitude 6.5 at 4"),
+        (other_event(magnitude=3.0), "magnitude 3 at "),
+    ],
+)
+def test_an_earthquake_that_moves_away_or_shrinks_is_closed(city, server, event, reason):
+    city.at(61)
+    # Services leave it out of their circle: its identifier is asked for
+    server.events["xx1"] = event
+    city.at(1000)
+    assert city.state().state == "closed"
+    assert reason in city.state().reason
+    assert city.revisions() == ["0001"]
+
+
+def test_an_unknown_magnitude_is_assumed_and_marked(city, server):
+    server.events = {"none": other_event(magnitude=None)}
+    city.at(61)
+    assert (city.state("none").magnitude, city.state("none").magnitude_assumed) == (None, True)
+    assert city.revisions("none") == ["0001"]
+    city.at(70, assumed_magnitude=1.0)
+
+
+def test_two_earthquakes_have_results_of_their_own_the_larger_first(city, server, caplog):
+    server.events["xx2"] = other_event(10.0, 7.3)
+    with caplog.at_level("INFO"):
+        city.at(75)
+    runs = [line for line in caplog.messages if ": run at" in line]
+    assert [line[:3] for line in runs] == ["xx2", "xx1"]
+    assert city.revisions("xx1") == city.revisions("xx2") == ["0001"]
+    assert city.event("xx1") != city.event("xx2")
+
+
+def test_a_second_watcher_is_refused(city):
+    with watch.locked_folder(city.folder), pytest.raises(FolderInUse, match="another run"):
+        city.at(61)
+
+
+def test_a_list_that_fails_does_not_hold_up_runs(city, server):
+    city.at(30)
+    refused = status(503, Retry_After="300")
+    server.fail("event", "*", refused)
+    found = city.at(61)
+    assert [type(error) for error in found.errors] == [watch.PassingFault]
+    assert city.revisions() == ["0001"]
+    # The service is left alone for as long as it demands
+    asked = server.asked("event")
+    assert isinstance(city.at(200).errors[0], TryLater)
+    assert server.asked("event") == asked
+    assert "503" in read_status(city.folder).last_error
+    assert city.at(400).errors == ()
+    assert read_status(city.folder).last_error is None
+
+
+def test_a_list_that_is_none_is_one_line(city, server):
+    server.fail("event", "*", content(b"<html><body>busy</body></html>"))
+    (error,) = city.at(61).errors
+    assert isinstance(error, ServiceError)
+    assert "answer is no list of events" in str(error)
+    assert "\n" not in str(error)
+
+
+def test_a_line_that_cannot_be_read_costs_no_other(city, server):
+    whole = server.events["xx1"]
+    rows = b"#EventID|Time|\nbad|2000-01-01|x\n"
+    good = b"xx1|2000-01-01T00:00:00|0.0|0.0|15|A|B|C|D|Mw|6.5|A|Nowhere\n"
+    odd = b"odd|2000-01-01T00:00:00|nan|0.0|15|A|B|C|D|Mw|6.5|A|Nowhere\n"
+    server.fail("event", "*", content(rows + good + odd))
+    errors = city.at(61).errors
+    assert whole is server.events["xx1"]
+    assert len(errors) == 2
+    assert city.revisions() == ["0001"]
+
+
+def test_a_station_that_fails_is_asked_again_after_a_pause(city, server):
+    # The run asks once more for what is missing
+    server.fail("dataselect", "S002", *[status(503, Retry_After="600")] * 2)
+    city.at(61)
+    assert city.state().complete is False
+    assert city.revisions() == ["0001"]
+    city.at(90)
+    assert city.revisions() == ["0001"]
+    city.at(125)
+    assert city.revisions() == ["0001", "0002"]
+    assert (city.state().complete, city.state().failures) == (True, 0)
+
+
+def test_a_failure_stops_no_other_earthquake_and_is_tried_again(city, server, monkeypatch):
+    server.events["xx2"] = other_event(0.0, 7.3)
+
+    def failing(settings, *others):
+        if "xx2" in settings.name:
+            raise WriteError("work", "No space left on device; try again when there is room")
+        return quick_run(settings, *others)
+
+    monkeypatch.setattr(event_run, "run", failing)
+    (error,) = city.at(61).errors
+    assert isinstance(error, WriteError)
+    assert (city.revisions("xx1"), city.revisions("xx2")) == (["0001"], [])
+    assert "No space left" in city.state("xx2").last_error
+    monkeypatch.setattr(event_run, "run", quick_run)
+    assert city.at(100).errors == ()
+    assert city.revisions("xx2") == []
+    city.at(130)
+    assert city.revisions("xx2") == ["0001"]
+
+
+def test_a_fault_of_the_program_is_one_line_and_stops_no_other(city, monkeypatch):
+    monkeypatch.setattr(event_run, "run", lambda *_: 1 / 0)
+    (error,) = city.at(61).errors
+    assert "ZeroDivisionError" in str(error)
+
+
+@pytest.mark.parametrize("place", ["publish", "point_latest", "_keep"])
+def test_a_kill_around_a_revision_neither_repeats_nor_reuses_its_number(
+    city, server, simulation, monkeypatch, place
+):
+    city.at(61)
+    server.events["xx1"] = magnified(simulation, 7.2)
+    module = watch if place == "_keep" else event_run
+    if place == "point_latest":
+        from per_obspy.operation.events import revisions as module
+
+    def killed(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, place, killed)
+        with pytest.raises(KeyboardInterrupt):
+            city.at(301)
+    city.at(310)
+    assert city.revisions() == ["0001", "0002"]
+    assert str((city.event() / "latest").readlink()) == "revisions/0002"
+    assert list(city.folder.rglob("*.part*")) == []
+
+
+def test_clock_that_jumps_back_and_forth(city, server):
+    # A day ahead: one run serves all delays
+    city.at(86_400)
+    assert sorted(city.state().done) == ["300", "60", "900"]
+    # Set right, all that was done "tomorrow" is due at its own time, and the list is asked whole
+    server.requests.clear()
+    city.at(70)
+    lists = [request.parameters for request in server.requests if request.service == "event"]
+    assert "updatedafter" not in lists[0]
+    assert city.state().done["60"].startswith("2000-01-01T00:01:10")
+    assert city.revisions()[0] == "0001"
+
+
+def test_ten_thousand_earthquakes_cost_little(city, server):
+    far = other_event(longitude=40.0)
+    # All in the circle of the query are weak, and the limit is reached
+    server.events = {f"w{number}": other_event(magnitude=2.0) for number in range(10)}
+    lines = [f"e{n}|2000-01-01T00:00:00|0|0.4|15|A|B|C|D|Mw|2.1|A|Far" for n in range(10_000)]
+    head = "#EventID|Time|Latitude"
+    server.fail("event", "*", content("\n".join([head, *lines]).encode()))
+    server.events = {"far": far, "xx1": other_event()}
+    tracemalloc.start()
+    start = time.process_time()
+    found = city.at(59, most_events=10_000)
+    seconds, (_, peak) = time.process_time() - start, tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # 10 000 rows of about 1 kB and their table of distances, measured 30 MB
+    assert peak < 100e6
+    assert seconds < 20
+    assert found.errors == ()
+    city.at(61)
+    # Weak ones crowd out no strong one
+    assert city.revisions("xx1") == ["0001"]
+    assert [path.name for path in (city.folder / "events").iterdir()] == ["xx1"]
+    assert any("minmagnitude" in request.parameters for request in server.requests)
+
+
+def test_services_without_updatedafter_are_asked_for_everything(city, server):
+    city.at(30)
+    server.fail("event", "*", status(400))
+    assert city.at(61).errors == ()
+    assert city.revisions() == ["0001"]
+
+
+def test_what_changed_is_asked_for_with_an_overlap(city, server):
+    city.at(30)
+    server.requests.clear()
+    city.at(59)
+    (request,) = server.requests
+    # Ten minutes before the latest poll
+    assert request.parameters["updatedafter"] == "1999-12-31T23:50:30"
+
+
+def test_old_earthquakes_are_not_opened_and_open_ones_finish(city):
+    city.at(30)
+    city.at(8 * 86_400)
+    assert (city.state().state, city.revisions()) == ("finished", ["0001"])
+    shutil.rmtree(city.event())
+    city.at(8 * 86_400 + 60)
+    assert not city.event().exists()
+
+
+def write_event(folder: Path, name: str, event) -> Path:
+    obspy.core.event.Catalog([event]).write(folder / name, format="QUAKEML")
+    return folder / name
+
+
+def in_folder(folder: Path) -> dict[str, object]:
+    folder.mkdir()
+    return {"service": None, "folder": folder}
+
+
+def test_folder_of_quakeml(city, simulation, tmp_path):
+    feed = in_folder(tmp_path / "feed")
+    file = write_event(tmp_path / "feed", "a.xml", simulation.event)
+    assert city.at(61, **feed).errors == ()
+    ((name, state),) = read_event_states(city.folder)[0].items()
+    assert (name, state.file, state.revision) == ("event", "a.xml", 1)
+    write_event(tmp_path / "feed", "a.xml", magnified(simulation, 7.2))
+    city.at(100, **feed)
+    assert city.revisions("event") == ["0001", "0002"]
+    file.unlink()
+    city.at(150, **feed)
+    assert city.state("event").reason == "deleted at its source"
+
+
+def test_file_that_is_no_quakeml_waits_while_it_is_young(city, tmp_path, simulation):
+    feed = in_folder(tmp_path / "feed")
+    write_event(tmp_path / "feed", "b.xml", simulation.event)
+    half = tmp_path / "feed" / "a.xml"
+    half.write_bytes((tmp_path / "feed" / "b.xml").read_bytes()[:300])
+    assert city.at(61, **feed).errors == ()
+    os.utime(half, (1e9, 1e9))
+    (error,) = city.at(100, **feed).errors
+    assert isinstance(error, CatalogError)
+    assert "a.xml: is no QuakeML" in str(error)
+    assert city.revisions("event") == ["0001"]
+    # It is tried again
+    shutil.copy(tmp_path / "feed" / "b.xml", half)
+    assert city.at(150, **feed).errors == ()
+
+
+def test_missing_folder_of_quakeml_is_one_line(city, tmp_path):
+    (error,) = city.at(61, service=None, folder=tmp_path / "none").errors
+    assert str(error).endswith("none: cannot be read: No such file or directory")
+
+
+def test_records_that_come_into_a_folder_are_run_at_once(city, tmp_path):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / "XX.S001.mseed").write_bytes(b"one")
+    records = city.settings.records.model_copy(update={"fdsn": None, "folder": folder})
+    city.settings = city.settings.model_copy(update={"records": records})
+    city.at(61)
+    (folder / "XX.S002.mseed").write_bytes(b"two")
+    city.at(120)
+    assert city.revisions() == ["0001", "0002"]
+    # One that is being written waits
+    waiting = records.model_copy(update={"settle": 3600.0})
+    city.settings = city.settings.model_copy(update={"records": waiting})
+    city.at(170)
+    (folder / "XX.S003.mseed").write_bytes(b"thr")
+    city.at(240)
+    assert "XX.S003" not in (city.event() / "latest" / "stations.csv").read_text()
+
+
+def test_the_daemon_goes_on_after_a_full_disk(city, clock, monkeypatch):
+    passes, wait = [], clock.wait
+    one_pass = watch._one_pass
+
+    def spoiled(*arguments, **named):
+        passes.append(clock.time)
+        if len(passes) == 2:
+            raise WriteError("watch.json", "No space left on device")
+        return one_pass(*arguments, **named)
+
+    monkeypatch.setattr(watch, "_one_pass", spoiled)
+    clock.at(30)
+    ended = watch.Clock(clock.now, lambda seconds: wait(seconds) or len(passes) >= 5)
+    watch_forever(city.settings, ended)
+    assert len(passes) == 5
+    assert city.revisions() == ["0001"]
+    # It never waits longer than the time between two polls
+    assert max(clock.waits) <= 30
+    assert read_status(city.folder).running

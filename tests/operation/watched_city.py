@@ -1,0 +1,133 @@
+"""A small simulated city for a watcher, and a service on loopback with its earthquake."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from fdsn_server import FdsnServer
+from obspy.core.event import Event, Magnitude, Origin
+
+from per_obspy.config import Run, Scenario
+from per_obspy.inventory.files.writing import write_pairs
+from per_obspy.inventory.simulated import simulated_pairs
+from per_obspy.jobs.output_folder import Result, file_hashes, recorded
+from per_obspy.operation.events.event_settings import read_settings
+from per_obspy.operation.watch import Clock
+from per_obspy.records.fdsn.cache import fetch, fetched_stations
+from per_obspy.records.simulation.earthquake import Simulation, simulate
+
+ORIGIN = datetime(2000, 1, 1, tzinfo=UTC)
+
+#: Runs of the tests, s after the origin time.
+DELAYS = (60, 300, 900)
+
+CONFIGURATION = """\
+name = "city"
+output = "out"
+workers = 1
+[records.fdsn]
+providers = ["{url}"]
+retries = 0
+before = 20
+after = 120
+wait = 0.01
+[pairs]
+file = "pairs.csv"
+[spectra]
+count = 12
+dampings = [0.05]
+azimuth_step = 30
+[watch]
+service = "{url}"
+delays = {delays}
+latency = 10
+poll = 30
+{watch}
+"""
+
+
+class FakeClock:
+    """A clock that does not move by itself; waiting moves it."""
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self.time = ORIGIN + timedelta(seconds=seconds)
+        self.waits: list[float] = []
+
+    def now(self) -> datetime:
+        return self.time
+
+    def at(self, seconds: float) -> Clock:
+        """Return the clock, moved to so many seconds after the origin time."""
+        self.time = ORIGIN + timedelta(seconds=seconds)
+        return Clock(self.now, self.wait)
+
+    def wait(self, seconds: float) -> bool:
+        self.waits.append(seconds)
+        self.time += timedelta(seconds=seconds)
+        return False
+
+
+def city_earthquake(stations: int = 3, magnitude: float = 6.5) -> Simulation:
+    """Return the earthquake of the city, at the same moment always."""
+    return simulate(Scenario(stations=stations, magnitude=magnitude, dt=0.02))
+
+
+def write_city(
+    folder: Path, server: FdsnServer, watch: str = "", delays: Sequence[float] = DELAYS
+) -> Path:
+    """Write the inventory and the configuration of the watcher, and return the configuration."""
+    places = [(station.longitude, station.latitude) for station in server.inventory[0]]
+    longitude, latitude = np.array(places).T
+    pairs = simulated_pairs(longitude, latitude, count=30, seed=1, radius=2000.0, touching=0.5)
+    write_pairs(pairs, folder / "pairs.csv")
+    text = CONFIGURATION.format(url=server.url, watch=watch, delays=list(delays))
+    (folder / "city.toml").write_text(text)
+    return folder / "city.toml"
+
+
+def settings_of(file: Path, **watch: object) -> Run:
+    """Return the settings of a watcher, with other values in its section."""
+    settings = read_settings(file)
+    return settings.model_copy(update={"watch": settings.watch.model_copy(update=watch)})
+
+
+def other_event(
+    seconds: float = 0.0, magnitude: float | None = 6.5, longitude: float = 0.0
+) -> Event:
+    """Return another earthquake, so many seconds after that of the city."""
+    time = (ORIGIN + timedelta(seconds=seconds)).replace(tzinfo=None)
+    origin = Origin(time=time, latitude=0.0, longitude=longitude, depth=15_000.0)
+    sizes = [] if magnitude is None else [Magnitude(mag=magnitude, magnitude_type="Mw")]
+    return Event(origins=[origin], magnitudes=sizes)
+
+
+def quick_run(settings: Run, *others: object) -> Result:
+    """Stand in for a whole run: tables that depend on event and records, as those of a run do."""
+    folder, facts = settings.output, others[-1]
+    (folder / "stations").mkdir(parents=True, exist_ok=True)
+    records = fetched_files(settings)
+    magnitude = (settings.records.event or folder).read_text().partition("<mag>")[2][:60]
+    # One pair per station, of a state that follows from the earthquake
+    state = "yes" if "7" in magnitude else "no"
+    names = [path.stem for path in records]
+    risk = {"pair_id": names, "state": [state] * len(names), "risk_class": ["low"] * len(names)}
+    pd.DataFrame(risk).to_parquet(folder / "risk.parquet")
+    stations = pd.DataFrame({"station": names, "state": ["used"] * len(names)})
+    stations.to_csv(folder / "stations.csv", index=False)
+    for name in ("configuration.toml", "report.html", "summary.txt"):
+        (folder / name).write_text(f"# {facts}")
+    made = [folder / name for name in ("risk.parquet", "stations.csv", "summary.txt")]
+    counts = {"stations": len(names), "pairs": len(names), state: len(names)}
+    record = {"state": "complete", "counts": counts, **facts}
+    record |= {"key": "k", "outputs": file_hashes(folder, made)}
+    return recorded(folder / "run.json", record)
+
+
+def fetched_files(settings: Run) -> list[Path]:
+    """Return the records of the window of an earthquake, or those of its folder."""
+    if settings.records.fdsn is None:
+        return sorted(settings.records.folder.iterdir())
+    fetched = fetch(settings.records.fdsn, settings.records.event)
+    return sorted(files[0] for files in fetched_stations(fetched).stations.values())

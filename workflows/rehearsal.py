@@ -1,0 +1,157 @@
+"""
+Rehearse an earthquake: services that fail, late stations, killed processes, a new magnitude.
+
+Usage: ``python workflows/rehearsal.py [FOLDER]``. Services on loopback list and record a simulated
+earthquake. The watcher runs as a process of its own for each moment, by a clock that is given, so
+that a quarter of an hour is rehearsed in about a minute. The tables must be those of an undisturbed
+watcher to the byte. Prints the time from origin to each revision: delay of the
+run and seconds of work.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+HERE = Path(__file__).resolve()
+sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ("operation", "records")]
+
+from fdsn_server import FdsnServer, serving, status  # noqa: E402 - from the tests
+from watched_city import ORIGIN, city_earthquake, settings_of, write_city  # noqa: E402
+
+from per_obspy.operation.watch import Clock, watch_once  # noqa: E402
+
+#: Tables that must be the same to the byte.
+TABLES = ("risk.parquet", "risk.csv", "stations.csv", "rejected.csv", "rows.parquet")
+TABLES = (*TABLES, "buildings.parquet", "totals.csv", "event.xml")
+
+
+def main(folder: Path) -> None:
+    """Rehearse in an empty folder, and compare with an undisturbed watcher."""
+    simulation = city_earthquake(stations=4, magnitude=6.8)
+    with serving(simulation) as server:
+        calm, rehearsed = folder / "undisturbed", folder / "rehearsed"
+        for place in (calm, rehearsed):
+            place.mkdir(parents=True)
+            file = write_city(place, server)
+            file.write_text(file.read_text().replace("workers = 1", "workers = 2"))
+        rehearse(rehearsed, server)
+        ended(started(calm, 901))
+    compare(calm / LATEST, rehearsed / LATEST)
+
+
+#: Newest revision in the folder of a city.
+LATEST = Path("out", "events", "xx1", "latest")
+
+
+def rehearse(folder: Path, server: FdsnServer) -> None:
+    """Let an earthquake happen, and disturb the watcher in every way."""
+    final = server.events["xx1"]
+    early = final.copy()
+    early.magnitudes[0].mag = 6.3
+    server.events["xx1"], server.silent = early, {"S003", "S004"}
+    # The list of earthquakes fails at first, and a service of records for one station
+    server.fail("event", "*", status(503, Retry_After="20"))
+    server.fail("dataselect", "S001", *[status(503, Retry_After="120")] * 2)
+    report(folder, 0, started(folder, 0), "the event service demands a pause", expected=75)
+    first = started(folder, 61)
+    kill_worker(first)
+    report(folder, 61, first, "one worker killed, two stations silent, one service fails")
+    report(folder, 125, started(folder, 125), "the service that failed is asked again")
+    # The watcher is killed in the middle of a run, and started again
+    server.silent = set()
+    kill_watcher(folder, started(folder, 301))
+    report(folder, 305, started(folder, 305), "watcher killed and started again, late stations")
+    server.events["xx1"] = final
+    report(folder, 600, started(folder, 600), "magnitude 6.3 becomes 6.8")
+    report(folder, 901, started(folder, 901), "nothing new")
+
+
+def started(folder: Path, seconds: float) -> "subprocess.Popen[str]":
+    """Start a watcher for one pass, so many seconds after the origin time."""
+    command = [sys.executable, str(HERE), "--pass", str(folder), str(seconds)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def one_pass(folder: Path, seconds: float) -> None:
+    """Do one pass of the watcher; end with 75 if it is to be tried again."""
+    now = ORIGIN + timedelta(seconds=seconds)
+    found = watch_once(settings_of(folder / "city.toml"), Clock(lambda: now))
+    for error in found.errors:
+        print(error, file=sys.stderr)
+    sys.exit(75 if found.errors else 0)
+
+
+def ended(watcher: "subprocess.Popen[str]", expected: int = 0) -> None:
+    """Wait for a watcher, and stop the rehearsal if it does not end as expected."""
+    _, errors = watcher.communicate(timeout=300)
+    if watcher.returncode != expected:
+        sys.exit(f"exit code {watcher.returncode}, expected {expected}: {errors}")
+
+
+def report(
+    folder: Path, delay: float, watcher: "subprocess.Popen[str]", event: str, expected: int = 0
+) -> None:
+    """Print the revision that a watcher has made, and the time from the origin to it."""
+    start = time.perf_counter()
+    ended(watcher, expected)
+    seconds = time.perf_counter() - start
+    made = sorted(path.name for path in folder.glob("out/events/*/revisions/*"))
+    record = folder / LATEST / "run.json"
+    counts = json.loads(record.read_text())["counts"] if record.is_file() else {}
+    known = f"revision {made[-1]}, {counts['stations']} stations" if made else "no revision"
+    done = f"{counts['stations'] - counts['stations_resumed']} computed" if made else ""
+    print(f"{delay:4.0f} s + {seconds:4.1f} s of work: {known}, {done:11s} ({event})", flush=True)
+
+
+def kill_worker(watcher: "subprocess.Popen[str]") -> None:
+    """Kill the first worker process that a watcher starts."""
+    waited(lambda: workers_of(watcher.pid) or watcher.poll() is not None)
+    for worker in workers_of(watcher.pid)[:1]:
+        os.kill(worker, signal.SIGKILL)
+
+
+def workers_of(process: int) -> list[int]:
+    """Return the worker processes of a watcher; its other children keep count of resources."""
+    children = Path(f"/proc/{process}/task/{process}/children")
+    numbers = [int(word) for word in children.read_text().split()] if children.exists() else []
+    commands = {number: Path(f"/proc/{number}/cmdline") for number in numbers}
+    return [number for number, file in commands.items() if b"spawn_main" in file.read_bytes()]
+
+
+def kill_watcher(folder: Path, watcher: "subprocess.Popen[str]") -> None:
+    """Kill a watcher while it screens."""
+    record = folder / "out" / "events" / "xx1" / "work" / "run.json"
+    waited(lambda: '"screening"' in record.read_text() or watcher.poll() is not None)
+    watcher.kill()
+    watcher.communicate()
+
+
+def waited(condition: Callable[[], object], seconds: float = 120.0) -> None:
+    """Wait until a condition holds."""
+    until = time.monotonic() + seconds
+    while not condition() and time.monotonic() < until:
+        time.sleep(0.02)
+
+
+def compare(calm: Path, rehearsed: Path) -> None:
+    """Stop with an error if a table differs from that of the undisturbed watcher."""
+    different = [
+        name for name in TABLES if (calm / name).read_bytes() != (rehearsed / name).read_bytes()
+    ]
+    if different:
+        sys.exit(f"differ from the undisturbed run: {', '.join(different)}")
+    print(f"{len(TABLES)} tables equal those of an undisturbed watcher to the byte")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--pass"]:
+        one_pass(Path(sys.argv[2]), float(sys.argv[3]))
+    with tempfile.TemporaryDirectory() as temporary:
+        main(Path(sys.argv[1] if sys.argv[1:] else temporary))
