@@ -26,7 +26,7 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import chain, islice
 from multiprocessing import active_children, get_context, parent_process
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
@@ -71,6 +71,9 @@ _SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 #: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
+
+#: Libraries of netCDF are not safe in threads: an executor with threads does one task at a time.
+_ONE_TASK = Lock()
 
 #: Tasks submitted ahead to an executor of unknown size.
 AHEAD_ELSEWHERE = 64
@@ -271,9 +274,10 @@ def _on(
 
 
 def _done(do: Do[Task, Result], task: Task) -> Result:
-    """Do a task; what an error was raised from is lost on its way out of a process."""
+    """Do a task; the cause of an error does not survive the way out of a process."""
     try:
-        return do(task)
+        with _ONE_TASK:
+            return do(task)
     except TryLater:
         raise
     except Exception as error:
