@@ -178,12 +178,14 @@ def undisturbed(tmp_path_factory):
     return tables
 
 
-def ended_run(folder, line, number, workers):
-    """End a run by a signal as it logs a line, check how it ends, and return what it started."""
+def ended_run(folder, line, workers, number):
+    """End a run by a signal as it logs a line and its workers begin; check how it ends."""
     running = small_run(folder, workers)
     while not (logged := running.stderr.readline()).startswith(line):
         assert logged, f"ended before {line}"
-    started = members(running.pid) - {running.pid}
+    # of two workers: both, the run, and the process that watches their locks
+    while len(members(running.pid)) < (4 if workers == 2 else 1):
+        assert running.poll() is None
     # a service manager asks the run alone, the key of a terminal everything that it started
     code, seconds, errors = end(running, number, key=number == signal.SIGINT)
     while members(running.pid):
@@ -193,18 +195,16 @@ def ended_run(folder, line, number, workers):
     assert (code, seconds < PROMISED, "Traceback" in errors) == (128 + number, True, False)
     word = {signal.SIGTERM: "terminated", signal.SIGINT: "interrupted"}[number]
     assert errors.splitlines()[-1] == word
-    return started
 
 
 def test_a_run_that_is_ended_twice_leaves_no_process_and_goes_on_to_the_same_bytes(
     tmp_path, undisturbed
 ):
     write_run(tmp_path)
-    # two workers and the process that watches their locks
-    assert len(ended_run(tmp_path, "stations: 1 of 3", signal.SIGTERM, workers=2)) == 3
-    finished = times(tmp_path / "out" / "stations", "*.json")
-    assert finished
-    ended_run(tmp_path, "screening: 0 of 9", signal.SIGINT, workers=1)
+    ended_run(tmp_path, "stations: 0 of 3", 2, signal.SIGTERM)
+    ended_run(tmp_path, "screening: 0 of 9", 1, signal.SIGINT)
+    stations = times(tmp_path / "out" / "stations", "*.json")
+    assert len(stations) == 3
     assert results_of(tmp_path) == undisturbed
     # finished stations were not done again
-    assert times(tmp_path / "out" / "stations", "*.json").items() >= finished.items()
+    assert times(tmp_path / "out" / "stations", "*.json") == stations
