@@ -2,7 +2,7 @@
 Rows of buildings: chains of joined contacts, cut where they close, bend, or are too long.
 
 Every pair is in exactly one row. A row that is cut at a gap leaves the pair of that gap as a
-separate row, so that no contact is lost; one that is cut at a bend has the building there in
+separate row, so that no contact is missing; one that is cut at a bend has the building there in
 both parts.
 """
 
