@@ -121,6 +121,7 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
 
 def _flat(rows: Iterable[_Piece]) -> tuple[IntArray, IntArray, IntArray]:
     """Return the end at which each contact is entered, and sizes and flags of the rows."""
+    # Arrays grow in place
     ends, sizes, codes = array("q"), array("q"), array("q")
     for row in rows:
         ends.extend(2 * pair + turned for pair, turned in row.links)

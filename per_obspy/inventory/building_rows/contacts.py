@@ -206,7 +206,7 @@ def _spread(pairs: pd.DataFrame, codes: IntArray) -> FloatArray:
 def _on_sphere(pairs: pd.DataFrame, i: int, axis: int) -> FloatArray:
     """Return one of the three coordinates of building i on the unit sphere, (n_pairs,)."""
     north = np.radians(numbers_in(pairs, f"latitude_{i}"))
-    if axis == 2:  # noqa: PLR2004 - the third axis
+    if axis == 2:
         return np.asarray(np.sin(north))
     east = np.radians(numbers_in(pairs, f"longitude_{i}"))
     return np.asarray(np.cos(north) * (np.sin(east) if axis else np.cos(east)))
