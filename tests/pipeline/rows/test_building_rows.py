@@ -100,8 +100,8 @@ def test_totals_count_every_building_once(finished):
     assert totals["buildings_hit"].sum() == (buildings["impacts"] > 0).sum()
     for end in ("common", "independent"):
         expected = buildings[f"probability_{end}"].sum()
-        # nine digits in the text
-        assert totals[f"expected_buildings_{end}"].sum() == pytest.approx(expected, rel=1e-7)
+        # each area has five digits in the text, so that it is off by half of the last one
+        assert totals[f"expected_buildings_{end}"].sum() == pytest.approx(expected, rel=5e-5)
     worst = buildings.drop_duplicates("area").set_index("area")["building_id"]
     found = totals[totals["buildings"] > 0].set_index("area")["worst_building"]
     assert found.to_dict() == worst.to_dict()
