@@ -114,7 +114,7 @@ def test_a_signal_is_an_exception_once_and_the_handler_before_returns():
 
 
 def interrupted_while_held(done):
-    """Send a signal to this process while it holds it back, and note what was done after it."""
+    """Send a signal to this process while it holds it back, and note the work done afterwards."""
     with termination.ending_in_time():
         with termination.held():
             with termination.held():
