@@ -1,6 +1,7 @@
 """``per-obspy screen`` by a design spectrum as a user meets it."""
 
 import json
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -42,11 +43,23 @@ def test_pairs_are_screened_and_every_column_is_described(screened, tmp_path):
     )
 
 
-def test_json_is_for_machines(screened):
+def test_json_is_for_machines(screened, tmp_path):
     code, out, _ = screened("--json")
-    said = json.loads(out)
+    found = json.loads(out)
     assert code == 0
-    assert (said["pairs"], said["yes"], said["rejected"], len(said["files"])) == (1, 1, 1, 9)
+    assert (found["pairs"], found["yes"], found["rejected"]) == (1, 1, 1)
+    assert [Path(name).relative_to(tmp_path / "out").as_posix() for name in found["files"]] == [
+        "design.csv",
+        "design.parquet",
+        "design.columns.csv",
+        "totals.csv",
+        "summary.txt",
+        "summary.pdf",
+        "design.kml",
+        "report.html",
+        "figures/overview.png",
+        "rejected.csv",
+    ]
 
 
 def test_a_wrong_spectrum_stops_with_one_line(screened, tmp_path):
