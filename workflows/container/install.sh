@@ -4,7 +4,7 @@
 #
 #   install.sh install SOURCE FOLDER    SOURCE: a checkout or wheel; FOLDER: new virtual environment
 #   install.sh compile FOLDER    minutes of processor time; nothing with WARM_UP=no
-#   install.sh check FOLDER    ask for the health of a watcher that has nothing to do, without rights
+#   install.sh check FOLDER    ask for the health of a watcher that has no event open, without rights
 #
 # PYTHON names the interpreter (python3), EXTRAS the optional libraries (gis,notify).
 # Kernels are kept in NUMBA_CACHE_DIR, else next to the package.
