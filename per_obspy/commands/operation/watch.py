@@ -14,7 +14,7 @@ def watch(
         Path, typer.Argument(help="TOML file of a run with a section \\[watch].")
     ],
     once: Annotated[
-        bool, typer.Option("--once", help="Do what is due and end, for timers and cron.")
+        bool, typer.Option("--once", help="Do all due runs once and end, for timers and cron.")
     ] = False,
     log: LogFile = None,
     log_format: LogForm = LogFormat.text,
