@@ -3,7 +3,7 @@
 # steps of the Dockerfile, which also work without a container.
 #
 #   install.sh install SOURCE FOLDER    SOURCE: a checkout or wheel; FOLDER: new virtual environment
-#   install.sh compile FOLDER    minutes of processor time; nothing with WARM_UP=no
+#   install.sh compile FOLDER    minutes of processor time; no kernel with WARM_UP=no
 #   install.sh check FOLDER    ask for the health of a watcher that has no event open, without rights
 #
 # PYTHON names the interpreter (python3), EXTRAS the optional libraries (gis,notify).
