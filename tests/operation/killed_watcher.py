@@ -92,7 +92,7 @@ def forked(city: Path, seconds: float) -> int:
     try:
         one_pass(city, seconds)
         code = 0
-    except BaseException:
+    except Exception:  # noqa: BLE001 - whatever it is, it is printed
         traceback.print_exc()
     finally:
         os._exit(code)
