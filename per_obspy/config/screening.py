@@ -280,7 +280,7 @@ class ReportTexts(Section):
     revision: int = Field(
         0,
         ge=0,
-        description="number of the revision on page and summary; 0: that of `per-obspy watch`, if any",
+        description="revision on page and summary; 0: the number that watch gives, if any",
     )
 
 
