@@ -34,6 +34,7 @@ from per_obspy.operation.events import event_feed, event_run
 from per_obspy.operation.events.state import read_event_states
 from per_obspy.operation.status import read_status
 from per_obspy.operation.watch import watch_forever, watch_once
+from per_obspy.pipeline.inputs.described_runs import result_facts
 from per_obspy.pipeline.run import run
 from per_obspy.records.fdsn.web import PassingFault
 
@@ -391,11 +392,14 @@ def test_only_a_station_that_comes_late_is_computed(city, server, monkeypatch):
     counts = [record["counts"] for record in records]
     assert [count["stations"] for count in counts] == [1, 2]
     assert [count["stations_resumed"] for count in counts] == [0, 1]
+    described = dict(result_facts(city.event() / "latest").lines)
+    assert described["earthquake"] == "2000-01-01T00:00:00, 2 stations"
     # People see which revision of which earthquake they have
     for number, name in enumerate(city.revisions(), start=1):
         folder = city.event() / "revisions" / name
-        text = (folder / "summary.txt").read_text()
-        assert f"xx1: Revision {number}, " in " ".join(text.split())
+        text = " ".join((folder / "summary.txt").read_text().split())
+        assert f"xx1: Revision {number}, 00:0{number * 3}" in text
+        assert "Earthquake of 2000-01-01 00:00:00 UTC. Magnitude 6.5. Epicentre 0.000" in text
         assert page_content(folder / "report.html")["revision"].startswith(
             f"xx1: Revision {number}, "
         )

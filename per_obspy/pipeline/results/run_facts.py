@@ -44,10 +44,16 @@ def event_facts(event: Any) -> dict[str, object]:
 
 
 def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[dict[str, object]]:
-    """Return the earthquakes of a folder; the screened one has the facts of its event file."""
+    """
+    Return the earthquakes of the records; the screened one has the facts of its event file.
+
+    Records that were fetched for an event have no groups: it is the only earthquake.
+    """
     if event is None:
         return list(groups)
     facts = event_facts(event)
+    if not groups:
+        return [{"screened": True, "event": facts}]
     return [group | {"event": facts} if group["screened"] else group for group in groups]
 
 
