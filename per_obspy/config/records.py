@@ -86,7 +86,7 @@ class Columns(Section):
 
 
 class Window(Section):
-    """A time window; what is not given is seen from the origin time of the event."""
+    """Time window; missing limits follow from the origin time of the event."""
 
     start: Moment | None = Field(
         None,

@@ -1,12 +1,12 @@
 """
-Independent tasks on several processes, or on any executor; none of them can stop the others.
+Independent tasks on several processes or any executor; a failure does not stop other tasks.
 
 The exception is a machine that cannot write: the first ``WriteError`` ends the work.
 
 A fault of the data is the result of its task. A fault of the machine (:mod:`per_obspy.machine`, or
 a worker that dies) is none: the task stays undone, and ``Unfinished`` is raised after all others.
 
-A task whose worker dies takes the whole pool with it. What was under way then is done again, each
+A task whose worker dies takes the whole pool with it. Tasks at work then are done again, each
 task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
 """
@@ -46,7 +46,7 @@ Failed = Callable[[Task, str], Result]
 
 class Work(NamedTuple, Generic[Task, Result]):
     """
-    What is done with every task.
+    Function of every task, with its substitute for failures and the name of a task.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def results(
     tasks : iterable
         Tasks, which are taken while the work goes on.
     work : Work
-        What is done with each of them.
+        Function of every task.
     workers : int
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
@@ -160,7 +160,7 @@ def new_and_resumed(
     executor: Executor | None,
 ) -> Iterator[Result]:
     """
-    Yield the result of every task; what an earlier run did is not done again.
+    Yield the result of every task; results of an earlier run are reused.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def new_and_resumed(
     resumed = list[Result]()
 
     def missing() -> Iterator[Task]:
-        """Yield the tasks that have to be done; the others are resumed on the way."""
+        """Yield the tasks without an earlier result, and collect the earlier results."""
         for task in tasks:
             found = earlier(task)
             if found is None:
@@ -204,7 +204,7 @@ class _Watched(Generic[Task, Result]):
 
     def result(self, task: Task, get: Callable[[], Result]) -> Iterator[Result]:
         """
-        Yield the result of a task, or its substitute; nothing if the machine failed.
+        Yield the result of a task, or its substitute; no result if the machine failed.
 
         Only where the machine cannot write, the other tasks fail too, and all of them stop.
         """
@@ -274,7 +274,7 @@ def _on(
 
 
 def _done(do: Do[Task, Result], task: Task) -> Result:
-    """Do a task; the cause of an error does not survive the way out of a process."""
+    """Do a task; raise errors caused by the machine as machine faults: processes drop causes."""
     try:
         with _ONE_TASK:
             return do(task)
@@ -286,7 +286,7 @@ def _done(do: Do[Task, Result], task: Task) -> Result:
 
 
 def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
-    """Yield the result of a task that has a process of its own."""
+    """Yield the result of one task, done in a separate process."""
     try:
         with _Pool(1) as pool:
             future = pool.submit(_done, watched.work.do, task)
@@ -296,14 +296,14 @@ def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end with an interrupt; fresh ones, for a fork beside threads can hang."""
+    """Process pool that ends with an interrupt; spawned, as a fork with threads can hang."""
 
     def __init__(self, workers: int) -> None:
         self._others = set(active_children())
         super().__init__(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """Submit a task; no signal ends the run while it starts a process for it."""
+        """Submit a task, with signals held back while a process starts."""
         with _signals_held():
             return super().submit(do, *arguments, **named)
 

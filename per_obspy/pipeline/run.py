@@ -1,9 +1,9 @@
 """
 One run, from records to report, or one of its stages alone.
 
-Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
+Stations and chunks of the inventory are separate jobs: a killed run continues where it stopped.
 The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
-only then the other results are complete, and a run of the same inputs does nothing.
+only then the other results are complete, and a run of the same inputs is up to date.
 """
 
 from collections.abc import Mapping, Sequence
@@ -149,7 +149,7 @@ def screen(
     progress: Progress = silent,
 ) -> Result:
     """
-    Screen the inventory again with the stations that an earlier run has left, and report.
+    Screen the inventory again with the stations of an earlier run, and write the report.
 
     Only chunks of the inventory that have changed are computed. Parameters and errors are those of
     :func:`run`; it is an error as well if there are no stations.
@@ -186,7 +186,7 @@ def report(
     Raises
     ------
     CatalogError
-        If there is no finished run, or what it left has changed.
+        If there is no finished run, or its files have changed.
     """
     asked = RunSettings(configuration, output)
     settings, folder = asked.settings, asked.folder
@@ -202,7 +202,7 @@ def report(
 
 
 def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
-    """Return the stations of the latest run; none where only a ShakeMap served its pairs."""
+    """Return the stations of the latest run; empty if only a ShakeMap served its pairs."""
     records = settings.records
     has_map = records is not None and records.shakemap is not None
     if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
@@ -211,7 +211,7 @@ def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
-    """Return the stations of which usable records were left."""
+    """Return the stations with usable records."""
     return [station for station in stations if station.shard is not None]
 
 
@@ -241,7 +241,7 @@ def _all_stages(
 
 
 def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations to a record, with what each serves."""
+    """Add expected, received, late and rejected stations, with their pairs, to ``run.json``."""
     used, served = record.pop("used"), record.pop("served")
     record["stations"] = station_facts(known, used, served, record["counts"])
 
@@ -291,7 +291,7 @@ def _finished_record(
     head: dict[str, Any],
     earlier_rows: int | None,
 ) -> Result:
-    """Write the record of a run, with the rows that it lost."""
+    """Write ``run.json``, with sentences on losses of rows."""
     lost = losses(settings, record["counts"], earlier_rows)
     # What failed unexpectedly is done again by the next run, and files that waited are taken
     waited = record["stations"]["waiting"]
@@ -337,7 +337,7 @@ def _later_stages(
 
 
 def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
-    """Return the stations that can serve pairs: those without a place cannot."""
+    """Return the names of the stations with known coordinates, which can serve pairs."""
     unplaced = {rejection.name for rejection in found.unplaced}
     return [station.station for station in usable if station.station not in unplaced]
 
@@ -375,7 +375,7 @@ def _write_stations(
 def _intermediate_hashes(
     folder: Path, stations: Sequence[FinishedStation], known: Mapping[Path, str]
 ) -> dict[str, str]:
-    """Return the hashes of the files of the first stage, which other commands or users read."""
+    """Return the hashes of the files of the first stage, which are results too."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
     made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)
@@ -391,7 +391,7 @@ def _intermediate_hashes(
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of the same run if its results and earlier stages are as it left them."""
+    """Return ``run.json`` of an identical earlier run if its files are unchanged."""
     record = earlier_status(folder / RECORD, key)
     known = record and record.get("intermediate")
     if record is None or not isinstance(known, dict):
@@ -401,11 +401,11 @@ def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def _finished(file: Path) -> dict[str, Any]:
-    """Return the record of a finished run whose risk table and spectra are as it left them."""
+    """Return ``run.json`` of a finished run if its risk table and spectra are unchanged."""
     try:
         record = read_status(file)
     except StatusError as error:
-        raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+        raise CatalogError(str(file), "no finished run here: run `per-obspy run` first") from error
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
@@ -413,5 +413,5 @@ def _finished(file: Path) -> dict[str, Any]:
     needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
-        raise CatalogError(str(changed[0]), "not as the run left it: run again")
+        raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")
     return record

@@ -1,4 +1,4 @@
-"""Failures of a watcher: the error that a user meets, and the pause until the next attempt."""
+"""Failures of a watcher: the error for users, and the pause until the next attempt."""
 
 import logging
 from datetime import datetime, timedelta
@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 def known_fault(error: Exception) -> PerError:
-    """Return an error that a user can meet for any error; one of the program is logged whole."""
+    """Convert any error to one for users; log the traceback of a programming error."""
     # A missing file of the configuration is a wrong name, as for other commands
     fault = machine_fault(error, missing=not isinstance(error, PerError))
     if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):
