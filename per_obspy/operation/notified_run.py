@@ -150,9 +150,13 @@ def undelivered(folders: Iterable[Path]) -> str | None:
     reason : str or None
         None if it was delivered, or there was none.
     """
-    found = [latest for folder in folders if (latest := _latest(folder))]
-    newest = max(found, key=lambda latest: str(latest.get("time")), default={})
-    failed = newest.get("failed")
+    newest: tuple[str, int, dict[str, Any]] = ("", 0, {})
+    for folder in folders:
+        if latest := _latest(folder):
+            # Messages of one second are in the order of their files
+            written = (folder / LATEST).stat().st_mtime_ns
+            newest = max(newest, (str(latest.get("time")), written, latest), key=lambda one: one[:2])
+    failed = newest[2].get("failed")
     return shortened(str(failed[0]), 300) if isinstance(failed, list) and failed else None
 
 

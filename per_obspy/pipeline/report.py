@@ -170,6 +170,7 @@ def _write_summary(
     language = settings.report.language
     revision = revision_of_run(folder / "run.json")
     number = settings.report.revision or revision.number
+    # Which result this is comes first, then the earthquake
     line = revision_line(number, revision.time, revision.event_id, language)
     source = [f"{line}."] if line else []
     source += event_sentences(_event(settings, folder, place), language)
