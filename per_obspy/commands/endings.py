@@ -87,7 +87,7 @@ def print_and_end(
         show(result)
     for fault in result.record.get("faults", []):
         print(f"per-obspy: {fault}", file=sys.stderr)
-    # How the pair tables are read, and what is odd of them
+    # Recognised form of the pair tables, and suspicious values
     notes = result.record.get("pair_tables", {})
     for sentence in (*notes.get("recognised", ()), *notes.get("suspicions", ())):
         print(printable(f"per-obspy: {sentence}"), file=sys.stderr)

@@ -71,7 +71,7 @@ def info(
     if as_json:
         print(json.dumps({"kind": found.kind, **found.values}))
     else:
-        # Records list what is wrong with them below, others among their facts
+        # Faults of records are listed below, those of other inputs among their facts
         rejected = found.values.get("rejected", []) if found.kind == "records" else []
         few = rejected if everything else rejected[:FIRST]
         for line in screen_of(path, found, len(few) + (len(few) < len(rejected))):

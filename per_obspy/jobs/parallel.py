@@ -64,7 +64,7 @@ class Work(NamedTuple, Generic[Task, Result]):
 
 
 #: Reason of a task that takes its worker with it, also when it is alone.
-DIED = "its worker process was killed, perhaps for want of memory"
+DIED = "its worker process was killed, perhaps for lack of memory"
 
 #: Signals that end a run.
 _SIGNALS = {signal.SIGINT, signal.SIGTERM}
@@ -266,7 +266,7 @@ def _on(
                 unfinished.append(task)
             except WriteError as error:
                 unwritten = error
-        # Other tasks cannot write either; what was finished has been passed on
+        # Other tasks cannot write either; finished results have been passed on
         if unwritten:
             for future in pending:
                 future.cancel()

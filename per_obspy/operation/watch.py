@@ -217,7 +217,7 @@ def _polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErr
         errors += _problems(watch, feed)
         for known in listed_states(watch, watcher.places, states, feed, now):
             _keep(watcher, states, known)
-        # The list comes last: what it opened is written
+        # The list comes last: states that it opened are written
         state = noted_poll(state, feed, now)
     write_watch_state(watcher.folder, state)
     return state

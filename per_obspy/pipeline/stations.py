@@ -216,7 +216,7 @@ def stations_of_earlier_run(folder: Path) -> list[FinishedStation]:
     statuses = sorted(path for path in _shards(folder).glob("*.json") if not is_part(path))
     found = [earlier_station(status) for status in statuses]
     if not found:
-        raise CatalogError(str(_shards(folder)), "contains no stations: run `per-obspy run` first")
+        raise CatalogError(str(_shards(folder)), "no stations here: run `per-obspy run` first")
     return found
 
 

@@ -197,7 +197,7 @@ def _component_spectra(
         "processing": (
             "component",
             processing,
-            {"long_name": "what was done to the record and every number chosen for it, as JSON"},
+            {"long_name": "processing steps of the record and every number chosen for it, as JSON"},
         ),
     }
     return xr.Dataset(variables, coords=_axes(list(traces), periods, dampings))

@@ -1,6 +1,7 @@
 """``per-obspy screen`` by a design spectrum as a user meets it."""
 
 import json
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -46,7 +47,13 @@ def test_json_is_for_machines(screened):
     code, out, _ = screened("--json")
     said = json.loads(out)
     assert code == 0
-    assert (said["pairs"], said["yes"], said["rejected"], len(said["files"])) == (1, 1, 1, 9)
+    assert (said["pairs"], said["yes"], said["rejected"]) == (1, 1, 1)
+    # table, meanings, totals, summary and page with the overview; rejections last
+    assert [Path(file).name for file in said["files"]] == [
+        *("design.csv", "design.parquet", "design.columns.csv", "totals.csv"),
+        *("summary.txt", "summary.pdf", "design.kml", "report.html", "overview.png"),
+        "rejected.csv",
+    ]
 
 
 def test_a_wrong_spectrum_stops_with_one_line(screened, tmp_path):

@@ -15,7 +15,7 @@ def watch(
         Path, typer.Argument(help="TOML file of a run with a section \\[watch].")
     ],
     once: Annotated[
-        bool, typer.Option("--once", help="Do what is due and end, for timers and cron.")
+        bool, typer.Option("--once", help="Do all due runs once and end, for timers and cron.")
     ] = False,
     dask: Dask = None,
     log: LogFile = None,

@@ -217,7 +217,7 @@ def circle_around(places: Places, reach: float) -> Circle:
     farthest = float(
         np.rad2deg(_angles(places, np.array([[longitude]]), np.array([[latitude]])).max())
     )
-    # Wider by a thousandth for what numbers of a query lose
+    # Wider by a thousandth for the rounding of numbers in a query
     radius = farthest + (places.radius + reach) / METRES_PER_DEGREE
     return Circle(longitude, latitude, min(radius * 1.001, 180.0))
 

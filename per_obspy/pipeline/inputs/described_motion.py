@@ -95,7 +95,7 @@ def earthquake_lines(records: Sequence[RecordInfo]) -> list[tuple[str, str]]:
 def shakemap_facts(path: Path) -> Facts:
     """Return the facts of a ShakeMap; places are marked by their share of the largest motion."""
     grid = read_shakemap(path)
-    # The motion that is mapped, and what of
+    # Values of the mapped quantity: PGA, or PSA at the shortest period
     values = (grid["pga"] if "pga" in grid else grid["psa"][0]).to_numpy()
     largest = float(values.max())
     event = str(grid.attrs.get("event_id", "of unknown identifier"))

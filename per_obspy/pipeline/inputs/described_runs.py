@@ -101,7 +101,7 @@ def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[
     lines = [("name", str(record.get("name", ""))), ("state", str(record.get("state", "")))]
     lines += [("begun", str(record["started"]))] if "started" in record else []
     lines += [("simulated", "the ground motion is SIMULATED.")] if record.get("simulated") else []
-    # The earthquake that was screened, and what was left out
+    # Screened earthquake, and rejections
     groups = [one for one in record.get("earthquakes") or [] if one.get("screened")]
     lines += [("earthquake", _earthquake(one, counts)) for one in groups]
     # Of footprints before the run, of everything else in it

@@ -35,7 +35,7 @@ def pair_table_facts(path: Path) -> Facts:
     inventory = PairInventory([path])
     table = checked_chunk(next(inventory.chunks(MOST_ROWS)))
     rejected = [one._asdict() for one in table.attrs["rejected"]]
-    # Sizes, what is derived instead, what is unknown and odd
+    # Ranges, then derived, unknown and suspicious columns
     derived = derived_counts(table) if len(table) else {}
     unused = unused_columns(table)
     lines = [*_gap_lines(table["gap"]), *_range_lines(table), *_odd_lines(table, derived, unused)]
@@ -125,7 +125,7 @@ def _outline_centres(outlines: "pa.Array") -> Places:
 
 def risk_table_facts(path: Path) -> Facts:
     """Return the facts of a risk table, CSV or Parquet, by its first rows if it is large."""
-    # Only what is shown is read
+    # Only the shown columns are read
     names = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
     if path.suffix.lower() == ".csv":
         table = pd.read_csv(path, nrows=MOST_ROWS, usecols=lambda name: name in names)

@@ -135,7 +135,7 @@ def building_rows(
     # Both tables, from the parts in their order
     parts.sort(key=lambda part: part.number)
     outputs = _written(settings, folder, risk, parts, facts)
-    # What was done, and what was left out
+    # Parts and rejections
     rejected = (*found.rejected, *rows_rejections(parts))
     counts = _counts(found, folder, parts)
     failed = any(part.failed for part in parts)
