@@ -155,7 +155,9 @@ def undelivered(folders: Iterable[Path]) -> str | None:
         if latest := _latest(folder):
             # Messages of one second are in the order of their files
             written = (folder / LATEST).stat().st_mtime_ns
-            newest = max(newest, (str(latest.get("time")), written, latest), key=lambda one: one[:2])
+            newest = max(
+                newest, (str(latest.get("time")), written, latest), key=lambda one: one[:2]
+            )
     failed = newest[2].get("failed")
     return shortened(str(failed[0]), 300) if isinstance(failed, list) and failed else None
 
