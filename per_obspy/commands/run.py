@@ -348,8 +348,9 @@ def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
             others = ", ".join(other["start"] for other in earthquakes if not other["screened"])
             facts = f"{group['stations']} stations; others, left out: {others}"
             lines.append(f"Records of {len(earthquakes)} earthquakes: {group['start']}, {facts}")
-        if group["screened"] and group["undated"] and group["undated"] < group["records"]:
-            lines.append(f"{group['undated']} records have no date and are taken for this one.")
+        undated = group.get("undated", 0)
+        if group["screened"] and undated and undated < group["records"]:
+            lines.append(f"{undated} records have no date and are taken for this one.")
     return lines
 
 

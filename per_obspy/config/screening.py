@@ -278,7 +278,9 @@ class ReportTexts(Section):
         "en", description="of page and summaries: en (English) or es (Spanish)"
     )
     revision: int = Field(
-        0, ge=0, description="number of the revision that the page shows; 0: none is shown"
+        0,
+        ge=0,
+        description="revision on page and summary; 0: the number that watch gives, if any",
     )
 
 
