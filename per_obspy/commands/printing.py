@@ -31,7 +31,7 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
 
 def state_texts(counts: "Mapping[str, int]") -> list[str]:
     """Return the number of pairs in each state as texts; unknown gaps only where there are any."""
-    from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_STATE
+    from per_obspy.config.screening import EVERY_STATE, UNKNOWN_STATE
 
     shown = [state for state in EVERY_STATE if counts.get(state) or state != UNKNOWN_STATE]
     return [f"{counts.get(state, 0)} {state}" for state in shown]

@@ -370,9 +370,18 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 
 def _print_worst(path: Path, count: int) -> None:
     """Print the worst pairs as a table."""
-    from per_obspy.tables.parts import parquet_rows
+    titles = list(SHOWN.values())
+    worst = _first_rows(path, list(SHOWN), count)
+    print_table(f"The {len(worst)} worst pairs", titles, worst)
 
-    # Not from the CSV, in which names may have an apostrophe before them
-    worst = parquet_rows([path], list(SHOWN)).head(count).to_pandas()
-    title = f"The {len(worst)} worst pairs"
-    print_table(title, list(SHOWN.values()), worst.itertuples(index=False))
+
+def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[list[object]]:
+    """Return the first rows of a Parquet file as they are printed: empty cells are empty texts."""
+    # Without libraries of tables, which a finished run would wait for
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    with pa.parquet.ParquetFile(path.absolute()) as file:
+        rows = next(file.iter_batches(count, columns=list(columns)), None)
+    found = [] if rows is None else rows.to_pylist()
+    return [["" if row[name] is None else row[name] for name in columns] for row in found]
