@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test workflows check wheel benchmark clean
+.PHONY: demo figures test workflows check docs wheel benchmark clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -32,12 +32,19 @@ check: .venv/check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: .venv/docs
+	@echo "== build the documentation in output/docs, offline; a warning or a link to nowhere is an error"
+	rm -rf output/docs docs/generated
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -W ignore -m sphinx -q -W --keep-going -b html docs output/docs
+	$(BIN)/python docs/extensions/check_site.py output/docs
+
 wheel: .venv/check
-	@echo "== build the wheel, install it into an empty environment, use it in an empty folder"
+	@echo "== build the wheel, install it into an empty environment, use it in an empty folder, check its types"
 	rm -rf dist .venv/wheel
 	$(BIN)/python -m build --outdir dist . >/dev/null
 	PYTHON=$(PYTHON) EXTRAS= workflows/container/install.sh install "$$(ls dist/*.whl)" .venv/wheel
-	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py
+	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py && \
+	  $(CURDIR)/.venv/bin/mypy --strict --config-file= --python-executable $(CURDIR)/.venv/wheel/bin/python smoke.py
 	@echo "== compile the kernels of the wheel, as a container does"
 	workflows/container/install.sh compile .venv/wheel workflows
 
@@ -65,4 +72,4 @@ benchmark: .venv/benchmark
 	@touch $@
 
 clean:
-	rm -rf .venv dist output
+	rm -rf .venv dist output docs/generated

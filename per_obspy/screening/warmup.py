@@ -103,6 +103,9 @@ def _spectra() -> None:
 @contextmanager
 def compiling(progress: Progress) -> Iterator[None]:
     """Compile the kernels of screening in a thread, while other processes do the stations."""
+    # Where Dask is installed, xarray imports it with the first Dataset: two threads that both make
+    # their first one would break this import
+    _station()
     thread = Thread(target=compile_screening)
     thread.start()
     try:

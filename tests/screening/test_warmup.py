@@ -1,5 +1,7 @@
 """Warming up reaches the kernels: it would be pointless if its pairs were rejected."""
 
+from threading import current_thread, main_thread
+
 import pytest
 
 import per_obspy.screening.warmup as warmup
@@ -12,6 +14,17 @@ def test_every_pair_is_judged(monkeypatch):
     warmup.compile_screening()
     assert sorted(tables[0]["demand_rule"]) == ["exact", "exact", "srss"]
     assert tables[0]["impacts"].min() >= 1
+
+
+def test_the_first_dataset_is_made_before_the_thread(monkeypatch):
+    # would catch two threads importing Dask at once, which ended a run where Dask is installed
+    threads = []
+    monkeypatch.setattr(warmup, "_station", lambda: threads.append(current_thread()))
+    monkeypatch.setattr(warmup, "compile_screening", lambda: threads.append(current_thread()))
+    with warmup.compiling(lambda *_: None):
+        pass
+    assert threads[0] is main_thread()
+    assert threads[1] is not main_thread()
 
 
 @pytest.mark.parametrize("name", sorted(warmup.PARTS))

@@ -1,0 +1,39 @@
+"""
+Spectra with xarray
+===================
+
+``spectra.nc``, which every run writes, is a file that xarray opens. Here the same Dataset is made
+from a Stream of two stations, stored and read again.
+"""
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import xarray as xr
+
+import per_obspy
+from per_obspy.config.simulation import Scenario
+from per_obspy.records.simulation.earthquake import simulate
+
+simulation = simulate(Scenario(magnitude=6.8, stations=2))
+for trace in simulation.stream:
+    trace.stats.response = simulation.inventory.get_response(trace.id, trace.stats.starttime)
+spectra = per_obspy.stream_spectra(per_obspy.process(simulation.stream, event=simulation.event))
+file = Path(tempfile.mkdtemp()) / "spectra.nc"
+spectra.to_netcdf(file)
+
+# %%
+# Select by name and value: units and meanings are attributes.
+
+stored = xr.open_dataset(file)
+print(stored["per_rotd50"].dims, stored["per_rotd50"].attrs)
+
+figure, axes = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
+for station in stored["station"].values:
+    curve = stored["per_rotd50"].sel(station=station, damping=0.05)
+    curve.plot(ax=axes, label=str(station), xscale="log", yscale="log")
+axes.set_title("RotD50 of PER, damping 5 %")
+axes.legend()
+plt.show()
+stored.close()
