@@ -2,6 +2,7 @@
 
 import json
 import sys
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -384,4 +385,6 @@ def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[list[o
     with pa.parquet.ParquetFile(path.absolute()) as file:
         rows = next(file.iter_batches(count, columns=list(columns)), None)
     found = [] if rows is None else rows.to_pylist()
-    return [["" if row[name] is None else row[name] for name in columns] for row in found]
+    # In the order of the columns that was asked for
+    shown = itemgetter(*columns)
+    return [["" if cell is None else cell for cell in shown(row)] for row in found]

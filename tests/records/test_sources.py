@@ -1,4 +1,8 @@
-"""Every source of a configuration under one contract."""
+"""
+Every source of a configuration under one contract.
+
+Covers per_obspy.records.contents.input_files too: the files on which a result depends.
+"""
 
 import re
 import tomllib

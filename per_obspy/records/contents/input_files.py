@@ -17,6 +17,7 @@ def input_files(records: config.Records | None, fetched: "Fetched | None") -> li
     """Return every file on which the result may depend; of an SDS archive those of the window."""
     if records is None:
         return []
+    # Files, and folders with everything below them
     named = [records.folder, records.stationxml, records.event]
     named += [table.file for table in records.columns]
     if fetched:

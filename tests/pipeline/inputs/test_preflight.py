@@ -1,4 +1,8 @@
-"""Faults of later stages stop a run before its first record is read."""
+"""
+Faults of later stages stop a run before its first record is read.
+
+Covers per_obspy.pipeline.inputs.extras too: libraries that are not installed.
+"""
 
 import datetime
 import shutil
