@@ -39,6 +39,8 @@ def state_texts(counts: "Mapping[str, int]") -> list[str]:
 
 def cell(value: object) -> str:
     """Return a value as text on one line: numbers with three digits, missing ones empty."""
+    if value is None:
+        return ""
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
     return printable(str(value))

@@ -376,8 +376,8 @@ def _print_worst(path: Path, count: int) -> None:
     print_table(f"The {len(worst)} worst pairs", titles, worst)
 
 
-def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[list[object]]:
-    """Return the first rows of a Parquet file as they are printed: empty cells are empty texts."""
+def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
+    """Return the first rows of a Parquet file; empty cells are None."""
     # Without libraries of tables, which a finished run would wait for
     import pyarrow as pa
     import pyarrow.parquet
@@ -386,5 +386,4 @@ def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[list[o
         rows = next(file.iter_batches(count, columns=list(columns)), None)
     found = [] if rows is None else rows.to_pylist()
     # In the order of the columns that was asked for
-    shown = itemgetter(*columns)
-    return [["" if cell is None else cell for cell in shown(row)] for row in found]
+    return list(map(itemgetter(*columns), found))

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError
 from per_obspy.jobs.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
+from per_obspy.jobs.parallel import prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
     from per_obspy.records.fdsn.cache import Fetched
@@ -73,6 +75,7 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
+        _prepare_workers(settings, executor)
         from per_obspy.pipeline.stages import new_run
 
         means = (executor, progress)
@@ -95,6 +98,7 @@ def screen(
     with locked_folder(asked.folder):
         # Stations and their facts are those of the latest run
         _require_stations(asked.folder)
+        _prepare_workers(asked.settings, executor)
         from per_obspy.pipeline.stages import new_screening
 
         return new_screening(asked, executor, progress)
@@ -117,6 +121,12 @@ def report(
         from per_obspy.pipeline.stages import new_report
 
         return new_report(asked, record, progress)
+
+
+def _prepare_workers(settings: Run, executor: Executor | None) -> None:
+    """Let workers load their libraries while this process loads its own, unless others work."""
+    if executor is None and settings.engine.dask is None:
+        prepare_workers(settings.workers or usable_processors())
 
 
 def _fetched_records(settings: Run, progress: Progress) -> "Fetched | None":
