@@ -1,10 +1,10 @@
 """
-How worker processes begin: as fresh interpreters, or as forks of a server without threads.
+How worker processes begin: as fresh interpreters, or as forks of a server.
 
-A fork beside threads can hang. The server has none: it loads the libraries of the jobs once, while
-the run that it serves loads its own, and each worker then begins with a copy. Both ends of this are
-left to the command line on Linux: the settings of the server are those of a whole program, and
-system libraries of macOS do not survive a fork.
+A fork beside threads of Python can hang. The server has none: it loads the libraries of the jobs
+once, while the run that it serves loads its own, and each worker begins with a copy. Threads of
+allocators and of linear algebra end and begin with a fork by themselves. Only the command line on
+Linux forks: the server is one per program, and system libraries of macOS do not survive a fork.
 """
 
 import sys
@@ -24,7 +24,7 @@ _forks = {"workers": False}
 
 @contextmanager
 def forked_workers() -> Iterator[None]:
-    """Let the workers of a program be forks of a server while the block runs, where that is safe."""
+    """Fork the workers of a program from a server while the block runs, where that is safe."""
     earlier = _forks["workers"]
     _forks["workers"] = sys.platform == "linux"
     try:
@@ -44,7 +44,7 @@ def worker_context() -> "BaseContext":
 
 
 def start_server() -> None:
-    """Start the server, if workers are forks of it; it loads its libraries in the background."""
+    """Start the server, if workers are its forks, which loads its libraries in the background."""
     from multiprocessing import forkserver
 
     if _forks["workers"]:
