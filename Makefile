@@ -27,6 +27,7 @@ workflows: .venv/test .venv/workflows
 
 check: .venv/check
 	$(BIN)/python tests/check_density.py
+	$(BIN)/python tests/check_words.py
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy

@@ -1,5 +1,5 @@
 """
-Find which neighbouring buildings hit each other in an earthquake, and what would prevent it.
+Find which neighbouring buildings hit each other in an earthquake, and how to prevent it.
 
 Everything is SI: m, s, m/s², kg; damping as a fraction of critical; angles in degrees clockwise
 from north. Each public name is imported when it is first used; ``__init__.pyi`` names its module.

@@ -44,7 +44,7 @@ def violations(path: Path) -> Iterator[str]:
 
 
 def problems_of(function: ast.FunctionDef, comments: set[int], is_kernel: bool) -> Iterator[str]:
-    """Yield what is wrong with one function."""
+    """Yield the violations of one function."""
     body = function.body[1:] if ast.get_docstring(function) is not None else function.body
     nodes = sum(count_nodes(statement) for statement in body)
     needed = nodes // NODES_PER_COMMENT

@@ -131,7 +131,7 @@ def test_json_is_for_machines(call, configuration):
 def test_pairs_are_screened_again_with_the_stations_of_a_run(call, configuration):
     code, _, err = call("screen", configuration)
     assert code == 2
-    assert "no stations here: a whole run comes first" in err.strip().splitlines()[-1]
+    assert "contains no stations: run `per-obspy run` first" in err.strip().splitlines()[-1]
     call("run", configuration)
     (configuration.parent / "pairs.csv").write_text(f"{HEADER}\n{ROW}\nb{ROW[1:]}\n")
     code, out, _ = call("screen", configuration, "--json")

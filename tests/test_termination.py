@@ -12,12 +12,25 @@ import pytest
 
 from per_obspy import termination
 
+from .pipeline.small_run import SCENARIO, write_configuration
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
 #: s, from the signal to the end: the time that a service manager is promised.
 PROMISED = 10.0
 
 CHECKOUT = Path(__file__).parents[1]
+
+#: Tables that a run that goes on must write as an undisturbed one does.
+TABLES = ("risk.parquet", "risk.csv", "rejected.csv", "totals.csv", "buildings.parquet")
+
+#: The command line; figures are short files, as most of the time of a small run goes into them.
+WITHOUT_FIGURES = """
+from small_run import plain_figures
+from per_obspy import cli
+with plain_figures():
+    cli.main()
+"""
 
 #: Main thread in compiled code, which no exception of Python interrupts.
 IN_COMPILED_CODE = """
@@ -45,27 +58,25 @@ with termination.ending_in_time():
 """
 
 
-def started_by(pid):
-    """Return the numbers of the processes that a process has started, and that these have."""
+def members(session):
+    """Return the processes of a session, but for those that have ended and wait to be asked."""
     found = set()
-    for tasks in Path("/proc", str(pid), "task").glob("*/children"):
+    for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(FileNotFoundError, ProcessLookupError):
-            found |= {int(word) for word in tasks.read_text().split()}
-    return found.union(*map(started_by, found))
+            # after the name in parentheses: state, parent, group, session
+            state, _, _, number = path.read_text().rsplit(")", 1)[1].split()[:4]
+            if int(number) == session and state not in "ZX":
+                found.add(int(path.parent.name))
+    return found
 
 
-def is_running(pid):
-    """Return whether a process works; one that waits to be asked for has ended."""
-    try:
-        return Path("/proc", str(pid), "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
-def end(running, number):
-    """Send a signal to a process alone, and return its exit code, duration and errors."""
+def end(running, number, key=False):
+    """Send a signal to a process, or to its group; return exit code, duration and errors."""
     started = time.monotonic()
-    running.send_signal(number)
+    if key:
+        os.killpg(running.pid, number)
+    else:
+        running.send_signal(number)
     _, errors = running.communicate(timeout=60)
     return running.returncode, time.monotonic() - started, errors
 
@@ -103,7 +114,7 @@ def test_a_signal_is_an_exception_once_and_the_handler_before_returns():
 
 
 def interrupted_while_held(done):
-    """Send a signal to this process while it holds it back, and note what was done after it."""
+    """Send a signal to this process while it holds it back, and note the work done afterwards."""
     with termination.ending_in_time():
         with termination.held():
             with termination.held():
@@ -119,49 +130,81 @@ def test_a_signal_that_is_held_back_waits():
     assert done == ["inside"]
 
 
-def smoke_run(output):
-    """Start the smoke run on two processes."""
-    command = [sys.executable, "-m", "per_obspy", "run", "workflows/smoke.toml", "-o", str(output)]
+def write_run(folder):
+    """Write the configuration of a run of three stations and nine pairs."""
+    write_configuration(folder)
+    (folder / "scenario.toml").write_text(SCENARIO.replace("count = 60", "count = 9"))
+
+
+def small_run(folder, workers):
+    """Start the run of a folder in a session of its own."""
+    command = [sys.executable, "-c", WITHOUT_FIGURES, "run", str(folder / "run.toml")]
     return subprocess.Popen(
-        [*command, "--set", "workers=2", "--set", "spectra.dampings=[0.05]"],
-        cwd=CHECKOUT,
+        [*command, "--set", f"workers={workers}"],
+        cwd=CHECKOUT / "tests" / "pipeline",
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
 
 
-def test_a_run_that_is_ended_at_several_moments_goes_on_to_the_same_bytes(tmp_path):
-    # undisturbed
-    whole = smoke_run(tmp_path / "whole")
-    assert whole.communicate(timeout=300) is not None
-    assert whole.returncode == 0
-    # each run goes on where the one before was ended
-    moments = {"stations: 0 of": 143, "report: 0 of": 130}
-    for moment, code in moments.items():
-        running = smoke_run(tmp_path / "ended")
-        while not (line := running.stderr.readline()).startswith(moment):
-            assert line, f"ended before {moment}"
-        # the first moment is that of two workers that have just begun, with Python's tracker of
-        # resources and the server whose forks they are
-        workers = set()
-        while moment.startswith("stations") and len(workers) < 4:
-            workers = started_by(running.pid)
-        number = signal.SIGTERM if code == 143 else signal.SIGINT
-        found, seconds, errors = end(running, number)
-        assert (found, errors.splitlines()[-1]) == (
-            code,
-            "terminated" if code == 143 else "interrupted",
-        )
+def results_of(folder):
+    """Run to the end, and return the bytes of the tables."""
+    running = small_run(folder, workers=1)
+    _, errors = running.communicate(timeout=300)
+    assert running.returncode == 0, errors
+    return {name: (folder / "out" / name).read_bytes() for name in TABLES}
+
+
+def times(folder, pattern):
+    """Return the files of a folder and when they were written."""
+    return {path: path.stat().st_mtime_ns for path in folder.rglob(pattern)}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Tables of a run that was not ended."""
+    kernels = Path(os.environ.get("NUMBA_CACHE_DIR", CHECKOUT / "per_obspy"))
+    for attempt in ("first", "second"):
+        folder = tmp_path_factory.mktemp(attempt)
+        write_run(folder)
+        before = times(kernels, "*.nb[ci]")
+        tables = results_of(folder)
+        # kernels that were just compiled differ from stored ones in the last bits
+        if times(kernels, "*.nb[ci]") == before:
+            break
+    return tables
+
+
+def ended_run(folder, line, workers, number):
+    """End a run by a signal as it logs a line and its workers begin; check how it ends."""
+    running = small_run(folder, workers)
+    while not (logged := running.stderr.readline()).startswith(line):
+        assert logged, f"ended before {line}"
+    # of two workers: both, the server that forks them, the run, and Python's tracker of resources
+    while len(members(running.pid)) < (5 if workers == 2 else 1):
+        assert running.poll() is None
+    # a service manager asks the run alone, the key of a terminal everything that it started
+    code, seconds, errors = end(running, number, key=number == signal.SIGINT)
+    while members(running.pid):
+        seconds += 0.05
         assert seconds < PROMISED
-        assert "Traceback" not in errors
-        # a process that was killed takes a moment to end, and so does Python's own that follows it
-        deadline = time.monotonic() + PROMISED - seconds
-        while any(map(is_running, workers)):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-    last = smoke_run(tmp_path / "ended")
-    last.communicate(timeout=300)
-    assert last.returncode == 0
-    for name in ("risk.parquet", "risk.csv", "rejected.csv", "totals.csv", "buildings.parquet"):
-        assert (tmp_path / "ended" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        time.sleep(0.05)
+    assert (code, seconds < PROMISED, "Traceback" in errors) == (128 + number, True, False)
+    word = {signal.SIGTERM: "terminated", signal.SIGINT: "interrupted"}[number]
+    assert errors.splitlines()[-1] == word
+
+
+def test_a_run_that_is_ended_twice_leaves_no_process_and_goes_on_to_the_same_bytes(
+    tmp_path, undisturbed
+):
+    write_run(tmp_path)
+    ended_run(tmp_path, "stations: 0 of 3", 2, signal.SIGTERM)
+    ended_run(tmp_path, "screening: 0 of 9", 1, signal.SIGINT)
+    stations = times(tmp_path / "out" / "stations", "*.json")
+    assert len(stations) == 3
+    assert results_of(tmp_path) == undisturbed
+    # finished stations were not done again
+    assert times(tmp_path / "out" / "stations", "*.json") == stations

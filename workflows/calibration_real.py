@@ -106,7 +106,7 @@ def error_table(groups: dict[str, pd.DataFrame]) -> Iterator[str]:
 
 
 def kind_table(rows: pd.DataFrame) -> Iterator[str]:
-    """Yield a row per kind of pair and distance: probability against what happened."""
+    """Yield a row per kind of pair and distance: probability against outcome."""
     yield "| pairs | number | predicted | larger demands | Brier score |"
     yield "|---|---|---|---|---|"
     for title, some in (("within 20 km", rows[rows["distance"] <= NEAR]), ("all", rows)):

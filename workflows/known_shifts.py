@@ -51,7 +51,7 @@ class Result(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A shift of a record: what the processing finds, and after each repair."""
+    """Shift of a record as the processing finds it, and after each repair."""
 
     kind: str
     size: float
@@ -114,7 +114,7 @@ def shift(samples: Array, dt: float, kind: str, share: float) -> Array:
 
 
 def repairs_of(samples: Array, dt: float, noise: float) -> dict[str, Result]:
-    """Return what the processing finds after each repair."""
+    """Return the shifts that the processing finds after each repair."""
     first = round(noise / dt)
     plain = samples - samples[:first].mean()
     end = noise + significant_samples(without_drift(plain, dt)[first:]) * dt

@@ -1,5 +1,5 @@
 """
-The figures of the paper, redrawn: one function a figure, which draws what it is given.
+Figures of the paper, redrawn: one function per figure, which draws given values.
 
 References
 ----------
@@ -273,7 +273,7 @@ def draw_restitution(
     gap_ratios: FloatArray, restitutions: Sequence[float], hits: Sequence[SingleHit], sheet: Sheet
 ) -> None:
     """
-    Draw Fig. 7: what the coefficient of restitution does to the amplification of both structures.
+    Draw Fig. 7: effect of the coefficient of restitution on the amplification of both structures.
 
     Parameters
     ----------

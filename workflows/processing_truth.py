@@ -74,7 +74,7 @@ def ground(seed: int) -> Array:
 
 
 def outcome(kind: str, seed: int) -> Outcome:
-    """Return what the processing recovers."""
+    """Return the motion that the processing recovers."""
     rng, truth = np.random.default_rng(100 + seed), ground(seed)
     recorded = truth + 1e-5 * rng.normal(size=COUNT) + ADDED[kind](rng)
     done = process(

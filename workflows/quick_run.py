@@ -102,7 +102,7 @@ def fill(desk: Path) -> None:
 
 
 def typed(command: str, desk: Path) -> str:
-    """Return what a command prints, with the folder of the desk as ~ and progress shortened."""
+    """Return the output of a command, with the folder of the desk as ~ and progress shortened."""
     program = f"{sys.executable} -m per_obspy"
     done = subprocess.run(
         command.replace("per-obspy", program),

@@ -1,1 +1,1 @@
-"""Commands of the command line, one module per group; each parses, calls a function, prints."""
+"""Commands of ``per-obspy``: each parses its arguments, calls one function, prints the result."""

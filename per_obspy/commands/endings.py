@@ -1,4 +1,4 @@
-"""Exit codes and endings that all commands share, and the option ``--json``."""
+"""Exit codes, options and final messages that several commands share."""
 
 import csv
 import json
@@ -49,14 +49,14 @@ Dask = Annotated[
 
 
 def named_path(text: str | Path) -> Path:
-    """Return a path that was given by name: an empty one would be the folder of the shell."""
+    """Return a path from the command line; refuse an empty one, which means the current folder."""
     if not str(text).strip():
         raise typer.BadParameter("the path is empty: name a file or folder")
     return Path(text)
 
 
 def output_option(meaning: str) -> Any:
-    """Return the option ``--output`` with what it names."""
+    """Return the option ``--output`` with its help text."""
     return typer.Option("--output", "-o", help=meaning, parser=named_path, metavar="PATH")
 
 
@@ -64,7 +64,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, 
 
 
 def stop_if_nothing(usable: int, reason: str = "") -> None:
-    """Stop with exit code 3 if ``usable`` is 0, after the reason if there is one."""
+    """Stop with exit code 3 if ``usable`` is 0; print the reason first if there is one."""
     if usable:
         return
     if reason:
@@ -78,7 +78,7 @@ def print_and_end(
     """
     Print the result of a run or of several, and stop without a usable record or pair.
 
-    Lost rows are printed on standard error; with ``strict`` they stop too.
+    Losses of rows are printed on standard error; with ``strict`` they end in exit code 3.
     """
     if as_json:
         known = {"folder": str(result.folder), "did_nothing": result.did_nothing}
@@ -102,8 +102,8 @@ def print_and_end(
 
 
 def why_nothing(rejected: Path) -> str:
-    """Return a message with the place of the reasons for rejection and the first of them."""
+    """Return a message that names the table of rejections and quotes its first row."""
     with rejected.open(encoding="utf-8", newline="") as file:
         first = next(csv.DictReader(file), None)
     example = f", first {first['kind']} {first['name']}: {first['reasons']}" if first else ""
-    return printable(f"nothing usable was left: see {rejected}{example}")
+    return printable(f"no usable record or pair: see {rejected}{example}")

@@ -109,7 +109,7 @@ def screen_of(path: str, found: "Facts", taken: int = 0) -> list[str]:
 
 
 def _with_place(found: "Facts", is_drawn: bool) -> list[tuple[str, str]]:
-    """Return the facts of an input, and its place if that is too little for a map."""
+    """Return the facts of an input; a single place is a fact instead of a map."""
     places = [place for layer in found.places.values() for place in zip(*layer, strict=True)]
     if is_drawn or not places:
         return found.lines
@@ -118,7 +118,7 @@ def _with_place(found: "Facts", is_drawn: bool) -> list[tuple[str, str]]:
 
 
 def _wrapped(found: "Facts", label: str, text: str) -> list[str]:
-    """Return a fact as lines below each other, the last of them shortened."""
+    """Return a fact as wrapped lines, the last one shortened."""
     width = min(max(len(known) for known, _ in [*found.lines, ("place", "")]), LONGEST_LABEL)
     lines = textwrap.wrap(printable(text), WIDTH - width - 4, break_on_hyphens=False) or [""]
     # What is longer is cut in the last line

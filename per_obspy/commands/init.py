@@ -1,4 +1,4 @@
-"""``per-obspy init`` and ``per-obspy warm-up``: before the first run."""
+"""``per-obspy init`` and ``per-obspy warm-up``: a first configuration, and compiled kernels."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +23,7 @@ def init(
     ] = False,
 ) -> None:
     """
-    Write a configuration with what was found, and every key with its help as comments.
+    Write a configuration for the inputs found, with every other key and its help as comments.
 
     Example: per-obspy init records pairs.csv -o run.toml
     """

@@ -1,4 +1,4 @@
-"""Questions of ``per-obspy pairs check`` about headings and units that are not plain."""
+"""Questions of ``per-obspy pairs check`` about ambiguous column headings and units."""
 
 import sys
 from typing import TYPE_CHECKING
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 def is_terminal() -> bool:
-    """Return whether a person can answer."""
+    """Return whether standard input and output are a terminal."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def asked_columns(path: "Path", form: "TableForm") -> "TableForm":
     """
-    Return the form of a table with the headings that the user takes for its missing columns.
+    Ask for the headings of missing columns, and return the form of the table with them.
 
     Parameters
     ----------
     path : Path
         Pair table.
     form : TableForm
-        What is known of it.
+        Form of the table as far as it was recognised.
     """
     from per_obspy.inventory.files.formats import pair_file
     from per_obspy.inventory.recognition.headings import is_building_list, missing_columns
@@ -52,7 +52,7 @@ def _unused(file: "PairFile", columns: "Mapping[str, str]") -> list[str]:
 
 
 def _choice(name: str, proposed: "Sequence[str]", others: "Sequence[str]") -> str:
-    """Return the heading that the user takes for a column, empty if none."""
+    """Return the heading that the user chooses for a column, empty if none."""
     from per_obspy.inventory.schema import COLUMNS
 
     # The column, and the headings that may be meant
@@ -74,7 +74,7 @@ def _choice(name: str, proposed: "Sequence[str]", others: "Sequence[str]") -> st
 
 
 def asked_units(units: "Mapping[str, str]") -> dict[str, str]:
-    """Return the units that the user confirms or names for columns whose numbers are odd."""
+    """Ask for the units of columns with implausible numbers, and return them."""
     from per_obspy.inventory.recognition.units import unit_of, unit_problem
     from per_obspy.inventory.schema import COLUMNS
 

@@ -101,7 +101,7 @@ def find_pairs(
 
 
 def _named_columns(options: "Sequence[str]") -> dict[str, str]:
-    """Return quantities and columns of options such as ``period=T1``."""
+    """Parse options such as ``period=T1`` into a mapping of quantities to columns."""
     from per_obspy.inventory.footprints.building_columns import GIVEN
 
     columns = {}
@@ -115,7 +115,7 @@ def _named_columns(options: "Sequence[str]") -> dict[str, str]:
 
 
 def _write_footprint_pairs(found: "FootprintPairs", output: Path) -> dict[str, Path]:
-    """Write pairs, rejections and buildings; return where."""
+    """Write the tables of pairs, rejections and buildings; return their paths."""
     from per_obspy.inventory.files.writing import write_pairs
     from per_obspy.inventory.footprints.buildings import write_buildings
     from per_obspy.tables.table_files import write_rejected
@@ -186,7 +186,7 @@ def check_pairs(
 
 
 def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
-    """Print what a pair table gives, for machines or people."""
+    """Print the description of a pair table, as JSON or as text."""
     from per_obspy.inventory.files.reading import recognised_line
     from per_obspy.inventory.table_checks import suspicions
 
@@ -211,7 +211,7 @@ def _show_check(file: Path, table: "pd.DataFrame", as_json: bool) -> None:
 
 
 def _described(table: "pd.DataFrame") -> "dict[str, Any]":
-    """Return the columns of a pair table, those that are derived and those that are unknown."""
+    """Return the profile of a pair table, the counts of derived values, and unused columns."""
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
     columns = json.loads(inventory_profile(table).to_json(orient="records"))
@@ -232,7 +232,7 @@ def _print_rejected(rejected: "Sequence[Rejection]") -> None:
 
 
 def _print_profile(table: "pd.DataFrame") -> None:
-    """Print the columns of a pair table, what is derived and what is unknown."""
+    """Print the columns of a pair table: given, derived and unknown ones."""
     from per_obspy.inventory.table_checks import derived_counts, inventory_profile, unused_columns
 
     profile, derived, unused = (

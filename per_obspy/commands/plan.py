@@ -1,4 +1,4 @@
-"""``per-obspy plan``: an order of visits to the buildings that a run found to be hit."""
+"""``per-obspy plan``: order of inspection of the buildings that a neighbour can hit."""
 
 import json
 from pathlib import Path
@@ -82,7 +82,7 @@ def plan(
 
 
 def _place(text: str) -> tuple[float, float]:
-    """Return longitude and latitude of a start."""
+    """Parse the start of a route as longitude and latitude, degrees."""
     try:
         longitude, latitude = (float(part) for part in text.split(","))
     except ValueError:

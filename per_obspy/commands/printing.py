@@ -30,7 +30,7 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
 
 
 def state_texts(counts: "Mapping[str, int]") -> list[str]:
-    """Return the number of pairs in each state as texts; unknown gaps only where there are any."""
+    """Return one text per state with its number of pairs; unknown gaps only if there are any."""
     from per_obspy.config.screening import EVERY_STATE, UNKNOWN_STATE
 
     shown = [state for state in EVERY_STATE if counts.get(state) or state != UNKNOWN_STATE]
@@ -74,7 +74,7 @@ def shown_progress() -> "Iterator[Progress]":
 
 @contextmanager
 def _notes(stream: "TextIO") -> "Iterator[None]":
-    """Print what a cluster reports meanwhile: where its dashboard is, and faults of workers."""
+    """Print events of a cluster: the address of its dashboard, and faults of workers."""
     log, handler = logging.getLogger("per_obspy.cluster"), logging.StreamHandler(stream)
     handler.setFormatter(logging.Formatter("per-obspy: %(message)s"))
     # Warnings have their line already
@@ -90,6 +90,6 @@ def _notes(stream: "TextIO") -> "Iterator[None]":
 
 
 def _print_line(stage: str, done: int, total: int) -> None:
-    """Print a step of progress; a log that is no longer read does not stop the work."""
+    """Print one line of progress; a closed standard error does not stop the work."""
     with suppress(BrokenPipeError):
         print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)

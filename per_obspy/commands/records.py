@@ -112,7 +112,7 @@ def fetch(
 def _print_fetched(
     folder: Path, stations: list[str], rejected: "tuple[Rejection, ...]", as_json: bool
 ) -> None:
-    """Print what a cache holds, for machines or people."""
+    """Print the records in a cache, as JSON or as text."""
     if as_json:
         rows = [rejection._asdict() for rejection in rejected]
         print(json.dumps({"folder": str(folder), "stations": stations, "rejected": rows}))

@@ -282,14 +282,14 @@ def process(
 
 
 def print_nothing(result: "Result") -> None:
-    """Print no result: a quiet command prints what went wrong."""
+    """Print no result: a quiet command prints faults only."""
 
 
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
     folder, record = result.folder, result.record
     if result.did_nothing:
-        print("Nothing to do: the same inputs were run before.")
+        print("Up to date: these inputs were run before.")
     _print_counts(record)
     _print_warnings(record.get("warnings", {}))
     # Agreement with observed pounding, worst pairs, files
@@ -341,7 +341,7 @@ def _simulated_line(counts: dict[str, int]) -> str:
 
 
 def _earthquake_lines(earthquakes: "Sequence[dict[str, Any]]") -> list[str]:
-    """Return which earthquake is screened where there are several, and its undated records."""
+    """Return lines on the screened one of several earthquakes, and on undated records."""
     lines = []
     for group in earthquakes:
         if len(earthquakes) > 1 and group["screened"]:

@@ -75,10 +75,10 @@ def screen(
     quiet: Quiet = False,
 ) -> None:
     """
-    Screen pairs: in an ensemble of scenarios, by a design spectrum, or again with a run's stations.
+    Screen pairs by an ensemble of scenarios, a design spectrum, or the stations of a run.
 
-    Of an ensemble and of a run only what has changed is computed. A single run must have been done
-    before.
+    Of an ensemble and of a run only changed parts are computed again. A single run needs results
+    of an earlier ``per-obspy run``.
 
     Example: per-obspy screen workflows/ensemble.toml
     """
@@ -142,7 +142,7 @@ def _screened_by_spectrum(
 
 
 def _end_design(design: "tuple[pd.DataFrame, list[Path]]", as_json: bool, quiet: bool) -> None:
-    """Print the result of a screening by a spectrum, and stop where nothing was usable."""
+    """Print the result of a screening by a spectrum, and stop without a usable pair."""
     table, files = design
     # Print the counts, for machines or with the worst pairs
     counts = _state_counts(table)
@@ -195,7 +195,7 @@ def _print_ensemble(result: "Result") -> None:
     # Counts, and a warning where the motion is simulated
     folder, record = result.folder, result.record
     if result.did_nothing:
-        print("Nothing to do: the same scenarios were joined before.")
+        print("Up to date: these scenarios were joined before.")
     if record["simulated"]:
         print("The ground motion of a scenario is SIMULATED.")
     counts = record["counts"]

@@ -1,4 +1,4 @@
-"""``per-obspy show``: one pair of finished results in words and as a figure."""
+"""``per-obspy show``: description and figure of one pair of finished results."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""A map of coordinates in text: one character per cell, the same scale both ways."""
+"""Maps of coordinates in text: one character per cell, the same scale in both directions."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -73,20 +73,20 @@ def _frame_around(points: Sequence[tuple[float, float]]) -> tuple[_Frame, float]
 
 
 def _finite(places: Places) -> list[tuple[float, float]]:
-    """Return the places whose coordinates are both known."""
+    """Return the places with finite coordinates."""
     pairs = zip(*places, strict=True)
     return [(float(x), float(y)) for x, y in pairs if math.isfinite(x) and math.isfinite(y)]
 
 
 def _unwrapped(longitudes: Sequence[float]) -> list[float]:
-    """Return longitudes without a jump at the date line, where that makes them closer."""
+    """Return longitudes without a jump at the date line if their range becomes smaller."""
     turned = [longitude % 360.0 for longitude in longitudes]
     is_closer = max(turned) - min(turned) < max(longitudes) - min(longitudes)
     return turned if is_closer else list(longitudes)
 
 
 def _drawn(layers: Mapping[str, Sequence[tuple[float, float]]], frame: _Frame) -> list[list[str]]:
-    """Return the cells of a map, row after row from the north."""
+    """Return the characters of a map, one text per row, from north to south."""
     columns, rows = frame.size
     grid = [[" "] * columns for _ in range(rows)]
     counts: dict[tuple[int, int], int] = {}
@@ -104,7 +104,7 @@ def _drawn(layers: Mapping[str, Sequence[tuple[float, float]]], frame: _Frame) -
 
 
 def _count_sign(number: int) -> str:
-    """Return the character of a cell with so many points."""
+    """Return the character for the number of points in a cell."""
     return [sign for least, sign in COUNTS.items() if number >= least][-1]
 
 

@@ -21,7 +21,7 @@ def parsed_changes(texts: Sequence[str], section: type[Section]) -> dict[str, An
     Parameters
     ----------
     texts : sequence of str
-        Each ``key=value`` with a dotted key. The value is one of TOML; what is none is text.
+        Each ``key=value`` with a dotted key. The value is one of TOML; other values are text.
     section : type of Section
         Model of the configuration.
 

@@ -71,12 +71,17 @@ class Engine(Section):
 
     dask: Annotated[str, AfterValidator(_from_configuration)] | None = Field(
         None,
-        description="Dask scheduler: local, local:4, tcp://HOST:PORT or a scheduler file (.json); "
-        "not given: processes of this machine; needs per_obspy[dask]",
+        description=(
+            "Dask scheduler: local, local:4, tcp://HOST:PORT or a scheduler file (.json); "
+            "if not set, processes of this machine; needs per_obspy[dask]"
+        ),
     )
     retries: int = Field(
-        3, ge=0, le=100, description="times that a task is tried again after a fault of a worker"
+        3,
+        ge=0,
+        le=100,
+        description="number of further attempts of a task after a fault of a worker",
     )
     wait: float = Field(
-        300.0, ge=1, description="s, longest time without any usable worker before the run stops"
+        300.0, ge=1, description="longest time without any usable worker before the run stops, s"
     )

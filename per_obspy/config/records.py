@@ -86,7 +86,7 @@ class Columns(Section):
 
 
 class Window(Section):
-    """A time window; what is not given is seen from the origin time of the event."""
+    """Time window; missing limits follow from the origin time of the event."""
 
     start: Moment | None = Field(
         None,
@@ -314,8 +314,9 @@ class Records(Section):
         ge=0,
         le=86_400,
         description=(
-            "s; a file of the folder that was changed less than this ago, or changes while it is "
-            "read, waits for the next run; for folders that grow; 0: every file is read"
+            "age of a file of the folder, s, from which it is read: one that was changed "
+            "later, or changes while it is read, waits for the next run; 0: every file is "
+            "read"
         ),
     )
     archives: Archives = Field(Archives(), description="limits of archives in the folder")

@@ -112,7 +112,7 @@ def screening_kind(path: Path) -> type[Run] | type[Design] | type[Ensemble]:
         return Run
     raise CatalogError(
         str(path),
-        "nothing to screen by: give records or simulation (a run), spectrum (a design "
+        "no ground motion to screen by: give records or simulation (a run), spectrum (a design "
         "spectrum) or [[scenario]] "
         "(an ensemble)",
     )

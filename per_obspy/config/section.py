@@ -73,7 +73,7 @@ def load(path: Path, section: type[SectionType]) -> SectionType:
     path : Path
         TOML file; paths in it are relative to its folder.
     section : type of Section
-        What the file holds: :class:`Run` or :class:`Simulation`.
+        Section of the whole file: :class:`Run` or :class:`Simulation`.
 
     Raises
     ------
@@ -116,13 +116,13 @@ def checked(
     Parameters
     ----------
     section : type of Section
-        What the content belongs to.
+        Section of the content.
     content : dict
         Key to value, as TOML gives it.
     source : str
         Where the content comes from, for the error.
     folder : Path, optional
-        What paths are relative to.
+        Folder to which paths are relative.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def _follows(fault: ErrorDetails, faults: Sequence[ErrorDetails]) -> bool:
 
 
 def _fault(fault: ErrorDetails, section: type[Section]) -> str:
-    """Return one fault of a configuration: key, what is wrong, value, and what is expected."""
+    """Return one fault of a configuration as text: key, fault, value and expected value."""
     # The key, and the value unless it is missing or already in the message
     key = ".".join(map(str, fault["loc"]))
     prefix = f"{key}: " if key else ""

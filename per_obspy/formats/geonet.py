@@ -139,7 +139,7 @@ def _unit(text: Text, first: int, state: str) -> float:
 
 
 def _angles(parts: tuple[str, ...]) -> tuple[Angle, Angle]:
-    """Return latitude and longitude; the numeric header has lost the sign of the southern side."""
+    """Return latitude and longitude; the numeric header lacks the sign of southern latitudes."""
     return Angle(sexagesimal(*parts[:3]), parts[3]), Angle(sexagesimal(*parts[4:7]), parts[7])
 
 

@@ -1,1 +1,1 @@
-"""Do one station or one chunk of pairs per job, in parallel, and resume after an interruption."""
+"""Parallel jobs, one per station or chunk of pairs, that resume after an interruption."""

@@ -66,7 +66,7 @@ class RowsPart(NamedTuple):
     rows : int
         Number of contacts.
     path, status : Path
-        Its interfaces, and the status file with what was left out.
+        Parquet file of the interfaces, and status file with the rejections.
     resumed, failed : bool
         Whether an earlier run had done it; whether its work failed unexpectedly.
     """
@@ -89,7 +89,7 @@ def do_row_chunks(
     jobs: Iterable[RowsJob], workers: int, executor: Executor | None
 ) -> Iterator[RowsPart]:
     """
-    Yield every part as it is finished, in parallel; what an earlier run did is not done again.
+    Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def do_row_chunks(
 
 
 def _earlier(job: RowsJob) -> RowsPart | None:
-    """Return the part as an earlier run left it, if it did the same and the part is whole."""
+    """Return the part of an earlier run if its key is the same and the part is complete."""
     status = earlier_status(_status_file(job), job.key)
     if status is None or "rejected" not in status:
         return None
@@ -186,7 +186,7 @@ def _first(row: IntArray) -> IntArray:
 
 
 def _flagged(flags: np.ndarray, name: str, where: np.ndarray | None) -> np.ndarray:
-    """Return texts of flags with one more, everywhere or in some rows."""
+    """Add a flag to texts of flags, in all or some rows."""
     longer = np.array([f"{text} {name}".strip() for text in flags.tolist()], dtype=object)
     return longer if where is None else np.where(where, longer, flags)
 
@@ -218,7 +218,7 @@ def _status_file(job: RowsJob) -> Path:
 
 
 def _key(job: RowsJob) -> str:
-    """Return the hash of everything on which the part depends."""
+    """Return the hash of all inputs of the part."""
     station = job.station.hash if job.station else ""
     digest = hashlib.sha256("\n".join([version("per_obspy"), station]).encode())
     content = pa.BufferOutputStream()
@@ -235,7 +235,7 @@ def _name(job: RowsJob) -> str:
 
 
 def _failed(job: RowsJob, reason: str) -> RowsPart:
-    """Return a part without histories, because its work failed; the next run does it again."""
+    """Return a part without histories after a failure; the next run repeats it."""
     contacts = _columns(job.contacts)
     names = dict.fromkeys(contacts["row_id"].tolist())
     rejected = [Rejection("row", name, "", None, (reason,)) for name in names]

@@ -2,7 +2,7 @@
 Work on one chunk of the inventory, from raw rows to its part of the risk table.
 
 Chunks are independent of each other. A part is a Parquet file with a status file
-(:mod:`per_obspy.resume`) of its name, which also holds what was left out. A chunk whose status and
+(:mod:`per_obspy.resume`) of its name, which also holds the rejections. A chunk whose status and
 part are whole is not done again.
 """
 
@@ -74,7 +74,7 @@ class Part(NamedTuple):
     path : Path or None
         Rows of the risk table, and the keys of their order; None if no pair was left.
     status : Path
-        Status file with what was left out, see :func:`rejections`.
+        Status file with the rejections, see :func:`rejections`.
     resumed : bool
         Whether an earlier run had done it.
     failed : bool
@@ -90,14 +90,14 @@ class Part(NamedTuple):
 
 
 def rejections(parts: Iterable[Part]) -> Iterator[Rejection]:
-    """Yield what was left out of some parts, which are read one after the other."""
+    """Yield the rejections of parts, reading one part at a time."""
     for part in parts:
         yield from map(Rejection.stored, read_status(part.status)["rejected"])
 
 
 def do_chunks(jobs: Iterable[ChunkJob], workers: int, executor: Executor | None) -> Iterator[Part]:
     """
-    Yield every part as it is finished, in parallel; what an earlier run did is not done again.
+    Yield every part as it is finished, in parallel; finished parts of an earlier run are reused.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _computed_rows(
 
 
 def _key(job: ChunkJob) -> str:
-    """Return the hash of everything on which the part depends."""
+    """Return the hash of all inputs of the part."""
     rows, digest = job.chunk.rows, hashlib.sha256()
     # Program, settings and ground motion
     settings = [job.building.model_dump_json(), job.screening.model_dump_json()]
@@ -190,7 +190,7 @@ def _key(job: ChunkJob) -> str:
 
 
 def _earlier(job: ChunkJob) -> Part | None:
-    """Return the part as an earlier run left it, if it did the same and the part is whole."""
+    """Return the part of an earlier run if its key is the same and the part is complete."""
     status = earlier_status(_status_file(job), job.key)
     if status is None or "rejected" not in status:
         return None
@@ -205,7 +205,7 @@ def _name(job: ChunkJob) -> str:
 
 
 def _failed(job: ChunkJob, reason: str) -> Part:
-    """Return a part that holds only rejections, because its work failed; the next run does it."""
+    """Return a part of rejections only after a failure; the next run repeats it."""
     # One rejection per pair, with its line
     rows = job.chunk.rows
     # Every row has the reason

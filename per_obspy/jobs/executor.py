@@ -89,7 +89,7 @@ def engine_facts(executor: Executor | None) -> dict[str, Any]:
 
 @contextmanager
 def noted_engine(record: Path, executor: Executor | None) -> Iterator[None]:
-    """Add workers and events of a cluster to the record of a run that an error ends."""
+    """Add workers and events of a cluster to ``run.json`` if an error ends the run."""
     try:
         yield
     except Exception:

@@ -1,4 +1,4 @@
-"""Ground motion of a region as files and small tables, which other processes read once each."""
+"""Ground motion of a region as files and small tables, each read once per process."""
 
 from collections.abc import Iterable
 from functools import lru_cache
@@ -41,7 +41,7 @@ class StationFile(NamedTuple):
     shard : Path
         Its Dataset.
     hash : str
-        Of the shard.
+        Of the station file.
     """
 
     name: str
@@ -78,12 +78,12 @@ def ground_files(
     stations: Iterable[FinishedStation], shakemap: tuple[Path, ...], settings: Interpolation
 ) -> tuple[GroundFiles, tuple[Rejection, ...]]:
     """
-    Describe the ground motion by finished stations and a ShakeMap; no shard is opened.
+    Describe the ground motion by finished stations and a ShakeMap; no station file is opened.
 
     Parameters
     ----------
     stations : iterable of FinishedStation
-        With shards of spectra.
+        With station files.
     shakemap : tuple of Path
         Files of the ShakeMap, empty if there is none.
     settings : Interpolation
@@ -119,7 +119,7 @@ def ground_files(
 def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
     """Return name, place and ground of a station with its spectra."""
     spectra, shard = station.spectra, station.shard
-    assert spectra is not None  # stations without a shard serve no pair
+    assert spectra is not None  # stations without a station file serve no pair
     assert shard is not None
     name, longitude, latitude = (
         spectra[key].item() for key in ("station", "longitude", "latitude")
@@ -129,7 +129,7 @@ def _station_file(station: FinishedStation) -> tuple[StationFile, xr.Dataset]:
 
 
 def read_ground(files: GroundFiles) -> RegionalMotion:
-    """Return the ground motion of a region; a station is read when a pair needs it."""
+    """Return the ground motion of a region; each station is read at its first use."""
     places = [(file.longitude, file.latitude) for file in files.stations]
     longitude, latitude = np.array(places).reshape(-1, 2).T
     names = np.array([file.name for file in files.stations], dtype=object)
@@ -145,16 +145,16 @@ def read_ground(files: GroundFiles) -> RegionalMotion:
 
 @lru_cache(1)
 def _shakemap(files: tuple[Path, ...], key: str) -> xr.Dataset:
-    """Return a ShakeMap; a changed one has another key."""
+    """Read a ShakeMap, cached by the key of the ground motion."""
     del key
     return read_shakemap(*files)
 
 
 @lru_cache(STATIONS_KEPT)
 def read_station_once(shard: Path, digest: str) -> xr.Dataset:
-    """Return a station's Dataset with its motion; a changed shard has another hash."""
+    """Read a station file, cached by its hash."""
     content = shard.read_bytes()
-    # Its pairs are not at fault, and the next run makes the shard again
+    # Its pairs are not at fault, and the next run makes the station file again
     if bytes_hash(content) != digest:
         raise MachineFault(f"{shard}: changed while the run read it")
     return read_spectra(shard, content)

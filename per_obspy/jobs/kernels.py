@@ -17,7 +17,7 @@ REST = "screening"
 
 def compile_kernels(progress: Progress) -> None:
     """
-    Compile all kernels that a command may need; what is compiled already is only loaded.
+    Compile all kernels that a command may need; compiled ones are only loaded.
 
     Parameters
     ----------
@@ -43,5 +43,5 @@ def _compiled() -> Iterator[str]:
 
 
 def _failed(name: str, reason: str) -> str:
-    """Raise the reason for which a part cannot be compiled."""
+    """Raise an error with the reason why a part cannot be compiled."""
     raise Unfinished(f"kernels of {name} cannot be compiled: {reason}")

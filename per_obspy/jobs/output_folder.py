@@ -62,7 +62,7 @@ class Result(NamedTuple):
 
 
 def recorded(file: Path, record: dict[str, Any]) -> Result:
-    """Write the record of a run with its key and outputs, after everything else."""
+    """Write ``run.json`` or ``ensemble.json`` with key and outputs, after all other files."""
     facts = {name: value for name, value in record.items() if name not in ("key", "outputs")}
     written = write_status(file, record["key"], record["outputs"], facts, indent=1)
     return Result(file.parent, written, did_nothing=False)
@@ -74,18 +74,18 @@ def file_hashes(folder: Path, files: Sequence[Path]) -> dict[str, str]:
 
 
 def software_versions() -> dict[str, str]:
-    """Return the version of everything that a result may depend on."""
+    """Return the versions of the libraries on which results depend."""
     return {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
 
 
 def now() -> str:
-    """Return the time, ISO 8601, UTC."""
+    """Return the current time, ISO 8601, UTC."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 @contextmanager
 def locked_folder(folder: Path) -> Iterator[None]:
-    """Lock an output folder and clear it of dead part files; an error names who holds the lock."""
+    """Lock an output folder and remove stale part files; an error names the lock's holder."""
     holder = folder / ".holder.json"
     lock = _acquired_lock(folder, holder)
     try:

@@ -1,12 +1,12 @@
 """
-Independent tasks on several processes, or on any executor; none of them can stop the others.
+Independent tasks on several processes or any executor; a failure does not stop other tasks.
 
 The exception is a machine that cannot write: the first ``WriteError`` ends the work.
 
 A fault of the data is the result of its task. A fault of the machine (:mod:`per_obspy.machine`, or
 a worker that dies) is none: the task stays undone, and ``Unfinished`` is raised after all others.
 
-A task whose worker dies takes the whole pool with it. What was under way then is done again, each
+A task whose worker dies takes the whole pool with it. Tasks at work then are done again, each
 task in a process of its own, so that only the guilty task fails; the rest goes on in a new pool.
 Few tasks are ahead of the results that were taken, so that a long row of them needs little memory.
 """
@@ -26,7 +26,7 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import chain, islice
 from multiprocessing import active_children, parent_process
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
@@ -47,7 +47,7 @@ Failed = Callable[[Task, str], Result]
 
 class Work(NamedTuple, Generic[Task, Result]):
     """
-    What is done with every task.
+    Function of every task, with its substitute for failures and the name of a task.
 
     Attributes
     ----------
@@ -72,6 +72,9 @@ _SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 #: Tasks submitted ahead, for each worker: one at work and one ready.
 AHEAD = 2
+
+#: Libraries of netCDF are not safe in threads: an executor with threads does one task at a time.
+_ONE_TASK = Lock()
 
 #: Tasks submitted ahead to an executor of unknown size.
 AHEAD_ELSEWHERE = 64
@@ -104,7 +107,7 @@ def results(
     tasks : iterable
         Tasks, which are taken while the work goes on.
     work : Work
-        What is done with each of them.
+        Function of every task.
     workers : int
         Number of processes; one, or a single task, needs none but this.
     executor : Executor, optional
@@ -165,7 +168,7 @@ def new_and_resumed(
     executor: Executor | None,
 ) -> Iterator[Result]:
     """
-    Yield the result of every task; what an earlier run did is not done again.
+    Yield the result of every task; results of an earlier run are reused.
 
     Parameters
     ----------
@@ -179,7 +182,7 @@ def new_and_resumed(
     resumed = list[Result]()
 
     def missing() -> Iterator[Task]:
-        """Yield the tasks that have to be done; the others are resumed on the way."""
+        """Yield the tasks without an earlier result, and collect the earlier results."""
         for task in tasks:
             found = earlier(task)
             if found is None:
@@ -209,7 +212,7 @@ class _Watched(Generic[Task, Result]):
 
     def result(self, task: Task, get: Callable[[], Result]) -> Iterator[Result]:
         """
-        Yield the result of a task, or its substitute; nothing if the machine failed.
+        Yield the result of a task, or its substitute; no result if the machine failed.
 
         Only where the machine cannot write, the other tasks fail too, and all of them stop.
         """
@@ -279,9 +282,10 @@ def _on(
 
 
 def _done(do: Do[Task, Result], task: Task) -> Result:
-    """Do a task; what an error was raised from is lost on its way out of a process."""
+    """Do a task; raise errors caused by the machine as machine faults: processes drop causes."""
     try:
-        return do(task)
+        with _ONE_TASK:
+            return do(task)
     except TryLater:
         raise
     except Exception as error:
@@ -290,7 +294,7 @@ def _done(do: Do[Task, Result], task: Task) -> Result:
 
 
 def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
-    """Yield the result of a task that has a process of its own."""
+    """Yield the result of one task, done in a separate process."""
     try:
         with _Pool(1) as pool:
             future = pool.submit(_done, watched.work.do, task)
@@ -300,14 +304,14 @@ def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end with an interrupt."""
+    """Process pool that ends with an interrupt."""
 
     def __init__(self, workers: int) -> None:
         self._others = set(active_children())
         super().__init__(workers, mp_context=worker_context(), initializer=_begin_worker)
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """Submit a task; no signal ends the run while it starts a process for it."""
+        """Submit a task, with signals held back while a process starts."""
         with _signals_held():
             return super().submit(do, *arguments, **named)
 

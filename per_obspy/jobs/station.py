@@ -1,8 +1,8 @@
 """
-Work on one station, from its files to its shard; stations are independent of each other.
+Work on one station, from its records to its station file, independent of other stations.
 
-A shard is a netCDF file with a status file (:mod:`per_obspy.resume`) of its name, which also holds
-what was left out. A station whose status and shard are whole is not done again.
+A station file is a netCDF file; its status file (:mod:`per_obspy.resume`) of the same name also
+holds the rejections. A station for which both are complete is not done again.
 """
 
 import os
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from obspy import Inventory, Stream
     from obspy.core.event import Event
 
-#: Suffix of a shard of spectra.
+#: Suffix of a station file with spectra.
 SPECTRA = ".nc"
 
 
@@ -46,9 +46,9 @@ class Products(NamedTuple):
     Attributes
     ----------
     rejected : tuple of Rejection
-        What was left out, with every reason.
+        Rejected inputs, each with its reasons.
     files : tuple of Path
-        The shard and what was written with it; empty if no usable record was left.
+        The station file and all files written with it; empty without a usable record.
     facts : mapping
         Plain values that the status file holds besides.
     """
@@ -59,7 +59,7 @@ class Products(NamedTuple):
 
 
 def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") -> Products:
-    """Write the spectra of a station as its shard if any record is usable."""
+    """Write the spectra of a station as its station file if any record is usable."""
     clean, unfit = process_station(taken(stream), job.processing, event)
     if not clean:
         return Products(unfit)
@@ -73,7 +73,7 @@ def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") ->
 
 
 def _hypocentre(event: "Event | None") -> dict[str, float]:
-    """Return where the earthquake started, degrees and m, if that is known."""
+    """Return the hypocentre, degrees and m, if it is known."""
     origin = event and (event.preferred_origin() or next(iter(event.origins), None))
     if not origin or None in (origin.longitude, origin.latitude, origin.depth):
         return {}
@@ -105,9 +105,9 @@ class StationJob(NamedTuple):
     reader : partial
         How its files are read: ``(files, inventory, station) -> (Stream, rejections)``.
     product : callable
-        What is made of the records that were read: see :func:`spectra_shard`.
+        Function that makes the files from the records: see :func:`spectra_shard`.
     key : str
-        Hash of everything on which the shard depends; :func:`do_stations` computes it.
+        Hash of all inputs of the station file; :func:`do_stations` computes it.
     """
 
     station: str
@@ -134,13 +134,13 @@ class FinishedStation(NamedTuple):
     shard : Path or None
         Its Dataset; None if no usable record was left.
     rejected : tuple of Rejection
-        What was left out, with every reason.
+        Rejected inputs, each with its reasons.
     resumed : bool
         Whether an earlier run had done it.
     hash : str
-        Of the shard; empty if there is none.
+        Of the station file; empty if there is none.
     spectra : Dataset or None
-        Content of a shard of spectra without the motion, so that no later stage reads it again.
+        Content of a station file without the motion, so that no later stage reads it again.
     failed : bool
         Whether its work failed unexpectedly, so that the next run does it again.
     """
@@ -158,12 +158,12 @@ def do_stations(
     jobs: Sequence[StationJob], workers: int, executor: Executor | None = None
 ) -> Iterator[FinishedStation]:
     """
-    Yield every station as it is finished, in parallel; what an earlier run did is not done again.
+    Yield every station as it is finished, in parallel; finished parts of an earlier run are reused.
 
     Parameters
     ----------
     jobs : sequence of StationJob
-        What to do.
+        One job per station.
     workers : int
         Number of processes; one, or a single job, needs none but this.
     executor : Executor, optional
@@ -172,7 +172,7 @@ def do_stations(
     Raises
     ------
     WriteError
-        If a shard cannot be written.
+        If a station file cannot be written.
     Unfinished
         After all other stations, if the machine failed at some.
     """
@@ -197,7 +197,7 @@ def _prepared(job: StationJob) -> StationJob | FinishedStation:
 
 
 def do_station(job: StationJob) -> FinishedStation:
-    """Write the shard of a station and its status, and return the finished station."""
+    """Write a station file and its status file, and return the finished station."""
     remove_file(job.shard)
     products = _products(job)
     has_shard = job.shard in products.files
@@ -235,7 +235,7 @@ def _file_names(job: StationJob) -> str:
 
 
 def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Dataset | None]:
-    """Return hash and spectra of a shard, opened once; no spectra if it is not as expected."""
+    """Return hash and spectra of a station file, opened once; no spectra if its hash differs."""
     if shard.suffix != SPECTRA:
         return file_hash(shard), None
     content = shard.read_bytes()
@@ -246,17 +246,17 @@ def _read_shard(shard: Path, expected: str | None = None) -> tuple[str, xr.Datas
 
 
 def _status_file(shard: Path) -> Path:
-    """Return the status file of a shard."""
+    """Return the status file of a station file."""
     return shard.with_suffix(".json")
 
 
 def _from_status(shard: Path, file: Path) -> str:
-    """Return the path of an output seen from the folder of the status file."""
+    """Return the path of an output relative to the folder of the status file."""
     return Path(os.path.relpath(file, shard.parent)).as_posix()
 
 
 def _key(job: StationJob) -> str:
-    """Return the hash of everything on which the products of a station depend."""
+    """Return the hash of all inputs of the products of a station."""
     settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
     files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
     files += [f"{job.event.path.name} {job.event.hash}"] if job.event else []
@@ -268,7 +268,7 @@ def _key(job: StationJob) -> str:
 
 
 def _earlier(job: StationJob) -> FinishedStation | None:
-    """Return the station as an earlier run left it, if it did the same and its files are whole."""
+    """Return the station of an earlier run if its key is the same and its files are complete."""
     try:
         status = read_status(_status_file(job.shard))
         rejected = _stored_rejections(status)
@@ -280,7 +280,7 @@ def _earlier(job: StationJob) -> FinishedStation | None:
 
 
 def _whole_station(station: FinishedStation, status: Status) -> FinishedStation | None:
-    """Return a resumed station with its shard's hash and spectra; None if an output has changed."""
+    """Return a resumed station with hash and spectra of its file; None if an output has changed."""
     assert station.shard is not None  # where it would be
     outputs = dict(status["outputs"])
     known = outputs.pop(station.shard.name, "")
@@ -288,7 +288,7 @@ def _whole_station(station: FinishedStation, status: Status) -> FinishedStation 
         return None
     if not known:
         return station._replace(shard=None)
-    # The shard is opened once: for its hash, and for its spectra if it has not changed
+    # The station file is opened once: for its hash, and for its spectra if it has not changed
     try:
         digest, spectra = _read_shard(station.shard, known)
     except OSError:
@@ -306,17 +306,17 @@ def _stored_rejections(status: Status) -> tuple[Rejection, ...]:
 
 def earlier_station(status_file: Path) -> FinishedStation:
     """
-    Return a station as an earlier run left it, even if its source has changed since.
+    Return the station of an earlier run, even if its source has changed since.
 
     Parameters
     ----------
     status_file : Path
-        Next to its shard of spectra.
+        Next to the station file.
 
     Raises
     ------
     CatalogError
-        If the status cannot be read or its shard is not as it was left.
+        If the status file cannot be read, or the station file has changed.
     """
     try:
         status = read_status(status_file)
@@ -326,7 +326,7 @@ def earlier_station(status_file: Path) -> FinishedStation:
     shard = status_file.with_suffix(SPECTRA)
     station = _whole_station(FinishedStation(status_file.stem, shard, rejected, True), status)
     if station is None:
-        raise CatalogError(str(shard), "damaged: not as the run left it")
+        raise CatalogError(str(shard), "damaged: changed since the run wrote it")
     return station
 
 
@@ -336,6 +336,6 @@ def _name(job: StationJob) -> str:
 
 
 def _failed(job: StationJob, reason: str) -> FinishedStation:
-    """Return a station whose work failed; the next run does it again."""
+    """Return a station after a failure; the next run repeats it."""
     rejection = Rejection("station", job.station, _file_names(job), None, (reason,))
     return FinishedStation(job.station, None, (rejection,), resumed=False, failed=True)

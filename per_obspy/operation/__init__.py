@@ -1,1 +1,1 @@
-"""Operation: watch for earthquakes, keep revisions, report status, notify."""
+"""Unattended operation: watching for earthquakes, revisions, status, notification."""

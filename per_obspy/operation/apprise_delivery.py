@@ -1,5 +1,5 @@
 """
-Deliver one message by Apprise: ``python -m per_obspy.operation.apprise_delivery``.
+Delivery of one message by Apprise: ``python -m per_obspy.operation.apprise_delivery``.
 
 Standard input holds the number of URLs, the URLs, the title, each on a line, and the text. Prints
 no word: addresses hold secrets.

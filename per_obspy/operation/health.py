@@ -1,4 +1,4 @@
-"""Health of a folder of results: of a watcher, or of the latest run; for people and monitoring."""
+"""Health of a folder of results: state of its watcher or latest run, for monitoring."""
 
 import os
 import platform
@@ -118,7 +118,7 @@ def _run(file: Path) -> Health:
     try:
         record = read_record(file)
     except StatusError as error:
-        raise CatalogError(str(file), f"not the record of a run: {error}") from error
+        raise CatalogError(str(file), f"cannot be read as run.json: {error}") from error
     # A run whose record is unfinished was killed, or is at work
     state = str(record.get("state"))
     known = {"complete": "fine", "unfinished": "unfinished", "nothing_usable": "nothing_usable"}
@@ -134,7 +134,7 @@ def _run(file: Path) -> Health:
 
 
 def _station_lines(stations: dict[str, Any]) -> list[str]:
-    """Return the numbers of stations of a run in words; none where its record has none."""
+    """Return the numbers of stations of a run in words; empty if its record has none."""
     if not stations:
         return []
     # Damaged records have no lists

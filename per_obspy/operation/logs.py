@@ -1,5 +1,5 @@
 """
-Logs of a command: one line per event on standard error, and as text or JSON in a file.
+Logs of a command: one line per event, on standard error and as text or JSON in a file.
 
 Everything is logged under the logger ``per_obspy``, so that programs that use the package decide
 themselves. Passwords and tokens of addresses are masked.
@@ -31,7 +31,7 @@ _SECRET = re.compile(r"(?i)\b(token|password|passwd|secret|api_?key)(=|: ?)[^\s&
 
 class LogOptions(NamedTuple):
     """
-    Places of the log of a command.
+    Options of the log of a command.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class LogOptions(NamedTuple):
 @contextmanager
 def logging_to(options: LogOptions) -> Iterator[None]:
     """
-    Log the events of a block as a command asks for it; an error that ends it is in the file.
+    Log the events of a block by the options of a command, with an error that ends it.
 
     Raises
     ------
@@ -100,17 +100,17 @@ def _file_handlers(options: LogOptions) -> list[logging.Handler]:
 
 
 def _is_unprinted(record: logging.LogRecord) -> bool:
-    """Return whether the command does not print the event itself."""
+    """Return whether the command leaves the printing of an event to the log."""
     return not getattr(record, "printed", False)
 
 
 def _log_end(reason: str) -> None:
-    """Log why a block ended; the command prints it itself."""
+    """Log the error that ended a block, in the file only: the command prints it."""
     ROOT.error("%s", reason, extra={"printed": True})
 
 
 class _File(logging.FileHandler):
-    """Log file; where it cannot be written, one line reports it and the work goes on."""
+    """Log file; if it cannot be written, one line reports that and the work continues."""
 
     has_failed = False
 

@@ -1,5 +1,5 @@
 """
-Messages about results and failures: by a command, and by Apprise to the services of its URLs.
+Messages about results and failures, by a command or by Apprise.
 
 A message that cannot be delivered is a warning in the log and a returned reason, never an error.
 Addresses of services hold secrets: they come from the environment or a private file, reach the
@@ -88,7 +88,7 @@ def notify(settings: Notify, message: Message) -> tuple[str, ...]:
 
 
 class _Undelivered(PerError):
-    """A message was not delivered."""
+    """Failure to deliver a message."""
 
 
 def _body(message: Message) -> str:

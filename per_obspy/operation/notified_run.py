@@ -1,5 +1,5 @@
 """
-A run whose first result, changed class counts and failures are notified, if it is configured so.
+Run with configured notification of its first result, changed class counts and failures.
 
 ``notification.json`` in the output folder holds the latest message and the counts that it was
 about, so that the same counts and the same failure are notified once.
@@ -33,7 +33,7 @@ def notified_run(
     executor: Any = None,
 ) -> Result:
     """
-    Do a whole run and notify of it; parameters and errors are those of ``pipeline.run.run``.
+    Do a whole run with notification; parameters and errors are those of ``pipeline.run.run``.
 
     A message that cannot be delivered changes neither result nor exit code.
     """
@@ -55,7 +55,7 @@ def notified_run(
 
 def notify_result(settings: Notify, result: Result, name: str) -> tuple[str, ...]:
     """
-    Notify of a result that is the first of its folder or has other class counts than the latest.
+    Notify of the first result of a folder, or of one with changed class counts.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def class_counts(folder: Path) -> dict[str, int]:
 def _sent(
     settings: Notify, folder: Path, message: Message, facts: Mapping[str, object]
 ) -> tuple[str, ...]:
-    """Deliver a message, and write what it was about and which ways failed."""
+    """Deliver a message, and write its subject and the failed ways of delivery."""
     reasons = notify(settings, message)
     latest = {"kind": message.kind, "time": now(), "failed": list(reasons), **facts}
     try:

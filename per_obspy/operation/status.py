@@ -1,5 +1,5 @@
 """
-Status of a watched folder, as one JSON file that is always whole.
+Status of a watched folder: one JSON file, replaced atomically.
 
 The watcher writes it after every poll; ``per-obspy status`` and monitoring read it.
 """

@@ -1,5 +1,5 @@
 """
-Watch for earthquakes: look at their list, do the runs that are due, and keep revisions.
+Watching for earthquakes: poll a list, do due runs, keep revisions.
 
 One pass looks at the list once and does everything that is due. The daemon is a loop of passes.
 Whatever ends a pass, the next one goes on: state files are written whole, after everything that
@@ -101,7 +101,7 @@ def watch_once(
     executor: Executor | None = None,
 ) -> Pass:
     """
-    Look at the list of earthquakes once, do everything that is due, and end.
+    Poll the list of earthquakes once, do all due runs, and end.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def watch_forever(
     executor: Executor | None = None,
 ) -> None:
     """
-    Do pass after pass until the program is asked to end; parameters and errors of `watch_once`.
+    Repeat passes until the program is asked to end; parameters and errors as `watch_once`.
 
     A pass that fails is tried again after a pause, which grows up to an hour.
     """
@@ -165,14 +165,14 @@ def _poll(settings: Run) -> float:
 def _watcher(
     settings: Run, folder: Path, means: tuple[Clock, Progress, Executor | None]
 ) -> Watcher:
-    """Return everything that the passes share."""
+    """Return the settings and state that the passes share."""
     clock, progress, executor = means
     places = inventory_places(settings, folder)
     return Watcher(settings, folder, places, clock.now, progress, executor)
 
 
 def _one_pass(watcher: Watcher, running: bool) -> Pass:
-    """Look at the list, do what is due, and write the status; a failure is an error of the pass."""
+    """Poll the list, do due runs and write the status; a failure is an error of the pass."""
     states, problems = read_event_states(watcher.folder)
     for problem in problems:
         log.warning("%s", problem)
@@ -201,7 +201,7 @@ def _is_over(watcher: Watcher, state: WatchState) -> bool:
 
 
 def _polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> WatchState:
-    """Look at the list of earthquakes, and write what it changes; a failure is noted."""
+    """Poll the list of earthquakes, and write changed states; a failure is noted."""
     watch, now = _watch_of(watcher), watcher.now()
     state = read_watch_state(watcher.folder)
     if is_paused(now, state.not_before):
@@ -230,7 +230,7 @@ def _watch_of(watcher: Watcher) -> Watch:
 
 
 def _circle(watcher: Watcher) -> Circle:
-    """Return the circle in which an earthquake can matter."""
+    """Return the circle within which an earthquake can be relevant."""
     reach = max(reach.distance for reach in _watch_of(watcher).magnitudes)
     return circle_around(watcher.places, reach)
 
@@ -261,7 +261,7 @@ def _after(now: datetime, failures: int, fault: PerError | None) -> str:
 
 
 def _fault(error: Exception) -> PerError:
-    """Return an error that a user can meet for any error; one of the program is logged whole."""
+    """Convert any error to one for users; log the traceback of a programming error."""
     # A missing file of the configuration is a wrong name, as for other commands
     fault = machine_fault(error, missing=not isinstance(error, PerError))
     if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):

@@ -1,5 +1,6 @@
 """
 Stages of a run: stations from records, the risk table from stations and pairs, then the report.
 
-Each needs only what the one before left in the output folder, so that it can be done again alone.
+Each stage reads the files of the stage before from the output folder, so that it can be
+repeated alone.
 """

@@ -1,5 +1,5 @@
 """
-Ensemble of scenarios: a run each, then the probability of every pair in all of them together.
+Ensemble of scenarios: one run per scenario, then the joint probability of every pair.
 
 A run that is done is not done again, and neither is the ensemble, whose ``ensemble.json`` is
 written last.
@@ -45,7 +45,7 @@ def screen_scenarios(
     language: str | None = None,
 ) -> Result:
     """
-    Do the run of every scenario, unless it is done, and join their probabilities pair by pair.
+    Run every scenario that is not up to date, and join the probabilities pair by pair.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _joined(
 
 
 def _check_runs(settings: Ensemble, configuration: Path, folder: Path) -> None:
-    """Check the inputs of every run, and that none writes where another or the ensemble does."""
+    """Check the inputs of every run, and that runs and ensemble write into separate folders."""
     owners = {folder: "the ensemble"}
     for scenario in settings.scenario:
         run_settings = load(scenario.run, Run)

@@ -1,4 +1,4 @@
-"""Fetching alone: the FDSN section of a configuration, or everything around one earthquake."""
+"""Fetching of records without a run: by a configuration, or around one earthquake."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ CHANNELS = ("HN?", "HL?", "BN?", "BL?", "CN?", "EN?")
 
 class FetchResult(NamedTuple):
     """
-    Records at hand after fetching.
+    Result of fetching the records of a configuration.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class FetchResult(NamedTuple):
     stations : list of str
         ``"NET.STA"`` of those with records.
     rejected : tuple of Rejection
-        What could not be fetched or read, with every reason.
+        Records that could not be fetched or read, each with its reasons.
     """
 
     folder: Path
@@ -82,7 +82,7 @@ class FetchedEvent(NamedTuple):
     stations : list of str
         ``"NET.STA"`` of those with records.
     rejected : tuple of Rejection
-        What could not be fetched or read, with every reason.
+        Records that could not be fetched or read, each with its reasons.
     records : Records
         Section ``[records]`` of a configuration that reads all of this without the network.
     """
@@ -112,7 +112,7 @@ def fetch_event(
         As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it; of the event service in
         ``settings`` if there is one.
     folder : Path
-        Keeps what is fetched; a request that is complete is answered from it.
+        Cache of the fetched files; complete requests are answered from it.
     settings : mapping, optional
         Keys of the section ``[records.fdsn]`` with other values than the defaults:
         ``event_provider``, ``radius`` (m, 100 000), ``channels``, ``providers``, ``before``,

@@ -1,4 +1,4 @@
-"""Rows of the pair tables that a run lost: against the run before it, and by rejection."""
+"""Losses of pair rows in a run: fewer rows than in the run before, and rejected rows."""
 
 import json
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from per_obspy.config import Pairs, Run
 
 def number_of_rows(record: Path) -> int | None:
     """
-    Return the number of rows of the pair tables in the run that left its record here.
+    Return the number of rows of the pair tables by ``run.json`` of the run before.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def number_of_rows(record: Path) -> int | None:
 
 def losses(settings: Run, counts: Mapping[str, int], earlier: int | None) -> list[str]:
     """
-    Return a sentence for each kind of loss; none without losses.
+    Return one sentence per kind of loss.
 
     Parameters
     ----------

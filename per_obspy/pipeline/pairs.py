@@ -29,7 +29,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results; simulated pairs are written there first.
     stations : sequence of StationFile
@@ -56,7 +56,7 @@ def pair_files(settings: Run, folder: Path, stations: Sequence[StationFile]) -> 
 
 
 def pair_simulation(settings: Run) -> SimulatedPairs:
-    """Return how the pairs are to be simulated, in the run or in the simulation that it names."""
+    """Return the settings of simulated pairs, from the run or from its simulation."""
     if settings.pairs and settings.pairs.simulated:
         return settings.pairs.simulated
     assert settings.simulation is not None  # Run demands pairs or a simulation

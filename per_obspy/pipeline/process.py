@@ -1,4 +1,4 @@
-"""Processed records of some sources as files: MiniSEED, the table of corners, a page per record."""
+"""Processed records as files: MiniSEED, the table of filter corners, one page per record."""
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -32,14 +32,14 @@ STATIONS, STRUCTURES = "stations", "structures"
 
 class Processed(NamedTuple):
     """
-    Processed records of some sources.
+    Result of processing the records of some sources.
 
     Attributes
     ----------
     done : list of FinishedStation
         Every station, sorted by name.
     rejected : tuple of Rejection
-        What was left out.
+        Rejected inputs, each with its reasons.
     files : tuple of Path
         Every file for the user to read.
     """
@@ -67,7 +67,7 @@ def process_records(
     folder : Path
         Gets ``stations/NET.STA.mseed`` and ``.json``, ``structures/`` with the same for sensors
         in structures, ``processed.csv``, ``processed.columns.csv`` and ``rejected.csv``.
-        What is still true is not done again.
+        Files that are still valid are not written again.
     settings : Processing
         Every number of the chain.
     event : Path or None
@@ -115,26 +115,26 @@ def process_records(
 
 
 def _records(jobs: Sequence[StationJob]) -> list[Path]:
-    """Return the MiniSEED files that these jobs left, those of structures last."""
+    """Return the MiniSEED files of finished jobs, those of structures last."""
     shards = [job.shard for job in jobs]
     structures = [_structure(job) for job in jobs]
     return [path for path in (*shards, *structures) if path.exists()]
 
 
 def _structure(job: StationJob) -> Path:
-    """Return where the records of a station's sensors in structures go."""
+    """Return the path for the records of a station's sensors in structures."""
     return job.shard.parent.with_name(STRUCTURES) / job.shard.name
 
 
 def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Write the processed records of a station as its shard, structures in another file."""
+    """Write the processed records of a station as its station file, structures in another file."""
     ground, structure = kept_apart(taken(stream))
     clean, unfit = process_station(chain(taken(ground), structure), job.processing, event)
     return _write_records(job, clean, unfit, _write_structure(job, structure, event))
 
 
 def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
-    """Do as :func:`records_shard`, and draw a page per record."""
+    """Write the station file as :func:`records_shard` does, and draw one page per record."""
     clean, unfit = process_station(stream, job.processing, event)
     # Each page shows a record before and after
     pages = job.shard.with_suffix(".pdf")
@@ -149,7 +149,7 @@ def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) ->
 def _write_records(
     job: StationJob, clean: Stream, unfit: Sequence[Rejection], structure: Products
 ) -> Products:
-    """Write the usable records of a station as its shard; return all products of the station."""
+    """Write the usable records of a station as its station file; return all its products."""
     rejected = (*unfit, *structure.rejected)
     if not clean:
         return Products(rejected, structure.files)
@@ -158,7 +158,7 @@ def _write_records(
 
 
 def _write_structure(job: StationJob, structure: Stream, event: Event | None) -> Products:
-    """Write the records of the sensors in structures, every instrument; empty the stream."""
+    """Write the records of all sensors in structures, and empty the stream."""
     path = _structure(job)
     remove_file(path)
     instruments, rejected = process_instruments(taken(structure), job.processing, event)

@@ -1,4 +1,4 @@
-"""What identifies a run: its configuration, its input files, and their common key."""
+"""Identity of a run: its configuration, its input files, and their common key."""
 
 import json
 import os
@@ -35,7 +35,7 @@ HEADING = (
 
 class RunSettings:
     """
-    Settings of a run, its output folder, and the folder from which its paths are seen.
+    Settings of a run, its output folder, and the folder to which its paths are relative.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class RunSettings:
 
     def head(self, fetched: "Fetched | None", hashes: Mapping[Path, str]) -> dict[str, Any]:
         """
-        Return key, configuration and inputs of a run; files with a known hash are not read.
+        Return key, configuration and inputs of a run; files with a known hash are not hashed again.
 
         The key is the same for every file that holds the same settings.
         """
@@ -88,12 +88,12 @@ class RunSettings:
 
     @property
     def _public(self) -> Run:
-        """Return the settings without those of messages, whose commands may hold secrets."""
+        """Return the settings without section ``[notify]``, whose commands may contain secrets."""
         return self.settings.model_copy(update={"notify": Notify()})
 
     def write(self) -> None:
         """
-        Write the effective configuration into the output folder, unless it is the one that runs.
+        Write the effective configuration into the output folder unless the run reads it from there.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class RunSettings:
             return
         placed = self._public.model_copy(update={"output": self.folder})
         text = commented(Run, effective_content(placed, self.folder), HEADING)
-        # A file of that name that somebody else wrote is kept
+        # A file of that name that no run has written is kept
         before = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
         if before and not before.startswith(f"# {WRITTEN}"):
             raise CatalogError(
@@ -117,7 +117,7 @@ class RunSettings:
 
 
 def _values(settings: Run, folder: Path) -> dict[str, Any]:
-    """Return all settings as plain values, with paths seen from a folder."""
+    """Return all settings as plain values, with paths relative to a folder."""
     values: dict[str, Any] = json.loads(settings.model_dump_json(context={"folder": folder}))
     return values
 
@@ -137,7 +137,7 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs.footprints is not None:
         return layer_files(pairs.footprints.file)
     if pairs.catalog is None:
-        # A file beside the table may say how it is read
+        # A file next to the table may describe how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []
     from per_obspy.inventory.catalogue import stored_inventories
 

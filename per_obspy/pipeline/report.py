@@ -52,7 +52,7 @@ OBSERVED_COLUMNS = ["observed", "state", "probability"]
 
 class RiskSummary(NamedTuple):
     """
-    Everything that the report takes from the risk table, in one pass.
+    Data of the report from the risk table, read in one pass.
 
     Attributes
     ----------
@@ -100,11 +100,11 @@ def reported(
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results; without a risk table only the spectra can be reported.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     progress : callable
         Called when it begins and ends.
     """
@@ -156,7 +156,7 @@ def _event(settings: Run, folder: Path, place: Region) -> dict[str, Any]:
 
 
 def _epicentre_of(event: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return longitude and latitude of an earthquake, None where they are unknown."""
+    """Return longitude and latitude of an epicentre, None if unknown."""
     longitude, latitude = (number(event, name) for name in ("longitude", "latitude"))
     known = math.isfinite(longitude) and math.isfinite(latitude)
     return (longitude, latitude) if known else None
@@ -182,7 +182,7 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
 
 
 def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Report) -> RiskSummary:
-    """Read the risk table once: for totals, figures, observations, notes, and all layers."""
+    """Read the risk table once, and write its layers; return totals, worst pairs and notes."""
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else _needed_columns(settings)
     # The layer takes the pieces one by one, and so they are noted on the way
@@ -210,7 +210,7 @@ def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Rep
 
 
 def _needed_columns(settings: Run) -> list[str]:
-    """Return the columns of the risk table that the report takes of every pair."""
+    """Return the columns of the risk table that the report needs for every pair."""
     figures = [*SHOWN_COLUMNS, *OBSERVED_COLUMNS, *totals_columns(settings.totals)]
     return needed_columns([*figures, *COUNTED])
 
@@ -228,7 +228,7 @@ def _write_layers(
     place: Region,
     files: tuple[Path, Path, Path],
 ) -> None:
-    """Write all layers; totals are known when the last piece has been taken."""
+    """Write all layers; totals are available after the last piece."""
     write_map_layers(
         noted,
         place,
@@ -242,7 +242,7 @@ def _write_layers(
 
 
 def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.DataFrame]:
-    """Yield the pieces of a risk table, and note what the report takes of each."""
+    """Yield the pieces of a risk table, and add each to the summaries of the report."""
     step = -(-table.pairs // SHOWN)
     classes = [*settings.screening.classes, UNKNOWN_CLASS]
     for piece in table.pieces():

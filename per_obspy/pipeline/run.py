@@ -89,7 +89,7 @@ def screen(
     progress: Progress = silent,
 ) -> Result:
     """
-    Screen the inventory again with the stations that an earlier run has left, and report.
+    Screen the inventory again with the stations of an earlier run, and write the report.
 
     Only chunks of the inventory that have changed are computed. Parameters and errors are those of
     :func:`run`; it is an error as well if there are no stations.
@@ -113,7 +113,7 @@ def report(
     Raises
     ------
     CatalogError
-        If there is no finished run, or what it left has changed.
+        If there is no finished run, or its files have changed.
     """
     asked = RunSettings(configuration, output)
     with locked_folder(asked.folder):
@@ -151,7 +151,7 @@ def _require_stations(folder: Path) -> None:
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of the same run if its results and earlier stages are as it left them."""
+    """Return ``run.json`` of an identical earlier run if its files are unchanged."""
     record = earlier_status(folder / RECORD, key)
     known = record and record.get("intermediate")
     if record is None or not isinstance(known, dict):
@@ -161,11 +161,11 @@ def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def _finished(file: Path) -> dict[str, Any]:
-    """Return the record of a finished run whose risk table and spectra are as it left them."""
+    """Return ``run.json`` of a finished run if its risk table and spectra are unchanged."""
     try:
         record = read_status(file)
     except StatusError as error:
-        raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+        raise CatalogError(str(file), "no finished run here: run `per-obspy run` first") from error
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
@@ -173,5 +173,5 @@ def _finished(file: Path) -> dict[str, Any]:
     needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
-        raise CatalogError(str(changed[0]), "not as the run left it: run again")
+        raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")
     return record

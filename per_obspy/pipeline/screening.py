@@ -37,7 +37,7 @@ class PairNotes(NamedTuple):
     recognised : tuple of str
         How each table that is not plain is read.
     suspicions : tuple of str
-        What is possible row by row but odd of all gaps.
+        Sentences on gaps that are possible one by one but implausible together.
     """
 
     recognised: tuple[str, ...] = ()
@@ -61,7 +61,7 @@ class Screened(NamedTuple):
     failed : bool
         Whether the work of a chunk failed unexpectedly.
     pair_tables : PairNotes
-        How the pair tables are read, and what is odd of their gaps.
+        Sentences on the recognised form of the pair tables, and on implausible gaps.
     """
 
     outputs: list[Path]
@@ -81,18 +81,18 @@ def screened(
     progress: Progress,
 ) -> Screened:
     """
-    Write the risk table and what was left out, for an inventory of any size.
+    Write the risk table and the rejections of an inventory of any size.
 
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results.
     stations : sequence of FinishedStation
-        With shards; if there is none and no ShakeMap, only ``rejected.csv`` is written.
+        With station files; if there is none and no ShakeMap, only ``rejected.csv`` is written.
     rejected : iterable of Rejection
-        What was left out before.
+        Rejections of the earlier stages.
     executor : Executor, optional
         Where to work instead of processes of this machine.
     progress : callable
@@ -167,7 +167,7 @@ def shakemap_files(settings: Run) -> tuple[Path, ...]:
 def _parts(
     settings: Run, folder: Path, ground: GroundFiles, executor: Executor | None, progress: Progress
 ) -> tuple[list[Part], PairNotes]:
-    """Do the chunks and return their parts in the order of the inventory; remove other parts."""
+    """Compute the chunks, remove other parts, and return the parts in order."""
     form = settings.pairs.form if settings.pairs else None
     inventory = PairInventory(pair_files(settings, folder, ground.stations), form)
     area = settings.totals.area
@@ -188,7 +188,7 @@ def _parts(
 
 
 def _remove_others(folder: Path, parts: Sequence[Part]) -> None:
-    """Remove everything but these parts: those of a longer inventory, and half written ones."""
+    """Remove parts of a longer inventory, and partly written ones."""
     known = {part.status for part in parts}
     known |= {part.path for part in parts if part.path}
     for path in folder.iterdir() if folder.is_dir() else ():

@@ -32,8 +32,8 @@ def spectra_of(
     sources : sequence of Path
         Waveform files, archives, or folders of them with StationXML.
     output : Path
-        netCDF file. A folder of its name with ``.stations`` keeps one shard per station; those
-        that are still true are not computed again. What was left out goes to ``.rejected.csv``.
+        netCDF file. The folder of the same name with ``.stations`` keeps the station files; valid
+        ones are not computed again. Rejections are written to ``.rejected.csv``.
     processing, grid : Processing, Spectra
         Settings.
     run : (int, Executor or None, callable)
@@ -45,7 +45,7 @@ def spectra_of(
     done : list of FinishedStation
         Every station, sorted by name.
     rejected : tuple of Rejection
-        What was left out.
+        Rejected inputs, each with its reasons.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def plot_station(shard: Path, damping: float, period: float, folder: Path) -> tu
         The files.
     """
     station = read_spectra(shard)
-    # The shard has the station's name without the dot of a missing network, which would hide a file
+    # The name of the station file lacks the dot of a missing network, which would hide it
     name = shard.stem
     spectra, state_space = folder / f"{name}.spectra.png", folder / f"{name}.state_space.png"
     draw_spectra(station, damping, spectra)

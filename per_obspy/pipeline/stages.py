@@ -1,9 +1,9 @@
 """
 The stages of a run in their order, and those that are done alone.
 
-Stations and chunks of the inventory are jobs of their own: a killed run goes on where it stopped.
+Stations and chunks of the inventory are separate jobs: a killed run continues where it stopped.
 The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
-only then the other results are complete, and a run of the same inputs does nothing.
+only then the other results are complete, and a run of the same inputs is up to date.
 """
 
 from collections.abc import Mapping, Sequence
@@ -127,7 +127,7 @@ def new_report(asked: RunSettings, record: dict[str, Any], progress: Progress) -
 
 
 def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
-    """Return the stations of the latest run; none where only a ShakeMap served its pairs."""
+    """Return the stations of the latest run; empty if only a ShakeMap served its pairs."""
     records = settings.records
     has_map = records is not None and records.shakemap is not None
     if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
@@ -136,7 +136,7 @@ def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
 
 
 def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
-    """Return the stations of which usable records were left."""
+    """Return the stations with usable records."""
     return [station for station in stations if station.shard is not None]
 
 
@@ -166,7 +166,7 @@ def _all_stages(
 
 
 def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations to a record, with what each serves."""
+    """Add expected, received, late and rejected stations, with their pairs, to ``run.json``."""
     used, served = record.pop("used"), record.pop("served")
     record["stations"] = station_facts(known, used, served, record["counts"])
 
@@ -204,7 +204,7 @@ def _finished_record(
     head: dict[str, Any],
     earlier_rows: int | None,
 ) -> Result:
-    """Write the record of a run, with the rows that it lost."""
+    """Write ``run.json``, with sentences on losses of rows."""
     lost = losses(settings, record["counts"], earlier_rows)
     # What failed unexpectedly is done again by the next run, and files that waited are taken
     waited = record["stations"]["waiting"]
@@ -250,7 +250,7 @@ def _later_stages(
 
 
 def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
-    """Return the stations that can serve pairs: those without a place cannot."""
+    """Return the names of the stations with known coordinates, which can serve pairs."""
     unplaced = {rejection.name for rejection in found.unplaced}
     return [station.station for station in usable if station.station not in unplaced]
 
@@ -288,7 +288,7 @@ def _write_stations(
 def _intermediate_hashes(
     folder: Path, stations: Sequence[FinishedStation], known: Mapping[Path, str]
 ) -> dict[str, str]:
-    """Return the hashes of the files of the first stage, which other commands or users read."""
+    """Return the hashes of the files of the first stage, which are results too."""
     folders = [folder / name for name in ("simulated", "stations")]
     files = [path for parent in folders for path in parent.rglob("*")]
     made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)

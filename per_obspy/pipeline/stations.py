@@ -1,4 +1,4 @@
-"""First stage: records, found or simulated, become one shard of spectra per station."""
+"""First stage: one station file with spectra per station, from found or simulated records."""
 
 import shutil
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ class FoundStations(NamedTuple):
     jobs : list of StationJob
         One per station.
     rejected : list of Rejection
-        What cannot be used of the sources.
+        Files and records of the sources that cannot be used.
     hashes : dict
         Hash of every file that was read on the way.
     earthquakes : list of dict
@@ -61,7 +61,7 @@ def find_station_jobs(
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results.
     fetched : Fetched or None
@@ -105,14 +105,14 @@ def station_jobs(
     event: EventFile | None = None,
 ) -> list[StationJob]:
     """
-    Return one job per station, sorted by name, which makes a shard of spectra.
+    Return one job per station, sorted by name, which writes a station file.
 
     Parameters
     ----------
     stations : mapping
         ``"NET.STA"`` -> files, metadata and reader.
     shards : Path
-        Folder of the shards.
+        Folder of the station files.
     processing, spectra : Processing, Spectra
         Settings.
     event : EventFile, optional
@@ -121,7 +121,7 @@ def station_jobs(
     Raises
     ------
     CatalogError
-        If the shard of a station would not be in that folder, because a link leads out of it.
+        If a station file would be outside of that folder, because a link leads out of it.
     """
     return [
         StationJob(
@@ -141,7 +141,7 @@ def station_jobs(
 
 def file_stem(station: str) -> str:
     """
-    Return the name of a station's files, without the dot of a missing network that hides a file.
+    Return the stem of a station's file names; a missing network leaves no leading dot.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def finished_stations(
 
 
 def simulated_stations(stations: Sequence[FinishedStation]) -> int:
-    """Return the number of stations whose motion is simulated, by the mark of their spectra."""
+    """Return the number of stations whose spectra are marked as simulated."""
     spectra = [station.spectra for station in stations if station.spectra is not None]
     return sum(dataset.attrs.get("simulated") == "true" for dataset in spectra)
 
@@ -189,7 +189,7 @@ def simulated_motion(settings: Run, stations: Sequence[FinishedStation]) -> bool
 
 
 def _waiting_stations(names: Sequence[str]) -> str:
-    """Return a message with the number of stations that wait and the names of some."""
+    """Return a message with the number and first names of stations to be tried again."""
     others = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{len(names)} stations wait for another run: {', '.join(names[:NAMED])}{others}"
 
@@ -197,7 +197,7 @@ def _waiting_stations(names: Sequence[str]) -> str:
 def all_rejections(
     found: Sequence[Rejection], stations: Sequence[FinishedStation]
 ) -> list[Rejection]:
-    """Return what was left out of the sources and then of every station."""
+    """Return the rejections of the sources and then of every station."""
     rejected = list(found)
     for station in stations:
         rejected += station.rejected
@@ -206,7 +206,7 @@ def all_rejections(
 
 def stations_of_earlier_run(folder: Path) -> list[FinishedStation]:
     """
-    Return the stations as the latest run left them in its output folder.
+    Return the finished stations of the latest run in an output folder.
 
     Raises
     ------
@@ -216,17 +216,17 @@ def stations_of_earlier_run(folder: Path) -> list[FinishedStation]:
     statuses = sorted(path for path in _shards(folder).glob("*.json") if not is_part(path))
     found = [earlier_station(status) for status in statuses]
     if not found:
-        raise CatalogError(str(_shards(folder)), "no stations here: a whole run comes first")
+        raise CatalogError(str(_shards(folder)), "contains no stations: run `per-obspy run` first")
     return found
 
 
 def _shards(folder: Path) -> Path:
-    """Return the folder of the shards of a run."""
+    """Return the folder of the station files of a run."""
     return folder / "stations"
 
 
 def _write_simulated_records(scenario: Scenario, folder: Path, progress: Progress) -> None:
-    """Write the records of a scenario, unless an earlier run has left them whole."""
+    """Write the records of a scenario unless those of an earlier run are complete."""
     if earlier_status(_simulation_status(folder), _simulation_key(scenario)) is not None:
         return
     progress("simulating records", 0, 1)

@@ -387,7 +387,7 @@ def _axes(
     rising = (np.diff(east) > 0).all() and (np.diff(north) > 0).all()
     # A whole turn would repeat a meridian
     if not regular or not rising or east[-1] - east[0] >= 360.0:
-        raise CatalogError(source, "its nodes are not those of a grid of longitudes and latitudes")
+        raise CatalogError(source, "its nodes do not form a grid of longitudes and latitudes")
     return east, north
 
 

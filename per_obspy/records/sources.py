@@ -191,7 +191,7 @@ def find_path_sources(paths: Sequence[Path]) -> Sources:
 def _with_usable_names(found: SourceContents) -> SourceContents:
     """Return a source without the stations whose codes cannot name a file; each is a rejection."""
     stations, rejected = {}, list(found.rejected)
-    # Codes become names of shards, records and figures
+    # Codes become names of station files, records and figures
     for name, paths in found.stations.items():
         if problem := code_problem(*name.split(".", 1)):
             source = ", ".join(sorted({str(path) for path in paths}))

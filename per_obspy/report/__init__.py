@@ -1,1 +1,1 @@
-"""Figures and maps of a run. Only this room draws."""
+"""Figures, maps, page, layers and summaries of results."""

@@ -1,4 +1,4 @@
-"""Clusters of pairs on a map: towns of a region, each of which is drawn at a scale of its own."""
+"""Clusters of pairs on a map: towns of a region, each drawn at a separate scale."""
 
 from typing import NamedTuple
 
@@ -59,7 +59,7 @@ def frame_of(longitude: ArrayLike, latitude: ArrayLike) -> Frame:
 
 def continuous(longitude: ArrayLike) -> FloatArray:
     """
-    Return longitudes (degrees) without a step at the date line where the points lie on both sides.
+    Return longitudes (degrees) without a step at the date line.
 
     Examples
     --------

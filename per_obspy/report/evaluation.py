@@ -83,7 +83,7 @@ def draw_reliability(found: Evaluation, path: Path, simulated: bool) -> None:
 
 
 def _draw_shares(axes: Axes, found: Evaluation) -> None:
-    """Draw the observed share of each bin, with the range in which 19 of 20 should lie."""
+    """Draw the observed share of each bin with its 95 % range."""
     bins = found.reliability
     mean, events = bins["mean_probability"].to_numpy(), bins["events"].to_numpy()
     axes.plot([0.0, 1.0], [0.0, 1.0], color=MOTION_COLOUR, linewidth=0.8, label="as predicted")

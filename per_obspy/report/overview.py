@@ -46,7 +46,7 @@ MARGIN = 0.06
 
 class Region(NamedTuple):
     """
-    Facts of a screening that its overview and its summary show.
+    Facts of a screening for its overview and summary.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def _whole_frame(points: _Points, region: Region) -> Frame:
 
 
 def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
-    """Return frames and members of the clusters that the whole map hides, worst first."""
+    """Return frames and members of clusters too small on the whole map, worst first."""
     if not points.longitude.size:
         return []
     # Stations and epicentre may be far away: then one town has a map of its own too
@@ -193,7 +193,7 @@ def _own_maps(points: _Points, whole: Frame) -> list[tuple[Frame, IntArray]]:
 
 
 def _cluster_maps(points: _Points, pairs_frame: Frame, seen: Frame) -> list[tuple[Frame, IntArray]]:
-    """Return frames and members of the clusters that a map of all pairs hides, worst first."""
+    """Return frames and members of clusters too small on a map of all pairs, worst first."""
     # A few pairs do not hide each other
     every = clusters(points.longitude, points.latitude, pairs_frame)
     found = [members for members in every if members.size >= FEWEST]
@@ -243,7 +243,7 @@ def _beside(longitude: FloatArray, middle: float) -> FloatArray:
 
 
 def _mark(axes: Axes, frames: Sequence[Frame]) -> None:
-    """Outline the clusters that have a map of their own, each with its letter."""
+    """Outline the clusters with separate maps, and write their letters."""
     for letter, frame in zip(ascii_uppercase, frames[:SHOWN_CLUSTERS], strict=False):
         width, height = frame.east - frame.west, frame.north - frame.south
         corner = frame.west, frame.south

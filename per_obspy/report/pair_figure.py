@@ -90,7 +90,7 @@ def _draw_motion(axes: Axes, station: xr.Dataset, azimuth: float) -> None:
 
 
 def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
-    """Draw the stored spectrum at the damping nearest to the pair's, and the pair's own radii."""
+    """Draw the stored spectrum at the damping nearest to the pair's, and the radii of the pair."""
     by_azimuth = "per_rotd100" in station
     stored = station["per_rotd100"] if by_azimuth else station["per"].isel(component=0)
     spectrum = stored.sel(damping=pair["damping_1"], method="nearest")
@@ -105,7 +105,7 @@ def _draw_spectrum(axes: Axes, station: xr.Dataset, pair: pd.Series) -> None:
 
 
 def _draw_radii(axes: Axes, pair: pd.Series) -> None:
-    """Draw the radii of the pair, which is computed at its own periods and dampings."""
+    """Draw the radii of the pair, computed at the periods and dampings of its buildings."""
     for i, colour in enumerate(BUILDING_COLOURS, start=1):
         text = f"building {i}: T = {pair[f'period_{i}']:.2f} s"
         # At contact height a radius is this times its participation
@@ -115,7 +115,7 @@ def _draw_radii(axes: Axes, pair: pd.Series) -> None:
 
 
 def _draw_two_gaps(figure: SubFigure, pair: pd.Series, number_text: str) -> None:
-    """Draw the circles at the gap that there is, and at the gap that is needed (Fig. 4)."""
+    """Draw the circles at the actual gap and at the needed gap (Fig. 4)."""
     needed, gap = number(pair, "demand"), number(pair, "gap")
     has, needs = figure.subplots(2, 1)
     # Where the gap is unknown there is one picture only
@@ -136,7 +136,7 @@ def _draw_two_gaps(figure: SubFigure, pair: pd.Series, number_text: str) -> None
 
 
 def _draw_circles(axes: Axes, pair: pd.Series, apart: float, widest: float) -> None:
-    """Draw the largest energy circle of each building, cm, this far (m) apart, with some room."""
+    """Draw the largest energy circle of each building, cm, at centres ``apart`` (m)."""
     # Dashes for the second building, as equal circles touch all around
     for i, (centre, line) in enumerate(((0.0, "-"), (100.0 * apart, "--")), start=1):
         colour = BUILDING_COLOURS[i - 1]

@@ -1,4 +1,4 @@
-"""One page per record: raw and processed motion, amplitudes, and every number chosen for it."""
+"""Figures of records: raw and processed motion, amplitudes and processing parameters."""
 
 import textwrap
 from collections.abc import Iterable
@@ -162,7 +162,7 @@ def _draw_noise(axes: Axes, unfiltered: FloatArray, dt: float, noise: float, low
 
 
 def _write_numbers(axes: Axes, processed: Any) -> None:
-    """List the numbers and texts of the processing."""
+    """Write the parameters of the processing as a list."""
     chosen = processed.stats.per_obspy
     lines = []
     for name in LISTED:

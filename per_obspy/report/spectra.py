@@ -62,7 +62,7 @@ def _write_title(figure: Figure, station: xr.Dataset, chosen: xr.Dataset) -> Non
 
 
 def record_date(station: xr.Dataset) -> str:
-    """Return the day and time at which the record of a station starts, as far as it is known."""
+    """Return day and time of the start of a station's record, as far as known."""
     start = str(station.attrs.get("time_coverage_start", ""))[:16]
     # Clocks that were never set stand at one of these days
     unset = {f"{year:04}-{month:02}-{day:02}" for year, month, day in UNSET_DAYS}

@@ -1,4 +1,4 @@
-"""Colours of all figures, and writing them as PNG."""
+"""Colours of all figures, texts of their titles, and writing of PNG files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,7 +39,7 @@ LINE_WIDTH = 40
 
 def class_colours(classes: Sequence[str]) -> dict[str, str]:
     """
-    Return the colour of each class of severity, hexadecimal: one meaning in figures and layers.
+    Return the hexadecimal colour of each risk class, the same in figures and layers.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def title_name(name: str) -> str:
 
 def literal(text: str) -> str:
     r"""
-    Return a text that matplotlib draws as it is: dollar signs begin no formula.
+    Escape the dollar signs of a text, so that matplotlib draws no formula.
 
     Examples
     --------

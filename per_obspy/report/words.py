@@ -1,4 +1,4 @@
-"""Numbers in words: of one pair, for the console, the summary and figures."""
+"""Descriptions of one pair and of numbers in words, for console, summary and figures."""
 
 import math
 from collections.abc import Mapping
@@ -64,7 +64,7 @@ def speed_text(metres_per_second: float) -> str:
 
 def chance_text(probability: float) -> str:
     """
-    Return a probability as a share of 100 cases; never certain where it is not.
+    Return a probability as a number of cases in 100; 0 and 100 only if exact.
 
     Examples
     --------
@@ -87,12 +87,12 @@ def pair_lines(pair: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     pair : mapping of str to object
-        A row of the table of a run, of a design spectrum or of an ensemble; what it lacks is left
-        out.
+        A row of the table of a run, of a design spectrum or of an ensemble; missing columns are
+        left out.
     """
     judged = [*_verdict(pair), *_gap_lines(pair), *_impact_lines(pair)]
     described = [*_building_lines(pair), *_motion_lines(pair)]
-    return [*judged, *described, *_prevention_lines(pair), *_doubt_lines(pair)]
+    return [*judged, *described, *_prevention_lines(pair), *_flag_lines(pair)]
 
 
 def number(pair: "Mapping[Any, Any] | pd.Series[Any]", name: str) -> float:
@@ -192,8 +192,8 @@ def _prevention_lines(pair: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _doubt_lines(pair: Mapping[str, Any]) -> list[str]:
-    """Explain every flag, and name what was derived."""
+def _flag_lines(pair: Mapping[str, Any]) -> list[str]:
+    """Explain every flag, and name the derived inputs."""
     lines = [
         f"Flag {name_text(flag)}: {FLAGS.get(flag, 'see the table of columns')}."
         for flag in _text(pair, "flags").split()

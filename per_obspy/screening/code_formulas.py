@@ -1,5 +1,5 @@
 """
-Formula of each code or screening rule; ``tests/screening/test_codes.py`` covers them.
+Formulas of code and screening rules.
 
 Each function takes the quantities of every pair and returns the rule's gap (m), factor or flags,
 (n_pairs,). ``code_rules.csv`` lists their clauses and sources. Where an input that has a larger and
@@ -171,7 +171,7 @@ def nch433(pair: RuleInputs) -> FloatArray:
 
 
 def started_steps(height: FloatArray, step: float) -> FloatArray:
-    """Return the number of steps that a further height has started; rounding starts none."""
+    """Return the number of started steps of an additional height; round-off starts none."""
     steps: FloatArray = np.maximum(np.ceil(height / step - 1e-9), 0.0)
     return steps
 

@@ -152,14 +152,14 @@ def _rule_inputs(
 
 
 def _is(pairs: pd.DataFrame, name: str, text: str) -> NDArray[np.bool_]:
-    """Return which pairs have this text in a column; none without the column."""
+    """Return a mask of pairs with a given text in a column; all false without the column."""
     if name not in pairs:
         return np.zeros(len(pairs), dtype=bool)
     return (pairs[name] == text).to_numpy(bool)
 
 
 def _system_factor(pairs: pd.DataFrame) -> FloatArray:
-    """Return the factor of GB 50011 of the system that requires more, NaN if one has none."""
+    """Return the larger factor of GB 50011 of both systems, NaN if a system has none."""
     factors = (
         np.asarray(pairs[f"system_{i}"].map(formulas.GB_FACTOR), dtype=np.float64) for i in (1, 2)
     )
@@ -167,7 +167,7 @@ def _system_factor(pairs: pd.DataFrame) -> FloatArray:
 
 
 def _same_structure(pairs: pd.DataFrame) -> NDArray[np.bool_]:
-    """Return which pairs have buildings of the same height and the same system, not derived."""
+    """Return a mask of pairs whose buildings have equal given heights and systems."""
     height_1, height_2 = both(pairs, "height")
     derived = pairs["derived"].str.contains(r"\bsystem_[12]\b", regex=True).to_numpy(bool)
     same_system = pairs["system_1"].to_numpy(object) == pairs["system_2"].to_numpy(object)
@@ -176,7 +176,7 @@ def _same_structure(pairs: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def _by_zone(pairs: pd.DataFrame, codes: Codes, shares: dict[str, float]) -> FloatArray:
-    """Return the share of the height in the pair's zone of Mexico City, NaN if unknown."""
+    """Return the fraction of the height for the pair's zone of Mexico City, NaN if unknown."""
     zone = pd.Series(codes.ntc_zone, index=pairs.index, dtype=object)
     # A valid zone of the pair itself goes before that of the region
     if "ntc_zone" in pairs:

@@ -310,14 +310,14 @@ FLAGS: dict[str, str] = {
         "no station of the pair's site class is in reach: the nearest of another serves"
     ),
     "motion_from_other_site_class": (
-        "no station on the site's class told its motion: those of other classes served"
+        "no station of the site's class contributes to the motion at the site: others do"
     ),
     "shakemap_demand": (
         "no station in reach: demand from the SD of a ShakeMap, "
         "without PER, record and exact history"
     ),
     "shakemap_assumed_deviation": (
-        "the ShakeMap tells no deviation: the configured one is assumed"
+        "the ShakeMap contains no deviation: the configured one is assumed"
     ),
     "baseline_shift": (
         "the baseline of the station's record shifted during the shaking: long periods are "
@@ -350,7 +350,7 @@ def _known() -> dict[str, Column]:
 
 
 def known_column(name: str) -> Column | None:
-    """Return unit and meaning of a column of the risk table; None if it is carried through."""
+    """Return unit and meaning of a column of the risk table; None for columns of the user."""
     return _known().get(name)
 
 

@@ -1,4 +1,4 @@
-"""Flags of a row: warnings that its reader must know."""
+"""Flags of the rows of the risk table: warnings and assumptions."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ UNRELIABLE_SINGLE_HIT = 0.6
 
 
 def period_is_derived(pairs: Table) -> NDArray[np.bool_]:
-    """Return which pairs have a period that was derived from height or storeys."""
+    """Return a mask of pairs with a period derived from height or storeys."""
     derived = np.asarray(pairs["derived"], dtype=object).tolist()
     # Many rows share few different texts: each text is searched once
     has_period = {text: "period_1" in text or "period_2" in text for text in set(derived)}
@@ -31,7 +31,7 @@ def joined_flags(raised: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.object_]
 
 
 def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
-    """Return the rows that raise each flag which needs no record."""
+    """Return a mask of rows per flag that needs no record."""
     gap = values(table, "gap")
     # Tables that are computed for a screening have a gap in every row, and a mark
     unknown = table["unknown_gap"] if "unknown_gap" in table else np.isnan(gap)
@@ -49,7 +49,7 @@ def raised_by_pairs(table: Table) -> dict[str, NDArray[np.bool_]]:
 def raised_by_record(
     table: Table, station: xr.Dataset, screening: Screening
 ) -> dict[str, NDArray[np.bool_]]:
-    """Return the rows that raise each flag of the record."""
+    """Return a mask of rows per flag of the record."""
     every = np.ones(len(table["distance"]), dtype=bool)
     # Only tables with motion between stations have this column
     name = "motion_from_other_site_class"
@@ -79,7 +79,7 @@ def record_flags(station: xr.Dataset) -> list[str]:
 
 
 def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.bool_]:
-    """Return which pairs have a building whose period the station's record does not support."""
+    """Return a mask of pairs with a period outside the usable periods of the record."""
     periods = np.stack(both(table, "period"))
     shortest = number(station, "shortest_usable_period")
     longest = number(station, "longest_usable_period")
@@ -87,6 +87,6 @@ def _outside_usable_periods(table: Table, station: xr.Dataset) -> NDArray[np.boo
 
 
 def _per_far_above_sd(table: Table, limit: float) -> NDArray[np.bool_]:
-    """Return which pairs have a building with PER / SD above a limit."""
+    """Return a mask of pairs in which a building has PER / SD above a limit."""
     per, sd = np.stack(both(table, "per")), np.stack(both(table, "sd"))
     return np.asarray((per > limit * sd).any(axis=0))

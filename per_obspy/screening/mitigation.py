@@ -1,5 +1,5 @@
 """
-Measures that would have kept a pair from pounding or from harm: gap, damping, or softer contact.
+Measures that would have prevented pounding or its harm: gap, damping, softer contact.
 
 Where the exact demand decides, exact displacements with the added damping do so too. Elsewhere
 added damping is an estimate: the critical gap, eq. (15) and (16), follows it on the station's
@@ -84,7 +84,7 @@ def mitigation_columns(
 
 
 def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
-    """Return the least damping to add to both buildings, as estimated; NaN if none is enough."""
+    """Return the estimated least added damping of both buildings; NaN if none is enough."""
     period_1, period_2 = governing(table, "period")
     damping_1, damping_2 = governing(table, "damping")
     radius_1, radius_2 = governing_radii(table)
@@ -112,7 +112,7 @@ def _supplemental_damping(station: StationMotion, table: Table) -> FloatArray:
 
 
 def _estimated_gap(table: Table) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Return which pairs count as uncorrelated, and the critical gap of eq. (15) or by SRSS, m."""
+    """Return a mask of uncorrelated pairs, and the critical gap by eq. (15) or SRSS, m."""
     period_1, period_2 = governing(table, "period")
     damping_1, damping_2 = governing(table, "damping")
     radii = governing_radii(table)

@@ -1,4 +1,4 @@
-"""Order of pairs by expected severity, the worst first, and names of states and risk classes."""
+"""Order of pairs by expected severity, worst first; names of states and risk classes."""
 
 import numpy as np
 import pandas as pd
@@ -71,7 +71,7 @@ def risk_class(velocity: FloatArray, classes: dict[str, float]) -> NDArray[np.ob
 
 
 def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> NDArray[np.object_]:
-    """Return the name of the first threshold, descending to 0, that is not above each number."""
+    """Return the name of the largest threshold that each number reaches."""
     names = np.array(list(thresholds), dtype=object)
     falling = np.array(list(thresholds.values()))
     index = np.searchsorted(-falling, -numbers, side="left")
@@ -81,7 +81,7 @@ def _first_reached(numbers: FloatArray, thresholds: dict[str, float]) -> NDArray
 
 def in_order(table: pd.DataFrame) -> pd.DataFrame:
     """
-    Sort pairs, the worst first, and add the columns ``KEYS`` by which they are sorted.
+    Sort pairs, worst first, and add the sort columns ``KEYS``.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _ties_by_name(
 
 
 def _demand_of_unknown(table: pd.DataFrame) -> FloatArray:
-    """Return the negated demand of pairs without a probability, 0 of the others."""
+    """Return the negative demand of pairs without a probability, 0 for other pairs."""
     unknown = table.reindex(columns=["probability"]).isna().to_numpy(bool)[:, 0]
     return np.where(unknown, -_largest(table, "demand"), 0.0)
 

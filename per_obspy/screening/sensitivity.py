@@ -136,7 +136,7 @@ def _outcome(
 
 
 def _as_given(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows as a pair table: what the completion derives with a deviation is empty."""
+    """Return the rows as a pair table; derived values with a deviation are empty."""
     derived = rows["derived"].str.split()
     columns: dict[str, pd.Series] = {}
     # An empty period keeps its deviation; masses and heights have none of their own

@@ -35,12 +35,12 @@ Columns = dict[str, NDArray[Any]]
 
 
 def chosen(table: Table, rows: NDArray[Any]) -> Columns:
-    """Return the rows of a table with these numbers, or of this mask."""
+    """Return the rows of a table by index or mask."""
     return {name: np.asarray(table[name])[rows] for name in table}
 
 
 def joined(parts: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Join parts, each with its row numbers, in the order of these; all have the same columns."""
+    """Join parts with equal columns in the order of their row numbers."""
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
     columns = {}
     for name in parts[0][1]:
@@ -55,7 +55,7 @@ def values(table: Table, name: str) -> FloatArray:
 
 
 def both(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return a column of building 1 and that of building 2."""
+    """Return the columns of a property for buildings 1 and 2."""
     return values(table, f"{name}_1"), values(table, f"{name}_2")
 
 

@@ -1,5 +1,5 @@
 """
-Compilation of kernels ahead of use: all of them in parts, or those of screening during a run.
+Compilation of kernels ahead of use: of all in parts, or of screening during a run.
 
 The parts share few kernels, so that processes can compile them next to each other.
 """
@@ -52,7 +52,7 @@ BOTH = np.stack([PULSE, PULSE])
 
 
 def _histories() -> None:
-    """Compile histories of pairs, and the single history of the page."""
+    """Compile the kernels of pair histories, and of the single history of the page."""
     oscillators = [0.5], 0.05, 1.0, [0.7], 0.05, 1.0
     pounding_histories(BOTH, INTERVAL, *oscillators, 0.001, 0.65, azimuth=[0.0])
     structures = [Structure(0.5, 0.05, 1.0), Structure(0.7, 0.05, 1.0)]
@@ -60,13 +60,13 @@ def _histories() -> None:
 
 
 def _yielding() -> None:
-    """Compile relative displacements of yielding pairs."""
+    """Compile the kernels of relative displacements of yielding pairs."""
     pair = [0.5], 0.05, [0.7], 0.05, [0.0]
     yielding_relative_displacement(BOTH, INTERVAL, *pair, yield_displacement_1=0.02)
 
 
 def _rows() -> None:
-    """Compile histories of rows of buildings."""
+    """Compile the kernels of histories of rows of buildings."""
     # Three buildings in touch that yield
     ones = np.ones(3)
     row = BuildingRows(
@@ -86,7 +86,7 @@ def _rows() -> None:
 
 
 def _relative() -> None:
-    """Compile relative displacements, correlations and maxima of pairs along azimuths."""
+    """Compile the kernels of relative displacements, correlations and maxima along azimuths."""
     pair = [0.5], [0.05], [0.7], [0.05], [0.0]
     directional_relative_displacement(PULSE, PULSE, INTERVAL, *pair)
     worst_azimuth(PULSE, PULSE, INTERVAL, *pair[:4], [1.0], [1.0])
@@ -94,7 +94,7 @@ def _relative() -> None:
 
 
 def _spectra() -> None:
-    """Compile spectra of a station, by component and by azimuth."""
+    """Compile the kernels of station spectra, by component and by azimuth."""
     response_spectra(PULSE, INTERVAL, [0.5], [0.05])
     azimuthal_per_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])
     azimuthal_sd_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])

@@ -1,1 +1,1 @@
-"""Read and write result tables: risk, totals, ensemble and their parts."""
+"""Result tables on disk: risk, stations, buildings, totals, ensemble and their parts."""

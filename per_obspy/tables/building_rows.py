@@ -1,4 +1,4 @@
-"""Rows of buildings as a table, one row per interface, from the parts that the jobs leave."""
+"""Rows of buildings as a table, one row per interface, joined from the parts of the jobs."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence

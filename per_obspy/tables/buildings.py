@@ -120,7 +120,7 @@ def write_buildings(
 def _pieces(
     database: duckdb.DuckDBPyConnection, folder: Path, risk: Dataset, totals: Totals
 ) -> Iterator[pd.DataFrame]:
-    """Yield the sides of buildings, all of a building in one piece."""
+    """Yield the sides of buildings in pieces; all sides of a building are in one piece."""
     database.register("interfaces", parquet_rows([folder / "rows.parquet"]))
     query = _sides_query(database, risk, totals)
     waiting: list[pd.DataFrame] = []

@@ -1,4 +1,4 @@
-"""Tables of one schema: types of their columns, and the file that explains them."""
+"""Tables of one schema: types of the columns, and the file of their meanings."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -27,7 +27,7 @@ def table_of(values: Mapping[str, Any] | pd.DataFrame, columns: Sequence[Column]
 
 
 def _array(values: Any, dtype: str) -> pa.Array:
-    """Return values in the type of their column."""
+    """Convert values to the type of their column."""
     if dtype != "int64":
         return pa.array(values, type=_TYPES[dtype], from_pandas=True)
     numbers = np.asarray(values)
@@ -37,7 +37,7 @@ def _array(values: Any, dtype: str) -> pa.Array:
 
 def regrouped(tables: Iterable[pa.Table], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
     """
-    Yield rows so many at a time, however many the given tables hold.
+    Yield the rows of tables in groups of a constant number.
 
     A Parquet file that is written piece by piece depends on the size of the pieces.
     """

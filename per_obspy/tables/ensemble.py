@@ -1,4 +1,4 @@
-"""Files of several scenarios together: risk tables joined pair by pair, on disk."""
+"""Files of an ensemble: risk tables of all scenarios, joined pair by pair on disk."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -103,7 +103,7 @@ def write_ensemble(
 
 
 def _join(scenarios: Scenarios, path: Path) -> None:
-    """Write one row for each name of a pair, as ``ensemble_rows`` of the screening takes them."""
+    """Write one row per pair name, in the form for ``screening.region.ensemble_rows``."""
     tables = list(scenarios.tables.values())
     with bounded_database(path.parent) as database:
         for number, table in enumerate(tables):
@@ -113,7 +113,7 @@ def _join(scenarios: Scenarios, path: Path) -> None:
 
 
 def _join_query(tables: list[Path | None]) -> str:
-    """Return the query that joins risk tables by pair, which are ``table0`` and so on."""
+    """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
     zeros = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))
     rows = [f"SELECT -1 AS scenario, '' AS pair_id, {zeros} WHERE false"]
@@ -152,7 +152,7 @@ def _pieces(scenarios: Scenarios, joined: Path) -> Iterator[pd.DataFrame]:
 
 
 def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
-    """Write the rows of the ensemble, not in order yet."""
+    """Write the rows of the ensemble, not ranked yet."""
     described = ensemble_columns(scenarios.weights, scenarios.yearly)
     # The rank is known when the rows are in order
     fields = [(name, _TYPES[column.dtype]) for name, column in described.items() if name != "rank"]
@@ -164,6 +164,6 @@ def _write_rows(scenarios: Scenarios, joined: Path, path: Path) -> None:
 
 
 def _rejections(scenarios: Scenarios, joined: Path) -> Iterator[Rejection]:
-    """Yield the pairs that not every scenario has, or that differ between them."""
+    """Yield the pairs that a scenario lacks or that differ between scenarios."""
     for piece in _pieces(scenarios, joined):
         yield from ensemble_rejections(piece, scenarios.weights)

@@ -42,7 +42,7 @@ _ORDER = f"SELECT {_PART} FROM parts ORDER BY {', '.join(KEYS)}, pair_id"
 
 
 def some_columns(table: Dataset, names: Sequence[str]) -> Dataset:
-    """Return some columns of Parquet files for a database, to which others may have equal names."""
+    """Return some columns of Parquet files, so that equal names of other columns do not matter."""
     return table.replace_schema(pa.schema([table.schema.field(name) for name in names]))
 
 
@@ -117,12 +117,12 @@ def write_part(rows: pd.DataFrame, number: int, path: Path) -> None:
 
 
 def text_columns(schema: pa.Schema) -> list[str]:
-    """Return the columns that gain from a dictionary: text, as numbers hardly repeat."""
+    """Return the columns of text, which a dictionary makes smaller."""
     return [field.name for field in schema if pa.types.is_string(field.type)]
 
 
 def joined_schema(parts: Sequence[Path]) -> pa.Schema:
-    """Return every column of the parts but those of the order; differing types are joined."""
+    """Return the schema of all parts without the columns of the order; types are reconciled."""
     types: dict[str, set[pa.DataType]] = {}
     for part in parts:
         for field in pq.read_schema(part.absolute()):
@@ -198,7 +198,7 @@ def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
 
 
 class _Rows:
-    """The rows of a part from its first to its last; the file is closed in between."""
+    """Rows of one part in order; the file is closed between reads."""
 
     def __init__(self, part: Path, schema: pa.Schema) -> None:
         self._left = schema.empty_table()
@@ -240,7 +240,7 @@ def _number(part: Path) -> int:
 
 
 def _common(types: set[pa.DataType]) -> pa.DataType:
-    """Return a type that holds values of all these: their own, a number, or text."""
+    """Return a common type of columns: equal types as they are, else a number, else text."""
     if len(types) == 1:
         return next(iter(types))
     numbers = all(pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in types)

@@ -48,7 +48,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     ),
     "certain_period": (
         "s",
-        "natural period beyond which PER depends on when the baseline shifted; empty: no doubt",
+        "natural period beyond which PER depends on when the baseline shifted; empty: no limit",
     ),
     "highpass": ("Hz", "high-pass corner, where the amplitude is 1/sqrt(2)"),
     "highpass_source": (

@@ -1,4 +1,4 @@
-"""Risk table on disk: parts of an inventory joined, worst first, never in memory as a whole."""
+"""Risk table on disk: parts of an inventory joined, worst first, in bounded memory."""
 
 import json
 import shutil
@@ -47,7 +47,7 @@ class RiskFiles(NamedTuple):
 
 class RankedTable(NamedTuple):
     """
-    A risk table that is open for one pass, worst pair first.
+    Risk table open for one pass, worst pair first.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class RankedTable(NamedTuple):
             yield batch.to_pandas()
 
     def first(self, count: int, columns: Sequence[str]) -> pd.DataFrame:
-        """Return the first rows with those of the columns that the table has."""
+        """Return the first rows with the named columns that the table has."""
         known = set(self.file.schema_arrow.names)
         names = [name for name in dict.fromkeys(columns) if name in known]
         empty = self.file.schema_arrow.empty_table().select(names)
@@ -159,7 +159,7 @@ def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> 
 
 
 def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path) -> None:
-    """Append rows, rounded already, to a CSV file that has a header."""
+    """Append rounded rows to a CSV file with a header."""
     # Names of columns may differ in case only, or be anything: the database numbers them
     numbered = arrow_cells(rows).rename_columns([f"c{i}" for i in range(rows.num_columns)])
     # It writes a separate file, which is appended to the others

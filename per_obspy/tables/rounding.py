@@ -1,5 +1,5 @@
 """
-Numbers in texts for people, rounded to what they mean.
+Rounding of numbers in texts to their significant digits.
 
 CSV files and workbooks have numbers of five significant digits, and coordinates of seven decimals
 (a centimetre). Parquet files keep all digits. Columns that the pair table brings along stay as
@@ -31,7 +31,7 @@ def rounded(values: FloatArray, digits: int = DIGITS) -> FloatArray:
     Parameters
     ----------
     values : (n,) ndarray
-        Numbers; what is not finite stays.
+        Numbers; NaN and infinity stay.
     digits : int
         At least 1.
 
@@ -104,7 +104,7 @@ def rounded_arrow(table: pa.Table, own: Collection[str] = ()) -> pa.Table:
 
 
 def _is_own(name: str, own: Collection[str]) -> bool:
-    """Return whether a column is of the package."""
+    """Return whether a column is defined by the package."""
     return name in own or known_column(name) is not None
 
 

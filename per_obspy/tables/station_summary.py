@@ -84,7 +84,7 @@ ONE_HORIZONTAL = "one_horizontal"
 
 class StationSummary(NamedTuple):
     """
-    Files of the station table, and the stations of each warning.
+    Paths of the station table, and names of the stations by warning.
 
     Attributes
     ----------

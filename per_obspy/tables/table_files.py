@@ -18,7 +18,7 @@ _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
 
 
 def as_arrow(table: pd.DataFrame) -> pa.Table:
-    """Return a table whose columns have the types of the schema, whichever rows it holds."""
+    """Convert a table to the column types of the schema, whatever rows it contains."""
     arrow = pa.Table.from_pandas(_plain(table), preserve_index=False)
     fields = [pa.field(field.name, _type(field)) for field in arrow.schema]
     return arrow.cast(pa.schema(fields))
@@ -32,7 +32,7 @@ def _plain(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _type(field: pa.Field) -> pa.DataType:
-    """Return the type of a known column; of another its own, or text if it is empty."""
+    """Return the type of a known column; others keep theirs, empty ones become text."""
     column = known_column(field.name)
     if column is not None:
         return _TYPES.get(column.dtype, field.type)
@@ -41,7 +41,7 @@ def _type(field: pa.Field) -> pa.DataType:
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write a table as CSV; no text of it is a formula to a spreadsheet."""
+    """Write a table as CSV, with texts escaped that a spreadsheet takes for formulas."""
     with written_whole(path) as part:
         cells(table).to_csv(part, index=False)
 
@@ -65,7 +65,7 @@ def write_described(columns: Iterable[Column], path: Path) -> None:
 
 def write_rejected(rejected: Iterable[Rejection], path: Path) -> Counter[str]:
     """
-    Write rejections, one row per rejected thing, its reasons separated by semicolons.
+    Write one row per rejection, its reasons separated by semicolons.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def worse(old: list[Figure], new: list[Figure]) -> tuple[list[str], int]:
 
 
 def main(old: Path, new: Path) -> int:
-    """Print what became worse, and return the exit code."""
+    """Print the worse figures, and return the exit code."""
     before, after = read(old), read(new)
     machines = {one["machine"] for one in before + after}
     if len(machines) > 1:

@@ -41,7 +41,7 @@ def note(
     Parameters
     ----------
     name : str
-        What was measured; unique within the script.
+        Measured quantity; unique within the script.
     value : float
         Processor time, a rate, or memory.
     unit : str

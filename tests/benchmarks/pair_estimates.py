@@ -121,7 +121,7 @@ def main() -> None:
 
 
 def of_a_record(motion: np.ndarray) -> None:
-    """Print what a pair costs that is run through the record."""
+    """Print the cost of a pair that is run through the record."""
     rng = np.random.default_rng(2)
     structures = rng.uniform([0.2, 0.02, 0.2, 0.02, 0.0], [3.0, 0.1, 3.0, 0.1, 360.0], (2000, 5)).T
     alike = structures.copy()

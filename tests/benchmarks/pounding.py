@@ -2,7 +2,7 @@
 Pairs per second of ``pounding_histories`` on one core, next to OpenSeesPy on the same pairs.
 
 Run as ``python tests/benchmarks/pounding.py``. OpenSees integrates with the record's own step,
-contact by a stiff no-tension gap; its cost is what is compared, not its accuracy. On a busy machine
+contact by a stiff no-tension gap; its cost is compared, not its accuracy. On a busy machine
 compare the ratios and the yardstick.
 """
 

@@ -1,5 +1,5 @@
 """
-Rows of five buildings a second of ``row_maxima`` on one core, and what they are compared with.
+Rows of five buildings per second of ``row_maxima`` on one core, against other programs.
 
 Run as ``python tests/benchmarks/rows.py``. The yardsticks are taken in turn with it in the same
 process: oscillator-steps a second of ``per_spectrum``, and `pounding_history` of the same rows one

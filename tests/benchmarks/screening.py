@@ -6,7 +6,7 @@ Linux. The pairs stand around the 24 simulated stations of the demonstration, wh
 first. Each inventory is screened with estimates only, and up to a million pairs with the exact
 demand and history of each. Seconds are by the clock, of screening with ranking, of the report, and
 of the whole command from its start; processor time is that of all processes; memory is the largest
-sum over all processes (proportional set size: what they share counts once).
+sum over all processes (proportional set size: shared memory counts once).
 """
 
 import json

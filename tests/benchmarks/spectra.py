@@ -57,7 +57,7 @@ def ground_motion(samples: int, seed: int = 0) -> np.ndarray:
 
 @kernel
 def multiply_add(rounds):
-    """Run chains of multiply-adds that stay in registers: what the machine can do at most."""
+    """Run chains of multiply-adds that stay in registers: the peak rate of the machine."""
     values = np.ones(PEAK_LANES)
     for _ in range(rounds):
         for lane in range(PEAK_LANES):

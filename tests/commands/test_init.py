@@ -1,4 +1,4 @@
-"""``per-obspy init``: a configuration with what was found, which runs."""
+"""``per-obspy init``: a configuration for the inputs found, which runs."""
 
 import json
 import tomllib

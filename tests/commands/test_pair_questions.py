@@ -1,4 +1,4 @@
-"""Questions of ``pairs check`` in a terminal, and what it writes with and without one."""
+"""Questions of ``pairs check`` in a terminal, and its output with and without one."""
 
 import pytest
 from messy_tables import NAMES, ROWS, readable, text_of

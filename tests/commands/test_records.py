@@ -169,7 +169,7 @@ def test_fetch_says_what_had_no_data_and_asks_again_when_told(server, configurat
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('providers = ["{url}"]', 'providers = ["NOWHERE"]', "NOWHERE: is no base URL"),
+        ('providers = ["{url}"]', 'providers = ["NOWHERE"]', "NOWHERE: is neither a base URL"),
         ('providers = ["{url}"]', "providers = []", "records.fdsn.providers"),
         ('event_id = "xx1"', 'event_id = "yy9"', "has no event yy9"),
         ('event_id = "xx1"', "", "fdsn needs event_id, or event, or latitude"),

@@ -1,4 +1,4 @@
-"""Arguments of ``per-obspy run``, and what it prints of earthquakes and simulated motion."""
+"""Arguments of ``per-obspy run``, and its lines on earthquakes and simulated motion."""
 
 import json
 

@@ -73,8 +73,11 @@ def test_results_go_where_they_are_asked_for(screened, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('name = "x"\noutput = "out"\n', "nothing to screen by: give records or simulation"),
-        ("[scenario]\nmagnitude = 7.0\n", "nothing to screen by"),  # what `simulate` takes
+        (
+            'name = "x"\noutput = "out"\n',
+            "no ground motion to screen by: give records or simulation",
+        ),
+        ("[scenario]\nmagnitude = 7.0\n", "no ground motion to screen by"),  # what `simulate` takes
         ("spectrum = ", "cannot be read as TOML"),
         ('spectrum = "code.csv"\npairs = "pairs.csv"\n', "output: Field required"),
         (

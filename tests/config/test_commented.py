@@ -72,7 +72,7 @@ def test_defaults_in_comments_are_the_defaults():
         lines += [] if is_open else [line.removeprefix("#")]
     # Optional sections are left out, and one way of counting totals is enough
     blocks = re.split(r"\n(?=\[)", "\n".join(lines))
-    optional = r"\[+(records\.(columns|fdsn|sds|asdf)|pairs\.(footprints|simulated))\b"
+    optional = r"\[+(records\.(columns|fdsn|sds|asdf)|pairs\.(footprints|simulated)|watch)\b"
     kept = "\n".join(block for block in blocks if not re.match(optional, block))
     again = checked(Run, tomllib.loads(kept), folder=FOLDER)
     assert again == settings

@@ -51,7 +51,7 @@ def _first_pages(folder):
 
 
 def _run_page(page: list[Block], folder: Path) -> None:
-    """Do what a reader of the page does: save files, run commands and programs."""
+    """Follow a page as a reader does: save files, run commands and programs."""
     with contextlib.chdir(folder):
         for block in page:
             if block.kind == "file":
@@ -104,7 +104,7 @@ def test_every_key_of_a_toml_block_exists(block):
 
 
 def _faults(model, content):
-    """Return what a model refuses of a part of a configuration, but for keys that are missing."""
+    """Return the faults of a part of a configuration, except missing keys."""
     try:
         model.model_validate(content)
     except ValidationError as error:

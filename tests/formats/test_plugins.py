@@ -211,7 +211,7 @@ def test_overlong_lines_are_refused(sample: Sample):
 
 
 def refuses_or_reads(name: str, content: bytes) -> None:
-    """Anything may be refused, but only as a RecordRejected; what is read is finite."""
+    """Any bytes may be refused, but only as a RecordRejected; records read are finite."""
     assert PLUGINS[name]["isFormat"](io.BytesIO(content)) in (True, False)
     try:
         stream = PLUGINS[name]["readFormat"](io.BytesIO(content))

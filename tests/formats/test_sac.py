@@ -1,4 +1,4 @@
-"""Checks of SAC headers: what ObsPy would compute with is a coordinate."""
+"""Checks of SAC headers: coordinates that ObsPy would compute with."""
 
 import io
 import struct

@@ -1,4 +1,4 @@
-"""Every way by which a file from outside enters: a sample of the file and what reads it."""
+"""Every entry of files from outside: a sample of the file and its reader."""
 
 import io
 import json
@@ -179,7 +179,7 @@ def _archives() -> dict[str, Entry]:
 
 
 def _metadata() -> dict[str, Entry]:
-    """Return what describes stations, earthquakes and regions."""
+    """Return the entries for stations, earthquakes and regions."""
     return {
         "stationxml": Entry("station.xml", _station_xml, _records_beside),
         "stations": Entry("stations.csv", lambda: STATIONS, _text_beside),
@@ -432,7 +432,7 @@ def _records(path: Path) -> Iterable[object]:
 
 
 def _direct(name: str, path: Path) -> Iterable[object]:
-    """Read the bytes of a format; what its numbers mean is unknown without a StationXML."""
+    """Read the bytes of a format, whose units are unknown without a StationXML."""
     stream = read_bytes_with_obspy(obspy.read, path.read_bytes(), str(path), format=name)
     return [len(trace.data) for trace in stream]
 

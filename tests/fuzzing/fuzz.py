@@ -73,14 +73,14 @@ def problem_of(entry: Entry, content: bytes) -> str | None:
 
 
 def _wrong_message(message: str) -> str:
-    """Return what is wrong with the message of a refusal, or ``refused``."""
+    """Return the fault in the message of a refusal, or ``refused``."""
     if len(message) > LONGEST_MESSAGE:
         return "a message of too many characters"
     return "refused" if message.isprintable() else "a message with control characters"
 
 
 def _wrong_numbers(numbers: list[object]) -> str | None:
-    """Return what is wrong with numbers that were read, or None; no number counts as refused."""
+    """Return the fault in numbers that were read, or None; no number counts as refused."""
     if not numbers:
         return "refused"
     finite = all(np.isfinite(np.asarray(number, dtype=np.float64)).all() for number in numbers)
@@ -122,13 +122,13 @@ def fuzz(name: str, copies: Copies, folder: Path) -> None:
 
 
 def new_copies(name: str, count: int, seed: int) -> Copies:
-    """Return what makes damaged copies: the same ones whichever kinds are read before."""
+    """Return the generator of damaged copies, independent of the kinds read before."""
     chance = random.Random(f"{name} {seed}")
     return lambda sample: (damaged(sample, chance) for _ in range(count))
 
 
 def kept_copies(name: str) -> Copies:
-    """Return what reads the copies that were at fault once."""
+    """Return the readers of copies that caused faults before."""
     return lambda _: [path.read_bytes() for path in sorted((FINDINGS / name).iterdir())]
 
 

@@ -76,7 +76,7 @@ def _damaged_once(content: bytes, chance: random.Random) -> bytes:
 
 
 def _piece(kind: int, old: bytes, chance: random.Random) -> bytes:
-    """Return what replaces a piece: a word, noise, flipped bits, itself twice, or a long word."""
+    """Return the replacement of a piece: a word, noise, flipped bits, a double, or a long word."""
     if kind == 1:
         return chance.choice(WORDS)
     if kind == 2:

@@ -1,4 +1,4 @@
-"""Chunks of rows as jobs: their key, what is resumed, and rows without a record."""
+"""Chunks of rows as jobs: keys, resumed parts, and rows without a record."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from per_obspy.screening.building_rows.row_columns import ROWS
 
 
 def contacts(**changes):
-    """Return a row of three buildings and a row of two, with what its interfaces need."""
+    """Return a row of three buildings and a row of two, with the columns of their interfaces."""
     table = {column.name: np.zeros(3) for column in ROWS if column.dtype != "str"}
     texts = {column.name: np.array(["a", "b", "c"]) for column in ROWS if column.dtype == "str"}
     table |= texts | {"row_id": np.array(["R-a", "R-a", "R-c"]), "row": np.array([4, 4, 5])}

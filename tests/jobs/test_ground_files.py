@@ -1,4 +1,4 @@
-"""Ground motion as files: stations without coordinates, keys, and shards that are read once."""
+"""Ground motion as files: stations without coordinates, keys, station files read once."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def stream(longitude, seed):
 
 @pytest.fixture
 def stations(tmp_path):
-    """Three finished stations with their shards; the place of the last is unknown."""
+    """Three finished stations with their station files; the place of the last is unknown."""
     finished = []
     for seed, longitude in enumerate((0.1, 0.2, np.nan), start=1):
         dataset = station_spectra(stream(longitude, seed), PERIODS, (0.05,), 30)
@@ -60,7 +60,7 @@ def test_stations_without_coordinates_serve_no_pair(stations):
 
 
 def test_the_field_is_that_of_the_whole_shards(stations):
-    # would catch spectra that lack what the field needs, now that no shard is read for it
+    # would catch spectra that lack what the field needs, now that no station file is read for it
     ground, _ = ground_files(stations, (), Interpolation())
     whole = [read_spectra(station.shard) for station in stations[:2]]
     expected = prepared_field(whole, Interpolation(), ground.field.source)

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from math import isqrt
 from pathlib import Path
 
@@ -136,3 +136,22 @@ def test_few_tasks_are_ahead_of_their_results():
 
 def test_nothing_to_do_is_done():
     assert list(results([], Work(isqrt, failed), 2, None)) == []
+
+
+def _overlap(task):
+    """Return how many tasks are at work at the same time as this one."""
+    _AT_WORK.append(task)
+    time.sleep(0.02)
+    count = len(_AT_WORK)
+    _AT_WORK.remove(task)
+    return count
+
+
+_AT_WORK: list[int] = []
+
+
+def test_threads_do_one_task_at_a_time():
+    # netCDF ends the process if two threads write: would catch tasks that overlap
+    with ThreadPoolExecutor(4) as threads:
+        found = list(results(range(8), Work(_overlap, failed), 4, threads))
+    assert found == [1] * 8

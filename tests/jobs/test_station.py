@@ -1,4 +1,4 @@
-"""Stations as jobs: shards and their status files, faults that cost one station only."""
+"""Stations as jobs: station files and their status files, faults that cost one station only."""
 
 import os
 import pickle
@@ -34,7 +34,7 @@ def make_jobs(records, tmp_path):
     """Return a function that makes the jobs of both stations."""
 
     def make_jobs(**changes):
-        # Records in the folder of the module, shards in that of the test
+        # Records in the folder of the module, station files in that of the test
         found = find_path_sources([records])
         common = {"processing": Processing(), "spectra": GRID} | changes
         return [
@@ -58,7 +58,7 @@ def done(jobs, workers=1):
 
 
 def test_a_finished_station_carries_its_spectra_and_the_hash_of_its_shard(make_jobs):
-    # would catch spectra that differ from those of the shard, which later stages do not read
+    # would catch spectra that differ from those of the station file, which later stages do not read
     for first, again in zip(done(make_jobs()), done(make_jobs()), strict=True):
         assert (first.resumed, again.resumed) == (False, True)
         whole = read_spectra(first.shard)
@@ -121,9 +121,9 @@ def test_an_earlier_station_is_found_by_its_status(make_jobs):
     found = earlier_station(station.shard.with_suffix(".json"))
     assert found[:2] == station[:2]
     assert found.hash == station.hash
-    # a shard that was damaged since is an error
+    # a station file that was damaged since is an error
     station.shard.write_bytes(b"half")
-    with pytest.raises(CatalogError, match="damaged: not as the run left it"):
+    with pytest.raises(CatalogError, match="damaged: changed since the run wrote it"):
         earlier_station(station.shard.with_suffix(".json"))
     station.shard.with_suffix(".json").write_text("[]")
     with pytest.raises(CatalogError, match="not the note of a station"):

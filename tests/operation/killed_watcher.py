@@ -109,7 +109,7 @@ def killed(city: Path, seconds: float, moment: float) -> bool:
 
 
 def faults_of(city: Path, expected: Path, revisions: list[str]) -> list[str]:
-    """Return what differs from the city of an undisturbed watcher."""
+    """Return the differences from the folder of an undisturbed watcher."""
     names = sorted(path.name for path in (city / LATEST).parent.glob("revisions/*"))
     faults = [] if names == revisions else [f"revisions {names}, expected {revisions}"]
     faults += [
@@ -121,7 +121,7 @@ def faults_of(city: Path, expected: Path, revisions: list[str]) -> list[str]:
 
 
 def main(folder: Path, count: int, seed: int) -> None:
-    """Kill so many watchers, and print what was wrong after the kills."""
+    """Kill a number of watchers, and print the faults after the kills."""
     for name in ("draw_overview", "draw_record_to_pair"):
         setattr(report, name, plain_figure)
     services, chance = Services(), random.Random(seed)

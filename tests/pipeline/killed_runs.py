@@ -65,7 +65,7 @@ def killed_run(configuration: Path, number: int, events: list[str]) -> None:
 
 
 def faults_after(configuration: Path, expected: dict[str, bytes]) -> list[str]:
-    """Run again after a kill, and return what is wrong with the results."""
+    """Run again after a kill, and return the faults of the results."""
     if ending_of(lambda: run(configuration, executor=InProcess())):
         return ["the next run fails"]
     folder = configuration.parent / "out"
@@ -74,13 +74,13 @@ def faults_after(configuration: Path, expected: dict[str, bytes]) -> list[str]:
 
 
 def main(folder: Path, events: list[str]) -> None:
-    """Kill runs until one completes, and print what was wrong after the kills."""
+    """Kill runs until one completes, and print the faults after the kills."""
     with plain_figures():
         kill_and_repeat(folder, events)
 
 
 def kill_and_repeat(folder: Path, events: list[str]) -> None:
-    """Do what `main` promises; figures are short files."""
+    """Kill runs as `main` describes; figures are short files."""
     # The first run also compiles, so that the other ones are quick
     (folder / "whole").mkdir()
     whole = run(write_smallest_configuration(folder / "whole"), executor=InProcess()).folder

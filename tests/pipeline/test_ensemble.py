@@ -136,7 +136,7 @@ def test_nothing_usable_in_a_scenario_exits_with_3(copied, capsys):
     text = (copied / "small.toml").read_text()
     (copied / "small.toml").write_text(text + "[screening]\nlargest_distance = 1.0\n")
     assert _call(copied) == 3
-    assert "nothing usable was left: see" in capsys.readouterr().err
+    assert "no usable record or pair: see" in capsys.readouterr().err
 
 
 WRONG = {

@@ -1,7 +1,7 @@
 """
 A disk that is full, or a file that cannot be written, ends every command alike.
 
-One line names the file, the reason and what helps; the exit code is 75; no half file stays, and
+One line names the file, the reason and the remedy; the exit code is 75; no half file stays, and
 the same command succeeds when there is room.
 """
 
@@ -90,13 +90,13 @@ def check_ending(called, folder):
     assert not [path for path in folder.rglob("*") if is_part(path)]
 
 
-#: Largest file (bytes): the first write, the simulated records, the shard, and tables fail.
+#: Largest file (bytes): the first write, the simulated records, the station file, and tables fail.
 SIZES = (0, 500, 8_000, 20_000, 40_000)
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_a_run_without_room_goes_on_when_there_is_room(call, whole, tmp_path, size):
-    # would catch a table of some stations, a traceback, or "Nothing to do" afterwards
+    # would catch a table of some stations, a traceback, or "Up to date" afterwards
     configuration = write_smallest_configuration(tmp_path, RUN)
     with no_room(size):
         ending = call("run", configuration)

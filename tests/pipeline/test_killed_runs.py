@@ -15,5 +15,5 @@ def test_a_run_killed_at_any_write_is_completed_by_the_next_one(tmp_path):
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["faults"] == {}
-    # Records, shard, pairs, part, tables, figures, and a status after each stage
+    # Records, station file, pairs, part, tables, figures, and a status after each stage
     assert found["kills"] > 10

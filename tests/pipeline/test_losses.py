@@ -1,4 +1,4 @@
-"""Rows that a run lost are counted against the run before it and against a limit."""
+"""Losses of rows are counted against the run before and against a limit."""
 
 import json
 

@@ -46,7 +46,7 @@ def no_memory(*_, **__):
     raise MemoryError("an array")
 
 
-#: What fails, and how: at a record, a shard, a chunk, and when a chunk reads a shard.
+#: What fails, and how: at a record, a station file, a chunk, and when a chunk reads a station file.
 FAULTS = {
     "record not opened": (archive_files, "_archive_of", system_error(errno.EMFILE)),
     "shard not read back": (station, "_read_shard", system_error(errno.EIO)),
@@ -58,7 +58,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_passing_fault_leaves_a_run_unfinished(call, whole, tmp_path, monkeypatch, name):
-    # would catch "complete" without these pairs, and "Nothing to do" afterwards
+    # would catch "complete" without these pairs, and "Up to date" afterwards
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     for made in ("stations", "chunks"):
         shutil.rmtree(tmp_path / "out" / made)
@@ -75,7 +75,7 @@ def test_a_passing_fault_leaves_a_run_unfinished(call, whole, tmp_path, monkeypa
     monkeypatch.undo()
     code, output, errors = call("run", tmp_path / "run.toml")
     assert code == 0, errors
-    assert "Nothing to do" not in output
+    assert "Up to date" not in output
     for file in COMPARED:
         assert (tmp_path / "out" / file).read_bytes() == (whole / "out" / file).read_bytes()
 

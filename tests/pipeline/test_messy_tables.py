@@ -1,8 +1,8 @@
 """
 Messy tables through ``pairs check`` and ``run``: read, refused or suspected as in the page.
 
-The table of ``docs/messy_tables.md`` is compared with what both commands print; where it differs,
-the new one is in ``messy_tables.md`` of the test's folder.
+The table of ``docs/messy_tables.md`` is compared with the output of both commands; if it
+differs, the new one is in ``messy_tables.md`` of the test's folder.
 """
 
 import io

@@ -1,5 +1,5 @@
 """
-A file is opened at most twice on its way through a run: to hash it, and to use what it holds.
+A file is opened at most twice on its way through a run: for its hash, and for its content.
 
 Counted by the kernel, so that no library escapes: per_obspy.pipeline.run and everything below.
 """
@@ -91,7 +91,7 @@ def test_a_run_opens_each_record_and_shard_at_most_twice(folder, opens, layers):
     write_counted(folder, layers)
     assert run(folder / "counted.toml", executor=InProcess()).record["counts"]["pairs"]
     # records: headers and hash together, then the samples; event, metadata: once for all stations;
-    # shards: hash and spectra together, then the motion; risk table: rows of buildings (columns,
+    # station files: hash with spectra, then the motion; risk table: rows of buildings (columns,
     # how they stand, histories, buildings), the report, and its hash
     assert by_kind(opens(), folder) == {
         "records": 2,
@@ -115,7 +115,7 @@ def test_a_resumed_run_opens_no_record_for_its_samples(folder, opens):
     (folder / "counted" / "run.json").unlink()
     counts = run(folder / "counted.toml", executor=InProcess()).record["counts"]
     assert counts["stations_resumed"] == 3
-    # headers and hash together; the only chunk is resumed too, and needs no shard
+    # headers and hash together; the only chunk is resumed too, and needs no station file
     found = by_kind(opens(), folder)
     assert (found["records"], found["event"]) == (1, 1)
     assert found["shards"] == 2  # one station is drawn with its motion

@@ -53,7 +53,7 @@ def test_a_report_alone_makes_its_files_again(copied):
 
 def test_a_report_needs_a_finished_run(copied):
     (copied / "out" / "risk.parquet").write_bytes(b"nothing")
-    with pytest.raises(CatalogError, match=r"risk\.parquet: not as the run left it"):
+    with pytest.raises(CatalogError, match=r"risk\.parquet: has changed since the run wrote it"):
         report(copied / "run.toml")
     (copied / "out" / "run.json").unlink()
     with pytest.raises(CatalogError, match="no finished run here"):

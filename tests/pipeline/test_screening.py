@@ -1,4 +1,4 @@
-"""Screening in chunks: results do not depend on them, and only what has changed is done again."""
+"""Screening in chunks: results do not depend on them, and only changed ones are done again."""
 
 import re
 import shutil
@@ -72,7 +72,7 @@ def test_the_function_gives_the_table_of_the_run(finished):
     assert table.index.tolist() == ran.index.tolist()
     numbers = [name for name in ran if pd.api.types.is_numeric_dtype(ran[name])]
     assert "probability" in numbers
-    # the same arithmetic in another process, and shards that keep all digits
+    # the same arithmetic in another process, and station files that keep all digits
     expected = table[numbers].to_numpy(np.float64)
     assert_allclose(ran[numbers].to_numpy(np.float64), expected, rtol=1e-8, atol=1e-12)
 

@@ -95,7 +95,7 @@ def test_no_station_writes_or_removes_outside_the_shards(tmp_path):
     facts = write_processed(stream, tmp_path / "in" / "a.mseed")
     facts["traces"][0] |= {"network": "XX_/../..", "station": "victim"}
     write_description(tmp_path / "in" / "a.mseed", facts)
-    # files that shard and status would replace
+    # files that station file and status would replace
     for name in ("victim.nc", "victim.json"):
         (tmp_path / name).write_text("valuable")
     (tmp_path / "out").mkdir()

@@ -136,7 +136,7 @@ def test_an_earlier_run_has_its_stations(settings):
         assert after[:3] == before[:3]
     assert all(station.resumed for station in again)
     shutil.rmtree(settings.output / "stations")
-    with pytest.raises(CatalogError, match="no stations here: a whole run comes first"):
+    with pytest.raises(CatalogError, match="contains no stations: run `per-obspy run` first"):
         stations_of_earlier_run(settings.output)
 
 

@@ -309,7 +309,7 @@ def cut(handler: _Handler, body: bytes) -> None:
 
 
 def shortened(handler: _Handler, body: bytes) -> None:
-    """Send a body that the service itself has cut, with the length of what is left."""
+    """Send a body that the service itself has cut, with the length of the rest."""
     handler.reply(200, body[:-100])
 
 

@@ -1,4 +1,4 @@
-"""ASDF workspaces of gmprocess: what it wrote, and what we make of its raw records."""
+"""ASDF workspaces of gmprocess: its processed records, and its raw records processed here."""
 
 import json
 import random
@@ -84,7 +84,7 @@ def put_station(file, metadata: Inventory) -> None:
 
 
 def put_trace(file, trace: Trace) -> None:
-    """Write a trace raw and processed, with what gmprocess notes of it."""
+    """Write a trace raw and processed, with the notes of gmprocess."""
     group = file[f"Waveforms/XX.{trace.stats.station}"]
     put_waveform(group, trace, "e1_unprocessed", trace.data.astype(np.int32))
     # 200 000 counts per m/s2, 2000 per cm/s2

@@ -1,4 +1,4 @@
-"""Clusters of pairs: towns apart, and frames that contain what they frame."""
+"""Clusters of pairs: towns apart, and frames that contain their points."""
 
 import numpy as np
 import pytest

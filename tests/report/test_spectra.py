@@ -1,4 +1,4 @@
-"""Spectra of a station and the state space of an oscillator: what is drawn is what was computed."""
+"""Figures of spectra and of the state space: drawn values equal computed ones."""
 
 from contextlib import nullcontext
 

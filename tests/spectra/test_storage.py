@@ -1,4 +1,4 @@
-"""Spectra on disk: identical when read back, and what the conventions ask for."""
+"""Spectra on disk: identical when read back, and conforming to the conventions."""
 
 import numpy as np
 import pytest
@@ -117,7 +117,7 @@ def test_conventions(stations, tmp_path, which):
 
 
 def _failed(result):
-    """Return whether a check lost points; messages alone may be remarks."""
+    """Return whether a check reports a fault; messages alone may be remarks."""
     reached, possible = (
         result.value if isinstance(result.value, tuple) else (bool(result.value), True)
     )

@@ -1,4 +1,4 @@
-"""Table of stations: one row per station, with what was used, left out and warned of."""
+"""Table of stations: one row per station, with used records, rejections and warnings."""
 
 import numpy as np
 import pandas as pd

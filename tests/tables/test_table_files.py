@@ -1,4 +1,4 @@
-"""Tables as files: types that do not depend on the rows, meanings, and what was left out."""
+"""Tables as files: types that do not depend on the rows, meanings, and rejections."""
 
 import numpy as np
 import pandas as pd

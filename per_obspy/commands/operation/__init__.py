@@ -1,1 +1,1 @@
-"""Commands of operation: status and the watcher."""
+"""Commands for unattended operation: log options, status and the watcher."""

@@ -1,4 +1,4 @@
-"""Options for the log of a command, and the log itself."""
+"""Options for the log of a command, and the context that writes the log."""
 
 import logging
 import sys
@@ -21,7 +21,7 @@ log = logging.getLogger("per_obspy.command")
 
 
 class LogFormat(StrEnum):
-    """Forms of the lines of a log file."""
+    """Formats of a log file."""
 
     text = "text"
     json = "json"
@@ -43,7 +43,7 @@ def logged(
     file: Path | None, form: LogFormat, quiet: bool, timed: bool = False
 ) -> "Iterator[Progress]":
     """
-    Log the events of a block, and yield its progress callback.
+    Log the events of a command, and yield its progress callback.
 
     A terminal shows bars; elsewhere each step is one line, unless ``quiet``. With ``timed`` lines
     begin with their time.
@@ -67,7 +67,7 @@ def logged(
 
 
 def log_ending(record: dict[str, Any]) -> None:
-    """Log state and counts of a result, its faults and losses; commands print them themselves."""
+    """Log state, counts, faults and losses of a result; standard output has them already."""
     counts = {name: count for name, count in record["counts"].items() if count}
     words = ", ".join(f"{count} {name}" for name, count in counts.items())
     facts = {"state": record["state"], "counts": record["counts"]}

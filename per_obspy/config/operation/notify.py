@@ -35,14 +35,15 @@ class Notify(Section):
     on: tuple[Kind, ...] = Field(
         ("first", "changed", "failure"),
         description=(
-            "occasions: first (first result), changed (number of pairs in a class changed), failure"
+            "occasions of messages: first (first result), changed (number of pairs in a "
+            "class changed), failure"
         ),
     )
     command: tuple[Argument, ...] = Field(
         (),
         description=(
-            "program and arguments, started without a shell; the text of the message is its "
-            "standard input, PER_OBSPY_KIND, PER_OBSPY_TITLE, PER_OBSPY_FOLDER and "
+            "program and arguments, started without a shell; the message is its standard "
+            "input, and PER_OBSPY_KIND, PER_OBSPY_TITLE, PER_OBSPY_FOLDER and "
             "PER_OBSPY_REPORT are in its environment"
         ),
     )
@@ -50,7 +51,8 @@ class Notify(Section):
         None,
         pattern="^[A-Za-z_][A-Za-z0-9_]*$",
         description=(
-            "environment variable with Apprise URLs, separated by blanks; needs per_obspy[notify]"
+            "name of the environment variable with Apprise URLs, separated by blanks; needs "
+            "per_obspy[notify]"
         ),
     )
     apprise_urls_file: RelativePath | None = Field(
@@ -61,7 +63,7 @@ class Notify(Section):
         ),
     )
     timeout: float = Field(
-        30.0, gt=0, le=600, description="s, after which a command or delivery is given up"
+        30.0, gt=0, le=600, description="longest time of a command or delivery, s"
     )
 
     @property

@@ -14,24 +14,29 @@ class Reach(Section):
     distance: float = Field(
         gt=0,
         le=20_000_000,
-        description="m, from the epicentre to the nearest pair of the inventory",
+        description="distance from the epicentre to the nearest pair of the inventory, m",
     )
     magnitude: float = Field(
-        ge=-2, le=10, description="smallest magnitude of an earthquake that matters within it"
+        ge=-2,
+        le=10,
+        description="smallest magnitude of an earthquake that matters within the distance",
     )
 
 
 class Region(Section):
     """Circle in place of the inventory, where its pairs are not in a table or catalogue."""
 
-    latitude: float = Field(ge=-90, le=90, description="centre, degrees north")
-    longitude: float = Field(ge=-180, le=180, description="centre, degrees east")
+    latitude: float = Field(ge=-90, le=90, description="latitude of the centre, degrees north")
+    longitude: float = Field(ge=-180, le=180, description="longitude of the centre, degrees east")
     radius: float = Field(
-        0.0, ge=0, le=20_000_000, description="m; distances are measured from the circle"
+        0.0,
+        ge=0,
+        le=20_000_000,
+        description="radius of the circle, m; distances are measured from the circle",
     )
 
 
-#: Chosen so that PGA at the distance is about 0.02 g by usual ground-motion models: no source.
+#: Smallest magnitudes by distance: a choice of this package, without a source.
 REACHES = tuple(
     Reach(distance=1000.0 * distance, magnitude=magnitude)
     for distance, magnitude in ((30, 4.5), (100, 5.5), (200, 6.5), (500, 7.5))
@@ -42,7 +47,11 @@ class Watch(Section):
     """Earthquakes that `per-obspy watch` looks for, and the times of their runs."""
 
     service: Provider | None = Field(
-        None, description="FDSN event service: ObsPy's name or base URL; or else give folder"
+        None,
+        description=(
+            "FDSN event service: a name known to ObsPy, or a base URL; either service or "
+            "folder is needed"
+        ),
     )
     folder: RelativePath | None = Field(
         None, description="folder of QuakeML files (.xml, .quakeml), instead of service"
@@ -50,52 +59,56 @@ class Watch(Section):
     region: Region | None = Field(
         None,
         description=(
-            "circle of the inventory; not given: the places of its pairs, which a table or a "
-            "catalogue has"
+            "circle that contains the inventory; if not set, the places of its pairs, which "
+            "a table or a catalogue contains"
         ),
     )
     magnitudes: tuple[Reach, ...] = Field(
         REACHES,
         min_length=1,
-        description="smallest magnitude by distance; beyond the largest distance none matters",
+        description=(
+            "smallest magnitude by distance; earthquakes beyond the largest distance are left out"
+        ),
     )
     assumed_magnitude: float = Field(
         6.0,
         ge=-2,
         le=10,
-        description="of an earthquake of unknown magnitude, to decide whether it matters",
+        description="magnitude assumed for an earthquake without one, to decide whether it matters",
     )
     delays: tuple[float, ...] = Field(
         (120.0, 300.0, 900.0, 3600.0, 86_400.0),
         min_length=1,
-        description="s from the origin time to each run, rising",
+        description="times from the origin time to each run, s, ascending",
     )
     latency: float = Field(
         60.0,
         ge=0,
         description=(
-            "s that records need to reach their service: the window of a run ends this long "
-            "before its delay, unless the configured window is over before"
+            "time that records need to reach their service, s: the window of a run ends "
+            "this long before its delay, unless the configured window ends earlier"
         ),
     )
-    poll: float = Field(60.0, ge=1, le=86_400, description="s between two looks at the earthquakes")
+    poll: float = Field(
+        60.0, ge=1, le=86_400, description="time between two polls of the list of earthquakes, s"
+    )
     confirm: float = Field(
         900.0,
         ge=1,
-        description="s after which an open earthquake is asked for by its identifier",
+        description="time after which an open earthquake is requested by its identifier, s",
     )
     oldest: float = Field(
         7 * 86_400.0,
         gt=0,
-        description="s since the origin time after which an earthquake is not opened or polled",
+        description="age of an earthquake beyond which it is neither opened nor polled, s",
     )
     most_events: int = Field(
         20_000,
         ge=1,
-        description="largest number of earthquakes that a service is asked for at once",
+        description="largest number of earthquakes in one request",
     )
     updatedafter: bool = Field(
-        True, description="ask a service only for what changed since the last poll"
+        True, description="request only earthquakes that changed since the last poll"
     )
 
     @field_validator("delays")

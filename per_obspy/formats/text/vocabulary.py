@@ -39,7 +39,7 @@ simulated
 header_peak
     Largest absolute value according to the header, in ``units``.
 processing
-    Notes of the reader, one line each: changes and doubts. Later steps follow.
+    Notes of the reader, one line each: changes and uncertainties. Later steps follow.
 
 A word that a file does not hold is absent: never a guess, never zero. Coordinates 0, 0 are what
 files write for unknown.

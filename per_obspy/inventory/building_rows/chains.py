@@ -2,7 +2,7 @@
 Rows of buildings: chains of joined contacts, cut where they close, bend, or are too long.
 
 Every pair is in exactly one row. A row that is cut at a gap leaves the pair of that gap as a
-separate row, so that no contact is lost; one that is cut at a bend has the building there in
+separate row, so that no contact is missing; one that is cut at a bend has the building there in
 both parts.
 """
 
@@ -117,7 +117,7 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
 
 
 def _flat(rows: Sequence[_Piece]) -> tuple[IntArray, BoolArray, IntArray]:
-    """Return pairs, which of them are turned, and the place of the first one of each row."""
+    """Return pairs, a mask of the turned ones, and the index of the first pair of each row."""
     # Link by link
     links = [link for row in rows for link in row.links]
     pair = np.array([link[0] for link in links], dtype=np.int64)

@@ -149,7 +149,7 @@ def _others(attributes: pd.DataFrame, known: pd.DataFrame) -> pd.DataFrame:
 
 
 def _is_same(original: pd.Series, known: pd.Series) -> bool:
-    """Return whether a column of the schema has what the column of its name in the layer has."""
+    """Return whether a column of the schema equals the column of the same name in the layer."""
     if is_number(original) and is_number(known):
         return bool(np.array_equal(original, known, equal_nan=True))
     # Text that was read as a number is kept in an additional column

@@ -181,7 +181,7 @@ def with_points(cells: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
 
 
 def two_readings(name: str, found: Evidence) -> str:
-    """Return the doubt about the commas of a column, and the mend."""
+    """Return a message on the ambiguous commas of a column, and the remedy."""
     comma, none = found.example.replace(",", "."), found.example.replace(",", "")
     reason = f"line {found.line}: {name} = {found.example!r} is {comma} or {none}"
     return f'{reason}, and no other number decides: give decimal = "," or "." in [pairs]'

@@ -116,7 +116,7 @@ def _decoding(
 
 
 def two_pages(name: str, text: str) -> str:
-    """Return the doubt about the letters of a text of the western page, and the mend."""
+    """Return a message on uncertain letters of a text in a Western code page, and the remedy."""
     turkish = text.encode("cp1252").decode("cp1254")
     reason = f"{name} = {text!r:.40} in cp1252, {turkish!r:.40} in cp1254"
     return f'{reason}, and no heading decides: give encoding = "cp1252" or "cp1254" in [pairs]'

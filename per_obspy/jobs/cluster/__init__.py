@@ -1,1 +1,1 @@
-"""Tasks on the workers of a Dask cluster: what runs there, who is there, and the executor."""
+"""Tasks on the workers of a Dask cluster: client, executor, checks of workers."""

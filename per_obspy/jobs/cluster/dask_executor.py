@@ -119,7 +119,7 @@ class DaskExecutor(ElasticExecutor):
         return max(FEWEST_AHEAD, AHEAD * sum(self.workers.fit().values()))
 
     def facts(self) -> dict[str, Any]:
-        """Return scheduler, workers and events as plain values, for the record of a run."""
+        """Return scheduler, workers and events as plain values, for ``run.json``."""
         return {"dask": self.address, **self.workers.facts()}
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
@@ -129,7 +129,7 @@ class DaskExecutor(ElasticExecutor):
         Raises
         ------
         BrokenExecutor
-            If the cluster is lost.
+            If the cluster is broken.
         WriteError
             If a large task cannot be written into the shared folder.
         """
@@ -165,14 +165,14 @@ class DaskExecutor(ElasticExecutor):
         self._wait_until_idle(self._engine.wait)
 
     def _no_worker(self) -> str:
-        """Return why there is no worker."""
+        """Return the reason for which there is no worker."""
         unfit = "; ".join(self.workers.unfit()[:3])
         return f"{self.address}: no usable worker within {self._engine.wait:g} s" + (
             f": {unfit}" if unfit else ""
         )
 
     def _look(self) -> None:
-        """Take over which workers there are, and judge the new ones."""
+        """Update the present workers, and check the new ones."""
         new = self.workers.update(present_workers(self._client))
         for address, found in fit_identities(self._client, new).items():
             if isinstance(found, str):
@@ -185,7 +185,7 @@ class DaskExecutor(ElasticExecutor):
                 self.workers.refuse(address, f"runs {difference}")
 
     def _watch(self) -> None:
-        """Look at the workers again and again; without any for too long the cluster is lost."""
+        """Poll the workers; without any for too long the cluster counts as broken."""
         seen = time.monotonic()
         while not self._closed.wait(LOOK):
             try:
@@ -285,7 +285,7 @@ class DaskExecutor(ElasticExecutor):
 
 
 def _reason(error: BaseException) -> str:
-    """Return why the cluster could not do a task."""
+    """Return the reason for which the cluster could not do a task."""
     worker = getattr(getattr(error, "last_worker", None), "address", "")
     died = f"its worker was killed each time, the last one at {worker}"
     return died if worker else f"{type(error).__name__}: {error}"

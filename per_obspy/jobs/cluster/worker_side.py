@@ -106,7 +106,7 @@ class Outcome(NamedTuple):
     value : object
         Its result.
     error : Exception or None
-        What it raised.
+        Error of the task.
     refusal : str
         Why the worker is unfit for any task of this run; empty if it is fit.
     worker, host : str
@@ -208,13 +208,13 @@ async def wait_until_idle(seconds: float) -> bool:
 
 
 def _refusal(task: SentTask) -> str:
-    """Return why this worker cannot do any task of the run; empty if it can."""
+    """Return the reason for which this worker cannot do tasks of the run; empty if it can."""
     difference = own_versions().difference(task.versions)
     return f"runs {difference}" if difference else _lost_folder(task.shared)
 
 
 def _lost_folder(shared: Shared) -> str:
-    """Return that the shared folder is not seen from here; empty if it is."""
+    """Return a message if the shared folder is not visible to this worker, else an empty one."""
     path = token_file(shared)
     try:
         known = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Workers of a cluster as the client knows them: fit, unfit or lost, and the work of each."""
+"""Workers of a cluster as the client knows them: fit, unfit or gone, and the work of each."""
 
 import logging
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ EVENTS_KEPT = 1000
 
 class Workers:
     """
-    Workers by address, with everything that happened to them.
+    Workers by address, with their events.
 
     Every fault is logged with the worker's machine and address when it happens.
     """
@@ -32,7 +32,7 @@ class Workers:
 
     def update(self, present: Mapping[str, tuple[str, int]]) -> set[str]:
         """
-        Take over which workers there are, note those that are lost, and return new addresses.
+        Update the present workers, note those that disappeared, and return new addresses.
 
         Parameters
         ----------
@@ -51,7 +51,7 @@ class Workers:
         return new
 
     def known_as(self, address: str, host: str) -> None:
-        """Take over the name of a worker's machine."""
+        """Set the machine name of a worker."""
         self._hosts[address] = host
 
     def refuse(self, address: str, reason: str) -> None:

@@ -1,1 +1,1 @@
-"""Watched earthquakes: their list, their state, the runs that are due, and their revisions."""
+"""Watched earthquakes: lists, states, due runs and revisions of results."""

@@ -39,7 +39,7 @@ def due_task(
     now: datetime, state: EventState, delays: Sequence[float], has_arrivals: bool = False
 ) -> Task | None:
     """
-    Return the run of an earthquake that is due, None if none is.
+    Return the due run of an earthquake, None if no run is due.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def passed_delays(now: datetime, state: EventState, delays: Sequence[float]) -> 
 
 
 def is_done(now: datetime, state: EventState, delay: float) -> bool:
-    """Return whether the run of a delay was done, at a time that is not still to come."""
+    """Return whether the run of a delay was done, not counting times in the future."""
     time = state.done.get(f"{delay:g}")
     return time is not None and moment(time) <= now + timedelta(seconds=TOLERANCE)
 
 
 def is_paused(now: datetime, not_before: str | None) -> bool:
-    """Return whether a pause lasts; one longer than any pause was set by another clock."""
+    """Return whether a pause lasts; too long a pause was set by a wrong clock and is ignored."""
     if not_before is None:
         return False
     return 0 < (moment(not_before) - now).total_seconds() <= LONGEST_PAUSE

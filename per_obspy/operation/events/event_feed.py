@@ -99,7 +99,7 @@ def read_feed(watch: Watch, state: WatchState, circle: Circle, now: datetime) ->
 
 
 def _pool() -> WebPool:
-    """Return connections to an event service."""
+    """Return the connection pool for an event service."""
     return web_pool(*_PATIENCE)._replace(longest_pause=_LONGEST_PAUSE)
 
 
@@ -120,7 +120,7 @@ def _query(watch: Watch, circle: Circle, now: datetime) -> dict[str, str]:
 
 
 def _since(watch: Watch, state: WatchState, now: datetime) -> str | None:
-    """Return the time from which on changes are asked for, None for everything."""
+    """Return the time since which changes are requested, None for all earthquakes."""
     # A time that is still to come was noted before the clock was put back
     if not watch.updatedafter or state.since is None or moment(state.since) > now:
         return None
@@ -130,7 +130,7 @@ def _since(watch: Watch, state: WatchState, now: datetime) -> str | None:
 def _listed_since(
     pool: WebPool, watch: Watch, query: Mapping[str, str], since: str
 ) -> tuple[list[EventRow], list[str]]:
-    """Return what changed since a time; everything if the service does not know the parameter."""
+    """Return the earthquakes changed since a time; all if the service lacks that parameter."""
     try:
         return _listed(pool, watch, {**query, "updatedafter": since})
     except ServiceError as error:
@@ -143,7 +143,7 @@ def _listed_since(
 def _listed(
     pool: WebPool, watch: Watch, query: Mapping[str, str]
 ) -> tuple[list[EventRow], list[str]]:
-    """Return the listed earthquakes; of more than the limit also all that are strong enough."""
+    """Return the listed earthquakes; beyond the limit of a list also all strong enough ones."""
     service = watch.service or ""
     rows, problems = listed_events(pool, service, query)
     if len(rows) < watch.most_events:
@@ -171,7 +171,7 @@ def _usable_rows(rows: list[EventRow]) -> tuple[dict[str, EventRow], list[str]]:
 
 def row_problem(row: EventRow) -> str:
     """
-    Return what is wrong with the facts of an earthquake; empty if they can be true.
+    Return the fault in the facts of an earthquake; empty if they are plausible.
 
     Examples
     --------
@@ -226,7 +226,7 @@ def _quakeml_files(folder: Path) -> list[Path]:
 
 class PresentEvent(NamedTuple):
     """
-    An earthquake as its service or file has it now.
+    Current facts of an earthquake in its service or file.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class PresentEvent(NamedTuple):
 
 def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None:
     """
-    Return an earthquake as its service or file has it now, None if it has been deleted.
+    Return the current facts of an earthquake, None if it has been deleted.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def present_event(watch: Watch, event_id: str, file: str) -> PresentEvent | None
 
 
 def _event_of_service(service: str, event_id: str) -> Any:
-    """Return an earthquake as its service sends it, None if it has no such earthquake."""
+    """Return an earthquake from its service, None if the service has no such earthquake."""
     content = event_content(_pool(), service, event_id)
     if not content:
         return None

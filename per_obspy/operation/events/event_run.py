@@ -1,4 +1,4 @@
-"""One run of one watched earthquake: its present facts, its records, its results, a revision."""
+"""Run of one watched earthquake: current facts, records, results and a revision."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ from per_obspy.records.fdsn.cut_records import cut_records_aside
 
 class Watcher(NamedTuple):
     """
-    Everything that the runs of all earthquakes share.
+    Settings and state that the runs of all earthquakes share.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def done_task(watcher: Watcher, state: EventState, task: Task) -> Done:
     Raises
     ------
     PerError
-        If the run fails; what is done is kept.
+        If the run fails; finished parts are kept.
     """
     watch = watch_of(watcher.settings)
     started = iso(watcher.now())
@@ -122,7 +122,7 @@ def done_task(watcher: Watcher, state: EventState, task: Task) -> Done:
 def _run_with_records(
     watcher: Watcher, settings: Run, state: EventState, occasion: tuple[Task, str]
 ) -> Done:
-    """Fetch the records of an earthquake, and run with those that there are."""
+    """Fetch the records of an earthquake, and run with those available."""
     watch, (task, started) = watch_of(watcher.settings), occasion
     # Records that come while the run goes on are for the next one
     arrivals = arrivals_of(watcher.settings)
@@ -150,7 +150,7 @@ def _write_if_new(file: Path, content: bytes) -> None:
 
 
 def _fetched(settings: Run, progress: Progress) -> Fetched | None:
-    """Bring the records of services into the folder of an earthquake, None if there are none."""
+    """Fetch the records of services into the folder of an earthquake; return None without any."""
     assert settings.records is not None
     request, event = settings.records.fdsn, settings.records.event
     if request is None:
@@ -164,7 +164,7 @@ def _fetched(settings: Run, progress: Progress) -> Fetched | None:
 
 
 def _has_records(settings: Run, fetched: Fetched | None) -> bool:
-    """Return whether there is anything that a run can use."""
+    """Return whether records or a ShakeMap are available for a run."""
     assert settings.records is not None
     if has_other_sources(settings.records):
         return True

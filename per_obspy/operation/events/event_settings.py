@@ -1,4 +1,4 @@
-"""Settings of a watcher, and those of the run of one earthquake that they make."""
+"""Settings of a watcher, and settings of the run of one earthquake derived from them."""
 
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -134,6 +134,6 @@ def _window(window: Window, origin: datetime, ends: float) -> dict[str, str]:
 
 
 def has_other_sources(records: Records) -> bool:
-    """Return whether records come from elsewhere than FDSN services."""
+    """Return whether there are sources of records other than FDSN services."""
     others = (records.folder, records.columns, records.sds, records.asdf, records.shakemap)
     return any(bool(source) for source in others)

@@ -1,4 +1,4 @@
-"""Open earthquakes: those of the list that matter, until they are deleted or move away."""
+"""Open earthquakes: relevant ones of the list, until deleted or moved away."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -25,7 +25,7 @@ DELETED = "deleted at its source"
 
 
 class Listed(NamedTuple):
-    """An earthquake of a list, why it does not matter (empty if it does), and its file."""
+    """Listed earthquake, reason for which it is irrelevant (empty if relevant), and its file."""
 
     row: EventRow
     reason: str
@@ -34,7 +34,7 @@ class Listed(NamedTuple):
 
 def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
     """
-    Return for each earthquake why it does not matter; empty for those that do.
+    Return the reason for which each earthquake is irrelevant; empty for relevant ones.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def judged(watch: Watch, places: Places, rows: list[EventRow]) -> list[str]:
 
 
 def _reason(watch: Watch, row: EventRow, distance: float) -> str:
-    """Return why an earthquake at a distance does not matter; empty if it does."""
+    """Return the reason for which an earthquake at a distance is irrelevant; empty if relevant."""
     magnitude = watch.assumed_magnitude if row.magnitude is None else row.magnitude
     if matters(watch.magnitudes, distance, magnitude):
         return ""
@@ -88,7 +88,7 @@ def listed_states(
     states : mapping
         Identifier -> state of every earthquake known so far.
     feed : Feed
-        What is listed as new or changed.
+        Earthquakes listed as new or changed.
     now : datetime
         With its zone.
     """
@@ -112,7 +112,7 @@ def _digest(row: EventRow) -> str:
 
 
 def _opened(watch: Watch, listed: Listed, now: datetime) -> EventState | None:
-    """Return the state of an earthquake that is listed first, None if it does not matter."""
+    """Return the state of a newly listed earthquake, None if it is irrelevant."""
     row = listed.row
     # Old ones are listed where a watcher begins, or their magnitude is revised
     is_old = moment(row.time) < now - timedelta(seconds=watch.oldest)
@@ -149,7 +149,7 @@ def _updated(known: EventState, listed: Listed, now: datetime) -> EventState | N
 
 
 def _change(known: EventState, row: EventRow) -> str:
-    """Return in words how a known earthquake comes back or changes."""
+    """Describe the return or change of a known earthquake."""
     if known.state == "closed":
         return f"opened again, {in_words(row)}"
     return f"updated, {in_words(row)}, before: {in_words(known.facts)}"
@@ -171,7 +171,7 @@ def in_words(row: EventRow) -> str:
 
 def present_state(watch: Watch, places: Places, state: EventState, now: datetime) -> EventState:
     """
-    Return the state of an open earthquake by what its service or file has of it now.
+    Return the state of an open earthquake by its current facts in service or file.
 
     Raises
     ------

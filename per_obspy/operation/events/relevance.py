@@ -33,7 +33,7 @@ PLACES = "places.json"
 
 class Places(NamedTuple):
     """
-    Places that stand for an inventory.
+    Places that represent an inventory.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def _kept_places(file: Path, settings: Run, folder: Path) -> Places:
 
 
 def _read_places(kept: Path, key: list[object]) -> Places | None:
-    """Return the places that a watched folder keeps under a key, None if it does not."""
+    """Return the stored places of a watched folder under a key, None if there are none."""
     try:
         content = json.loads(kept.read_text(encoding="utf-8"))
         longitude, latitude = np.array(content["places"], dtype=np.float64)
@@ -224,7 +224,7 @@ def circle_around(places: Places, reach: float) -> Circle:
 
 def matters(reaches: Sequence[Reach], distance: float, magnitude: float) -> bool:
     """
-    Return whether an earthquake of a magnitude at a distance matters.
+    Return whether an earthquake of a magnitude at a distance is relevant.
 
     Examples
     --------

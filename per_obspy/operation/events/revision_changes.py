@@ -84,7 +84,7 @@ def event_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterat
 
 
 def _station_changes(before: Path | None, after: Path) -> Iterator[Row]:
-    """Yield the stations that came, went, or are used now and were not, by name."""
+    """Yield the stations that are new, missing or of a changed state, by name."""
     old = _station_states(before / "stations.csv") if before is not None else {}
     new = _station_states(after / "stations.csv")
     for name in sorted(old.keys() | new.keys()):
@@ -94,7 +94,7 @@ def _station_changes(before: Path | None, after: Path) -> Iterator[Row]:
 
 
 def _station_states(table: Path) -> dict[str, str]:
-    """Return the state of every station of a table, none if there is no table."""
+    """Return the state of every station of a table, empty without a table."""
     if not table.is_file():
         return {}
     columns = ["station", "state"]
@@ -105,7 +105,7 @@ def _station_states(table: Path) -> dict[str, str]:
 def _table_changes(
     kind: str, tables: tuple[Path, Path], identifier: str, quantities: tuple[str, ...]
 ) -> Iterator[Row]:
-    """Yield the changes between two tables, by name; memory does not grow with their size."""
+    """Yield the changes between two tables, by name, in bounded memory."""
     # Named so that the database finds them
     columns = [identifier, *quantities]
     old, new = (parquet_rows([table], columns) for table in tables)

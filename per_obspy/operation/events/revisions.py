@@ -1,5 +1,5 @@
 """
-Revisions of the results of an earthquake: numbered folders that never change once they are there.
+Revisions of the results of an earthquake: numbered folders that never change.
 
 ``revisions/0001`` and so on hold the results of a run with ``run.json``, ``configuration.toml``,
 ``event.xml``, ``changes.csv`` and ``revision.json``. A revision appears whole or not at all. Files
@@ -53,7 +53,7 @@ def newest_revision(event: Path) -> int:
 
 def content_of(record: Mapping[str, Any], event_hash: str) -> str:
     """
-    Return a hash of what a revision shows: tables, counts and the earthquake.
+    Return a hash of the content of a revision: tables, counts and the earthquake.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def content_of(record: Mapping[str, Any], event_hash: str) -> str:
 
 
 def shown_content(event: Path, number: int) -> str:
-    """Return the hash of what a revision shows, empty if there is none or it is damaged."""
+    """Return the stored hash of the content of a revision, empty if missing or damaged."""
     try:
         status = read_status(revision_folder(event, number) / REVISION)
     except StatusError:
@@ -88,7 +88,7 @@ def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[
     record : mapping
         Content of ``run.json``.
     facts : mapping
-        What ``revision.json`` has besides: earthquake, delay, time.
+        Further content of ``revision.json``: earthquake, delay, time.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def publish(event: Path, number: int, record: Mapping[str, Any], facts: Mapping[
 def _shared_files(
     event: Path, made: Path, outputs: Mapping[str, str], before: Path | None
 ) -> dict[str, str]:
-    """Put the results of a run into a revision that is made, and return the hash of each."""
+    """Put the results of a run into a new revision, and return the hash of each."""
     known = _known_files(before) if before else {}
     work, hashes = event / "work", dict(outputs)
     for name, digest in sorted(outputs.items()):
@@ -163,7 +163,7 @@ def _share(source: Path, target: Path, digest: str, earlier: Path | None) -> Non
 
 
 def _linked(earlier: Path, target: Path, digest: str) -> bool:
-    """Link a file to an earlier one that is as it was left; return whether that was possible."""
+    """Link a file to an unchanged earlier one; return whether that was possible."""
     try:
         if file_hash(earlier) != digest:
             return False

@@ -1,5 +1,5 @@
 """
-State of a watched folder and of each earthquake in it, as JSON files that are always whole.
+State of a watched folder and of each earthquake in it: JSON files, replaced atomically.
 
 A folder that is watched into holds ``watch.json``, ``status.json`` and ``events/ID/``. The folder
 of an earthquake holds ``event.json`` (its state), ``event.xml`` (QuakeML as it was screened
@@ -110,7 +110,7 @@ class EventState(_State):
 
     @property
     def facts(self) -> EventRow:
-        """Facts of the earthquake, as a list has them."""
+        """Facts of the earthquake in the form of a list."""
         values = {name: getattr(self, name) for name in EventRow._fields}
         return EventRow(**values)
 

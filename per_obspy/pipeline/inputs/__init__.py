@@ -1,1 +1,1 @@
-"""Arguments of a command: recognised by content, described, and made into a run."""
+"""Arguments of commands: recognise their kind by content, describe them, make a run of them."""

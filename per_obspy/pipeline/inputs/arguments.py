@@ -1,4 +1,4 @@
-"""Settings of a run from what its command names: a configuration, or records and pairs."""
+"""Settings of a run from the arguments of a command: a configuration, or records and pairs."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ RESULTS = Path("results")
 
 class Request(NamedTuple):
     """
-    A run as its command asks for it.
+    Settings of a run, from the arguments of its command.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ def requested_run(
     first: str, second: str | None = None, output: Path | None = None, changes: Sequence[str] = ()
 ) -> Request:
     """
-    Return the run that a command asks for.
+    Return the settings of the run for the arguments of a command.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def run_content(records: str | None, pairs: str | None, output: Path) -> dict[st
     Parameters
     ----------
     records, pairs : str, optional
-        What a command named; what is not given is left out.
+        Arguments of the command; missing ones are left out.
     output : Path
         Folder of the results.
     """
@@ -121,7 +121,7 @@ def _configuration(argument: str) -> Path | None:
 def _roles(
     first: str, second: str | None, changed: Mapping[str, Any]
 ) -> tuple[str | None, str | None]:
-    """Return records and pairs, in whichever order they were named."""
+    """Return records and pairs from arguments in any order."""
     given = [first] if second is None else [first, second]
     kinds = {argument: kind_of(argument) for argument in given}
     records = [argument for argument in given if kinds[argument] in RECORD_KINDS]
@@ -139,7 +139,7 @@ def _require_both(
     found: tuple[list[str], list[str]],
     changed: Mapping[str, Any],
 ) -> None:
-    """Raise CatalogError with what is missing unless there are one source and one inventory."""
+    """Raise CatalogError unless the arguments are one source of records and one inventory."""
     # Neither of them
     for argument in given:
         if kinds[argument] not in (*RECORD_KINDS, *PAIR_KINDS):
@@ -159,7 +159,7 @@ def _require_both(
 
 
 def _misplaced(kind: Kind) -> str:
-    """Return what is done with a kind of input that is neither records nor pairs."""
+    """Return the advice for an input that is neither records nor pairs."""
     commands = {
         Kind.DESIGN: "per-obspy screen FILE",
         Kind.ENSEMBLE: "per-obspy screen FILE",
@@ -215,7 +215,7 @@ def _pairs_content(pairs: str) -> dict[str, Any]:
 
 
 def _one_table(pairs: str) -> Path:
-    """Return the pair table or layer that an argument names, the only one of a folder."""
+    """Return the pair table or layer of an argument; a folder must contain exactly one."""
     tables = _tables_in(pairs) if Path(pairs).is_dir() else [Path(pairs)]
     if len(tables) > 1:
         names = ", ".join(file.name for file in tables)
@@ -232,7 +232,7 @@ def _require_apart(settings: Run) -> None:
 
 
 def _default_output(records: str | None, pairs: str | None) -> Path:
-    """Return the folder of the results where none is named, by the names of the inputs."""
+    """Return the default folder of the results, made of the names of the inputs."""
     return RESULTS / "-".join(_stem(one) for one in (records, pairs) if one is not None)
 
 
@@ -242,7 +242,7 @@ def _title(records: str | None, pairs: str | None) -> str:
 
 
 def _stem(argument: str) -> str:
-    """Return the name of an input without its suffix, fit for the name of a folder."""
+    """Return the name of an input without its suffix, as a valid folder name."""
     path = Path(argument)
     name = path.resolve().name if path.exists() else argument
     stem = name.partition(".")[0] if path.is_file() else name
@@ -250,7 +250,7 @@ def _stem(argument: str) -> str:
 
 
 def _said(role: str, argument: str | None) -> str:
-    """Return how an argument was understood."""
+    """Return a sentence on the recognised kind of an argument."""
     if argument is None:
         return f"{role}: those of the scenario or of --set"
     kind, path = kind_of(argument), Path(argument)
@@ -260,6 +260,6 @@ def _said(role: str, argument: str | None) -> str:
 
 
 def _shown(path: Path) -> str:
-    """Return a path as seen from the folder of the shell, if it lies below it."""
+    """Return a path relative to the current folder if it lies below it."""
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)

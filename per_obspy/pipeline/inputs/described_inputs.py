@@ -26,7 +26,7 @@ def described(argument: str, stationxml: Path | None = None) -> Facts:
     Raises
     ------
     CatalogError
-        If it cannot be read as what it looks like.
+        If the input cannot be read as its recognised kind.
     """
     kind, path = kind_of(argument), Path(argument)
     if kind is Kind.EVENT_ID:
@@ -49,7 +49,7 @@ def _records(path: Path, stationxml: Path | None) -> Facts:
 
 
 def _tables(path: Path, kind: Kind) -> Facts | None:
-    """Return the facts of a table of pairs or of a layer, None if it is neither."""
+    """Return the facts of a pair table or layer, None for other kinds."""
     from per_obspy.pipeline.inputs import described_tables
 
     if kind is Kind.PAIRS:
@@ -60,7 +60,7 @@ def _tables(path: Path, kind: Kind) -> Facts | None:
 
 
 def _motion(path: Path, kind: Kind) -> Facts | None:
-    """Return the facts of ground motion and its metadata, None if it is neither."""
+    """Return the facts of ground motion or its metadata, None for other kinds."""
     from per_obspy.pipeline.inputs import described_motion
 
     describe = {

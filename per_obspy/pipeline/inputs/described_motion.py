@@ -26,7 +26,7 @@ SHOWN = 4
 
 
 def record_facts(records: Sequence[RecordInfo], rejected: Sequence[Rejection]) -> Facts:
-    """Return the facts of records that were described one by one."""
+    """Return the facts of a set of records from their descriptions."""
     stations = sorted({_station(record) for record in records})
     places = _places(records)
     title = f"{len(records)} records of {len(stations)} stations, {len(rejected)} rejected"
@@ -41,7 +41,7 @@ def record_facts(records: Sequence[RecordInfo], rejected: Sequence[Rejection]) -
 def _record_lines(
     records: Sequence[RecordInfo], stations: Sequence[str], places: Mapping[str, object]
 ) -> list[tuple[str, str]]:
-    """Return the facts of records, a line each."""
+    """Return one line per fact of a set of records."""
     simulated = sum(record.simulated for record in records)
     lines = [("simulated", f"{simulated} records are SIMULATED.")] if simulated else []
     # Formats with the level of processing
@@ -160,7 +160,7 @@ def spectra_facts(path: Path) -> Facts:
 
 def _dataset_facts(found: "xr.Dataset") -> Facts:
     """Return the facts of spectra of one station or several."""
-    # A shard holds one station, the file of a run all of them
+    # A station file holds one station, the file of a run all of them
     column = found["station_name" if "station_name" in found else "station"]
     names = np.atleast_1d(column.to_numpy()).astype(str).tolist()
     place = [np.atleast_1d(found[name]).tolist() for name in ("longitude", "latitude")]

@@ -97,7 +97,7 @@ def result_facts(folder: Path) -> Facts:
 
 
 def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[str, str]]:
-    """Return the facts that the record of a run holds."""
+    """Return the facts in ``run.json``."""
     lines = [("name", str(record.get("name", ""))), ("state", str(record.get("state", "")))]
     lines += [("begun", str(record["started"]))] if "started" in record else []
     lines += [("simulated", "the ground motion is SIMULATED.")] if record.get("simulated") else []
@@ -121,7 +121,7 @@ def _dotted(content: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _shown(configuration: Path, value: object) -> str:
-    """Return a value of a configuration; of a path also whether it is there."""
+    """Return a value of a configuration as text; of a path also whether it exists."""
     if isinstance(value, str) and ("/" in value or "." in value):
         place = configuration.resolve().parent / value
         return f"{value}{'' if place.exists() else ' (not there)'}"
@@ -129,12 +129,12 @@ def _shown(configuration: Path, value: object) -> str:
 
 
 def _presence(path: Path) -> str:
-    """Return a path and whether it is there."""
+    """Return a path and whether it exists."""
     return f"{path}{'' if path.exists() else ' (not there yet)'}"
 
 
 def _rejected(counts: dict[str, int]) -> str:
-    """Return what was left out, by kind."""
+    """Return the number of rejections of each kind as text."""
     kinds = {name: count for name, count in counts.items() if name.startswith("rejected_")}
     parts = [f"{count} {name.removeprefix('rejected_')}" for name, count in kinds.items() if count]
     return f"{', '.join(parts)}: rejected.csv" if parts else "nothing"

@@ -54,7 +54,7 @@ def _gap_lines(gaps: pd.Series) -> list[tuple[str, str]]:
 
 
 def _rows(count: int) -> str:
-    """Return the number of rows, and of how many where only the first are looked at."""
+    """Return the number of rows read, and of all rows if only the first are read."""
     return f"the first {MOST_ROWS} of {count} rows" if count > MOST_ROWS else f"{count} rows"
 
 
@@ -81,7 +81,7 @@ def _range_lines(table: pd.DataFrame) -> list[tuple[str, str]]:
 def _odd_lines(
     table: pd.DataFrame, derived: Mapping[str, int], unused: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return what is derived, unknown or suspicious of a pair table."""
+    """Return lines on derived, unknown and suspicious columns of a pair table."""
     lines = []
     if derived:
         lines.append(("derived", some([f"{name} ({rows})" for name, rows in derived.items()], 8)))

@@ -1,4 +1,4 @@
-"""A first configuration from what lies in a folder, for ``per-obspy init``."""
+"""First configuration from the files of a folder, for ``per-obspy init``."""
 
 import os
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ class Found(NamedTuple):
 
 def found_inputs(folder: Path) -> Found:
     """
-    Return what a folder holds that a run could use: files, archives and subfolders.
+    Return the possible inputs of a run in a folder: files, archives and subfolders.
 
     Loose records in the folder itself count as the folder.
     """
@@ -78,26 +78,26 @@ def write_first_configuration(
     path: Path, records: str | None, pairs: str | None, force: bool = False
 ) -> list[str]:
     """
-    Write a configuration with what was named, or else found in its folder, and help on every key.
+    Write a configuration with the named inputs, or those of its folder, and help on every key.
 
     Parameters
     ----------
     path : Path
         TOML file.
     records, pairs : str, optional
-        As in ``per-obspy run``; what is not given is looked for in the folder of the file.
+        As in ``per-obspy run``; a missing one is looked for in the folder of the file.
     force : bool
         Whether an existing file may be replaced.
 
     Returns
     -------
     lines : list of str
-        What was found, and what is missing.
+        Sentences on found and missing inputs.
 
     Raises
     ------
     CatalogError
-        If the file exists, or what was named is neither records nor pairs.
+        If the file exists, or an argument is neither records nor pairs.
     """
     if path.exists() and not force:
         raise CatalogError(str(path), "exists already: --force writes it again, -o names another")

@@ -1,4 +1,4 @@
-"""Pairs of a run from drawn outlines: found once, written into the output folder, and kept."""
+"""Pairs of a run from footprints: found once and written into the output folder."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -26,7 +26,7 @@ _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[str, int]:
     """
-    Find the pairs of the configured footprints, unless the same ones are in the folder already.
+    Find the pairs of the configured footprints unless the output folder has them already.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _write_found(footprints: Footprints, folder: Path) -> dict[str, int]:
 
 
 def pair_table(settings: Run, folder: Path) -> Path | None:
-    """Return the table of a run that has one: the configured file, or that of the footprints."""
+    """Return the pair table of a run: the configured file, or that made from footprints."""
     pairs = settings.pairs
     if pairs and pairs.footprints:
         return folder / PAIRS
@@ -92,13 +92,13 @@ def pair_table(settings: Run, folder: Path) -> Path | None:
 
 
 def layer_files(layer: Path) -> list[Path]:
-    """Return the files of a layer: of a Shapefile all its parts."""
+    """Return all files of a layer; a Shapefile has several."""
     parts = [layer.with_suffix(suffix) for suffix in _PARTS] if layer.suffix == ".shp" else []
     return [layer, *(part for part in parts if part.is_file())]
 
 
 def _options(footprints: Footprints) -> dict[str, Any]:
-    """Return the options of the search that are given; others have the defaults of the search."""
+    """Return the configured options of the search for pairs; others keep their defaults."""
     return footprints.model_dump(exclude={"file"}, exclude_none=True)
 
 

@@ -15,7 +15,7 @@ def event_section(identifier: str, cache: Path) -> dict[str, object]:
     identifier : str
         As :func:`per_obspy.records.fdsn.event_ids.event_of` takes it.
     cache : Path
-        Folder that keeps what is fetched.
+        Cache of the fetched files.
 
     Examples
     --------

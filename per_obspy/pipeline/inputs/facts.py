@@ -1,4 +1,4 @@
-"""Description of an input: a title, facts on a line each, and places for a map."""
+"""Description of an input: a title, one line per fact, and places for a map."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ class Facts(NamedTuple):
     Attributes
     ----------
     kind : str
-        What it is.
+        Kind of the input in words.
     title : str
         Its size in a few words.
     lines : list of tuple of str
@@ -36,7 +36,7 @@ class Facts(NamedTuple):
 
 def span(values: Iterable[float], unit: str = "") -> str:
     """
-    Return the range of numbers that are known.
+    Return the range of the finite numbers as text.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def span(values: Iterable[float], unit: str = "") -> str:
 
 def some(names: Sequence[str], count: int = 6) -> str:
     """
-    Return the first names and the number of the others.
+    Return the first names, and the number of the others, as text.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def some(names: Sequence[str], count: int = 6) -> str:
 
 def unzipped(places: Sequence[tuple[float, float]]) -> Places:
     """
-    Return longitudes and latitudes of places.
+    Return the longitudes and the latitudes of places.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from per_obspy.inventory.schema import COLUMNS
 
 
 class Kind(StrEnum):
-    """Kinds of inputs and results, each with the words by which it is called."""
+    """Kinds of inputs and results, each with its name in messages."""
 
     CONFIGURATION = "configuration of a run"
     DESIGN = "configuration of a screening by a spectrum"
@@ -79,7 +79,7 @@ SIDECARS = (".dbf", ".shx", ".prj", ".cpg", ".sbn", ".sbx", ".qix", ".qmd")
 
 def kind_of(argument: str | Path) -> Kind:
     """
-    Return what an argument is: a path, or the identifier of an earthquake where there is no path.
+    Return the kind of an argument: of a path that exists, else the identifier of an earthquake.
 
     A file that shows no other kind counts as one of records, and so does a folder.
 
@@ -104,14 +104,14 @@ def kind_of(argument: str | Path) -> Kind:
 
 
 def files_in(folder: Path) -> dict[Path, Kind]:
-    """Return the files of a folder, not of its subfolders, with their kinds; no hidden ones."""
+    """Return the files of a folder with their kinds, without hidden files and subfolders."""
     shown = (path for path in sorted(folder.iterdir()) if not path.name.startswith("."))
     files = [path for path in shown if path.is_file() and path.suffix.lower() not in SIDECARS]
     return {path: _readable_kind(path) for path in files if ".rejected" not in path.suffixes}
 
 
 def _readable_kind(path: Path) -> Kind:
-    """Return the kind of a file; one that cannot be read counts as a record, which is rejected."""
+    """Return the kind of a file; an unreadable one counts as a record, which is rejected later."""
     try:
         return _file_kind(path)
     except OSError:
@@ -267,7 +267,7 @@ def _is_station_table(head: bytes) -> bool:
 
 
 def _is_json(path: Path) -> bool:
-    """Return whether the name of a file ends in JSON: descriptions of buildings may be so."""
+    """Return whether the name of a file ends in ``json``, as that of a layer of buildings may."""
     return path.suffix.lower() in (".json", ".geojson")
 
 

@@ -22,7 +22,7 @@ def check_inputs(settings: Run, folder: Path) -> None:
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results, where the pairs of footprints are.
 
@@ -46,13 +46,13 @@ def check_inputs(settings: Run, folder: Path) -> None:
 
 
 def _is_pending(settings: Run, table: Path) -> bool:
-    """Return whether the pairs of footprints are yet to be found."""
+    """Return whether the pairs of footprints have not been found yet."""
     is_drawn = settings.pairs is not None and settings.pairs.footprints is not None
     return is_drawn and not table.is_file()
 
 
 def _check_area(settings: Run, folder: Path) -> None:
-    """Check that the pairs have the column by which totals are counted."""
+    """Check that the pairs have the column of the areas of the totals."""
     area, table = settings.totals.area, pair_table(settings, folder)
     if table and _is_pending(settings, table):
         return
@@ -62,7 +62,7 @@ def _check_area(settings: Run, folder: Path) -> None:
 
 
 def _pair_columns(settings: Run, folder: Path) -> set[str]:
-    """Return the columns of the pairs; of inventories not chosen yet, those that any has."""
+    """Return the columns of the pairs; of several stored inventories those of any."""
     pairs = settings.pairs
     if pairs and (table := pair_table(settings, folder)):
         return set(pair_file(table, pairs.form).names)

@@ -1,1 +1,1 @@
-"""Results for people: summary, layers and workbook of every kind of screening."""
+"""Results to read: page, summary, layers and workbook of every kind of screening."""

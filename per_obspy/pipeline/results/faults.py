@@ -1,4 +1,4 @@
-"""Files of a report, and those that could not be made."""
+"""Files of a report, and files that could not be written."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from per_obspy.files import remove_file
 
 class Report(NamedTuple):
     """
-    What the report has written.
+    Files that the report has written.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Report(NamedTuple):
 
     @contextmanager
     def tried(self, *paths: Path) -> Iterator[None]:
-        """Note files that the block writes; a fault of the drawing leaves them out, in one line."""
+        """Note the files that a block writes, or one line on the fault that prevents them."""
         try:
             yield
         except (PerError, OSError, MemoryError):

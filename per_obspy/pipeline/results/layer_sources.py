@@ -1,4 +1,4 @@
-"""Layers of a run: what they show beside its pairs, with the optional libraries."""
+"""Map layers of a run: pairs, buildings, stations and areas, with the optional libraries."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ def layer_paths(folder: Path, stem: str) -> tuple[Path, Path, Path]:
 
 
 def outlines_beside(*pairs: Path | None) -> Path | None:
-    """Return the first file of outlines that lies beside one of these pair tables, if any."""
+    """Return the first file of outlines that lies next to one of these pair tables, if any."""
     for table in pairs:
         if table is not None and (found := table.with_suffix(".buildings.parquet")).is_file():
             return found

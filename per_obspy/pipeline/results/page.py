@@ -1,4 +1,4 @@
-"""Everything that the page of a run is made of, gathered from the results in the output folder."""
+"""Data of ``report.html``, gathered from the results in the output folder."""
 
 import csv
 import math
@@ -60,11 +60,11 @@ def write_run_page(
     Parameters
     ----------
     settings : Run
-        What was done.
+        Settings of the finished run.
     folder : Path
         Of the results; its tables of stations, rejections and buildings are read.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     found : (PairTally, DataFrame, DataFrame)
         Counts of all pairs, the worst pairs, and totals by area.
     simulated : bool
@@ -100,20 +100,20 @@ def write_run_page(
 
 
 def _known(settings: Run, folder: Path, region: Region) -> Mapping[str, Any]:
-    """Return the facts of the earthquake of a run."""
+    """Return the facts of the earthquake of a run for the page."""
     shakemap = settings.records.shakemap if settings.records else None
     return event_of_run(folder / "run.json", region, shakemap)
 
 
 def _outlines_of(settings: Run, folder: Path) -> Path | None:
-    """Return the outlines of a run: of a layer, it keeps pairs and outlines in its folder."""
+    """Return the file of outlines of a run: in its folder if footprints are configured."""
     given = settings.pairs.file if settings.pairs else None
     return outlines_beside(given, folder / "pairs.parquet")
 
 
 class TableSources(NamedTuple):
     """
-    Everything of a page that is in no table of pairs, for a screening by a spectrum or an ensemble.
+    Data of a page other than its pairs, for a screening by a spectrum or an ensemble.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class TableSources(NamedTuple):
     histories : mapping of int to dict
         Rank -> history of a pair.
     notes : sequence of str
-        Sentences on what is left out, or comes from elsewhere.
+        Sentences on omitted contents, and on those from other sources.
     """
 
     region: Region
@@ -194,7 +194,7 @@ def _content(notes: Sequence[str], language: Language) -> list[tuple[str, str]]:
 
 
 def _column(table: pd.DataFrame, name: str) -> FloatArray:
-    """Return a column of numbers, none of them if the table lacks it."""
+    """Return a column of numbers, all NaN if the table lacks it."""
     return table[name].to_numpy(dtype=np.float64) if name in table else np.empty(0)
 
 
@@ -229,7 +229,7 @@ def _run_event(
     stations: Sequence[FinishedStation],
     table: pd.DataFrame,
 ) -> Event:
-    """Return the earthquake of a run, with number and time of its revision, if it has them."""
+    """Return the earthquake of a run with number and time of its revision, as far as known."""
     known = _known(settings, folder, region)
     event = _event(stations, table, known, settings.report.language)
     number, time = revision_of_run(folder / "run.json")
@@ -256,7 +256,7 @@ def _place(
 
 
 def _coordinates(facts: Mapping[str, Any], prefix: str) -> tuple[float, float, float]:
-    """Return longitude, latitude and depth of names with a prefix, NaN where one is missing."""
+    """Return longitude, latitude and depth of keys with a prefix, NaN where missing."""
     longitude, latitude, depth = (
         _number(facts.get(f"{prefix}{axis}")) for axis in ("longitude", "latitude", "depth")
     )
@@ -275,7 +275,7 @@ def _is_dated(facts: Mapping[str, Any]) -> bool:
 
 
 def _rejected(path: Path) -> tuple[pd.DataFrame, int]:
-    """Return the first rows of the table of rejections, and how many it has."""
+    """Return the first rows of the table of rejections, and its number of rows."""
     # Line by line: rejections of a large inventory are many
     rows, count = list[list[str]](), 0
     if path.is_file():
@@ -309,8 +309,8 @@ def _outlines(beside: Path | None, worst: pd.DataFrame) -> list[tuple[str, list[
 
 
 def _provenance(settings: Run) -> list[tuple[str, str]]:
-    """Return how the results were made."""
-    # Everything else is in the files beside the page
+    """Return the provenance of the results as pairs of title and text."""
+    # Everything else is in the files next to the page
     texts = LANGUAGES[settings.report.language]
     has_map = settings.records is not None and settings.records.shakemap is not None
     notes = [WORDING[settings.report.language]["page_shakemap"]] if has_map else []
@@ -324,7 +324,7 @@ def _provenance(settings: Run) -> list[tuple[str, str]]:
 
 
 def _made(language: Language) -> list[tuple[str, str]]:
-    """Return when and with what the page was made."""
+    """Return time and software versions of the page as pairs of title and text."""
     texts = LANGUAGES[language]
     return [
         (texts["made_with"], f"per_obspy {version('per_obspy')}"),

@@ -1,4 +1,4 @@
-"""Everything that a page draws of single pairs and stations, computed again for some of them."""
+"""Drawings of single pairs and stations for the page, computed anew for some of them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -35,7 +35,7 @@ def page_drawings(
     worst : DataFrame
         Pairs of the page with all columns of the risk table.
     stations : sequence of FinishedStation
-        With shards.
+        With station files.
     """
     if "probability" not in worst or "derived" not in worst:
         return PageDrawings({}, {}, 0, 0)
@@ -67,7 +67,7 @@ def _sensitivities(
 
 
 def _each(pairs: pd.DataFrame, ground: RegionalMotion, settings: Run) -> list[Any]:
-    """Return the sensitivities of all pairs but those that cannot be computed."""
+    """Return the sensitivities of all pairs for which they can be computed."""
     try:
         return input_sensitivity(pairs, ground, settings.building, settings.screening)
     except (ValueError, ArithmeticError):

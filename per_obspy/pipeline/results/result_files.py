@@ -64,7 +64,7 @@ class Screening(NamedTuple):
 
 def write_results(screening: Screening, notes: Notes, shown: pd.DataFrame, report: Report) -> None:
     """
-    Write summary, KML and workbook; a file that cannot be made is one line of the report.
+    Write summary, KML and workbook; note each file that cannot be written as a fault.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _worst_buildings(path: Path) -> pd.DataFrame:
 
 
 def _extent(screening: Screening, notes: Notes, most: int) -> str:
-    """Return a sentence on how many pairs a file has, the worst, and where all of them are."""
+    """Return a sentence on the number of pairs in a file, and on the table with all pairs."""
     pairs = notes.counts.pairs
     if pairs <= most:
         return f"All {pairs} pairs."

@@ -1,4 +1,4 @@
-"""Facts of a run that its summary states: the earthquake and the stations."""
+"""Facts of a run for its summary: the earthquake and the stations."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -39,7 +39,7 @@ def event_facts(event: Any) -> dict[str, object]:
 
 
 def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[dict[str, object]]:
-    """Return the earthquakes of a folder; the screened one has the facts of its event file."""
+    """Return the earthquakes of a run, the screened one with the facts of its event file."""
     if event is None:
         return list(groups)
     facts = event_facts(event)
@@ -48,14 +48,14 @@ def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[d
 
 def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> dict[str, Any]:
     """
-    Return the facts of the earthquake of a run: of its file, else of the headers of its records.
+    Return the facts of the earthquake of a run, from its event file or the records' headers.
 
     Parameters
     ----------
     record : Path
         ``run.json``, finished or not.
     region : Region
-        Whose epicentre counts where nothing else is known.
+        Region whose epicentre counts where no event file or record gives one.
     shakemap : Path, optional
         Grid of the map that serves pairs without a station; it names itself, and the earthquake
         where no record does.

@@ -1,4 +1,4 @@
-"""Facts of an ensemble that its table lacks, from the runs of its scenarios."""
+"""Facts of an ensemble from the runs of its scenarios, which its table lacks."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -43,13 +43,13 @@ class ScenarioRun(NamedTuple):
 
     @property
     def risk(self) -> Path:
-        """Return the path of its risk table, which is missing if no pair was usable."""
+        """Return the path of the risk table, which is missing if no pair is usable."""
         return self.folder / "risk.parquet"
 
 
 class ScenarioRuns:
     """
-    Runs of all scenarios, by the names of these.
+    Runs of all scenarios, by the name of the scenario.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class ScenarioRuns:
                 yield _with_flags_of_pairs(batch.to_pandas())
 
     def _columns(self) -> list[str]:
-        """Return the columns of the first run that the ensemble takes over."""
+        """Return the columns that the ensemble takes from its first run."""
         if self.first is None:
             return []
         area = self.first.settings.totals.area
@@ -137,14 +137,14 @@ class ScenarioRuns:
 
 
 def _stations(run: ScenarioRun) -> Sequence[Any]:
-    """Return the stations that a run left; none where it has a map only."""
+    """Return the stations of a finished run; empty if it has a ShakeMap only."""
     if not (run.folder / "stations").is_dir():
         return []
     return [station for station in stations_of_earlier_run(run.folder) if station.shard]
 
 
 def _rows_of(risk: Path, names: Sequence[str]) -> pd.DataFrame:
-    """Return the rows of some pairs with everything that a history needs but the rank."""
+    """Return the rows of some pairs with the columns for a history, except the rank."""
     wanted = [name for name in ("pair_id", *HISTORY_COLUMNS) if name != "rank"]
     known = set(pq.read_schema(risk.absolute()).names)
     columns = [name for name in wanted if name in known]

@@ -9,7 +9,7 @@ from per_obspy.resume import StatusError, read_status
 
 class KnownStations(NamedTuple):
     """
-    Stations that were expected, and those of which records came.
+    Names of the expected stations, and of those with received records.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class KnownStations(NamedTuple):
     def of(
         cls, expected: Iterable[str], received: Iterable[str], waiting: Iterable[Path]
     ) -> "KnownStations":
-        """Return the stations of the sources of a run; what was received was expected."""
+        """Return the stations of the sources of a run; received stations count as expected."""
         names = tuple(sorted(set(received)))
         files = tuple(sorted({path.name for path in waiting}))
         return cls(tuple(sorted({*expected, *names})), names, files)
@@ -37,7 +37,7 @@ class KnownStations(NamedTuple):
 
 class Served(NamedTuple):
     """
-    Numbers of what the record of each station is used for.
+    Numbers of pairs and buildings for which the record of each station is used.
 
     Attributes
     ----------
@@ -100,12 +100,12 @@ def station_facts(
 
 
 def _share(part: int, whole: int) -> float:
-    """Return a part of a whole, rounded as tables are read; 0 of an empty whole."""
+    """Return part / whole, rounded; 0 if the whole is 0."""
     return round(part / whole, 6) if whole else 0.0
 
 
 def earlier_facts(record: Path) -> tuple[list[Any], KnownStations]:
-    """Return the earthquakes and stations of the run that wrote a record; empty without one."""
+    """Return the earthquakes and stations in ``run.json``; empty without such a file."""
     try:
         found = read_status(record)
     except StatusError:

@@ -71,7 +71,7 @@ def find_pair(name: str, folder: Path) -> ShownPair:
 
 
 def _simulated(folder: Path) -> bool:
-    """Return whether the record of the results says that the motion is simulated."""
+    """Return whether the motion of the results is simulated, by the file that describes them."""
     for name in ("run.json", "ensemble.json"):
         try:
             return bool(read_status(folder / name).get("simulated", False))
@@ -82,7 +82,7 @@ def _simulated(folder: Path) -> bool:
 
 def draw_pair(pair: ShownPair, path: Path) -> None:
     """
-    Draw a pair: with its record where it has one, else its circles alone.
+    Draw a pair with its record, or its circles alone if no record serves it.
 
     Raises
     ------

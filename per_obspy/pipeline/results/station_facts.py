@@ -65,7 +65,7 @@ def pair_histories(
     worst : DataFrame
         Rows of a risk table, worst first.
     stations : iterable of FinishedStation
-        With shards.
+        With station files.
     """
     if not set(HISTORY_COLUMNS) <= set(worst):
         return {}

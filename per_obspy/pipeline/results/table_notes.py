@@ -1,4 +1,4 @@
-"""Numbers of a whole table, and its worst rows, noted while it is read in pieces."""
+"""Counts and worst rows of a table, collected while it is read in pieces."""
 
 from collections.abc import Sequence
 
@@ -53,5 +53,5 @@ class Notes:
 
 
 def needed_columns(more: Sequence[str]) -> list[str]:
-    """Return the columns that notes and others need, each once."""
+    """Return the columns for the notes and some more, without repetition."""
     return list(dict.fromkeys([*COLUMNS, *more]))

@@ -1,4 +1,4 @@
-"""Results for people of screenings without records of their own: design spectrum, ensemble."""
+"""Page, summary and layers of a screening by a design spectrum or an ensemble."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -42,7 +42,7 @@ _SHOWN_COLUMNS = ("rank", "pair_id", "risk_class", "longitude", "latitude", "dem
 
 class _Asked(NamedTuple):
     """
-    Results that are wanted, their place, and everything that is not in the table.
+    Wanted results, their folder, and all data that are not in the table.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class _Asked(NamedTuple):
     outlines : Path or None
         Of the buildings.
     notes : list of str
-        Sentences on what the page leaves out.
+        Sentences on contents that the page omits.
     own : sequence of str
         Columns that are computed, besides those of a risk table.
     stations : DataFrame
@@ -82,7 +82,7 @@ class _Asked(NamedTuple):
 
 
 class _Noted(NamedTuple):
-    """Whatever is noted of a table while it is read in pieces."""
+    """Summaries of a table that is read in pieces."""
 
     notes: Notes
     shown: list[pd.DataFrame]
@@ -97,7 +97,7 @@ def report_design(settings: Design, table: pd.DataFrame, folder: Path) -> Report
     Parameters
     ----------
     settings : Design
-        What was asked.
+        Settings of the screening.
     table : DataFrame
         From :func:`per_obspy.screening.by_spectrum.design_table.design_table`.
     folder : Path
@@ -150,7 +150,7 @@ def report_ensemble(
     Parameters
     ----------
     settings : Ensemble
-        What was asked.
+        Settings of the ensemble.
     folder : Path
         With ``ensemble.parquet``.
     simulated : bool
@@ -184,7 +184,7 @@ def report_ensemble(
 
 
 def _scenario_sentences(settings: Ensemble) -> list[str]:
-    """Name the first scenarios."""
+    """Return sentences that name the first scenarios."""
     key = "scenario_rate" if settings.yearly else "scenario_weight"
     sentence, first = WORDING[settings.report.language][key], [*settings.weights.items()][:5]
     return [sentence.format(name=name_text(name), value=f"{value:g}") for name, value in first]
@@ -207,7 +207,7 @@ def _with_classes(piece: pd.DataFrame, limits: ScreeningSettings) -> pd.DataFram
 
 
 def _write(asked: _Asked, pieces: Iterator[pd.DataFrame], pairs: int, report: Report) -> None:
-    """Read a table once, and write everything that people look at."""
+    """Read a table once, and write page, summary, totals, layers and workbook."""
     found = _Noted(Notes(asked.region.classes), [], [], [])
     noted = _noted(pieces, pairs, asked, found)
     if asked.settings.geopackage:
@@ -281,7 +281,7 @@ def _with_stations(asked: _Asked) -> Region:
 def _noted(
     pieces: Iterator[pd.DataFrame], pairs: int, asked: _Asked, found: _Noted
 ) -> Iterator[pd.DataFrame]:
-    """Yield pieces, and note numbers, totals, and pairs of figures and of the page."""
+    """Yield the pieces of a table, and add each to the summaries."""
     step, totals = -(-pairs // SHOWN), asked.totals
     classes = [*asked.region.classes, UNKNOWN_CLASS]
     for piece in pieces:

@@ -84,7 +84,7 @@ NO_ROWS = BuildingRowsDone([], {})
 
 
 class _Found(NamedTuple):
-    """Contacts of all rows in their order, buildings, number of rows, rejections, served ones."""
+    """Result of the search for rows: contacts in order, buildings, rejections, served buildings."""
 
     placed: pd.DataFrame
     contacts: Contacts
@@ -107,7 +107,7 @@ def building_rows(
     Parameters
     ----------
     settings : Run
-        What to do.
+        Settings of the run.
     folder : Path
         Of the results, with ``risk.parquet``.
     ground : GroundFiles
@@ -168,14 +168,14 @@ def _written(
 
 
 def _enabled(rows: Rows, risk: Dataset) -> bool:
-    """Return whether rows are wanted: if not configured, where pairs name their buildings."""
+    """Return whether rows are computed: as configured, by default if pairs name their buildings."""
     if rows.enabled is not None:
         return rows.enabled
     return set(IDENTIFIERS) <= set(risk.schema.names)
 
 
 def _found(rows: Rows, risk: Dataset) -> _Found:
-    """Find the rows of all pairs, and the order in which they are followed."""
+    """Find the rows of all pairs, and their order of computation."""
     names = [name for name in FINDING if name in risk.schema.names]
     pairs = risk.to_table(columns=names, use_threads=False).to_pandas()
     # From pairs to chains of contacts
@@ -220,7 +220,7 @@ def served_buildings(station: pd.Series, buildings: IntArray) -> dict[str, int]:
 
 
 def _raised(chains: Chains, placed: PlacedRows, first: IntArray) -> dict[str, BoolArray]:
-    """Return the flags of the rows in the order in which they are followed."""
+    """Return the flags of the rows in their order of computation."""
     raised = {name: flag[placed.order] for name, flag in chains.flags.items()}
     station = placed.contacts["station"].iloc[first]
     return raised | {
@@ -251,7 +251,7 @@ def _jobs(
 
 
 def _chunks(folder: Path, risk: Dataset, found: _Found) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Yield the contacts of each chunk with what their histories need, read in their order."""
+    """Yield the contacts of each chunk in order, with the columns for their histories."""
     waiting = list[pd.DataFrame]()
     for piece in _pieces(folder, risk, found.placed):
         waiting.append(_with_buildings(piece, found.contacts))
@@ -266,7 +266,7 @@ def _chunks(folder: Path, risk: Dataset, found: _Found) -> Iterator[tuple[int, p
 
 
 def _pieces(folder: Path, risk: Dataset, placed: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """Yield the contacts with their pairs, some thousands at a time, in memory that is bounded."""
+    """Yield the contacts with their pairs, some thousands at a time, in bounded memory."""
     names = ["pair_id", "longitude", "latitude", *NEEDED]
     mapping = pa.table({"rank": placed["rank"].to_numpy(), "place": np.arange(len(placed))})
     with bounded_database(folder) as database:
@@ -296,7 +296,7 @@ def _with_buildings(piece: pd.DataFrame, contacts: Contacts) -> pd.DataFrame:
 
 
 def _remove_others(folder: Path, parts: list[RowsPart]) -> None:
-    """Remove everything but these parts: those of an earlier table, and half written ones."""
+    """Remove parts of an earlier table, and partly written ones."""
     known = {path for part in parts for path in (part.path, part.status)}
     for path in folder.iterdir() if folder.is_dir() else ():
         if path not in known and path.is_file():

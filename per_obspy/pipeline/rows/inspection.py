@@ -1,4 +1,4 @@
-"""Plan of inspection: the worst buildings of a run, in the order in which teams visit them."""
+"""Plan of inspection: order in which teams visit the worst buildings of a run."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -99,7 +99,7 @@ def _facts(results: Path) -> dict[str, str]:
     try:
         record = read_status(file)
     except StatusError as error:
-        raise CatalogError(str(file), "no finished run here: a whole run comes first") from error
+        raise CatalogError(str(file), "no finished run here: run `per-obspy run` first") from error
     if record.get("state") == "unfinished":
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     if not (results / "buildings.parquet").is_file():

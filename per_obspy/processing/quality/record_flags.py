@@ -1,4 +1,4 @@
-"""Flags of a record: short names of what its reader must know, for tables and the console."""
+"""Flags of a record: short names of warnings and assumptions, for tables and the console."""
 
 from obspy import Stream, Trace
 

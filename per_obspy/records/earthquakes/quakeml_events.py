@@ -1,4 +1,4 @@
-"""Earthquakes of QuakeML files and answers, and QuakeML with what their screening depends on."""
+"""Earthquakes of QuakeML files and answers, and QuakeML with the facts for their screening."""
 
 from io import BytesIO
 from pathlib import Path

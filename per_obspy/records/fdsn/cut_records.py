@@ -33,7 +33,7 @@ def cut_records_aside(request: Fdsn) -> Iterator[None]:
     Parameters
     ----------
     request : Fdsn
-        With start and end; what a killed program has set aside returns to its place first.
+        With start and end; files that a killed program has set aside are restored first.
 
     Raises
     ------

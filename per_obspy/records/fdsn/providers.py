@@ -55,7 +55,7 @@ def base_url(provider: str) -> str:
         names = ", ".join(sorted(URL_MAPPINGS))
         raise CatalogError(
             public_url(provider),
-            f"is no base URL, no router ({', '.join(ROUTERS)}) and none of {names}",
+            f"is neither a base URL, nor a router ({', '.join(ROUTERS)}) nor one of {names}",
         )
     return str(URL_MAPPINGS[provider.upper()])
 

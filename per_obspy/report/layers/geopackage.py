@@ -50,7 +50,7 @@ class Layer(NamedTuple):
 
 def append_layer(path: Path, layer: Layer, is_new: bool, facts: Mapping[str, str]) -> None:
     """
-    Write a layer into a GeoPackage, or append rows to one that it has.
+    Write a layer into a GeoPackage, or append rows to an existing layer.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def geometry_type(shapes: Shapes) -> str:
 
 def layer_names(columns: Iterable[str], taken: Sequence[str] = (GEOMETRY, IDENTIFIER)) -> list[str]:
     """
-    Return names of columns for a layer, which are distinct whatever the case of their letters.
+    Return column names for a layer, distinct without regard to case.
 
     The layer has an identifier ``fid`` and a geometry ``geom`` of its own. Of names that are taken
     the later one gets a number.
@@ -115,7 +115,7 @@ def layer_names(columns: Iterable[str], taken: Sequence[str] = (GEOMETRY, IDENTI
 
 
 def with_shapes(table: pd.DataFrame, shapes: Shapes, geometry: str) -> pa.Table:
-    """Return a table with its geometries as WKB in a last column, all columns of a known type."""
+    """Return a table with WKB geometries in its last column and a known type for every column."""
     plain = table.copy(deep=False)
     plain.attrs = {}
     arrow = pa.Table.from_pandas(plain, preserve_index=False)
@@ -131,7 +131,7 @@ def with_shapes(table: pd.DataFrame, shapes: Shapes, geometry: str) -> pa.Table:
 
 def write_styles(path: Path, styles: Mapping[str, str]) -> None:
     """
-    Add the table in which QGIS keeps styles, with the default style of each layer.
+    Add the table of QGIS styles with the default style of each layer.
 
     Parameters
     ----------

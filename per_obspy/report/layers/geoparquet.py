@@ -1,4 +1,4 @@
-"""Pairs as GeoParquet: the whole risk table with a shape per pair, written piece by piece."""
+"""Pairs as GeoParquet: the risk table with one shape per pair, written piece by piece."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ VERSION, GEOMETRY = "1.1.0", "geometry"
 
 class GeoParquet:
     """
-    GeoParquet file that takes rows in pieces.
+    GeoParquet file to which rows are appended in pieces.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The worst pairs as KML, which viewers of globes and telephones open."""
+"""Worst pairs as KML, for globe viewers and telephones."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -75,7 +75,7 @@ def _add_mark(
 
 
 def _as_html(line: str) -> str:
-    """Return a line whose letters are no markup of HTML."""
+    """Return a line with HTML markup escaped."""
     letters = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "$": "&#36;"}
     return "".join(letters.get(letter, letter) for letter in printable(line))
 

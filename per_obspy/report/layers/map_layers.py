@@ -1,4 +1,4 @@
-"""All layers of a screening: ``risk.gpkg``, the project of QGIS beside it, and GeoParquet."""
+"""All layers of a screening: ``risk.gpkg``, its project of QGIS, and GeoParquet."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -37,7 +37,7 @@ _UNITS = {"pga": "m/s2", "pgv": "m/s", "severity": "m/s", "worst_expected_impact
 
 class MapSources(NamedTuple):
     """
-    Everything that layers show beside the pairs.
+    Contents of the layers other than the pairs.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def write_layers(
         The risk table, in one piece or in several with the same columns; only one is held at a
         time.
     sources : MapSources
-        What there is beside the pairs.
+        Contents of the layers other than the pairs.
     files : tuple of Path
         GeoPackage, project of QGIS, GeoParquet.
     """
@@ -107,7 +107,7 @@ class _Package:
         self.has_places = False
 
     def add(self, layer: Layer) -> None:
-        """Write a layer, or more rows of one."""
+        """Write a layer, or append rows to it."""
         is_new = layer.name not in self.layers
         if is_new:
             kind = geometry_type(layer.shapes)
@@ -144,7 +144,7 @@ def _style(layer: Layer, kind: str, classes: Sequence[str]) -> str:
 
 
 def _other_layers(sources: MapSources, pairs: Path, has_places: bool) -> Iterator[Layer]:
-    """Yield buildings, stations and areas, as far as there are any."""
+    """Yield the layers of buildings, stations and areas that are not empty."""
     if has_places:
         yield from building_layers(pairs, sources.ranked, sources.outlines)
     if not sources.stations.empty:

@@ -1,4 +1,4 @@
-"""Project of QGIS that opens the layers of a GeoPackage beside it, coloured."""
+"""Project of QGIS that opens the layers of a GeoPackage in the same folder, coloured."""
 
 import zipfile
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ def write_project(
     title : str
         Name of the run.
     data : str
-        Name of the GeoPackage, which lies beside the project: both can be moved together.
+        Name of the GeoPackage in the folder of the project: both can be moved together.
     layers : sequence of ProjectLayer
         The first is drawn on top.
     extent : tuple of float
@@ -93,7 +93,7 @@ def write_project(
 
 
 def _add_properties(root: ElementTree.Element) -> None:
-    """Add that paths are seen from the project, and that it has a coordinate reference system."""
+    """Set relative paths and the use of a coordinate reference system."""
     properties = ElementTree.SubElement(root, "properties")
     paths = ElementTree.SubElement(properties, "Paths")
     ElementTree.SubElement(paths, "Absolute", type="bool").text = "false"
@@ -103,7 +103,7 @@ def _add_properties(root: ElementTree.Element) -> None:
 
 
 def _add_view(root: ElementTree.Element, extent: tuple[float, float, float, float]) -> None:
-    """Add the part of the map that is seen first."""
+    """Add the initial extent of the map."""
     view = ElementTree.SubElement(root, "mapcanvas", name="theMapCanvas", annotationsVisible="1")
     ElementTree.SubElement(view, "units").text = "degrees"
     corners = ElementTree.SubElement(view, "extent")

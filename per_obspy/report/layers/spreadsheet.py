@@ -1,4 +1,4 @@
-"""Results as a workbook for spreadsheets: one sheet per table, no text of which is a formula."""
+"""Results as a workbook: one sheet per table, without formulas."""
 
 import math
 import re
@@ -83,7 +83,7 @@ def _add_sheet(book: Any, sheet: Sheet) -> None:
 
 
 def _cell(page: Any, value: object) -> object:
-    """Return a value as a cell: numbers as numbers, anything else as text, nothing as empty."""
+    """Return a value as a cell: numbers as numbers, missing values as empty, others as text."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     # A workbook has neither NaN nor infinity

@@ -19,7 +19,7 @@ DECIMALS = 6
 
 def read_outlines(path: Path, names: Collection[str]) -> list[tuple[str, list[float]]]:
     """
-    Read the outlines of buildings, none where there is no such table or no library for it.
+    Read the outlines of buildings; empty without the table or the library that reads it.
 
     Parameters
     ----------

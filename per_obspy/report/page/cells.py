@@ -1,4 +1,4 @@
-"""Counts of pairs by cell, class and state, for those that a page does not show one by one."""
+"""Counts of pairs by cell, class and state, for pairs that the page does not list."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ SMALLEST_CELL = 0.001
 
 class CellCounts:
     """
-    Numbers of pairs in cells of a grid in degrees, by class and state, taken in pieces.
+    Numbers of pairs in cells of a grid in degrees, by class and state, counted in pieces.
 
     A class, because cells grow while the pieces of a table arrive.
 
@@ -49,7 +49,7 @@ class CellCounts:
             self._enlarge()
 
     def _enlarge(self) -> None:
-        """Join four cells to one."""
+        """Double the size of the cells."""
         self.size *= 2.0
         joined: Counter[tuple[int, int, int]] = Counter()
         for (column, row, kind), count in self._counts.items():
@@ -75,6 +75,6 @@ class CellCounts:
 
 
 def _codes(column: pd.Series, names: Sequence[str]) -> NDArray[np.int64]:
-    """Return the number of each row's name, of other names the last one."""
+    """Return the code of each row's name; other names have the last code."""
     codes = pd.Index(names).get_indexer(pd.Index(column)).astype(np.int64)
     return np.where(codes < 0, len(names) - 1, codes)

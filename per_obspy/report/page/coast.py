@@ -21,7 +21,7 @@ DECIMALS = 3
 
 class _Lines(NamedTuple):
     """
-    All lines of the world.
+    Coast lines and borders of the world.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def lines_around(longitude: FloatArray, latitude: FloatArray) -> dict[str, list[
 
 
 def _near(corners: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
-    """Return which corners are near places, or the next to one that is."""
+    """Return a mask of the corners near places, and of their neighbours."""
     low, high = places.min(axis=0), places.max(axis=0)
     margin = np.maximum(MARGIN * (high - low), LEAST_MARGIN)
     near = ((corners >= low - margin) & (corners <= high + margin)).all(axis=1)
@@ -81,7 +81,7 @@ def _near(corners: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
 
 
 def _pieces(corners: FloatArray, near: NDArray[np.bool_], stride: int) -> list[list[float]]:
-    """Return the parts of a line whose corners are near, every so many corners and the last."""
+    """Return the near parts of a line, thinned to every n-th corner and the last."""
     # First corners that are near, and first ones that are not, by turns
     edges = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
     pieces = []
@@ -95,7 +95,7 @@ def _pieces(corners: FloatArray, near: NDArray[np.bool_], stride: int) -> list[l
 
 @cache
 def _world() -> _Lines:
-    """Return all lines; ``workflows/coast_lines.py`` has made the file."""
+    """Read all lines from the file that ``workflows/coast_lines.py`` writes."""
     resource = files("per_obspy.report.page") / "assets" / "coast_lines.npz"
     with as_file(resource) as path, np.load(path, allow_pickle=False) as stored:
         ends = np.cumsum(stored["lengths"])

@@ -1,4 +1,4 @@
-"""Content of the page: everything that its script shows, as values of JSON and packed tables."""
+"""Content of the page: data for its script, as JSON values and packed tables."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -65,7 +65,7 @@ LONGEST_CELL = 300
 
 class PageDrawings(NamedTuple):
     """
-    Drawings and sensitivities, computed again for some pairs and stations.
+    Drawings and sensitivities of some pairs and stations.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ NO_DRAWINGS = PageDrawings({}, {}, 0, 0)
 
 class PageData(NamedTuple):
     """
-    Everything that a page is made of.
+    Data of a page.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class PageData(NamedTuple):
 
 
 def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
-    """Return the content of the page, and its tables, whose descriptions the content holds."""
+    """Return the content of the page, with descriptions of its tables, and the tables."""
     # Sentences first, then whatever the script draws
     facts = data.language, data.simulated
     # Tables of which it names rows
@@ -171,7 +171,7 @@ def page_content(data: PageData) -> tuple[dict[str, Any], list[PackedTable]]:
 
 
 def _drawn(data: PageData) -> dict[str, Any]:
-    """Return everything of the map and of the figures that is in no table."""
+    """Return the data of map and figures that are not in tables."""
     return {
         "building_colours": BUILDING_COLOURS,
         "cell_size": data.tally.cells.size,
@@ -296,7 +296,7 @@ def _station_places(stations: pd.DataFrame) -> list[list[Any]]:
 
 
 def _rows(table: pd.DataFrame, columns: Sequence[str], texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return heads and rows of the columns that a table has."""
+    """Return headings and rows for the columns that a table has."""
     present = [name for name in columns if name in table]
     rows = [
         [_cell(value) for value in row]
@@ -306,7 +306,7 @@ def _rows(table: pd.DataFrame, columns: Sequence[str], texts: Mapping[str, str])
 
 
 def _cell(value: Any) -> str | float:
-    """Return a value of a table as JSON holds it; missing ones are empty."""
+    """Return a value of a table for JSON; missing values are empty texts."""
     if value is None or value is pd.NA:
         return ""
     if isinstance(value, str):

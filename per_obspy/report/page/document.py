@@ -1,4 +1,4 @@
-"""The page as one HTML file: its skeleton, style and script with the data."""
+"""Page as one HTML file with its style, script and data."""
 
 import hashlib
 import re
@@ -35,8 +35,8 @@ def page_document(data: PageData) -> str:
     Return the page as HTML.
 
     Texts of data are only in the block of data, whose letters cannot be markup, and the script sets
-    them as texts. The policy allows the page's own script and style by their hashes and nothing
-    else: no request leaves the browser.
+    them as texts. The policy allows only the page's own script and style, by their hashes: no
+    request leaves the browser.
     """
     content, tables = page_content(data)
     style, script = _asset("page.css"), "\n".join(_asset(name) for name in SCRIPTS)
@@ -56,10 +56,10 @@ def page_document(data: PageData) -> str:
 
 
 def _asset(name: str) -> str:
-    """Return a file of the page that comes with the package."""
+    """Read a file of the page from the package."""
     return (files("per_obspy.report.page") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _hash(text: str) -> str:
-    """Return the hash by which a policy allows a script or style."""
+    """Return the hash of a script or style for the content security policy."""
     return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode()}"

@@ -31,7 +31,7 @@ MOST_SAMPLES = 200_000
 
 def drawn_history(station: xr.Dataset, pair: pd.Series) -> dict[str, Any] | None:
     """
-    Return the exact history of a pair at contact level for a drawing, None where there is none.
+    Return the exact history of a pair at contact level for a drawing, None if there is none.
 
     Parameters
     ----------
@@ -82,9 +82,9 @@ def _structure(pair: pd.Series, number: int) -> Structure:
 
 
 def _thinned(history: PoundingHistory) -> dict[str, Any]:
-    """Return the part of a history with strong motion as few numbers."""
+    """Return the strong motion of a history, thinned."""
     strength = np.cumsum((history.displacement**2).sum(axis=0))
-    # All of it where nothing moves
+    # All of it without any motion
     shares = np.array([0.002, 0.995]) if strength[-1] > 0 else np.array([0.0, 1.0])
     first, last = np.searchsorted(strength, shares * strength[-1])
     edges = np.unique(np.linspace(first, max(last, first + 1), INTERVALS + 1).astype(int))

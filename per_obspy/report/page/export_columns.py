@@ -34,7 +34,7 @@ PLACE_NAMES = frozenset(
 
 def pack_export(pairs: pd.DataFrame, known: Collection[str]) -> PackedTable:
     """
-    Pack the columns of pairs that a page does not show, in their order, as far as there is room.
+    Pack the columns of pairs that the page does not show, in order, up to its size limit.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def pack_export(pairs: pd.DataFrame, known: Collection[str]) -> PackedTable:
 
 
 def _kind(pairs: pd.DataFrame, name: str) -> str:
-    """Return how a column is packed: numbers with four digits, whole ones with all of theirs."""
+    """Return the packing of a column: four digits for numbers, all digits for whole numbers."""
     column = pairs[name]
     if is_bool_dtype(column) or not is_numeric_dtype(column):
         return text_kind(pairs, name)
@@ -82,7 +82,7 @@ def _kind(pairs: pd.DataFrame, name: str) -> str:
 
 
 def text_kind(pairs: pd.DataFrame, name: str) -> str:
-    """Return how a column of texts is packed, if there is one: once each where they are few."""
+    """Return the packing of a column of texts; few different texts are stored once each."""
     if name not in pairs:
         return "text"
     return "choice" if pairs[name].nunique() < min(MOST_CHOICES, 0.5 * len(pairs) + 2) else "text"
@@ -90,7 +90,7 @@ def text_kind(pairs: pd.DataFrame, name: str) -> str:
 
 def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
     """
-    Return the names of places of each pair in one text, None where the table has no such column.
+    Return the place names of each pair as one text, None without such a column.
 
     Examples
     --------
@@ -107,12 +107,12 @@ def addresses(pairs: pd.DataFrame) -> "pd.Series[str] | None":
 
 
 def _joined(names: Iterable[object]) -> str:
-    """Return names in their order, each once."""
+    """Join names in their order, without repetition."""
     texts = dict.fromkeys(str(name).strip() for name in names)
     return ", ".join(text for text in texts if text)
 
 
 def _is_place(name: str) -> bool:
-    """Return whether a column has the name of one with names of places."""
+    """Return whether a column contains names of places, by its name."""
     stem = name.lower().removesuffix("_1").removesuffix("_2").rsplit(":", 1)[-1]
     return stem in PLACE_NAMES

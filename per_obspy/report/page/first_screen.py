@@ -1,4 +1,4 @@
-"""Sentences and numbers of the first screen: event, five numbers, first actions, doubts."""
+"""Sentences and numbers of the first screen: event, five numbers, actions, uncertainty."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ LONGEST_NAME = 40
 #: Stations in a sentence, and the longest reason of one that is not used, characters.
 NAMED_STATIONS, LONGEST_REASON = 12, 90
 
-#: Longest text on what stands for an earthquake, characters.
+#: Longest text on a scenario or spectrum in place of an earthquake, characters.
 LONGEST_SOURCE = 500
 
 #: Flags that are counted on the first screen, with the keys of their sentences.
@@ -50,7 +50,7 @@ class Event(NamedTuple):
     used, missing : int
         Stations that serve pairs and those that do not.
     source : str
-        Sentences on what stands for the earthquake, instead of all that; empty if there is one.
+        Sentences on a spectrum or on scenarios in place of an earthquake; empty if there is one.
     revision : int
         Number of the revision of these results; 0 if they have none.
     revised : str
@@ -70,7 +70,7 @@ class Event(NamedTuple):
 
 class FirstScreen(NamedTuple):
     """
-    Everything of the first screen, in one language.
+    Texts of the first screen in one language.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class FirstScreen(NamedTuple):
     numbers : list of (str, str)
         Value and meaning.
     first, sure : list of str
-        Sentences: what to do first, and how sure the result is.
+        Sentences on first actions, and on uncertainty.
     """
 
     event: str
@@ -155,7 +155,7 @@ def _revision(event: Event, language: Language) -> str:
 
 
 def _expected(stations: pd.DataFrame, language: Language) -> str:
-    """Return how many stations are expected, and the names of the used and the missing ones."""
+    """Return the number of expected stations, and the names of used and missing ones."""
     if stations.empty or not {"station", "state"} <= set(stations):
         return ""
     # Whatever is not used serves no pair
@@ -187,7 +187,7 @@ def _place_texts(event: Event, language: Language) -> list[str]:
     """Return epicentre and depth, as far as they are known."""
     if event.place is None:
         return []
-    # Latitude first, as people say it
+    # Latitude first, as in speech
     texts, (longitude, latitude, depth) = LANGUAGES[language], event.place
     place = {"latitude": latitude, "longitude": longitude}
     numbers = {name: written(degrees, 2, language) for name, degrees in place.items()}
@@ -223,13 +223,13 @@ def _numbers(
 
 
 def _meaning(key: str, value: float, language: Language) -> str:
-    """Return the meaning of a number, in the singular where it is written as one."""
+    """Return the meaning of a number, in the singular if the number is 1."""
     texts = LANGUAGES[language]
     return texts[f"{key}_one"] if written(value, 0, language) == "1" else texts[key]
 
 
 def _fastest(worst: pd.DataFrame, language: Language) -> list[tuple[str, str]]:
-    """Return the fastest expected impact, if there is one."""
+    """Return the fastest expected impact as text, empty if there is none."""
     fastest = float(worst["expected_impact_velocity"].max()) if len(worst) else math.nan
     if not math.isfinite(fastest):
         return []
@@ -244,7 +244,7 @@ def _first(
     buildings: pd.DataFrame | None,
     facts: tuple[Language, bool],
 ) -> list[str]:
-    """Return sentences on what to do first."""
+    """Return sentences on first actions."""
     language, simulated = facts
     texts = LANGUAGES[language]
     said = [texts["todo_exercise"]] if simulated else []
@@ -260,7 +260,7 @@ def _first(
 def _inspected(
     hit: pd.DataFrame, areas: pd.DataFrame, buildings: pd.DataFrame | None, language: Language
 ) -> list[str]:
-    """Return what to inspect first: buildings or pairs, and areas."""
+    """Return sentences on the first inspections: buildings or pairs, and areas."""
     texts, said = LANGUAGES[language], list[str]()
     if buildings is not None and len(buildings):
         said.append(texts["todo_buildings"].format(names=_names(buildings["building_id"])))
@@ -274,7 +274,7 @@ def _inspected(
 
 
 def _sure(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[str]:
-    """Return sentences on what is uncertain."""
+    """Return sentences on uncertainty."""
     texts, said = LANGUAGES[language], _spread(tally, areas, language)
     whole = written(tally.pairs, 0, language)
     for flag, key in DOUBTS.items():
@@ -303,7 +303,7 @@ def _spread(tally: PairTally, areas: pd.DataFrame, language: Language) -> list[s
 
 
 def _placed_names(areas: pd.DataFrame, language: Language) -> str:
-    """Return the names of areas with latitude and longitude of their middle."""
+    """Return the names of areas with the coordinates of their centres."""
     named = []
     for _, area in areas.iterrows():
         place = (written(area[name], 3, language) for name in ("latitude", "longitude"))

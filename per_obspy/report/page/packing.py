@@ -1,4 +1,4 @@
-"""Columns of a table as few bytes that a browser reads at once."""
+"""Packing of the columns of a table as compact bytes for a browser."""
 
 import json
 import zlib
@@ -47,7 +47,7 @@ class PackedTable(NamedTuple):
 
 def pack_table(table: pd.DataFrame, kinds: Mapping[str, str]) -> PackedTable:
     """
-    Pack columns of a table; those that it lacks are left out.
+    Pack columns of a table; missing columns are left out.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _places(column: pd.Series) -> tuple[dict[str, Any], bytes]:
 
 
 def _choices(column: pd.Series, longest: int = LONGEST_TEXT) -> tuple[dict[str, Any], bytes]:
-    """Return the different texts, and the number of each row's text."""
+    """Return the different texts, and the index of each row's text."""
     codes, texts = pd.factorize(column.fillna("").astype(str))
     if len(texts) > MOST_CHOICES:
         raise ValueError(f"{column.name}: {len(texts)} different texts are no choice")
@@ -120,7 +120,7 @@ def _names(column: pd.Series) -> tuple[dict[str, Any], bytes]:
 
 
 def _texts(column: pd.Series) -> tuple[dict[str, Any], bytes]:
-    """Return every text; they are part of the description."""
+    """Return the text of every row as part of the description."""
     return {"texts": _short(column.fillna("").astype(str))}, b""
 
 
@@ -149,7 +149,7 @@ def encoded(content: Mapping[str, Any], tables: Sequence[PackedTable]) -> str:
     """
     Return content and tables as one deflated text of letters, digits, ``+``, ``/`` and ``=``.
 
-    Nothing in it can be taken for markup. Its bytes are the length of a JSON text (four bytes,
+    No part of it can be taken for markup. Its bytes are the length of a JSON text (four bytes,
     little endian), the JSON text, and the data of the tables.
 
     Parameters

@@ -68,7 +68,7 @@ class PairTally:
 
 
 def _counts(piece: pd.DataFrame, column: str) -> dict[str, int]:
-    """Return how often each text occurs in a column, nothing if the table lacks it."""
+    """Return the number of rows of each text of a column, empty if the table lacks it."""
     if column not in piece:
         return {}
     return {str(text): int(count) for text, count in piece[column].value_counts().items()}

@@ -1,4 +1,4 @@
-"""Texts of the page in English, and the choice of a language; numbers are written by it too."""
+"""English texts of the page, and formats of texts and numbers by language."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -39,7 +39,7 @@ ENGLISH: dict[str, str] = {
     "stations_missing": "{count} missing or rejected",
     "stations_missing_one": "{count} missing or rejected",
     "and_more": "and {count} more",
-    "todo_exercise": "Send nobody: the motion is simulated.",
+    "todo_exercise": "Send no team: the motion is simulated.",
     "todo_worst": "Inspect the pairs of the fastest impacts first: {names}.",
     "todo_buildings": "Inspect these buildings first: {names}.",
     "todo_areas": "Begin in the areas with most expected pounding: {names}.",
@@ -196,7 +196,7 @@ ENGLISH: dict[str, str] = {
     "prevents_bumper": (
         "Bumpers do not prevent it but soften it: restitution at most {value} (estimate)."
     ),
-    "prevents_nothing": "Nothing is needed in this event.",
+    "prevents_nothing": "No measure is needed in this event.",
     "flags": "Flags",
     "derived": "Derived inputs",
     "derived_spread": (
@@ -266,7 +266,7 @@ ENGLISH: dict[str, str] = {
     "stations": "Stations",
     "areas": "Areas",
     "rejected": "Rejected, with reasons",
-    "rejected_none": "Nothing was rejected.",
+    "rejected_none": "No input was rejected.",
     "rejected_some": "{shown} of {all} rejections; all are in rejected.csv.",
     "rejected_some_one": "{shown} of {all} rejection; it is in rejected.csv too.",
     "provenance": "Where this comes from",
@@ -293,7 +293,7 @@ ENGLISH: dict[str, str] = {
     "head_row": "row",
     "head_reasons": "reasons",
     "made_with": "made with",
-    "files": "files beside this page",
+    "files": "files next to this page",
     "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (inputs with their hashes)",
     "configuration": "configuration",
     "station_used": "used",
@@ -328,7 +328,7 @@ def written(value: float, digits: int, language: Language) -> str:
 
 def counted(language: Language, key: str, count: float, **values: str) -> str:
     """
-    Return a text about a number of things, in the singular where the number is one.
+    Return a text about a number of things, in the singular if the number is 1.
 
     Parameters
     ----------
@@ -353,5 +353,5 @@ def counted(language: Language, key: str, count: float, **values: str) -> str:
 
 
 def fixed_phrases(text: str, language: Language) -> str:
-    """Return a sentence of other modules with its fixed phrases in a language."""
+    """Translate the fixed phrases of a sentence from other modules."""
     return in_spanish(text) if language == "es" else text

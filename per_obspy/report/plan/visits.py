@@ -65,7 +65,7 @@ class _State(NamedTuple):
 
 
 def largest_number(teams: Teams) -> int:
-    """Return how many buildings the teams can visit at most, without any way between them."""
+    """Return the largest number of buildings that the teams can visit, without travel time."""
     return int(teams.shift // teams.inspection) * len(teams.starts)
 
 
@@ -140,7 +140,7 @@ def _problem(block: pd.DataFrame, state: _State, teams: Teams) -> "ProblemData":
 
 
 def _clients(block: pd.DataFrame, first: int, longest: int, inspection: int) -> "list[Client]":
-    """Return the buildings, which may be left out at the cost of their prize."""
+    """Return the buildings as optional clients of the routes, each with its prize."""
     from pyvrp import Client
 
     return [
@@ -160,7 +160,7 @@ def _prizes(block: pd.DataFrame, longest: int) -> list[int]:
 def _ways(
     longitude: FloatArray, latitude: FloatArray, end: int, detour: float
 ) -> NDArray[np.int64]:
-    """Return the way between all places along streets, m; none to the end of a route."""
+    """Return the distances between all places along streets, m; 0 to the end of a route."""
     apart = great_circle(longitude[:, None], latitude[:, None], longitude, latitude)
     ways = np.rint(detour * apart).astype(np.int64)
     ways[end, :] = ways[:, end] = 0

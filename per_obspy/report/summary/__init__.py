@@ -1,1 +1,1 @@
-"""One page for mail and radio: what happened, five numbers, the worst pairs, what to do first."""
+"""Summary of a screening for mail and radio: earthquake, five numbers, worst pairs, actions."""

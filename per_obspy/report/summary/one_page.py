@@ -48,7 +48,7 @@ def write_page(facts: SummaryFacts, shown: pd.DataFrame, path: Path) -> None:
     Parameters
     ----------
     facts : SummaryFacts
-        What it states.
+        Facts of the screening.
     shown : DataFrame
         Pairs of the map: ``risk_class, longitude, latitude``.
     path : Path
@@ -166,7 +166,7 @@ def _write_pairs(figure: Figure, facts: SummaryFacts, at: float) -> None:
 
 
 def _titles(facts: SummaryFacts) -> list[str]:
-    """Return the titles of the columns; an ensemble has no gap needed."""
+    """Return the titles of the columns; an ensemble lacks the needed gap."""
     hidden = set() if "demand" in facts.worst else {"needed"}
     return [facts.texts[f"head_{key}"] if key and key not in hidden else "" for key in COLUMNS]
 
@@ -191,7 +191,7 @@ def _write_row(figure: Figure, cells: Iterable[str], at: float, colour: str) -> 
 
 
 def _fit(text: Text, room: float) -> None:
-    """Shrink a text that is wider than its room, pixels."""
+    """Shrink a text to a width in pixels."""
     width = text.get_window_extent().width
     if width > room:
         text.set_fontsize(8.0 * room / width)

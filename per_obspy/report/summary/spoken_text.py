@@ -38,7 +38,7 @@ _WORDS: dict[Language, dict[str, str]] = {
 
 def spoken(text: str, language: Language = "en") -> str:
     """
-    Return a text of plain letters and numbers; accents are dropped, symbols are words or blanks.
+    Return a text as plain letters and digits: no accents, symbols as words or blanks.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def summary_lines(facts: SummaryFacts) -> list[str]:
 
 
 def _sections(facts: SummaryFacts) -> dict[str, list[str]]:
-    """Return the sentences of each section by its title; the first has none."""
+    """Return the sentences of each section by its title; the first title is empty."""
     texts, language = facts.texts, facts.language
     simulated = [texts["simulated_spoken"]] if facts.region.simulated else []
     head = [

@@ -1,4 +1,4 @@
-"""Facts of a screening that its summary states."""
+"""Facts of a screening for its summary, and sentences on them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -46,7 +46,7 @@ class Counts(NamedTuple):
 
 class SummaryFacts(NamedTuple):
     """
-    Everything that a summary states.
+    Facts for a summary.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class SummaryFacts(NamedTuple):
 
     @property
     def texts(self) -> Mapping[str, str]:
-        """Return the sentences of its language by their keys."""
+        """Return the sentences in the language of the summary by their keys."""
         return WORDING[self.language]
 
 
@@ -171,7 +171,7 @@ def _named(names: Sequence[str], texts: Mapping[str, str]) -> str:
 
 
 def first_steps(facts: SummaryFacts) -> list[str]:
-    """Return what to do first."""
+    """Return sentences on first actions."""
     counts, texts = facts.counts, facts.texts
     # The rest depends on the results
     steps = [texts["inspect"]]
@@ -185,7 +185,7 @@ def first_steps(facts: SummaryFacts) -> list[str]:
 
 
 def sureness(facts: SummaryFacts) -> list[str]:
-    """Return sentences on how sure the numbers are."""
+    """Return sentences on uncertainty."""
     counts, sentences, texts = facts.counts, list[str](), facts.texts
     # States between yes and no
     middle = sum(counts.states.get(state, 0) for state in ("likely", "possible", "unlikely"))
@@ -199,7 +199,7 @@ def sureness(facts: SummaryFacts) -> list[str]:
 
 
 def pair_sentence(pair: Mapping[str, Any], language: Language) -> str:
-    """Return a pair of the list in one sentence."""
+    """Describe a listed pair in one sentence."""
     texts, parts = WORDING[language], [_headline(pair, "pair_id")]
     # Values that are unknown are left out
     speed = in_language(speed_text(number(pair, "expected_impact_velocity")), language)
@@ -227,7 +227,7 @@ def _at(row: Mapping[str, Any], language: Language) -> list[str]:
 
 def place_text(north: float, east: float, decimals: int, language: Language = "en") -> str:
     """
-    Return a place (degrees) without signs, which are lost on the radio.
+    Return a place (degrees) with compass directions instead of signs, for the radio.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def place_text(north: float, east: float, decimals: int, language: Language = "e
 
 
 def building_sentence(building: Mapping[str, Any], language: Language) -> str:
-    """Return a building of the list in one sentence."""
+    """Describe a listed building in one sentence."""
     speed = in_language(speed_text(number(building, "severity")), language)
     severity = WORDING[language]["severity"].format(speed=speed)
     parts = [_headline(building, "building_id"), severity, *_at(building, language)]

@@ -1,5 +1,5 @@
 """
-One row per building from the sides on which neighbours can hit it.
+Table of buildings: one row per building, from the sides on which neighbours can hit it.
 
 A building is hit if any neighbour hits it. Pairs that share a building share the earthquake too:
 the probability lies between that of one common cause, which is the largest of its pairs, and that
@@ -69,13 +69,13 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
 
 
 def _classes(severity: FloatArray, classes: Mapping[str, float]) -> NDArray[np.object_]:
-    """Return the risk class of each building, that of unknown gaps where no gap is known."""
+    """Return the risk class of each building; that of unknown gaps if no gap is known."""
     named = risk_class(np.nan_to_num(severity), dict(classes))
     return np.where(np.isnan(severity), UNKNOWN_CLASS, named).astype(object)
 
 
 def _severity(sides: pd.DataFrame) -> FloatArray:
-    """Return the expected impact velocity with the addition of the row to that of the pair, m/s."""
+    """Return the expected impact velocity of the pair, increased by the effect of the row, m/s."""
     added = values(sides, "impact_velocity") - values(sides, "impact_velocity_alone")
     # A row that softens a hit once does not so in the next earthquake
     more: FloatArray = np.nan_to_num(np.maximum(added, 0.0))
@@ -83,7 +83,7 @@ def _severity(sides: pd.DataFrame) -> FloatArray:
 
 
 def _worst(severity: FloatArray, sides: pd.DataFrame, groups: Groups) -> NDArray[np.intp]:
-    """Return the place of the worst side of each building: most severe, then by rank of pairs."""
+    """Return the index of the worst side of each building: by severity, then rank of the pair."""
     building = sides["building_number"].to_numpy(np.int64)
     order = np.lexsort([values(sides, "rank"), -severity, building])
     return order[groups.starts]
@@ -119,7 +119,7 @@ def _position(sides: pd.DataFrame, groups: Groups, angle: float) -> NDArray[np.o
 
 
 def _contacts_in_row(sides: pd.DataFrame) -> FloatArray:
-    """Return on how many sides the building of each side has neighbours in that row."""
+    """Return the number of sides with neighbours in the same row, for the building of each side."""
     counted = sides.groupby(["building_number", "row_id"])["interface"].transform("size")
     return counted.to_numpy(np.float64)
 
@@ -142,7 +142,7 @@ def _hits(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray | NDArray
 
 
 def _impacts(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray]:
-    """Return numbers of hits, from all sides and from each side of the compass."""
+    """Return the numbers of hits in total and by compass side."""
     impacts = values(sides, "impacts")
     found = {"impacts": groups.sum(impacts)}
     # The quarter of the compass in which the neighbour is
@@ -163,7 +163,7 @@ def _rows(
 
 
 def _flags(sides: pd.DataFrame, groups: Groups) -> NDArray[np.object_]:
-    """Return the flags of the rows of each building, and those of the building."""
+    """Return the flags of each building, including those of its rows."""
     # Many rows share few texts
     codes, texts = pd.factorize(sides["flags"])
     words = [str(text).split(" ") for text in texts]

@@ -36,7 +36,7 @@ def row_outcomes(
     azimuth: FloatArray,
 ) -> Columns:
     """
-    Compute the outcome of every contact in its row, and of its pair alone.
+    Compute the outcome of every contact, in its row and for the pair alone.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def row_outcomes(
 
 
 def no_outcomes(count: int) -> Columns:
-    """Return ``OUTCOMES``, all empty, for a number of contacts."""
+    """Return empty ``OUTCOMES`` for a number of contacts."""
     empty: Columns = {name: np.full(count, np.nan) for name in OUTCOMES}
     return empty | {"reconciled": np.zeros(count, dtype=bool)}
 
@@ -79,7 +79,7 @@ def no_outcomes(count: int) -> Columns:
 def _alone(
     motion: tuple[FloatArray, FloatArray, float], members: Members, outcome: Columns
 ) -> Columns:
-    """Return the outcome of each pair alone; a row of two is its pair."""
+    """Return the outcome of each pair without its row; a row of two buildings equals its pair."""
     names = ("impacts", "impact_velocity", "amplification_left", "amplification_right")
     columns = {name: outcome[name].copy() for name in names}
     # Contacts of rows of three and more
@@ -99,7 +99,7 @@ def _alone(
 
 
 def _name_alone(name: str) -> str:
-    """Return the name of a column of the pair alone."""
+    """Return the name of an outcome column for the pair without its row."""
     for side in ("_left", "_right"):
         if name.endswith(side):
             return f"{name.removesuffix(side)}_alone{side}"

@@ -1,5 +1,5 @@
 """
-Buildings of a row, each of which is described by the pair on its left and by that on its right.
+Buildings of a row, each described by the pairs on both sides of it.
 
 The two may differ in derived or rounded values: a known value goes before a derived one, and of
 two alike the mean is taken, so that a row read backwards is the same row.
@@ -121,7 +121,7 @@ def _modal_masses(contacts: Table) -> tuple[FloatArray, FloatArray]:
 
 def alone(rows: BuildingRows, left: IntArray, azimuth: FloatArray) -> BuildingRows:
     """
-    Return some interfaces as rows of two buildings.
+    Return interfaces as separate rows of two buildings.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def alone(rows: BuildingRows, left: IntArray, azimuth: FloatArray) -> BuildingRo
 
 
 class _Joined(NamedTuple):
-    """A property of each building, and whether its descriptions differ."""
+    """Property of each building, and whether its two descriptions differ."""
 
     values: FloatArray
     differs: BoolArray
@@ -162,7 +162,7 @@ class _Layout(NamedTuple):
         return np.where(self.turned, second, first), np.where(self.turned, first, second)
 
     def at(self, buildings: IntArray, given: FloatArray, other: float) -> FloatArray:
-        """Return one value per building: those given of some, another one elsewhere."""
+        """Return one value per building: given values for some, another value elsewhere."""
         column = np.full(self.buildings, other)
         column[buildings] = given
         return column
@@ -184,7 +184,7 @@ class _Layout(NamedTuple):
 
 
 def _layout(contacts: Table, first: IntArray) -> _Layout:
-    """Return where the contacts of rows are among their buildings."""
+    """Return the indices of the buildings on both sides of each contact."""
     row = np.repeat(np.arange(first.size - 1), np.diff(first))
     # Each row has one building more than contacts
     left = np.arange(row.size) + row
@@ -198,7 +198,7 @@ def _is_given(derived: Any, name: str, found: FloatArray) -> FloatArray:
 
 
 def _differ(found: FloatArray) -> BoolArray:
-    """Return where two descriptions differ by more than is noted."""
+    """Return a mask of buildings whose two descriptions differ by more than the tolerance."""
     low, high = np.fmin(*found), np.fmax(*found)
     # One that yields and one that does not differ, two that do not yield do not
     with np.errstate(invalid="ignore"):

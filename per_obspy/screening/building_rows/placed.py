@@ -1,4 +1,4 @@
-"""Station of each row, and the order in which rows are followed: station by station."""
+"""Station of each row, and the order of computation of rows: station by station."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 
 class PlacedRows(NamedTuple):
     """
-    Contacts of all rows in the order in which they are followed.
+    Contacts of all rows in their order of computation.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class PlacedRows(NamedTuple):
 
 def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     """
-    Assign a station to every row, and put whole rows of one station together into chunks.
+    Assign a station to every row, and group whole rows of one station into chunks.
 
     The station is the one that serves most pairs of the row; of several that serve equally many it
     is the one nearer to its pairs, then the first by name. It is empty where most pairs have none.
@@ -85,7 +85,7 @@ def _names(pairs: pd.DataFrame) -> pd.Index:
 
 
 def _stations(row: IntArray, pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Return the number of the station of each row, and whether its pairs have several."""
+    """Return the station number of each row, and whether its pairs have several stations."""
     codes = _names(pairs).get_indexer(pd.Index(pairs["station"]))
     table = pd.DataFrame({"row": row, "code": codes, "distance": pairs["distance"].to_numpy()})
     groups = table.groupby(["row", "code"])["distance"].agg(["size", "sum"]).reset_index()
@@ -99,7 +99,7 @@ def _stations(row: IntArray, pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.
 
 
 def _chunks(sizes: IntArray, station: IntArray, size: int) -> IntArray:
-    """Return the chunk of each row: no chunk has two stations, or more contacts than its size."""
+    """Return the chunk number of each row: one station and limited contacts per chunk."""
     chunk, number, contacts, before = np.empty(sizes.size, dtype=np.int64), 0, 0, -1
     # Rows of one station, as long as there is room
     for row, (count, code) in enumerate(zip(sizes.tolist(), station.tolist(), strict=True)):

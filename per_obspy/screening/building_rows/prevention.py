@@ -1,5 +1,5 @@
 """
-What would have kept a building from being hit, or softened the hits: the measures of its pairs.
+Measures that would have kept a building from being hit, or softened the hits, by its pairs.
 
 In a row in which no gap closes every building moves as if alone. Gaps that are enough for each pair
 are therefore enough for the row, if all of the row are: the measures of the pairs hold.
@@ -13,8 +13,8 @@ from per_obspy.checks import FloatArray
 from per_obspy.screening.building_rows.sides import Groups
 from per_obspy.screening.values import values
 
-#: Texts of a building that needs nothing, and of one whose own gaps are enough.
-NOTHING = "nothing: its gaps are enough in this record"
+#: Texts of a building without need of a measure, and of one that needs them in other gaps.
+NOTHING = "no measure: its gaps are enough in this record"
 ELSEWHERE = "wider gaps elsewhere in its row: its own are enough for each pair alone"
 
 #: Text of a building with a gap that is not known.
@@ -28,7 +28,7 @@ def prevention(
     sides: pd.DataFrame, groups: Groups, neighbour: pd.Series
 ) -> dict[str, FloatArray | NDArray[np.object_]]:
     """
-    Return the measures that all sides of a building need, and a sentence about them.
+    Return the measures that protect all sides of each building, with a sentence on them.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def prevention(
 
 
 def _all_known(groups: Groups, column: FloatArray, reduced: FloatArray) -> FloatArray:
-    """Return reduced values, NaN where a side of the building has none."""
+    """Return reduced values, NaN for buildings with a side without a value."""
     return np.where(groups.any(np.isnan(column)), np.nan, reduced)
 
 

@@ -15,7 +15,7 @@ HISTORY_FLAGS: dict[str, str] = {
 #: All flags of a row.
 FLAGS: dict[str, str] = {**ROW_FLAGS, **HISTORY_FLAGS}
 
-#: Flags of a building beside those of its rows, and the meaning of each.
+#: Flags of a building in addition to those of its rows, and the meaning of each.
 BUILDING_FLAGS: dict[str, str] = {
     "hit_only_in_row": "it is hit in its row at a gap that its pair alone does not close",
     "floor_to_column": "floors of a neighbour may hit its columns: outside the method",
@@ -43,10 +43,12 @@ _SIDES = tuple(
     for side in ("left", "right")
     for column in (
         _text(f"building_id_{side}", f"building on the {side}; PAIR#1 if the table has no name"),
-        _count(f"building_number_{side}", "its number in this run: names need not be unique"),
-        _number(f"amplification_{side}", "1", "its largest radius in the row / without contact"),
-        _number(f"displacement_{side}", "m", "its largest, of the oscillator, in the row"),
-        _number(f"amplification_alone_{side}", "1", "the same as amplification, of the pair alone"),
+        _count(f"building_number_{side}", "number of the building; names need not be unique"),
+        _number(f"amplification_{side}", "1", "largest radius in the row / without contact"),
+        _number(f"displacement_{side}", "m", "largest displacement of the oscillator in the row"),
+        _number(
+            f"amplification_alone_{side}", "1", "largest radius in the pair alone / without contact"
+        ),
     )
 )
 
@@ -66,9 +68,11 @@ ROWS: tuple[Column, ...] = (
     ),
     _text("station", "station of the record that drives the row; empty without one"),
     _number("gap", "m", "clear distance at this interface"),
-    _count("impacts", "in the row, faster than 1 mm/s and than 1 % of the fastest; empty without"),
+    _count("impacts", "impacts above 1 mm/s and 1 % of the fastest; empty without a history"),
     _number("impact_velocity", "m/s", "largest approach velocity in the row; 0 without impact"),
-    _count("impacts_alone", "number of such impacts of the pair alone, under the same motion"),
+    _count(
+        "impacts_alone", "impacts of the pair alone, counted as in impacts, under the same motion"
+    ),
     _number(
         "impact_velocity_alone",
         "m/s",
@@ -76,7 +80,7 @@ ROWS: tuple[Column, ...] = (
     ),
     _number("longitude", "degrees", "longitude of the middle of the pair or of the building, east"),
     _number("latitude", "degrees", "latitude of the middle of the pair or of the building, north"),
-    _text("flags", "of the row, separated by spaces, each explained in a row flag_..."),
+    _text("flags", "flags of the row, separated by spaces, each explained in a row flag_..."),
 )
 
 #: Compass sides of a building: names of their columns, and the azimuth of the middle of each.
@@ -87,8 +91,8 @@ POSITIONS = ("inside", "end", "corner", "single")
 
 #: One row per building, worst first.
 BUILDINGS: tuple[Column, ...] = (
-    _count("rank", "1 is inspected first: by severity, amplification, probability, importance"),
-    _text("building_id", "of the pair table; PAIR#1 or PAIR#2 where it names none"),
+    _count("rank", "order of inspection, by severity, amplification, probability, importance"),
+    _text("building_id", "identifier in the pair table; PAIR#1 or PAIR#2 without one"),
     _number(
         "severity",
         "m/s",
@@ -112,14 +116,17 @@ BUILDINGS: tuple[Column, ...] = (
         "place of the building: inside its row; end of it; corner of two rows; "
         "single: it has one pair",
     ),
-    _count("neighbours", "number of buildings next to it, across a gap"),
+    _count("neighbours", "number of neighbouring buildings across a gap"),
     _count(
         "neighbours_that_can_hit",
         "number of neighbours whose pair has a state other than no, or an impact in the row",
     ),
-    _count("impacts", "hits in all its rows; empty without a history"),
-    *(_count(f"impacts_{side}", f"of these, from the {side}") for side in COMPASS),
-    _number("impact_velocity", "m/s", "largest in its rows"),
+    _count("impacts", "hits in all rows of the building; empty without a history"),
+    *(
+        _count(f"impacts_{side}", f"hits in all rows of the building from the {side}")
+        for side in COMPASS
+    ),
+    _number("impact_velocity", "m/s", "largest approach velocity in the rows of the building"),
     _number("amplification_row", "1", "largest radius in a row / largest radius without contact"),
     _number(
         "amplification_pair",

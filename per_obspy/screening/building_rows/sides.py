@@ -1,4 +1,4 @@
-"""Sides of buildings: each contact as one of its two buildings meets it, and groups of them."""
+"""Sides of buildings: each contact seen from one of its buildings, and groups of sides."""
 
 from collections.abc import Callable
 from typing import Any
@@ -29,7 +29,7 @@ OF_PAIRS = (
 
 def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
     """
-    Return interfaces as one of their two buildings meets them.
+    Return interfaces as seen from one of their two buildings.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
 
 
 def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the columns of the pair, and those of the building itself."""
+    """Return the columns of the pair, and those of the building of one side."""
     columns: dict[str, Any] = {}
     # Building 1 is on the left of a pair that is not turned
     is_first = at_left ^ interfaces["turned"].to_numpy(bool)
@@ -73,7 +73,7 @@ def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[s
 
 class Groups:
     """
-    Consecutive rows of a table with the same number.
+    Groups of consecutive rows of a table with the same number.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Groups:
         return np.asarray(np.logical_or.reduceat(values, self.starts))
 
     def distinct(self, values: NDArray[np.int64], where: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return how many different numbers some rows of each group have."""
+        """Return the number of different values in some rows of each group."""
         group = np.repeat(np.arange(self.starts.size), self.sizes)[where]
         pairs = np.unique(np.stack([group, values[where]], axis=1), axis=0)
         return np.bincount(pairs[:, 0], minlength=self.starts.size).astype(np.int64)
@@ -122,7 +122,7 @@ class Groups:
         return np.array(joined, dtype=object)
 
     def _reduced(self, function: np.ufunc, values: NDArray[Any]) -> FloatArray:
-        """Return a reduction of each group."""
+        """Apply a reduction to each group."""
         return np.asarray(
             function.reduceat(np.asarray(values, dtype=np.float64), self.starts), dtype=np.float64
         )

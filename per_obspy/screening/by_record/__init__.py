@@ -1,1 +1,1 @@
-"""Compute demands of pairs from the record of their station."""
+"""Demand of pairs by the record of their station."""

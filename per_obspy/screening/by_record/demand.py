@@ -37,7 +37,7 @@ class GapEstimates(NamedTuple):
 
 class Demand(NamedTuple):
     """
-    The demand that decides, m, and its rule by name.
+    Governing demand, m, and the name of its rule.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def governing_demand(estimates: GapEstimates, period_derived: NDArray[np.bool_])
 
 
 def demand_ratio(gap: FloatArray, demand: FloatArray) -> FloatArray:
-    """Return gap / demand: 0 when touching, NaN (an empty cell) where the demand is 0."""
+    """Return gap / demand: 0 for touching pairs, NaN (an empty cell) where the demand is 0."""
     ratio: FloatArray = np.divide(
         gap, demand, out=np.full(np.shape(demand), np.nan), where=demand > 0
     )

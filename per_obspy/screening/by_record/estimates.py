@@ -68,7 +68,7 @@ def demand_columns(
 
 
 def _estimated_demand(table: Table) -> Columns:
-    """Return the larger of the elastic demand, too small for yielding pairs, and the linearized."""
+    """Return the larger of elastic and linearized demand: yielding may raise the elastic one."""
     elastic, linearized = values(table, "demand"), values(table, "critical_gap_linearized")
     larger = linearized > elastic
     return {
@@ -78,7 +78,7 @@ def _estimated_demand(table: Table) -> Columns:
 
 
 def _exact_demand(station: StationMotion, table: Table) -> Columns:
-    """Return the demand and its rule with the exact one in place where it decides."""
+    """Return the demand and its rule, replaced by the exact demand where that decides."""
     decides = exact_decides(station, table)
     return {
         "demand": np.where(decides, table["demand_exact"], table["demand"]),
@@ -87,7 +87,7 @@ def _exact_demand(station: StationMotion, table: Table) -> Columns:
 
 
 def _estimate_over_exact(table: Table) -> FloatArray:
-    """Return the estimated over the exact demand, NaN where that is unknown, 0, or round-off."""
+    """Return estimated / exact demand, NaN where the exact one is unknown, 0 or round-off."""
     exact, estimate = values(table, "demand_exact"), values(table, "demand_estimated")
     known = exact > ROUND_OFF * values(table, "absolute_gap")
     return np.divide(estimate, exact, out=np.full_like(exact, np.nan), where=known)
@@ -142,7 +142,7 @@ def _estimates(motion: PairMotion, pairs: Table) -> GapEstimates:
 
 
 def _single_hits(table: Table) -> Columns:
-    """Return the single hit of every pair; its critical gap is the estimated demand."""
+    """Return the single hit of every pair, with the estimated demand as its critical gap."""
     # oscillators of the model whose gap governs: of yielding buildings maybe the equivalent ones
     radii, periods = governing_radii(table), governing(table, "period")
     masses = both(table, "contact_mass")

@@ -71,7 +71,7 @@ def furthest_azimuth(station: StationMotion, pairs: Table) -> FloatArray:
 
 def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     """
-    Return for which pairs the exact demand is the demand.
+    Return a mask of the pairs whose demand is the exact one.
 
     The record must support the pair, and no period may be derived: the exact demand of two equal
     derived periods is 0.
@@ -88,7 +88,7 @@ def exact_decides(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
 
 def record_supports(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
     """
-    Return for which pairs the record gives an exact demand.
+    Return a mask of the pairs for which the record gives an exact demand.
 
     It must hold both periods in its usable range and both horizontals. The worst azimuth is known
     of linear buildings only: where one can yield, the pair's azimuth must be given.
@@ -111,7 +111,7 @@ def record_supports(station: StationMotion, pairs: Table) -> NDArray[np.bool_]:
 
 
 def can_yield(pairs: Table) -> NDArray[np.bool_]:
-    """Return which pairs have a building with a yield displacement."""
+    """Return a mask of the pairs in which a building has a yield displacement."""
     return np.asarray(np.isfinite(np.stack(both(pairs, "yield_displacement"))).any(axis=0))
 
 
@@ -163,7 +163,7 @@ def exact_approach(station: StationMotion, table: Table, azimuth: FloatArray) ->
 
 
 def no_outcome(count: int) -> Columns:
-    """Return ``EXACT_COLUMNS``, all empty, for a number of pairs."""
+    """Return empty ``EXACT_COLUMNS`` for a number of pairs."""
     return {name: np.full(count, np.nan) for name in EXACT_COLUMNS}
 
 
@@ -198,7 +198,7 @@ def _pounding_maxima(station: StationMotion, table: Table, azimuth: FloatArray) 
 
 
 def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) -> _WithoutContact:
-    """Return the response of pairs that do not touch; linear pairs take the shorter computation."""
+    """Return the response without contact; linear pairs take the shorter computation."""
     towards, away = np.empty((2, azimuth.size))
     per_1, per_2 = at_contact(table, "per")
     free = _WithoutContact(towards, away, per_1.copy(), per_2.copy())
@@ -222,7 +222,7 @@ def _without_contact(station: StationMotion, table: Table, azimuth: FloatArray) 
 def _bilinear(
     station: StationMotion, pairs: Table, azimuth: FloatArray
 ) -> YieldingRelativeDisplacement:
-    """Return the relative displacement of pairs of which a building can yield."""
+    """Return the relative displacement of pairs in which a building can yield."""
     yield_1, yield_2 = at_contact(pairs, "yield_displacement")
     hardening_1, hardening_2 = both(pairs, "hardening")
     return yielding_relative_displacement(
@@ -245,5 +245,5 @@ def _oscillators(pairs: Table, azimuth: FloatArray) -> Oscillators:
 
 
 def _ratio(after: FloatArray, before: FloatArray) -> FloatArray:
-    """Return after / before, 1 where there was no motion."""
+    """Return after / before, 1 where the motion before is 0."""
     return np.divide(after, before, out=np.ones_like(after), where=before > 0)

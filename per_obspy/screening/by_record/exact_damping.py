@@ -1,5 +1,5 @@
 """
-Least damping with which a record no longer brings a pair together, by exact displacements.
+Least added damping that keeps the buildings of a pair apart, by exact displacements.
 
 Damping is added to both buildings in steps, and refined before the first step that is enough: more
 damping does not always help. The demand is the one that decides of such pairs: along the pair's
@@ -26,7 +26,7 @@ NEARLY_CRITICAL = 0.99
 
 def least_exact_damping(station: StationMotion, table: Table, largest: float) -> FloatArray:
     """
-    Find the least damping to add to both buildings so that the exact demand fits into the gap.
+    Find the least added damping of both buildings with which the exact demand fits into the gap.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
 def _refined(
     station: StationMotion, table: Table, low: FloatArray, enough: FloatArray
 ) -> FloatArray:
-    """Halve the step between too little damping and enough; NaN stays."""
+    """Refine the least damping by bisection; NaN stays."""
     found = np.flatnonzero(np.isfinite(enough))
     if not found.size:
         return enough
@@ -79,7 +79,7 @@ def _refined(
 
 
 def _fits(station: StationMotion, table: Table, added: FloatArray) -> NDArray[np.bool_]:
-    """Return for which pairs the exact demand with the added damping is at most the gap."""
+    """Return a mask of the pairs whose exact demand with the added damping is at most the gap."""
     damping_1, damping_2 = both(table, "damping")
     damped = {name: table[name] for name in table}
     damped |= {"damping_1": damping_1 + added, "damping_2": damping_2 + added}

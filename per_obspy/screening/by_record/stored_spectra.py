@@ -45,7 +45,7 @@ def stored_log(
     spectra: LogSpectra, row: NDArray[np.intp], log_period: FloatArray, log_damping: FloatArray
 ) -> FloatArray:
     """
-    Interpolate the stored logarithm at (ln period, ln damping); beyond the grid its edge counts.
+    Interpolate stored logarithms at (ln period, ln damping); constant beyond the grid.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def stored_log(
 
 
 def _lower_neighbour(grid: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the lower neighbour on a grid and the share of the way to the next, from 0 to 1."""
+    """Return the lower neighbour on a grid, and the fraction towards the next one, 0 to 1."""
     if grid.size == 1:
         return np.zeros(points.shape, dtype=np.intp), np.zeros(points.shape)
     lower = np.clip(np.searchsorted(grid, points) - 1, 0, grid.size - 2)

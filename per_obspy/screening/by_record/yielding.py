@@ -117,7 +117,7 @@ def linearized_columns(station: StationMotion, table: Table) -> Columns:
 
 def governing(table: Table, name: str) -> tuple[FloatArray, FloatArray]:
     """
-    Return a property of the oscillators 1 and 2 whose critical gap is the estimated demand.
+    Return a property of the two oscillators that govern the estimated demand.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _yielding_columns(station: StationMotion, table: Table) -> Columns:
 def _equivalent_correlation(
     station: StationMotion, table: Table, first: Equivalent, second: Equivalent
 ) -> FloatArray:
-    """Return eq. (16) of the equivalent buildings; in narrow motion not above the elastic one."""
+    """Return eq. (16) of the equivalent buildings; in narrow motion at most the elastic one."""
     correlation = ddc_correlation(first.period, first.damping, second.period, second.damping)
     if record_bandwidth(station.north, station.east, station.dt) < NARROW:
         return np.minimum(correlation, values(table, "correlation"))
@@ -198,7 +198,7 @@ def _equivalent_correlation(
 
 
 def _equivalent(station: StationMotion, row: NDArray[np.intp], table: Table, i: int) -> Equivalent:
-    """Return the equivalent linear buildings i; those that stay elastic as they are."""
+    """Return the equivalent linear buildings i; elastic ones stay unchanged."""
     elastic = _elastic_ductility(table, i)
     period, damping = values(table, f"period_{i}"), values(table, f"damping_{i}")
     yields = elastic > 1.0
@@ -232,7 +232,7 @@ def _change(spectra: LogSpectra, building: _Building, ductility: FloatArray) -> 
 def _largest_ductility(
     sd: LogSpectra, building: _Building, elastic: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the ductility above which none is exceeded by the displacement, and if it is found."""
+    """Return the largest ductility that the displacement reaches, and whether it was found."""
 
     def excess(ductility: FloatArray) -> FloatArray:
         return np.asarray(elastic[:, None] * _change(sd, building, ductility) - ductility)
@@ -257,7 +257,7 @@ def _largest_ductility(
 
 
 def _last_bracket(ductility: FloatArray, excess: FloatArray) -> _Bracket:
-    """Return the last ductility with an excess and the next one; at the ends the nearest two."""
+    """Return the bracket of the last zero of the excess, at the ends of the grid the nearest."""
     positive = excess > 0.0
     # an interval exists whatever the signs at both ends
     positive[:, 0], positive[:, -1] = True, False

@@ -1,1 +1,1 @@
-"""Compute demands of pairs from a design spectrum or a ShakeMap."""
+"""Demand of pairs by a design spectrum or a ShakeMap."""

@@ -105,7 +105,7 @@ def spectral_columns(
     screening: Screening,
 ) -> pd.DataFrame:
     """
-    Return the pairs with estimates, single hit, state, class and code rules; not ranked yet.
+    Return pairs with estimates, single hit, state, class and code rules, not ranked yet.
 
     Parameters
     ----------

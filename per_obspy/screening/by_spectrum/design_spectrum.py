@@ -1,4 +1,4 @@
-"""Design or user spectrum: displacement by period and damping, given instead of a record."""
+"""Design or user spectrum: displacement by period and damping, in place of a record."""
 
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -75,7 +75,7 @@ def read_design_spectrum(path: str | Path) -> DesignSpectrum:
 
 
 def _read(source: str) -> pd.DataFrame:
-    """Return the table of a CSV file as it is."""
+    """Read a CSV file as a table of text."""
     try:
         check_text(Path(source))
         # An open file, as pandas fetches names that are addresses and unpacks others
@@ -89,7 +89,7 @@ def _read(source: str) -> pd.DataFrame:
 
 
 def _check_lines(file: TextIO, source: str) -> None:
-    """Raise ``CatalogError`` for a line that is none of numbers: it may take all memory."""
+    """Raise ``CatalogError`` for a line that is not plain numbers, before it is parsed."""
     while line := file.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
             raise CatalogError(source, f"has a line of {LONGEST_LINE} characters or more")
@@ -97,7 +97,7 @@ def _check_lines(file: TextIO, source: str) -> None:
 
 
 def _quantity(table: pd.DataFrame, source: str) -> str:
-    """Return which of the two quantities the table gives."""
+    """Return the quantity of the table, one of two."""
     given = [name for name in QUANTITIES if name in table]
     missing = [name for name in ("period", "damping") if name not in table]
     if missing or len(given) != 1:
@@ -109,7 +109,7 @@ def _quantity(table: pd.DataFrame, source: str) -> str:
 
 
 def _positive(table: pd.DataFrame, name: str, source: str) -> FloatArray:
-    """Return a column of plausible positive numbers; rows count without header and comments."""
+    """Check and return a column of plausible positive numbers; row numbers exclude comments."""
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64)
     if not values.size:
         raise CatalogError(source, "has no row")
@@ -142,7 +142,7 @@ def _on_grid(rows: pd.DataFrame, quantity: str, source: str) -> DesignSpectrum:
 
 def within(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayLike) -> NDArray[np.bool_]:
     """
-    Return where oscillators are inside the periods and the dampings of a spectrum, ends included.
+    Return a mask of oscillators within the periods and dampings of a spectrum, inclusive.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def displacement_at(spectrum: DesignSpectrum, period: ArrayLike, damping: ArrayL
 def _damping_cell(
     dampings: FloatArray, damping: FloatArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
-    """Return the rows of the dampings below and above, and the share of the way in logarithms."""
+    """Return the rows of the dampings below and above, and the fraction between, in ln damping."""
     last = dampings.size - 1
     upper = np.clip(np.searchsorted(dampings, damping), min(1, last), last)
     lower = np.maximum(upper - 1, 0)

@@ -131,7 +131,7 @@ def _oscillators(pairs: pd.DataFrame) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def _outside(spectrum: DesignSpectrum, pairs: pd.DataFrame) -> tuple[Rejection, ...]:
-    """Return the rejections of pairs outside the spectrum, with every value that is outside."""
+    """Return rejections of pairs outside the spectrum, each with all values that are outside."""
     reasons: list[list[str]] = [[] for _ in range(len(pairs))]
     grids = {"period": (spectrum.periods, " s"), "damping": (spectrum.dampings, "")}
     for name in ("period_1", "period_2", "damping_1", "damping_2"):

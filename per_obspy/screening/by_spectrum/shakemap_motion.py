@@ -40,7 +40,7 @@ class MapMotion(NamedTuple):
 
 
 class _Nodes(NamedTuple):
-    """Cells of a map that hold places, (n_places,): its south-western node and the share beyond."""
+    """Grid cells of places, (n_places,): south-western node, and fractions from it to the next."""
 
     column: NDArray[np.intp]
     east: FloatArray
@@ -50,7 +50,7 @@ class _Nodes(NamedTuple):
 
 def seen_from(shakemap: xr.Dataset, longitude: FloatArray) -> FloatArray:
     """
-    Return longitudes as a map that crosses the date line counts them, degrees.
+    Return longitudes continuous with those of a map that crosses the date line, degrees.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def motion_on_map(
     shakemap: xr.Dataset, longitude: FloatArray, latitude: FloatArray, assumed_log_std: float
 ) -> MapMotion:
     """
-    Interpolate the motion of a ShakeMap at places inside it, bilinear between its nodes.
+    Interpolate a ShakeMap bilinearly at places inside it.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def displacement_on_map(motion: MapMotion, period: FloatArray, damping: FloatArr
 
 def at_period(periods: FloatArray, ordinates: FloatArray, period: FloatArray) -> FloatArray:
     """
-    Interpolate ordinates at one period per place, linear in its logarithm; beyond the ends kept.
+    Interpolate ordinates at one period per place in log period; constant beyond the ends.
 
     Parameters
     ----------
@@ -213,6 +213,6 @@ def _at_places(grid: FloatArray, nodes: _Nodes) -> FloatArray:
 
 
 def _lower_neighbour(axis: FloatArray, points: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the lower neighbour on an axis and the share of the way to the next."""
+    """Return the lower neighbour on an axis, and the fraction towards the next one."""
     lower = np.clip(np.searchsorted(axis, points, side="right") - 1, 0, axis.size - 2)
     return lower, np.clip((points - axis[lower]) / (axis[lower + 1] - axis[lower]), 0.0, 1.0)

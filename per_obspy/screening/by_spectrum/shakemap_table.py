@@ -83,7 +83,7 @@ def shakemap_fallback(
     shakemap: xr.Dataset, pairs: pd.DataFrame, unreached: Sequence[Rejection], screening: Screening
 ) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
     """
-    Compute the rows of pairs without a station; pairs outside the map too have both reasons.
+    Compute the rows of pairs without a station; reject those outside the map with both reasons.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def shakemap_fallback(
 
 
 def _taken(pairs: pd.DataFrame, rows: NDArray[np.intp]) -> pd.DataFrame:
-    """Return rows of pairs by their positions, numbered anew."""
+    """Return rows of pairs by position, renumbered."""
     return pairs.iloc[rows].reset_index(drop=True)
 
 
@@ -156,7 +156,7 @@ def _flags(shakemap: xr.Dataset, table: pd.DataFrame) -> NDArray[np.object_]:
 
 
 def _empty(name: str) -> str | float:
-    """Return the value of a column of the risk table that a map cannot fill."""
+    """Return the empty value of a risk-table column without data from a map."""
     return "" if RESULTS[name].dtype == "str" else np.nan
 
 

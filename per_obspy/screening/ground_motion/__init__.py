@@ -1,1 +1,1 @@
-"""Assign stations to pairs and interpolate ground motion between stations."""
+"""Assignment of stations to pairs, and ground motion between stations."""

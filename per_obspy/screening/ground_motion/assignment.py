@@ -106,7 +106,7 @@ def assigned(
 
 
 def _without_stations(pairs: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Rejection, ...]]:
-    """Return no pairs, and a rejection of each, where there is no station."""
+    """Return an empty table and one rejection per pair, for a region without stations."""
     none = pairs.iloc[:0].assign(station="", station_index=0, distance=0.0, other_site_class=False)
     reasons = ("no station has coordinates",)
     return none, tuple(Rejection("pair", name, "", None, reasons) for name in pairs["pair_id"])
@@ -125,7 +125,7 @@ def _out_of_reach(pairs: pd.DataFrame, stations: Stations, reach: float) -> tupl
 
 
 def _swap_hints(pairs: pd.DataFrame, stations: Stations, reach: float) -> list[str]:
-    """Return a hint per pair that exchanged coordinates would reach a station; empty if not."""
+    """Return a hint per pair whose exchanged coordinates would reach a station, else empty."""
     longitude, latitude = values(pairs, "longitude"), values(pairs, "latitude")
     # A longitude beyond 90 degrees cannot be a latitude
     possible = np.abs(longitude) <= 90.0

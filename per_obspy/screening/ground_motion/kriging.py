@@ -33,7 +33,7 @@ NEIGHBOURS = 20
 
 class MotionField(NamedTuple):
     """
-    Fitted trend and residuals of a region: small, and the same for every worker.
+    Fitted trend and residuals of a region, small enough to be sent to every worker.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ def fitted_field(
     settings: Interpolation,
 ) -> MotionField:
     """
-    Fit the trend of each site class, and that of all stations for places of other classes.
+    Fit one trend per site class, and one of all stations for places of other classes.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def _kriged(field: MotionField, group: Group, places: Sites, period: FloatArray)
 
 
 def on_grid(periods: FloatArray, period: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """Return the lower neighbour on a grid of periods and the share of the step above it, ln T."""
+    """Return the lower neighbour on a grid of periods, and the fraction of the step in ln T."""
     lower = np.clip(np.searchsorted(periods, period, side="right") - 1, 0, periods.size - 2)
     grid = np.log(periods)
     share = (np.log(period) - grid[lower]) / (grid[lower + 1] - grid[lower])

@@ -1,5 +1,5 @@
 """
-The ground motion at a pair of buildings, compared with that of the record assigned to the pair.
+Ground motion at the site of a pair, relative to the record assigned to the pair.
 
 The record decides the demand; the columns made here state how far the motion at the site is
 expected to be from it, and how well that is known. The measure of a station's motion is PER at 5 %
@@ -47,7 +47,7 @@ HYPOCENTRE = tuple(f"hypocentre_{name}" for name in Hypocentre._fields)
 
 class StationField(NamedTuple):
     """
-    The motion of all stations of a run: made once, small, and passed to every worker.
+    Motion of all stations of a run, computed once and passed to every worker.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class StationField(NamedTuple):
 
 class RegionalMotion(NamedTuple):
     """
-    The ground motion of a region: stations, the motion between them, and a map beyond their reach.
+    Ground motion of a region: stations, motion between them, and a ShakeMap beyond.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def hypocentre_of(attributes: Iterable[Mapping[Hashable, Any]]) -> Hypocentre | 
 
 
 def _middle(numbers: FloatArray) -> float:
-    """Return the lower median, which is one of the numbers."""
+    """Return the lower median, an element of the numbers."""
     return float(np.sort(numbers)[(numbers.size - 1) // 2])
 
 
@@ -246,7 +246,7 @@ class _StationMotion(NamedTuple):
 
 
 def _station_motion(station: xr.Dataset) -> _StationMotion:
-    """Extract from a station's Dataset the values that the field uses."""
+    """Extract the values of the motion field from a station's Dataset."""
     return _StationMotion(
         longitude=number(station, "longitude"),
         latitude=number(station, "latitude"),

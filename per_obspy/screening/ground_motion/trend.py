@@ -1,5 +1,5 @@
 """
-The trend of ln PER over the stations of a group, per period: Bayesian generalised least squares.
+Trend of ln PER over a group of stations, per period, by Bayesian generalised least squares.
 
 The slope in ln distance has a prior, because few stations do not resolve it and all attenuation has
 it; mean and the slope in ln Vs30 have none. Prior of slope and variance are conjugate: given the
@@ -104,7 +104,7 @@ def fitted_group(
 def _averaged_by_place(
     stations: Sites, values: FloatArray, usable: FloatArray
 ) -> tuple[Sites, FloatArray, FloatArray]:
-    """Return each place once: its stations' mean, and the periods that all of them support."""
+    """Average the stations at equal places; keep periods that all of them support."""
     position = np.round(np.stack([stations.longitude, stations.latitude], axis=1), DECIMALS)
     _, first, place = np.unique(position, axis=0, return_index=True, return_inverse=True)
 
@@ -216,7 +216,7 @@ def _posterior(
 
 
 def _slopes(features: FloatArray) -> NDArray[np.intp]:
-    """Return the features with a slope: a known distance, and others that stations resolve."""
+    """Return a mask of the features with a slope: known distance, and others with enough spread."""
     # the prior makes up for stations that resolve no slope
     used: list[int] = []
     for index, values in enumerate(features.T):

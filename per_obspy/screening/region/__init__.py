@@ -1,1 +1,1 @@
-"""Sum risk over areas, compare it with observations and combine scenarios."""
+"""Risk of a region: totals of areas, comparison with observations, several scenarios."""

@@ -129,7 +129,7 @@ JOINED = (
 
 def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Column]:
     """
-    Return the columns of the table of several scenarios, in their order, by name.
+    Return the columns of the ensemble table in order, by name.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def ensemble_columns(weights: Mapping[str, float], yearly: bool) -> dict[str, Co
 
 def ensemble_rows(joined: pd.DataFrame, weights: Mapping[str, float], yearly: bool) -> pd.DataFrame:
     """
-    Compute the probabilities of pairs whose scenarios were joined.
+    Compute the probabilities of pairs from their joined scenarios.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def _worst(rows: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.objec
 
 
 def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> Iterator[Rejection]:
-    """Yield pairs that lack a probability in a scenario, or differ between the scenarios."""
+    """Yield rejections of pairs without a probability in a scenario, or with differing data."""
     for row in joined[~_comparable(joined, weights)].to_dict("records"):
         reasons = []
         lacking = [name for name in weights if np.isnan(row[f"probability_{name}"])]
@@ -227,7 +227,7 @@ def ensemble_rejections(joined: pd.DataFrame, weights: Mapping[str, float]) -> I
 
 
 def _comparable(joined: pd.DataFrame, weights: Mapping[str, float]) -> NDArray[np.bool_]:
-    """Return which pairs have a probability in every scenario and are the same pair in all."""
+    """Return a mask of pairs with a probability in every scenario and equal data in all."""
     names = [f"probability_{name}" for name in weights]
     comparable: NDArray[np.bool_] = joined[names].notna().all(axis=1).to_numpy()
     for name in SAME:

@@ -55,7 +55,7 @@ def hexagon_outlines(cells: Iterable[str]) -> list[FloatArray]:
 
 
 def _unbroken(corners: FloatArray) -> FloatArray:
-    """Return corners whose longitudes do not jump by 360 degrees."""
+    """Return corners with longitudes without jumps by 360 degrees."""
     east = corners[:, 0]
     if np.ptp(east) <= 180.0:
         return corners

@@ -5,7 +5,7 @@ The record drives the buildings of every node. Their exact relative displacement
 the node, and their relative velocity that of ``severity.py``, whether periods were given or
 derived; both are carried to the site (``site_demand.py``). So equal buildings of uncertain period
 or damping are not certain to move as one, and stiff buildings, which follow slow ground, do not hit
-as if they vibrated freely. Elsewhere, and where the estimate leaves no doubt that a pair of derived
+as if they vibrated freely. Elsewhere, and where the estimate shows that a pair of derived
 periods does not touch, estimates take the place of the record.
 
 Against 4096 nodes, for 320 pairs in 18 real records (periods 0.3 to 3 s, one in three pairs of
@@ -17,7 +17,7 @@ nodes    32    64   128   256
 error  .069  .035  .021  .015
 ===== ===== ===== ===== =====
 
-Where the first nodes leave no doubt about contact the others are left out.
+Where the first nodes make contact or its absence certain the others are left out.
 ``workflows/population_accuracy.py`` compares populations with draws of exact histories.
 """
 
@@ -129,8 +129,8 @@ def record_population(station: StationMotion, table: Table, screening: Screening
     Returns
     -------
     dict of (n_pairs,) ndarray
-        ``population.COLUMNS``. Where the exact demand decides and nothing is uncertain, what the
-        exact history gives.
+        ``population.COLUMNS``. Where the exact demand decides without uncertain inputs, the
+        results of the exact history.
     """
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
@@ -217,7 +217,7 @@ def _of_certain_buildings(block: _Block) -> Columns:
 
 
 def _sampled(block: _Block, first: int, count: int) -> Columns:
-    """Return the population of uncertain buildings, at all nodes where the first leave a doubt."""
+    """Return the population of uncertain buildings, at all nodes if the first are inconclusive."""
     # first nodes
     few = _node_motion(block, NODES[:first])
     chance = chance_of_contact(few.demand, block.site.log_std, block.table)

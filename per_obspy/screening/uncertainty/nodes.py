@@ -68,7 +68,7 @@ def damping_at_nodes(median: FloatArray, table: Table, i: int, nodes: FloatArray
 
 
 def building_is_uncertain(pairs: Table) -> NDArray[np.bool_]:
-    """Return which pairs have a building whose period or damping has a log-standard deviation."""
+    """Return a mask of pairs in which a period or damping has a log-standard deviation."""
     period = np.maximum(*both(pairs, "period_log_std"))
     damping = np.maximum(*both(pairs, "damping_log_std"))
     return np.asarray((period > 0) | (damping > 0))
@@ -95,7 +95,7 @@ def median_gap(pairs: Table) -> FloatArray:
 
 
 def one_wall_chance(pairs: Table) -> FloatArray:
-    """Return the chance that buildings whose outlines touch have one wall; 0 of other pairs."""
+    """Return the probability that buildings with touching outlines share a wall; else 0."""
     touching = (values(pairs, "gap") == 0.0) & (values(pairs, "gap_std") > 0.0)
     return np.where(touching, ONE_WALL, 0.0)
 

@@ -54,7 +54,7 @@ def period_correlation(period_1: ArrayLike, period_2: ArrayLike) -> FloatArray:
 
 
 def _c2(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return equation (3), of short periods."""
+    """Return C2, equation (3), for short periods."""
     # the exponent of long periods, whose c2 does not count, would overflow
     fading = 1.0 / (1.0 + np.exp(100.0 * np.minimum(high, 1.0) - 5.0))
     longer = high > low
@@ -70,7 +70,7 @@ def pair_motion(
     periods: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return ln of the gap that pairs need at the site over that here, and its log-standard deviation.
+    Return ln of the needed gap at the site over that at the record, and its deviation.
 
     Parameters
     ----------
@@ -108,5 +108,5 @@ def pair_motion(
 
 
 def _share(part: FloatArray, whole: FloatArray, moving: NDArray[np.bool_]) -> FloatArray:
-    """Return part / whole of the squared gap, one half where the pair does not move."""
+    """Return part / whole of the squared gap, 0.5 for pairs without motion."""
     return np.divide(part, whole, out=np.full_like(whole, 0.5), where=moving)

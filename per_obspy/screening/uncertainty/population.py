@@ -1,7 +1,7 @@
 """
-Population of a pair: its outcome over everything that is uncertain about it.
+Population of a pair: its outcomes at nodes of all uncertain values.
 
-The nodes are those of ``nodes.py``: periods and dampings of both buildings, what else is uncertain
+The nodes are those of ``nodes.py``: periods and dampings of both buildings, other uncertainties
 of the demand (motion at the site, error of an estimate), and the gap. Every node has a demand and
 an impact velocity. The probability is the mean over the buildings of the nodes of the chance that a
 lognormal demand exceeds a lognormal gap; expected values and the quantile are those of all nodes,

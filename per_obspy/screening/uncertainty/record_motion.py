@@ -59,7 +59,7 @@ def record_motion(station: StationMotion, table: Table, screening: Screening) ->
 
 
 def is_exact(table: Table) -> NDArray[np.bool_]:
-    """Return where the exact demand decides."""
+    """Return a mask of the pairs whose demand is the exact one."""
     return np.asarray(table["demand_rule"] == "exact")
 
 
@@ -78,12 +78,12 @@ def _radius(table: Table, i: int, screening: Screening) -> UncertainRadius:
 
 
 def _linearized(table: Table) -> NDArray[np.bool_]:
-    """Return where the gap of equivalent linear buildings decides."""
+    """Return a mask of the pairs whose demand is that of equivalent linear buildings."""
     return np.asarray(table["demand_rule"] == "linearized")
 
 
 def _deciding(table: Table, name: str) -> FloatArray:
-    """Return a column, that of the equivalent building where this decides."""
+    """Return a column, with the values of the equivalent buildings where these decide."""
     return np.where(_linearized(table), values(table, f"equivalent_{name}"), values(table, name))
 
 

@@ -20,7 +20,7 @@ from per_obspy.kernels.pairs.node_outcomes import fill_velocities
 
 class RelativeMotion(NamedTuple):
     """
-    Motion without contact of pairs at nodes, (n_pairs, n_nodes); all of it grows with the ground.
+    Motion without contact of pairs at nodes, (n_pairs, n_nodes); proportional to the ground motion.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ from per_obspy.screening.values import Table, at_contact, both, values
 
 class SiteDemand(NamedTuple):
     """
-    Exact demand of pairs at their sites, as uncertain as the motion there is; each (n_pairs,).
+    Exact demand of pairs at their sites, with its uncertainty; each (n_pairs,).
 
     At the distance h of site and record the correlation of the particular part of their demands is
     ``c(h) = p + (1 - p) exp(-h / L)``. The logarithm of the demand is normal, with the median
@@ -70,7 +70,7 @@ class SiteDemand(NamedTuple):
 
 def site_demand(station: StationMotion, table: Table, screening: Screening) -> SiteDemand:
     """
-    Return how the exact demand of pairs at their sites follows from that of their record.
+    Return the relation of the exact demand at the sites to that of the records.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def median_at_site(
     demand: FloatArray, weight: FloatArray, ln_ratio: FloatArray, ln_field: FloatArray
 ) -> FloatArray:
     """
-    Return the median demand at the site, m, of demands of the record; 0 of pairs that move as one.
+    Return the median demand at the site, m, for demands of the record; 0 stays 0.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def median_at_site(
 
 
 def demand_correlation(table: Table, settings: Interpolation) -> FloatArray:
-    """Return the correlation c(h) of the particular part of the demands of record and site."""
+    """Return the correlation c(h) of the residual demands at record and site."""
     if "ln_per_ratio_1" not in table:
         return np.ones_like(values(table, "gap"))
     persistence, length = settings.demand_persistence, settings.demand_length
@@ -173,7 +173,7 @@ def motion_at_site(table: Table, i: int) -> tuple[FloatArray, FloatArray]:
 
 def ln_field_demand(station: StationMotion, table: Table, screening: Screening) -> FloatArray:
     """
-    Return ln of the demand in m that the motion between the stations lets expect at the site.
+    Return ln of the expected demand at the site, m, from the motion between stations.
 
     Minus infinity of pairs that move as one: equal buildings need no gap.
     """

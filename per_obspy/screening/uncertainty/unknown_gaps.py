@@ -3,7 +3,7 @@ Pairs whose gap is unknown: their demand is known, everything that depends on th
 
 Such pairs are computed as if their buildings were too far apart to meet, and the columns that
 depend on the gap are emptied at the end. A pair whose gap is assumed by the configuration
-(``[building] gap``) keeps them; its class says that the gap is unknown.
+(``[building] gap``) keeps them; its risk class remains ``gap unknown``.
 """
 
 import numpy as np
@@ -48,7 +48,7 @@ TEXTS = ("single_hit_status", "fema_p154_flags_unverified")
 
 def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
     """
-    Return completed pairs with a gap in every row and the columns ``MARKS``.
+    Return completed pairs with a substitute for unknown gaps, and the columns ``MARKS``.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def kept_apart(pairs: pd.DataFrame) -> pd.DataFrame:
 
 def without_gap(table: pd.DataFrame) -> pd.DataFrame:
     """
-    Return rows of a risk table, empty in columns that depend on an unknown gap, without ``MARKS``.
+    Empty the columns that depend on an unknown gap, and drop the columns ``MARKS``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lines of CSV files joined to rows: which quotations are closed, and what a row may contain."""
+"""Lines of CSV files joined to rows: closed quotations, and permitted contents of a row."""
 
 import random
 

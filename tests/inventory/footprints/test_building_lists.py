@@ -1,4 +1,4 @@
-"""Lists of buildings: outlines from WKT and from sides, and what is missing for them."""
+"""Lists of buildings: outlines from WKT and from sides, and missing columns."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Lengths as people write them: units by their definition, and what may mean two lengths."""
+"""Lengths in text: units by their definition, and ambiguous lengths."""
 
 import numpy as np
 import pandas as pd

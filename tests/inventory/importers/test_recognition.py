@@ -1,5 +1,5 @@
 """
-Foreign column names: what is recognised, what stays unknown.
+Foreign column names: recognised and unknown ones.
 
 Covers per_obspy.inventory.importers.importer.
 """

@@ -58,7 +58,7 @@ class Messy(NamedTuple):
     file : str
         Its name.
     content : bytes
-        What is in it.
+        Bytes of the file.
     """
 
     file: str
@@ -135,7 +135,7 @@ def plain() -> Messy:
 
 
 def readable() -> dict[str, Messy]:
-    """Return every kind that is read, by what is messy about it."""
+    """Return every readable kind of messy table, by its defect."""
     cm, mm, t = {1: 100.0}, {1: 1000.0}, {8: 0.001}
     upper = [name.upper() for name in NAMES]
     grouped = text_of(NAMES, ROWS, ";").replace("1250000", "1,250,000").replace("980500", "980,500")
@@ -182,7 +182,7 @@ def readable() -> dict[str, Messy]:
 
 
 def refused() -> dict[str, Messy]:
-    """Return every kind that is refused, by what is doubtful about it."""
+    """Return every refused kind of messy table, by its ambiguity."""
     whole = [[row[0], 2.345, *row[2:4], 10.125, *row[5:7], 12.25, *row[8:]] for row in ROWS]
     doubtful = [[*row[:7], 12.125, 2500.0, row[9]] for row in whole]
     points = text_of(NAMES, doubtful, ";")

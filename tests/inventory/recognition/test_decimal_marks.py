@@ -1,5 +1,5 @@
 """
-Decimal marks of whole columns: what decides, what is doubtful, what stays as it is.
+Decimal marks of whole columns: decisive, ambiguous and unchanged cells.
 
 Also of per_obspy.inventory.recognition.unit_columns and per_obspy.inventory.recognition.units.
 """

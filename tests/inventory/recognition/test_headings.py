@@ -1,5 +1,5 @@
 """
-Headings of several languages and forms, and what they never mean.
+Headings of several languages and forms, and meanings that they never have.
 
 Also of per_obspy.inventory.recognition.column_meanings.
 """

@@ -1,4 +1,4 @@
-"""Windows of pairs: bounds are never exceeded, and what lies outside the windows does not count."""
+"""Windows of pairs: bounds are never exceeded, and motion outside of windows does not count."""
 
 import numpy as np
 import pytest

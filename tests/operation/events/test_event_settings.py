@@ -72,7 +72,7 @@ def test_a_folder_of_records_waits_for_half_written_files(tmp_path):
     ("old", "new", "reason"),
     [
         ('[watch]\nservice = "USGS"\n', "", r"no section \[watch\]"),
-        ('service = "USGS"', 'service = "USSGS"', "is no base URL"),
+        ('service = "USGS"', 'service = "USSGS"', "is neither a base URL"),
         ('service = "USGS"', "", "give either service"),
         ('service = "USGS"', 'service = "USGS"\nfolder = "x"', "give either service"),
         ('service = "USGS"', 'service = "USGS"\ndelays = [60, 30]', "must be positive and rise"),

@@ -140,7 +140,7 @@ def test_revision_of_the_run_is_on_the_page(folder):
 
 def test_rejections_are_counted_and_their_beginning_shown(content):
     assert content["rejected"]["rows"] == []
-    assert content["rejected"]["note"] == "Nothing was rejected."
+    assert content["rejected"]["note"] == "No input was rejected."
 
 
 def test_language_on_the_command_line(folder, call):

@@ -1,4 +1,4 @@
-"""Energy balance: closed forms of simple motions, and the imbalance that a lost term leaves."""
+"""Energy balance: closed forms of simple motions, and the imbalance of a missing term."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Spread of PER over baselines: shifts that bring the velocity to rest, periods in doubt."""
+"""Spread of PER over baselines: shifts that bring the velocity to rest, uncertain periods."""
 
 import numpy as np
 import pytest

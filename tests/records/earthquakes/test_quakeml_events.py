@@ -1,4 +1,4 @@
-"""QuakeML of watched earthquakes: only what screening depends on, and one line for what is none."""
+"""QuakeML of watched earthquakes: only facts for screening, and one line for other files."""
 
 import obspy
 import pytest

@@ -341,7 +341,7 @@ def test_routers_name_the_services(server: FdsnServer, ask: Ask, monkeypatch, ro
 
 
 def test_unknown_providers_and_events_are_wrong_input(ask: Ask):
-    with pytest.raises(CatalogError, match="NOWHERE: is no base URL, no router"):
+    with pytest.raises(CatalogError, match="NOWHERE: is neither a base URL, nor a router"):
         ask(providers=("NOWHERE",))
     with pytest.raises(CatalogError, match="has no event yy9"):
         ask(event_id="yy9")

@@ -138,7 +138,7 @@ def test_answers_that_are_no_list_are_the_services_fault(server: FdsnServer, wro
 
 
 def test_unknown_sources_are_wrong_input():
-    with pytest.raises(CatalogError, match="absent: is no base URL"):
+    with pytest.raises(CatalogError, match="absent: is neither a base URL"):
         find_events("absent", {})
 
 

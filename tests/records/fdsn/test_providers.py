@@ -27,7 +27,7 @@ def test_names_are_those_of_obspy(pool: urllib3.PoolManager):
 
 
 def test_unknown_names_are_refused():
-    with pytest.raises(CatalogError, match="nobody: is no base URL, no router"):
+    with pytest.raises(CatalogError, match="nobody: is neither a base URL, nor a router"):
         base_url("nobody")
 
 

@@ -1,10 +1,10 @@
 """
-Layers read back by GDAL and by SQLite, which shares no code with what wrote them.
+Layers read back by GDAL and by SQLite, which shares no code with the writers.
 
 Tests of per_obspy.report.layers.geopackage, per_obspy.report.layers.geoparquet,
 per_obspy.report.layers.building_layer, per_obspy.report.layers.qgis_project and
-per_obspy.report.layers.shapes and per_obspy.report.layers.pair_places too: they are what
-``write_layers`` calls.
+per_obspy.report.layers.shapes and per_obspy.report.layers.pair_places too:
+``write_layers`` calls them.
 """
 
 import json

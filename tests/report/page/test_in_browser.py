@@ -1,7 +1,7 @@
 """
 The page as a person uses it, in Chromium; its script and style are package data.
 
-What it shows comes from per_obspy.report.page.document, per_obspy.report.page.content and
+Its content comes from per_obspy.report.page.document, per_obspy.report.page.content and
 per_obspy.report.page.first_screen.
 """
 

@@ -1,4 +1,4 @@
-"""Exact histories of rows: a row of two is the pair, mirrored rows, and what neighbours change."""
+"""Exact histories of rows: a row of two is the pair, mirrored rows, effect of neighbours."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Motion of a ShakeMap: interpolation by hand, the damping of the code, and what is uncertain."""
+"""Motion of a ShakeMap: interpolation by hand, the damping of the code, and uncertainty."""
 
 import numpy as np
 import pytest

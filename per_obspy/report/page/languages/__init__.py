@@ -1,1 +1,1 @@
-"""Texts of the page in other languages than English."""
+"""Translations of the texts of the page."""

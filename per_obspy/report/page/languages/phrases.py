@@ -5,8 +5,8 @@ import re
 #: English phrase, as the module that writes it has it -> Spanish phrase.
 SPANISH_PHRASES: dict[str, str] = {
     # Prevention of buildings
-    "nothing: its gaps are enough in this record": (
-        "nada: sus separaciones bastan en este registro"
+    "no measure: its gaps are enough in this record": (
+        "ninguna medida: sus separaciones bastan en este registro"
     ),
     "wider gaps elsewhere in its row: its own are enough for each pair alone": (
         "separaciones más anchas en otra parte de su fila: las suyas bastan para cada par solo"
@@ -95,7 +95,7 @@ BEGINNINGS = ("up to ", "or ")
 
 
 def _pattern() -> re.Pattern[str]:
-    """Return a pattern of all phrases, the longest first: none hides one that begins alike."""
+    """Return a pattern of all phrases, the longest first, so that longer ones match first."""
     phrases = sorted(SPANISH_PHRASES, key=len, reverse=True)
     parts = [
         f"(?:^|(?<=; )){re.escape(phrase)}" if phrase in BEGINNINGS else re.escape(phrase)
@@ -109,7 +109,7 @@ _PHRASES = _pattern()
 
 def in_spanish(text: str) -> str:
     """
-    Return a text with its fixed phrases in Spanish; numbers, names and other words stay.
+    Translate the fixed phrases of a text into Spanish; numbers, names and other words stay.
 
     Examples
     --------
