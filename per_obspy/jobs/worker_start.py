@@ -1,10 +1,11 @@
 """
-How worker processes begin: as fresh interpreters, or as forks of a server.
+Start of worker processes: fresh interpreters, or forks of a server.
 
-A fork beside threads of Python can hang. The server has none: it loads the libraries of the jobs
-once, while the run that it serves loads its own, and each worker begins with a copy. Threads of
-allocators and of linear algebra end and begin with a fork by themselves. Only the command line on
-Linux forks: the server is one per program, and system libraries of macOS do not survive a fork.
+A fork of a process with threads of Python can hang. The server has none: it loads the libraries of
+the jobs once, while the run that it serves loads its own, and each worker begins with a copy.
+Threads of allocators and of linear algebra end and begin with a fork by themselves. Only the
+command line on Linux forks: a program has one server, which may be that of its user, and system
+libraries of macOS do not survive a fork.
 """
 
 import sys
