@@ -201,10 +201,10 @@ OF_STAGES = {"obspy", "numba", "scipy", "matplotlib", "pandas", "xarray", "duckd
 
 
 def test_a_finished_run_answers_without_the_libraries_of_its_stages(copied):
-    # catches any import on the way that makes people wait three seconds for "nothing to do"
+    # catches any import on the way that makes people wait three seconds for "up to date"
     code = "from per_obspy.cli import main; sys.argv = ['per-obspy', 'run', 'run.toml']; main()"
     modules, output = modules_after(code, copied)
-    assert output.startswith("Nothing to do")
+    assert output.startswith("Up to date")
     assert "The 10 worst pairs" in output
     assert not OF_STAGES & modules
 
