@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test workflows check docs wheel benchmark clean
+.PHONY: demo figures test workflows rehearsal check docs wheel benchmark clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -24,6 +24,10 @@ test: .venv/test
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"
 	$(BIN)/python -m pytest -q tests/workflows/test_snakefile.py
+
+rehearsal: .venv/test
+	@echo "== an earthquake that happens: failing services, late stations, killed processes"
+	$(BIN)/python workflows/rehearsal.py
 
 check: .venv/check
 	$(BIN)/python tests/check_density.py
@@ -46,8 +50,9 @@ wheel: .venv/check
 	PYTHON=$(PYTHON) EXTRAS= workflows/container/install.sh install "$$(ls dist/*.whl)" .venv/wheel
 	folder=$$(mktemp -d) && cp workflows/smoke.py $$folder && cd $$folder && $(CURDIR)/.venv/wheel/bin/python smoke.py && \
 	  $(CURDIR)/.venv/bin/mypy --strict --config-file= --python-executable $(CURDIR)/.venv/wheel/bin/python smoke.py
-	@echo "== compile the kernels of the wheel, as a container does"
-	workflows/container/install.sh compile .venv/wheel workflows
+	@echo "== the other steps of the container, but for the compilation"
+	WARM_UP=no workflows/container/install.sh compile .venv/wheel
+	workflows/container/install.sh check .venv/wheel
 
 benchmark: .venv/benchmark
 	$(BIN)/python tests/benchmarks/figures.py docs/benchmarks.json

@@ -2,29 +2,35 @@
 Rehearse an earthquake: services that fail, late stations, killed processes, a new magnitude.
 
 Usage: ``python workflows/rehearsal.py [FOLDER]``. Services on loopback list and record a simulated
-earthquake. The watcher runs as a process of its own for each moment, by a clock that is given, so
-that a quarter of an hour is rehearsed in about a minute. The tables must be those of an undisturbed
-watcher to the byte. Prints the time from origin to each revision: delay of the
-run and seconds of work.
+earthquake. The watcher runs by a clock that is given, so that a quarter of an hour is rehearsed in
+less than a minute; where it or its worker is killed, it is a process of its own. The tables must be
+those of an undisturbed watcher to the byte. Prints the time from origin to each revision: delay of
+the run and seconds of work.
 """
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor
 from datetime import timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 HERE = Path(__file__).resolve()
-sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ("operation", "records")]
+ROOMS = ("operation", "records", "pipeline")
+sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ROOMS]
 
 from fdsn_server import FdsnServer, serving, status  # noqa: E402 - from the tests
+from small_run import InProcess, plain_figures  # noqa: E402
 from watched_city import ORIGIN, city_earthquake, settings_of, write_city  # noqa: E402
 
+from per_obspy.errors import PerError  # noqa: E402
 from per_obspy.operation.watch import Clock, watch_once  # noqa: E402
 
 #: Tables that must be the same to the byte.
@@ -39,10 +45,10 @@ def main(folder: Path) -> None:
         calm, rehearsed = folder / "undisturbed", folder / "rehearsed"
         for place in (calm, rehearsed):
             place.mkdir(parents=True)
-            file = write_city(place, server)
-            file.write_text(file.read_text().replace("workers = 1", "workers = 2"))
+            write_city(place, server)
         rehearse(rehearsed, server)
-        ended(started(calm, 901))
+        if errors := one_pass(calm, 901, InProcess()):
+            sys.exit(f"the undisturbed watcher fails: {errors[0]}")
     compare(calm / LATEST, rehearsed / LATEST)
 
 
@@ -59,49 +65,62 @@ def rehearse(folder: Path, server: FdsnServer) -> None:
     # The list of earthquakes fails at first, and a service of records for one station
     server.fail("event", "*", status(503, Retry_After="20"))
     server.fail("dataselect", "S001", *[status(503, Retry_After="120")] * 2)
-    report(folder, 0, started(folder, 0), "the event service demands a pause", expected=75)
-    first = started(folder, 61)
-    kill_worker(first)
-    report(folder, 61, first, "one worker killed, two stations silent, one service fails")
-    report(folder, 125, started(folder, 125), "the service that failed is asked again")
+    report(folder, 0, "the event service demands a pause", expected=1)
+    first = started(folder, 61, workers=2)
+    kill_worker(first.process)
+    report(folder, 61, "one worker killed, two stations silent, one service fails", first)
+    report(folder, 125, "the service that failed is asked again")
     # The watcher is killed in the middle of a run, and started again
     server.silent = set()
-    kill_watcher(folder, started(folder, 301))
-    report(folder, 305, started(folder, 305), "watcher killed and started again, late stations")
+    kill_watcher(folder, started(folder, 301, workers=1).process)
+    report(folder, 305, "watcher killed and started again, late stations")
     server.events["xx1"] = final
-    report(folder, 600, started(folder, 600), "magnitude 6.3 becomes 6.8")
-    report(folder, 901, started(folder, 901), "nothing new")
+    report(folder, 600, "magnitude 6.3 becomes 6.8")
+    report(folder, 901, "nothing new")
 
 
-def started(folder: Path, seconds: float) -> "subprocess.Popen[str]":
+class Started(NamedTuple):
+    """A watcher in a process of its own, and when it was started, s."""
+
+    process: "subprocess.Popen[str]"
+    since: float
+
+
+def started(folder: Path, seconds: float, workers: int) -> Started:
     """Start a watcher for one pass, so many seconds after the origin time."""
+    file = folder / "city.toml"
+    file.write_text(re.sub(r"workers = \d+", f"workers = {workers}", file.read_text()))
     command = [sys.executable, str(HERE), "--pass", str(folder), str(seconds)]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    since = time.perf_counter()
+    return Started(subprocess.Popen(command, stderr=subprocess.PIPE, text=True), since)
 
 
-def one_pass(folder: Path, seconds: float) -> None:
-    """Do one pass of the watcher; end with 75 if it is to be tried again."""
+def one_pass(
+    folder: Path, seconds: float, executor: Executor | None = None
+) -> tuple[PerError, ...]:
+    """Do one pass of the watcher, and return what failed."""
     now = ORIGIN + timedelta(seconds=seconds)
-    found = watch_once(settings_of(folder / "city.toml"), Clock(lambda: now))
-    for error in found.errors:
-        print(error, file=sys.stderr)
-    sys.exit(75 if found.errors else 0)
+    # Figures are most of the time of a small run, and none is compared
+    with plain_figures():
+        settings = settings_of(folder / "city.toml")
+        return watch_once(settings, Clock(lambda: now), executor=executor).errors
 
 
-def ended(watcher: "subprocess.Popen[str]", expected: int = 0) -> None:
-    """Wait for a watcher, and stop the rehearsal if it does not end as expected."""
-    _, errors = watcher.communicate(timeout=300)
-    if watcher.returncode != expected:
-        sys.exit(f"exit code {watcher.returncode}, expected {expected}: {errors}")
+def ended(watcher: Started) -> tuple[str, ...]:
+    """Wait for a watcher, and return what failed."""
+    _, errors = watcher.process.communicate(timeout=300)
+    return (errors,) if watcher.process.returncode else ()
 
 
 def report(
-    folder: Path, delay: float, watcher: "subprocess.Popen[str]", event: str, expected: int = 0
+    folder: Path, delay: float, event: str, watcher: Started | None = None, expected: int = 0
 ) -> None:
-    """Print the revision that a watcher has made, and the time from the origin to it."""
-    start = time.perf_counter()
-    ended(watcher, expected)
-    seconds = time.perf_counter() - start
+    """Print the revision that a pass has made, and the time from the origin to it."""
+    since = watcher.since if watcher else time.perf_counter()
+    errors = ended(watcher) if watcher else one_pass(folder, delay, InProcess())
+    seconds = time.perf_counter() - since
+    if len(errors) != expected:
+        sys.exit(f"{delay:g} s: {len(errors)} errors, expected {expected}: {errors}")
     made = sorted(path.name for path in folder.glob("out/events/*/revisions/*"))
     record = folder / LATEST / "run.json"
     counts = json.loads(record.read_text())["counts"] if record.is_file() else {}
@@ -128,7 +147,12 @@ def workers_of(process: int) -> list[int]:
 def kill_watcher(folder: Path, watcher: "subprocess.Popen[str]") -> None:
     """Kill a watcher while it screens."""
     record = folder / "out" / "events" / "xx1" / "work" / "run.json"
-    waited(lambda: '"screening"' in record.read_text() or watcher.poll() is not None)
+    # The record of a run that is complete has times of its stages
+    waited(
+        lambda: (
+            json.loads(record.read_text()).get("stage") == "screening" or watcher.poll() is not None
+        )
+    )
     watcher.kill()
     watcher.communicate()
 
@@ -152,6 +176,6 @@ def compare(calm: Path, rehearsed: Path) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--pass"]:
-        one_pass(Path(sys.argv[2]), float(sys.argv[3]))
+        sys.exit("\n".join(map(str, one_pass(Path(sys.argv[2]), float(sys.argv[3])))) or None)
     with tempfile.TemporaryDirectory() as temporary:
         main(Path(sys.argv[1] if sys.argv[1:] else temporary))

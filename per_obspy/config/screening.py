@@ -16,6 +16,15 @@ SectionType = TypeVar("SectionType", bound=Section)
 #: Largest offset of two floors that still hit floor to floor, m: 2 ft in FEMA P-154.
 FLOOR_TOLERANCE = 0.61
 
+#: States of a pair, likeliest first.
+STATES = ("yes", "likely", "possible", "unlikely", "no")
+
+#: State of a pair whose gap is unknown.
+UNKNOWN_STATE = "unknown"
+
+#: All states that a row can have.
+EVERY_STATE = (*STATES, UNKNOWN_STATE)
+
 
 class Building(Section):
     """Assumptions about buildings where the inventory has no value; each use is marked derived."""
@@ -278,7 +287,9 @@ class ReportTexts(Section):
         "en", description="of page and summaries: en (English) or es (Spanish)"
     )
     revision: int = Field(
-        0, ge=0, description="number of the revision that the page shows; 0: none is shown"
+        0,
+        ge=0,
+        description="revision on page and summary; 0: the number that watch gives, if any",
     )
 
 

@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from per_obspy.config import Run
 from per_obspy.config.engine import Engine, checked_address
-from per_obspy.errors import CatalogError
+from per_obspy.errors import CatalogError, require_extra
 from per_obspy.resume import StatusError, read_status, write_status
 
 
@@ -36,14 +37,45 @@ def dask_executor(address: str | None) -> Iterator[Executor | None]:
     if address is None:
         yield None
         return
-    try:
-        checked = checked_address(address, Path.cwd())
-    except ValueError as error:
-        raise CatalogError("--dask", str(error)) from error
     from per_obspy.jobs.cluster.dask_executor import DaskExecutor
 
-    with DaskExecutor(checked) as executor:
+    with DaskExecutor(_address(address)) as executor:
         yield executor
+
+
+def on_cluster(settings: Run, address: str | None) -> Run:
+    """
+    Return settings whose every run connects to a Dask cluster by itself; as they are without one.
+
+    A program of many runs outlives a scheduler that is started again.
+
+    Parameters
+    ----------
+    settings : Run
+        Of the runs.
+    address : str or None
+        As :func:`dask_executor` takes it.
+
+    Raises
+    ------
+    CatalogError
+        If the address is none.
+    MissingExtra
+        If Dask is not installed.
+    """
+    if address is None:
+        return settings
+    require_extra("dask", "distributed")
+    engine = settings.engine.model_copy(update={"dask": _address(address)})
+    return settings.model_copy(update={"engine": engine})
+
+
+def _address(address: str) -> str:
+    """Return a checked address of the command line."""
+    try:
+        return checked_address(address, Path.cwd())
+    except ValueError as error:
+        raise CatalogError("--dask", str(error)) from error
 
 
 @contextmanager

@@ -6,18 +6,21 @@ about, so that the same counts and the same failure are notified once.
 """
 
 import json
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from per_obspy.config import Notify, Run, load
-from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of
+from per_obspy.errors import FolderInUse, PerError, WriteError, reason_of, shortened
 from per_obspy.files import written_whole
 from per_obspy.jobs.output_folder import Result, now
 from per_obspy.operation.logs import without_secrets
 from per_obspy.operation.notification import Message, notify
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
+
+log = logging.getLogger(__name__)
 
 #: File of the latest message in the folder of the results.
 LATEST = "notification.json"
@@ -53,9 +56,22 @@ def notified_run(
     return result
 
 
-def notify_result(settings: Notify, result: Result, name: str) -> tuple[str, ...]:
+def notify_result(
+    settings: Notify, result: Result, name: str, shown: Path | None = None
+) -> tuple[str, ...]:
     """
     Notify of the first result of a folder, or of one with changed class counts.
+
+    Parameters
+    ----------
+    settings : Notify
+        Occasions and ways.
+    result : Result
+        Of a run.
+    name : str
+        Beginning of the title.
+    shown : Path, optional
+        Folder whose page and summary people are shown, if not that of the result.
 
     Returns
     -------
@@ -75,8 +91,9 @@ def notify_result(settings: Notify, result: Result, name: str) -> tuple[str, ...
     known = earlier if isinstance(earlier, dict) else None
     change = "first result" if known is None else f"changed from {_words(known)}"
     title = f"{name}: {words} ({change})"
-    text = _text(folder / "summary.txt") or title
-    message = Message("first" if known is None else "changed", title, text, _report(folder))
+    place = shown or folder
+    text = _text(place / "summary.txt") or title
+    message = Message("first" if known is None else "changed", title, text, _report(place))
     return _sent(settings, folder, message, {"classes": counts})
 
 
@@ -119,8 +136,30 @@ def _sent(
         with written_whole(folder / LATEST) as part:
             part.write_text(json.dumps(latest, indent=1), encoding="utf-8")
     except WriteError as error:
+        log.warning("%s", error)
         return (*reasons, str(error))
     return reasons
+
+
+def undelivered(folders: Iterable[Path]) -> str | None:
+    """
+    Return why the latest message about results in some folders was not delivered.
+
+    Returns
+    -------
+    reason : str or None
+        None if it was delivered, or there was none.
+    """
+    newest: tuple[str, int, dict[str, Any]] = ("", 0, {})
+    for folder in folders:
+        if latest := _latest(folder):
+            # Messages of one second are in the order of their files
+            written = (folder / LATEST).stat().st_mtime_ns
+            newest = max(
+                newest, (str(latest.get("time")), written, latest), key=lambda one: one[:2]
+            )
+    failed = newest[2].get("failed")
+    return shortened(str(failed[0]), 300) if isinstance(failed, list) and failed else None
 
 
 def _latest(folder: Path) -> dict[str, Any]:

@@ -15,22 +15,15 @@ from typing import NamedTuple
 
 from per_obspy import termination
 from per_obspy.config import Run, Watch
-from per_obspy.errors import (
-    CatalogError,
-    MachineFault,
-    PerError,
-    ServiceError,
-    TryLater,
-    shortened,
-)
+from per_obspy.errors import CatalogError, PerError, ServiceError, TryLater, shortened
 from per_obspy.jobs.output_folder import locked_folder
-from per_obspy.machine import machine_fault
 from per_obspy.operation.events.due import Task, due_task, is_paused, next_due, pause
 from per_obspy.operation.events.event_feed import Feed, noted_poll, read_feed
 from per_obspy.operation.events.event_run import Watcher, arrivals_of, done_task
+from per_obspy.operation.events.failures import after_pause, failed, known_fault
 from per_obspy.operation.events.open_events import listed_states, present_state
 from per_obspy.operation.events.relevance import Circle, circle_around, inventory_places
-from per_obspy.operation.events.revisions import point_latest
+from per_obspy.operation.events.revisions import WORK, point_latest, revision_folder
 from per_obspy.operation.events.state import (
     EventState,
     WatchState,
@@ -43,10 +36,9 @@ from per_obspy.operation.events.state import (
     write_event_state,
     write_watch_state,
 )
-from per_obspy.operation.notified_run import notify_failure, notify_result
+from per_obspy.operation.notified_run import notify_failure, notify_result, undelivered
 from per_obspy.operation.status import WatchStatus, write_status
 from per_obspy.progress import Progress, silent
-from per_obspy.records.fdsn.web import PassingFault
 
 log = logging.getLogger(__name__)
 
@@ -177,9 +169,9 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
     for problem in problems:
         log.warning("%s", problem)
     # A power cut may have come between a revision and the link to it
-    for event_id in states:
-        point_latest(event_folder(watcher.folder, event_id))
     errors = list[PerError]()
+    for event_id in states:
+        _point_latest(event_folder(watcher.folder, event_id), errors)
     state = _polled(watcher, states, errors)
     _confirm(watcher, states, errors)
     while not termination.requested() and (found := _most_urgent(watcher, states)):
@@ -189,6 +181,14 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
         if _is_over(watcher, state):
             state = _polled(watcher, states, errors)
     return _ended(watcher, states, state, errors, running)
+
+
+def _point_latest(folder: Path, errors: list[PerError]) -> None:
+    """Let ``latest`` lead to the newest revision; a failure stops no other earthquake."""
+    try:
+        point_latest(folder)
+    except PerError as error:
+        errors.append(error)
 
 
 def _is_over(watcher: Watcher, state: WatchState) -> bool:
@@ -210,7 +210,7 @@ def _polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErr
     try:
         feed = read_feed(watch, state, _circle(watcher), now)
     except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for the list
-        fault = _fault(error)
+        fault = known_fault(error)
         errors.append(fault)
         state = _failed_poll(state, fault, now)
     else:
@@ -248,28 +248,10 @@ def _failed_poll(state: WatchState, fault: PerError, now: datetime) -> WatchStat
     failures = state.failures + 1
     update = {
         "failures": failures,
-        "not_before": _after(now, failures, fault),
+        "not_before": after_pause(now, failures, fault),
         "last_error": shortened(str(fault)),
     }
     return state.model_copy(update=update)
-
-
-def _after(now: datetime, failures: int, fault: PerError | None) -> str:
-    """Return the time after the pause that follows some failures in succession."""
-    demanded = fault.pause if isinstance(fault, PassingFault) else None
-    return iso(now + timedelta(seconds=pause(failures, demanded)))
-
-
-def _fault(error: Exception) -> PerError:
-    """Convert any error to one for users; log the traceback of a programming error."""
-    # A missing file of the configuration is a wrong name, as for other commands
-    fault = machine_fault(error, missing=not isinstance(error, PerError))
-    if isinstance(error, PerError) and (fault is None or isinstance(error, TryLater)):
-        return error
-    if fault is not None:
-        return fault
-    log.error("an error of the program", exc_info=error)
-    return MachineFault(shortened(f"{type(error).__name__}: {error}"))
 
 
 def _keep(watcher: Watcher, states: dict[str, EventState], state: EventState) -> None:
@@ -293,7 +275,7 @@ def _confirm(watcher: Watcher, states: dict[str, EventState], errors: list[PerEr
         try:
             present = present_state(watch, watcher.places, state, now)
         except Exception as error:  # noqa: BLE001 - the other earthquakes are confirmed
-            errors.append(_fault(error))
+            errors.append(known_fault(error))
             # The service of all others fails as well
             return
         _keep(watcher, states, present)
@@ -330,26 +312,29 @@ def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerEr
     try:
         done = done_task(watcher, state, task)
     except Exception as error:  # noqa: BLE001 - the other earthquakes have their runs
-        fault = _fault(error)
+        fault = known_fault(error)
         errors.append(fault)
         log.error("%s: %s", name, fault)
-        return _failure(watcher, _failed(state, str(fault), watcher.now(), fault))
+        return _failure(watcher, failed(state, str(fault), watcher.now(), fault))
     log.info("%s: %s", name, done.line)
     # What is missing because a service failed is asked for again after a pause
     if done.state.complete:
         after = changed(done.state, failures=0, not_before=None, last_error=None)
     else:
-        after = _failed(done.state, INCOMPLETE, watcher.now(), None)
+        after = failed(done.state, INCOMPLETE, watcher.now(), None)
     _keep(watcher, {state.event_id: state}, after)
     if done.result is not None:
-        notify_result(watcher.settings.notify, done.result, _label(watcher, state))
+        # Its folder works on: people are shown the revision, which never changes
+        folder = event_folder(watcher.folder, state.event_id)
+        shown = revision_folder(folder, after.revision) if after.revision else None
+        notify_result(watcher.settings.notify, done.result, _label(watcher, state), shown)
     return after
 
 
 def _failure(watcher: Watcher, state: EventState) -> EventState:
     """Write the state of an earthquake whose run failed, and notify people."""
     _keep(watcher, {state.event_id: state}, state)
-    work = event_folder(watcher.folder, state.event_id) / "work"
+    work = event_folder(watcher.folder, state.event_id) / WORK
     reason = state.last_error or ""
     notify_failure(watcher.settings.notify, work, _label(watcher, state), reason)
     return state
@@ -358,17 +343,6 @@ def _failure(watcher: Watcher, state: EventState) -> EventState:
 def _label(watcher: Watcher, state: EventState) -> str:
     """Return the title of messages about an earthquake."""
     return f"{watcher.settings.name}: {state.event_id}"
-
-
-def _failed(state: EventState, reason: str, now: datetime, fault: PerError | None) -> EventState:
-    """Return the state of an earthquake after a failure: it is tried again after a pause."""
-    failures = state.failures + 1
-    return changed(
-        state,
-        failures=failures,
-        not_before=_after(now, failures, fault),
-        last_error=shortened(reason),
-    )
 
 
 def _ended(
@@ -396,6 +370,9 @@ def _ended(
         last_error=shortened(str(errors[0])) if errors else None,
         next_due=iso(following),
         failures=max([state.failures, *(known.failures for known in states.values())]),
+        last_notification_error=undelivered(
+            event_folder(watcher.folder, event_id) / WORK for event_id in states
+        ),
         running=running,
     )
     write_status(watcher.folder, status)

@@ -17,12 +17,13 @@ from per_obspy.pipeline.results.faults import Report
 from per_obspy.pipeline.results.layer_sources import layer_paths, outlines_beside, write_map_layers
 from per_obspy.pipeline.results.page import worst_pairs, write_run_page
 from per_obspy.pipeline.results.result_files import Screening, write_results
-from per_obspy.pipeline.results.run_facts import event_of_run, read_stations
+from per_obspy.pipeline.results.run_facts import event_of_run, read_stations, revision_of_run
 from per_obspy.pipeline.results.table_notes import Notes, needed_columns
 from per_obspy.pipeline.stations import simulated_motion
 from per_obspy.progress import Progress
 from per_obspy.report.evaluation import write_evaluation
 from per_obspy.report.overview import Region, draw_overview
+from per_obspy.report.page.first_screen import revision_line
 from per_obspy.report.page.tally import COUNTED, PairTally
 from per_obspy.report.pair_figure import draw_record_to_pair
 from per_obspy.report.summary.statements import event_sentences
@@ -167,7 +168,12 @@ def _write_summary(
 ) -> None:
     """Write summary, KML and workbook."""
     language = settings.report.language
-    source = event_sentences(_event(settings, folder, place), language)
+    revision = revision_of_run(folder / "run.json")
+    number = settings.report.revision or revision.number
+    # Which result this is comes first, then the earthquake
+    line = revision_line(number, revision.time, revision.event_id, language)
+    source = [f"{line}."] if line else []
+    source += event_sentences(_event(settings, folder, place), language)
     stations = read_stations(folder / "stations.csv")
     written = Screening(folder, "risk", place, source, settings.spreadsheet, language)
     written = written._replace(stations=stations, areas=summary.totals.table)

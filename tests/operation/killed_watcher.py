@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from pathlib import Path
 
 HERE = Path(__file__).resolve()
@@ -91,6 +92,8 @@ def forked(city: Path, seconds: float) -> int:
     try:
         one_pass(city, seconds)
         code = 0
+    except Exception:  # noqa: BLE001 - whatever it is, it is printed
+        traceback.print_exc()
     finally:
         os._exit(code)
 
@@ -130,13 +133,13 @@ def main(folder: Path, count: int, seed: int) -> None:
     first.mkdir()
     write_city(first, services)
     services.silence("S002")
-    shutil.copytree(first, early)
+    shutil.copytree(first, early, symlinks=True)
     one_pass(early, 61)
     services.silence()
-    shutil.copytree(early, late)
+    shutil.copytree(early, late, symlinks=True)
     seconds = {late: timed_pass(late), first: 0.0}
     calm = folder / "calm"
-    shutil.copytree(first, calm)
+    shutil.copytree(first, calm, symlinks=True)
     seconds[first] = timed_pass(calm)
     cases = [(first, calm, ["0001"]), (early, late, ["0001", "0002"])]
     seconds[early] = seconds[late]

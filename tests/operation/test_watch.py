@@ -1,12 +1,14 @@
 """A watcher and a service on loopback, by a clock of the test: every result is kept.
 
-Tests ``per_obspy.operation.events.event_feed``, ``per_obspy.operation.events.event_run`` and
-``per_obspy.operation.events.open_events`` as well.
+Tests ``per_obspy.operation.events.event_feed``, ``per_obspy.operation.events.event_run``,
+``per_obspy.operation.events.failures`` and ``per_obspy.operation.events.open_events`` as well.
 """
 
+import errno
 import json
 import os
 import shutil
+import sys
 import time
 import tracemalloc
 from pathlib import Path
@@ -24,6 +26,7 @@ from watched_city import (
     write_city,
 )
 
+from per_obspy.config import Notify
 from per_obspy.errors import CatalogError, FolderInUse, ServiceError, TryLater, WriteError
 from per_obspy.files import file_hash
 from per_obspy.operation import watch
@@ -31,6 +34,11 @@ from per_obspy.operation.events import event_feed, event_run
 from per_obspy.operation.events.state import read_event_states
 from per_obspy.operation.status import read_status
 from per_obspy.operation.watch import watch_forever, watch_once
+from per_obspy.pipeline.inputs.described_runs import result_facts
+from per_obspy.pipeline.run import run
+from per_obspy.records.fdsn.web import PassingFault
+
+from ..pipeline.small_run import InProcess, page_content, plain_figures
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +68,7 @@ class City:
         """Return the outcome of one pass, so many seconds after the origin time."""
         section = self.settings.watch.model_copy(update=changes)
         settings = self.settings.model_copy(update={"watch": section})
-        return watch_once(settings, self.clock.at(seconds))
+        return watch_once(settings, self.clock.at(seconds), executor=InProcess())
 
     def state(self, name: str = "xx1"):
         return read_event_states(self.folder)[0][name]
@@ -200,7 +208,7 @@ def test_a_list_that_fails_does_not_hold_up_runs(city, server):
     refused = status(503, Retry_After="300")
     server.fail("event", "*", refused)
     found = city.at(61)
-    assert [type(error) for error in found.errors] == [watch.PassingFault]
+    assert [type(error) for error in found.errors] == [PassingFault]
     assert city.revisions() == ["0001"]
     # The service is left alone for as long as it demands
     asked = server.asked("event")
@@ -291,6 +299,110 @@ def test_a_kill_around_a_revision_neither_repeats_nor_reuses_its_number(
     assert city.revisions() == ["0001", "0002"]
     assert str((city.event() / "latest").readlink()) == "revisions/0002"
     assert list(city.folder.rglob("*.part*")) == []
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES])
+@pytest.mark.parametrize("place", ["watch.json", "event.json", "revision.json", "status.json"])
+def test_output_that_cannot_be_written_is_one_line_and_tried_again(
+    city, monkeypatch, number, place
+):
+    replace = Path.replace
+
+    def refused(path, target):
+        # Rights and mounts do not hold back every user: the system call fails instead
+        if Path(target).name == place:
+            raise OSError(number, os.strerror(number))
+        return replace(path, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", refused)
+        try:
+            (error,) = city.at(61).errors
+        except WriteError as raised:
+            error = raised
+    assert isinstance(error, WriteError)
+    assert os.strerror(number) in str(error)
+    assert "\n" not in str(error)
+    # Nothing half is left, and everything is done by a later pass
+    assert list(city.folder.rglob("*.part*")) == []
+    assert city.at(130).errors == ()
+    assert city.revisions() == ["0001"]
+    assert "XX.S002" in (city.event() / "latest" / "stations.csv").read_text()
+
+
+def test_a_file_in_the_place_of_the_earthquakes_is_one_line(city):
+    city.folder.mkdir()
+    (city.folder / "events").write_text("a file")
+    with pytest.raises((CatalogError, WriteError), match="events") as refused:
+        city.at(61)
+    assert "\n" not in str(refused.value)
+    (city.folder / "events").unlink()
+    assert city.at(130).errors == ()
+    assert city.revisions() == ["0001"]
+
+
+def test_a_folder_in_the_place_of_the_link_stops_no_other_earthquake(city, server):
+    city.at(61)
+    latest = city.event() / "latest"
+    results = latest.resolve()
+    latest.unlink()
+    shutil.copytree(results, latest)
+    server.events["xx2"] = other_event(0.0, 7.3)
+    (error, *_) = city.at(305).errors
+    assert str(error).endswith("as copies without links leave it: remove it")
+    assert city.revisions("xx2") == ["0001"]
+    shutil.rmtree(latest)
+    assert city.at(700).errors == ()
+    assert latest.is_symlink()
+
+
+def test_messages_show_the_revision_and_a_failing_one_is_in_the_status(city, server, tmp_path):
+    program = "import os; print(os.environ['PER_OBSPY_REPORT'], file=open(os.sys.argv[1], 'a'))"
+    sent = tmp_path / "sent"
+    works = Notify(command=(sys.executable, "-c", program, str(sent)))
+    fails = Notify(command=("/no/such/program",))
+    city.settings = city.settings.model_copy(update={"notify": fails})
+    assert city.at(61).errors == ()
+    assert "No such file" in read_status(city.folder).last_notification_error
+    # It is the latest message until there is another
+    city.at(90)
+    assert "No such file" in read_status(city.folder).last_notification_error
+    city.settings = city.settings.model_copy(update={"notify": works})
+    server.events["xx2"] = other_event(0.0, 7.3)
+    city.at(130)
+    assert sent.read_text().split() == [
+        str(city.event("xx2").resolve() / "revisions" / "0001" / "report.html")
+    ]
+    assert read_status(city.folder).last_notification_error is None
+
+
+def test_only_a_station_that_comes_late_is_computed(city, server, monkeypatch):
+    """With real runs, whose windows of records are the same at both delays."""
+    monkeypatch.setattr(event_run, "run", run)
+    server.silent = {"S002"}
+    with plain_figures():
+        city.at(201, delays=[200, 400])
+        server.silent = set()
+        city.at(401, delays=[200, 400])
+    assert city.revisions() == ["0001", "0002"]
+    records = [
+        json.loads((city.event() / "revisions" / name / "run.json").read_text())
+        for name in city.revisions()
+    ]
+    counts = [record["counts"] for record in records]
+    assert [count["stations"] for count in counts] == [1, 2]
+    assert [count["stations_resumed"] for count in counts] == [0, 1]
+    described = dict(result_facts(city.event() / "latest").lines)
+    assert described["earthquake"] == "2000-01-01T00:00:00, 2 stations"
+    # People see which revision of which earthquake they have
+    for number, name in enumerate(city.revisions(), start=1):
+        folder = city.event() / "revisions" / name
+        text = " ".join((folder / "summary.txt").read_text().split())
+        assert f"xx1: Revision {number}, 00:0{number * 3}" in text
+        assert "Earthquake of 2000-01-01 00:00:00 UTC. Magnitude 6.5. Epicentre 0.000" in text
+        assert page_content(folder / "report.html")["revision"].startswith(
+            f"xx1: Revision {number}, "
+        )
 
 
 def test_clock_that_jumps_back_and_forth(city, server):

@@ -118,7 +118,8 @@ def quick_run(settings: Run, *others: object) -> Result:
     stations.to_csv(folder / "stations.csv", index=False)
     for name in ("configuration.toml", "report.html", "summary.txt"):
         (folder / name).write_text(f"# {facts}")
-    made = [folder / name for name in ("risk.parquet", "stations.csv", "summary.txt")]
+    files = ("risk.parquet", "stations.csv", "summary.txt", "report.html")
+    made = [folder / name for name in files]
     counts = {"stations": len(names), "pairs": len(names), state: len(names)}
     record = {"state": "complete", "counts": counts, **facts}
     record |= {"key": "k", "outputs": file_hashes(folder, made)}

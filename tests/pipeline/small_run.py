@@ -1,9 +1,14 @@
 """A small simulated run that several test modules share: three stations, sixty pairs, or fewer."""
 
+import json
+import re
+import zlib
+from base64 import b64decode
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,6 +63,15 @@ def plain_figures() -> Iterator[None]:
         patch.setattr(report, "draw_record_to_pair", plain_figure)
         patch.setattr(result_files, "write_page", plain_figure)
         yield
+
+
+def page_content(path: Path) -> dict[str, Any]:
+    """Return the content of a page, without its tables of numbers."""
+    block = re.search(
+        r'<script type="application/octet-stream" id="data">([^<]*)<', path.read_text()
+    )
+    data = zlib.decompress(b64decode(block[1]))
+    return json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
 
 
 def write_folder_configuration(folder: Path, output: str, text: str = "") -> Path:

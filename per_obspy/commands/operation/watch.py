@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from per_obspy.commands.endings import Dask
 from per_obspy.commands.operation.logged import LogFile, LogForm, LogFormat, Quiet, logged
 from per_obspy.errors import PerError, TryLater
 
@@ -16,6 +17,7 @@ def watch(
     once: Annotated[
         bool, typer.Option("--once", help="Do all due runs once and end, for timers and cron.")
     ] = False,
+    dask: Dask = None,
     log: LogFile = None,
     log_format: LogForm = LogFormat.text,
     quiet: Quiet = False,
@@ -28,10 +30,11 @@ def watch(
     Example: per-obspy watch city.toml --once
     """
     with logged(log, log_format, quiet, timed=not once) as progress:
+        from per_obspy.jobs.executor import on_cluster
         from per_obspy.operation.events.event_settings import read_settings
         from per_obspy.operation.watch import watch_forever, watch_once
 
-        settings = read_settings(configuration)
+        settings = on_cluster(read_settings(configuration), dask)
         if once:
             _raise_worst(watch_once(settings, progress=progress).errors)
         else:

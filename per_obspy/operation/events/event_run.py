@@ -136,7 +136,7 @@ def _run_with_records(
         return Done(state, "no records yet")
     folder = event_folder(watcher.folder, state.event_id)
     number = max(state.revision, newest_revision(folder)) + 1
-    facts = {"event_id": state.event_id, "revision": number}
+    facts = {"event_id": state.event_id, "revision": number, "revised": started}
     result = run(settings, None, watcher.executor, watcher.progress, facts)
     return _published(folder, state, result, occasion)
 

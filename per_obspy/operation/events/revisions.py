@@ -17,14 +17,17 @@ from typing import Any
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, file_hash, temporary_folder, writing
+from per_obspy.jobs.output_folder import RECORD
 from per_obspy.names import inside
 from per_obspy.operation.events.revision_changes import CHANGES, write_changes
 from per_obspy.pipeline.provenance import CONFIGURATION
-from per_obspy.pipeline.run import RECORD
 from per_obspy.resume import Status, StatusError, read_status, write_status
 
 #: Folder of the revisions, link to the newest, and description of each.
 REVISIONS, LATEST, REVISION = "revisions", "latest", "revision.json"
+
+#: Folder in which the runs of an earthquake work.
+WORK = "work"
 
 #: Results by which a revision differs from the one before.
 COMPARED = ("risk.parquet", "stations.csv", "rows.parquet", "buildings.parquet", "totals.csv")
@@ -129,7 +132,7 @@ def _shared_files(
 ) -> dict[str, str]:
     """Put the results of a run into a new revision, and return the hash of each."""
     known = _known_files(before) if before else {}
-    work, hashes = event / "work", dict(outputs)
+    work, hashes = event / WORK, dict(outputs)
     for name, digest in sorted(outputs.items()):
         _share(inside(work, name), inside(made, name), digest, known.get(digest))
     # Files that no run lists
@@ -200,6 +203,9 @@ def point_latest(event: Path) -> None:
     with writing(link):
         if link.is_symlink() and str(link.readlink()) == goal:
             return
+        if link.is_dir() and not link.is_symlink():
+            problem = "is a folder, not a link, as copies without links leave it: remove it"
+            raise CatalogError(str(link), problem)
         with temporary_folder(event) as room:
             (room / LATEST).symlink_to(goal, target_is_directory=True)
             (room / LATEST).replace(link)

@@ -103,12 +103,18 @@ def _record_lines(record: dict[str, Any], counts: dict[str, int]) -> list[tuple[
     lines += [("simulated", "the ground motion is SIMULATED.")] if record.get("simulated") else []
     # Screened earthquake, and rejections
     groups = [one for one in record.get("earthquakes") or [] if one.get("screened")]
-    lines += [("earthquake", f"{one['start']}, {one['stations']} stations") for one in groups]
+    lines += [("earthquake", _earthquake(one, counts)) for one in groups]
     # Of footprints before the run, of everything else in it
     drawn = record.get("drawn") or {}
     if drawn.get("rejected"):
         lines.append(("footprints", f"{drawn['rejected']} rejected: pairs.rejected.csv"))
     return [*lines, *([("rejected", _rejected(counts))] if counts else [])]
+
+
+def _earthquake(group: dict[str, Any], counts: dict[str, int]) -> str:
+    """Return the time of an earthquake, of its event where there are no groups, and stations."""
+    time = group.get("start") or (group.get("event") or {}).get("time", "")
+    return f"{time}, {group.get('stations', counts.get('stations', 0))} stations"
 
 
 def _dotted(content: dict[str, Any], prefix: str = "") -> dict[str, Any]:

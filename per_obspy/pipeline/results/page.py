@@ -232,8 +232,9 @@ def _run_event(
     """Return the earthquake of a run with number and time of its revision, as far as known."""
     known = _known(settings, folder, region)
     event = _event(stations, table, known, settings.report.language)
-    number, time = revision_of_run(folder / "run.json")
-    return event._replace(revision=settings.report.revision or number, revised=time)
+    found = revision_of_run(folder / "run.json")
+    number = settings.report.revision or found.number
+    return event._replace(revision=number, revised=found.time, event_id=found.event_id)
 
 
 def _map_sentences(known: Mapping[str, Any], table: pd.DataFrame, language: Language) -> list[str]:

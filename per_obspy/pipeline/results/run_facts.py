@@ -3,10 +3,11 @@
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
+from per_obspy.errors import shortened
 from per_obspy.records.shakemap import map_event
 from per_obspy.report.overview import Region
 from per_obspy.resume import StatusError, read_status
@@ -14,6 +15,10 @@ from per_obspy.tables.station_summary import COLUMNS
 
 #: A time of ISO 8601 up to its minute.
 TIME = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+
+
+#: Characters of the longest identifier that is shown.
+LONGEST_ID = 80
 
 
 def event_facts(event: Any) -> dict[str, object]:
@@ -39,10 +44,16 @@ def event_facts(event: Any) -> dict[str, object]:
 
 
 def with_event(groups: Sequence[dict[str, object]], event: Any | None) -> list[dict[str, object]]:
-    """Return the earthquakes of a run, the screened one with the facts of its event file."""
+    """
+    Return the earthquakes of a run, the screened one with the facts of its event file.
+
+    Records that were fetched for an event have no groups: it is the only earthquake.
+    """
     if event is None:
         return list(groups)
     facts = event_facts(event)
+    if not groups:
+        return [{"screened": True, "event": facts}]
     return [group | {"event": facts} if group["screened"] else group for group in groups]
 
 
@@ -76,24 +87,48 @@ def event_of_run(record: Path, region: Region, shakemap: Path | None = None) -> 
     return facts
 
 
-def revision_of_run(record: Path) -> tuple[int, str]:
+class Revision(NamedTuple):
     """
-    Return number and time (``HH:MM``, UTC) of the revision of a run; 0 and empty where unknown.
+    Revision of the results of a watched earthquake.
+
+    Attributes
+    ----------
+    number : int
+        0 if the run is none.
+    time : str
+        ``HH:MM``, UTC; empty where unknown.
+    event_id : str
+        Identifier of the earthquake in its list; empty where unknown.
+    """
+
+    number: int
+    time: str
+    event_id: str
+
+
+def revision_of_run(record: Path) -> Revision:
+    """
+    Return the revision that a run is made for.
 
     Parameters
     ----------
     record : Path
-        ``run.json``, finished or not: ``revision``, and ``revised`` or else ``started``.
+        ``run.json``, finished or not: ``revision``, ``event_id``, and ``revised`` or ``started``.
     """
     try:
         known = read_status(record)
     except StatusError:
-        return 0, ""
+        return Revision(0, "", "")
     given, time = known.get("revision"), str(known.get("revised") or known.get("started") or "")
     # Anything else than a whole number above 0 is none
     is_number = isinstance(given, int) and not isinstance(given, bool) and given > 0
     number = int(str(given)) if is_number else 0
-    return number, time[11:16] if TIME.match(time) else ""
+    name = known.get("event_id")
+    return Revision(
+        number,
+        time[11:16] if TIME.match(time) else "",
+        shortened(name, LONGEST_ID) if isinstance(name, str) else "",
+    )
 
 
 def read_stations(path: Path) -> pd.DataFrame:

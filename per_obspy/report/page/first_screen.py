@@ -55,6 +55,8 @@ class Event(NamedTuple):
         Number of the revision of these results; 0 if they have none.
     revised : str
         Time of that revision, UTC, as text; empty if unknown.
+    event_id : str
+        Identifier of the earthquake in its list; empty if unknown.
     """
 
     start: str
@@ -66,6 +68,7 @@ class Event(NamedTuple):
     source: str = ""
     revision: int = 0
     revised: str = ""
+    event_id: str = ""
 
 
 class FirstScreen(NamedTuple):
@@ -121,7 +124,7 @@ def first_screen(
     language, (areas, stations) = facts[0], tables
     return FirstScreen(
         _event_line(event, language),
-        _revision(event, language),
+        revision_line(event.revision, event.revised, event.event_id, language),
         _expected(stations, language),
         _numbers(tally, worst, buildings, language),
         _first(tally, worst, areas, buildings, facts),
@@ -145,13 +148,32 @@ def _event_line(event: Event, language: Language) -> str:
     return f"{', '.join(parts)}." if parts else ""
 
 
-def _revision(event: Event, language: Language) -> str:
-    """Return number and time of the revision, empty if there is none."""
-    if not event.revision:
+def revision_line(revision: int, revised: str, event_id: str, language: Language) -> str:
+    """
+    Return number and time of a revision, empty if there is none.
+
+    Parameters
+    ----------
+    revision : int
+        Its number; 0 if there is none.
+    revised : str
+        Its time, UTC, as text; empty if unknown.
+    event_id : str
+        Identifier of its earthquake; empty if unknown.
+    language : {'en', 'es'}
+        Of the line.
+
+    Examples
+    --------
+    >>> revision_line(3, "04:12", "us7000abcd", "en"), revision_line(0, "", "", "en")
+    ('us7000abcd: Revision 3, 04:12 UTC', '')
+    """
+    if not revision:
         return ""
-    key = "revision_time" if event.revised else "revision"
-    value = written(event.revision, 0, language)
-    return LANGUAGES[language][key].format(value=value, time=shortened(event.revised, 20))
+    key = "revision_time" if revised else "revision"
+    value = written(revision, 0, language)
+    line = LANGUAGES[language][key].format(value=value, time=shortened(revised, 20))
+    return f"{shortened(event_id, LONGEST_NAME)}: {line}" if event_id else line
 
 
 def _expected(stations: pd.DataFrame, language: Language) -> str:

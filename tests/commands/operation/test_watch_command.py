@@ -4,6 +4,7 @@ import pytest
 from fdsn_server import content, serving, status
 from watched_city import city_earthquake, write_city
 
+from per_obspy.operation import watch
 from per_obspy.operation.events import event_feed
 
 
@@ -69,3 +70,19 @@ def test_pairs_that_are_missing_are_one_line_and_2(call, city):
     code, _, err = call("watch", city, "--once")
     assert (code, len(lines(err))) == (2, 1)
     assert "pairs.csv" in err
+
+
+def test_a_cluster_is_that_of_every_run(call, city, monkeypatch):
+    pytest.importorskip("distributed")
+    seen = []
+
+    def noted(settings, **_):
+        seen.append(settings.engine.dask)
+        return watch.Pass((), 0, watch.utc_now())
+
+    monkeypatch.setattr(watch, "watch_once", noted)
+    assert call("watch", city, "--once", "--dask", "local:2")[0] == 0
+    assert seen == ["local:2"]
+    code, _, err = call("watch", city, "--once", "--dask", "nowhere")
+    assert (code, len(lines(err))) == (2, 1)
+    assert "--dask" in err

@@ -5,26 +5,14 @@ Tests of per_obspy.pipeline.results.page, per_obspy.pipeline.results.page_drawin
 per_obspy.report.page.drawn_histories.
 """
 
-import json
 import re
-import zlib
-from base64 import b64decode
 
 import pandas as pd
 import pytest
 
 from per_obspy.pipeline.run import report, run
 
-from ..small_run import InProcess, write_configuration
-
-
-def content_of(path):
-    """Return the content of a page, without its tables of numbers."""
-    block = re.search(
-        r'<script type="application/octet-stream" id="data">([^<]*)<', path.read_text()
-    )
-    data = zlib.decompress(b64decode(block[1]))
-    return json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
+from ..small_run import InProcess, page_content, write_configuration
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +25,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def content(folder):
-    return content_of(folder / "out" / "report.html")
+    return page_content(folder / "out" / "report.html")
 
 
 @pytest.fixture(scope="module")
@@ -126,14 +114,14 @@ def test_areas_of_the_page_are_those_of_the_totals(folder, content):
 def test_report_writes_the_page_in_the_language_of_the_configuration(folder):
     configuration = write_configuration(folder, '[report]\nlanguage = "es"\n')
     report(configuration, folder / "out")
-    assert content_of(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
+    assert page_content(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
 
 
 def test_revision_of_the_run_is_on_the_page(folder):
     """Its number is that of the configuration; its time the beginning of the run."""
     configuration = write_configuration(folder, "[report]\nrevision = 3\n")
     report(configuration, folder / "out")
-    shown = content_of(folder / "out" / "report.html")["revision"]
+    shown = page_content(folder / "out" / "report.html")["revision"]
     assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
     report(write_configuration(folder), folder / "out")
 
@@ -146,4 +134,4 @@ def test_rejections_are_counted_and_their_beginning_shown(content):
 def test_language_on_the_command_line(folder, call):
     code, _, error = call("report", folder / "run.toml", "-o", folder / "out", "--language", "es")
     assert (code, error) == (0, error)
-    assert content_of(folder / "out" / "report.html")["language"] == "es"
+    assert page_content(folder / "out" / "report.html")["language"] == "es"
