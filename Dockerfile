@@ -9,14 +9,13 @@ ENV NUMBA_CACHE_DIR=/var/cache/per-obspy/numba MPLCONFIGDIR=/var/cache/per-obspy
 
 COPY pyproject.toml README.md LICENSE /src/
 COPY per_obspy /src/per_obspy
-COPY workflows/smoke.toml /src/workflows/smoke.toml
 COPY workflows/container /src/workflows/container
-COPY catalogs/smoke /src/catalogs/smoke
 RUN /src/workflows/container/install.sh install /src /opt/per-obspy
 
 # Kernels are compiled as the user that runs them, who keeps those of another processor too
 USER per-obspy
-RUN /src/workflows/container/install.sh compile /opt/per-obspy /src/workflows
+RUN /src/workflows/container/install.sh compile /opt/per-obspy
+RUN /src/workflows/container/install.sh check /opt/per-obspy
 
 WORKDIR /data
 VOLUME /data

@@ -29,6 +29,7 @@ from per_obspy.commands.show import show
 from per_obspy.errors import NothingUsable, PerError, TryLater, WriteError
 from per_obspy.files import writing
 from per_obspy.full_vectors import use_full_vectors
+from per_obspy.jobs.worker_start import forked_workers
 from per_obspy.machine import machine_fault
 from per_obspy.termination import (
     INTERRUPTED,
@@ -89,7 +90,7 @@ def options(
 
 def main() -> None:
     """Run the command line; wrong input ends in one line and an exit code, not in a traceback."""
-    with ending_in_time():
+    with ending_in_time(), forked_workers():
         code = _exit_code()
         if code in SIGNALLED:
             _end_by_signal(code)

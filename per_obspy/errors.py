@@ -38,6 +38,9 @@ def printable(text: str) -> str:
     >>> printable("CI.CLC" + chr(10) + "=A1")
     'CI.CLC =A1'
     """
+    # Nearly all texts have none of these characters; letter by letter they take seconds
+    if text.isprintable():
+        return text
     known = text.encode("utf-8", "replace").decode("utf-8")
     return "".join(" " if category(letter)[0] == "C" else letter for letter in known)
 
@@ -53,8 +56,9 @@ def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
     """
     # Blanks of other widths as well
     known = printable(text[:length])
-    start = "".join(letter if letter.isprintable() else " " for letter in known)
-    return start if len(text) <= length else f"{start[:-1]}…"
+    if not known.isprintable():
+        known = "".join(letter if letter.isprintable() else " " for letter in known)
+    return known if len(text) <= length else f"{known[:-1]}…"
 
 
 class PerError(Exception):

@@ -1,6 +1,7 @@
 """Errors name file and field in one line, and are the built-in errors they amount to."""
 
 import pickle
+from unicodedata import category
 
 import pytest
 
@@ -13,7 +14,9 @@ from per_obspy.errors import (
     TryLater,
     WriteError,
     did_you_mean,
+    printable,
     reason_of,
+    shortened,
 )
 
 
@@ -79,3 +82,12 @@ def test_messages_quote_a_bounded_part_of_a_file():
     for error in (RecordRejected("n" * 10**6, "w" * 10**6), CatalogError("file", "w" * 10**6)):
         assert len(str(error)) < 2100
         assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_texts_on_one_line_follow_the_categories_of_unicode():
+    """Every hundredth character, alone and within a text: C becomes a blank, Z in short texts."""
+    for code in [*range(0x300), *range(0x2000, 0x2070), *range(0x300, 0x110000, 100)]:
+        kinds = category(chr(code))
+        alone = "?" if kinds == "Cs" else " " if kinds[0] == "C" else chr(code)
+        assert printable(f"a{chr(code)}b") == f"a{alone}b"
+        assert shortened(f"a{chr(code)}b") == ("a b" if kinds[0] == "Z" else f"a{alone}b")

@@ -183,8 +183,8 @@ def ended_run(folder, line, workers, number):
     running = small_run(folder, workers)
     while not (logged := running.stderr.readline()).startswith(line):
         assert logged, f"ended before {line}"
-    # of two workers: both, the run, and the process that watches their locks
-    while len(members(running.pid)) < (4 if workers == 2 else 1):
+    # of two workers: both, the server that forks them, the run, and Python's tracker of resources
+    while len(members(running.pid)) < (5 if workers == 2 else 1):
         assert running.poll() is None
     # a service manager asks the run alone, the key of a terminal everything that it started
     code, seconds, errors = end(running, number, key=number == signal.SIGINT)

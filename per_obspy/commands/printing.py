@@ -31,7 +31,7 @@ def print_table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[o
 
 def state_texts(counts: "Mapping[str, int]") -> list[str]:
     """Return one text per state with its number of pairs; unknown gaps only if there are any."""
-    from per_obspy.screening.ranking import EVERY_STATE, UNKNOWN_STATE
+    from per_obspy.config.screening import EVERY_STATE, UNKNOWN_STATE
 
     shown = [state for state in EVERY_STATE if counts.get(state) or state != UNKNOWN_STATE]
     return [f"{counts.get(state, 0)} {state}" for state in shown]
@@ -39,6 +39,8 @@ def state_texts(counts: "Mapping[str, int]") -> list[str]:
 
 def cell(value: object) -> str:
     """Return a value as text on one line: numbers with three digits, missing ones empty."""
+    if value is None:
+        return ""
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
     return printable(str(value))

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -371,9 +372,19 @@ def _print_evaluation(found: dict[str, Any]) -> None:
 
 def _print_worst(path: Path, count: int) -> None:
     """Print the worst pairs as a table."""
-    from per_obspy.tables.parts import parquet_rows
+    titles = list(SHOWN.values())
+    worst = _first_rows(path, list(SHOWN), count)
+    print_table(f"The {len(worst)} worst pairs", titles, worst)
 
-    # Not from the CSV, in which names may have an apostrophe before them
-    worst = parquet_rows([path], list(SHOWN)).head(count).to_pandas()
-    title = f"The {len(worst)} worst pairs"
-    print_table(title, list(SHOWN.values()), worst.itertuples(index=False))
+
+def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
+    """Return the first rows of a Parquet file; empty cells are None."""
+    # Without libraries of tables, which a finished run would wait for
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    with pa.parquet.ParquetFile(path.absolute()) as file:
+        rows = next(file.iter_batches(count, columns=list(columns)), None)
+    found = [] if rows is None else rows.to_pylist()
+    # In the order of the columns that was asked for
+    return list(map(itemgetter(*columns), found))

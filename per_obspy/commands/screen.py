@@ -124,7 +124,7 @@ def _screened_by_spectrum(
     """Screen pairs by a design or user spectrum instead of a record; return table and files."""
     from per_obspy.config import Design, in_language, load
     from per_obspy.inventory.files.reading import read_pairs, recognised_line
-    from per_obspy.pipeline.preflight import require_extras
+    from per_obspy.pipeline.inputs.extras import require_extras
     from per_obspy.screening.by_spectrum.design_spectrum import read_design_spectrum
     from per_obspy.screening.by_spectrum.design_table import design_table
 

@@ -201,7 +201,7 @@ class Fdsn(Window):
         ge=0,
         description=(
             "longest pause that a service may demand by Retry-After, s; a service that demands "
-            "more is not asked again in this run; not given: it is asked again after at most 600 s"
+            "more is not asked again in this run; if not set, it is asked again after at most 600 s"
         ),
     )
 

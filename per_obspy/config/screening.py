@@ -16,6 +16,15 @@ SectionType = TypeVar("SectionType", bound=Section)
 #: Largest offset of two floors that still hit floor to floor, m: 2 ft in FEMA P-154.
 FLOOR_TOLERANCE = 0.61
 
+#: States of a pair, likeliest first.
+STATES = ("yes", "likely", "possible", "unlikely", "no")
+
+#: State of a pair whose gap is unknown.
+UNKNOWN_STATE = "unknown"
+
+#: All states that a row can have.
+EVERY_STATE = (*STATES, UNKNOWN_STATE)
+
 
 class Building(Section):
     """Assumptions about buildings where the inventory has no value; each use is marked derived."""

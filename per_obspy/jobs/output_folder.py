@@ -21,6 +21,12 @@ from per_obspy.errors import CatalogError, FolderInUse
 from per_obspy.files import file_hash, remove_dead_parts, writing
 from per_obspy.resume import write_status
 
+#: Written first as unfinished, and last as it ends.
+RECORD = "run.json"
+
+#: State of a run that is under way, was killed, or met a fault of the machine; and its stages.
+UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
+
 #: Libraries whose versions a result may depend on.
 LIBRARIES = (
     "per_obspy",

@@ -25,11 +25,12 @@ from concurrent.futures import (
 from contextlib import contextmanager
 from functools import partial
 from itertools import chain, islice
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, parent_process
 from threading import Lock, Thread
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from per_obspy.errors import PerError, TryLater, Unfinished, WriteError
+from per_obspy.jobs.worker_start import start_server, worker_context
 from per_obspy.machine import machine_fault, raise_machine_fault
 from per_obspy.termination import held
 from per_obspy.threads import use_one_thread
@@ -150,6 +151,13 @@ def _all_results(
             unfinished = yield from _on(pool, waiting, watched, lambda: AHEAD * workers)
         for task in unfinished:
             yield from _alone(task, watched)
+
+
+def prepare_workers(workers: int) -> None:
+    """Let the libraries of the workers be loaded in the background, if more than one will work."""
+    if workers > 1:
+        with _signals_held():
+            start_server()
 
 
 def new_and_resumed(
@@ -296,11 +304,11 @@ def _alone(task: Task, watched: _Watched[Task, Result]) -> Iterator[Result]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Process pool that ends with an interrupt; spawned, as a fork with threads can hang."""
+    """Process pool that ends with an interrupt."""
 
     def __init__(self, workers: int) -> None:
         self._others = set(active_children())
-        super().__init__(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+        super().__init__(workers, mp_context=worker_context(), initializer=_begin_worker)
 
     def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """Submit a task, with signals held back while a process starts."""

@@ -24,7 +24,8 @@ from per_obspy.jobs.output_folder import (
     recorded,
     software_versions,
 )
-from per_obspy.pipeline.preflight import check_inputs, require_extras
+from per_obspy.pipeline.inputs.extras import require_extras
+from per_obspy.pipeline.inputs.preflight import check_inputs
 from per_obspy.pipeline.results.scenario_runs import ScenarioRun, ScenarioRuns
 from per_obspy.pipeline.results.table_report import report_ensemble
 from per_obspy.pipeline.run import run

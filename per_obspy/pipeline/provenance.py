@@ -5,18 +5,19 @@ import os
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from per_obspy.config import Engine, Notify, Run, load
 from per_obspy.config.commented import commented, effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, written_whole
-from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.recognition.side_file import side_file
 from per_obspy.pipeline.inputs.drawn_pairs import layer_files
-from per_obspy.pipeline.preflight import require_extras
-from per_obspy.records.fdsn.cache import Fetched
-from per_obspy.records.sources import hash_if_readable, input_files
+from per_obspy.pipeline.inputs.extras import require_extras
+from per_obspy.records.contents.input_files import hash_if_readable, input_files
+
+if TYPE_CHECKING:
+    from per_obspy.records.fdsn.cache import Fetched
 
 #: Effective configuration of a run in its output folder.
 CONFIGURATION = "configuration.toml"
@@ -61,7 +62,7 @@ class RunSettings:
         self.folder = Path(output or self.settings.output).resolve()
         self.base = self.file.parent if self.file else self.folder
 
-    def head(self, fetched: Fetched | None, hashes: Mapping[Path, str]) -> dict[str, Any]:
+    def head(self, fetched: "Fetched | None", hashes: Mapping[Path, str]) -> dict[str, Any]:
         """
         Return key, configuration and inputs of a run; files with a known hash are not hashed again.
 
@@ -121,7 +122,7 @@ def _values(settings: Run, folder: Path) -> dict[str, Any]:
     return values
 
 
-def _input_files(settings: Run, fetched: Fetched | None) -> list[Path]:
+def _input_files(settings: Run, fetched: "Fetched | None") -> list[Path]:
     """Return every input file of a run: records and their metadata, scenario and inventory."""
     given = [settings.simulation, *_inventory_files(settings)]
     files = [path for path in given if path and path.is_file()]
@@ -138,6 +139,8 @@ def _inventory_files(settings: Run) -> list[Path]:
     if pairs.catalog is None:
         # A file next to the table may describe how it is read
         return [pairs.file, side_file(pairs.file)] if pairs.file else []
+    from per_obspy.inventory.catalogue import stored_inventories
+
     # Stored inventories, all of which the region may touch
     stored = stored_inventories(pairs.catalog)
     chosen = [entry.file for entry in stored if not pairs.names or entry.name in pairs.names]

@@ -1,67 +1,26 @@
 """
 One run, from records to report, or one of its stages alone.
 
-Stations and chunks of the inventory are separate jobs: a killed run continues where it stopped.
-The state in ``run.json`` is ``unfinished`` from the beginning to the end, when it is written again:
-only then the other results are complete, and a run of the same inputs is up to date.
+Whether the work is done is found out here with few libraries, so that a finished run answers at
+once; :mod:`per_obspy.pipeline.stages` does what is left, in the order of its functions.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from per_obspy.config import Run
-from per_obspy.errors import CatalogError, Rejection
-from per_obspy.files import file_hash, is_part, remove_file
-from per_obspy.jobs.executor import engine_facts, noted_engine, opened_executor
-from per_obspy.jobs.output_folder import (
-    Result,
-    file_hashes,
-    locked_folder,
-    now,
-    recorded,
-    software_versions,
-)
-from per_obspy.jobs.station import FinishedStation
-from per_obspy.pipeline.inputs.drawn_pairs import BUILDINGS, PAIRS, REJECTED, write_drawn_pairs
-from per_obspy.pipeline.losses import losses, number_of_rows
-from per_obspy.pipeline.preflight import check_inputs
+from per_obspy.errors import CatalogError
+from per_obspy.jobs.output_folder import RECORD, STATIONS, UNFINISHED, Result, locked_folder
+from per_obspy.jobs.parallel import prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
-from per_obspy.pipeline.report import reported
-from per_obspy.pipeline.results.served_stations import (
-    KnownStations,
-    earlier_facts,
-    station_facts,
-)
-from per_obspy.pipeline.screening import Screened, screened
-from per_obspy.pipeline.stations import (
-    FoundStations,
-    all_rejections,
-    find_station_jobs,
-    finished_stations,
-    simulated_motion,
-    simulated_stations,
-    stations_of_earlier_run,
-)
-from per_obspy.progress import Progress, silent, timed
-from per_obspy.records.fdsn.cache import Fetched
-from per_obspy.records.sources import fetched_records
-from per_obspy.resume import (
-    StatusError,
-    changed_outputs,
-    earlier_status,
-    read_status,
-    write_status,
-)
-from per_obspy.screening.warmup import compiling
-from per_obspy.tables.station_summary import StationSummary, write_stations
+from per_obspy.progress import Progress, silent
+from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.threads import usable_processors
 
-#: Written first as unfinished, and last as it ends.
-RECORD = "run.json"
-
-#: State of a run that is under way, was killed, or met a fault of the machine; and its stages.
-UNFINISHED, STATIONS, SCREENING = "unfinished", "stations", "screening"
+if TYPE_CHECKING:
+    from per_obspy.records.fdsn.cache import Fetched
 
 
 def run(
@@ -108,7 +67,7 @@ def run(
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         asked.write()
-        fetched = fetched_records(settings.records, progress)
+        fetched = _fetched_records(settings, progress)
         # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():
@@ -116,30 +75,11 @@ def run(
             if known := _earlier_run(folder, head["key"]):
                 return Result(folder, known, did_nothing=True)
 
+        _prepare_workers(settings, executor)
+        from per_obspy.pipeline.stages import new_run
+
         means = (executor, progress)
-        return _new_run(asked, fetched, head, means, dict(facts or {}))
-
-
-def _new_run(
-    asked: RunSettings,
-    fetched: Fetched | None,
-    head: dict[str, Any] | None,
-    means: tuple[Executor | None, Progress],
-    facts: dict[str, Any],
-) -> Result:
-    """Do a run that was not done before; inputs without a hash are hashed as they are read."""
-    settings, folder, progress = asked.settings, asked.folder, means[1]
-    drawn = write_drawn_pairs(settings, folder, progress)
-    check_inputs(settings, folder)
-    earlier_rows = _begun(folder, settings, STATIONS, facts=facts)
-    seconds, started = dict[str, float](), now()
-    with timed(seconds, "records"):
-        found = find_station_jobs(settings, folder, fetched, progress)
-        head = head or asked.head(fetched, found.hashes)
-    # From here on the folder describes an unfinished run
-    record = facts | _all_stages(settings, folder, found, means, facts)
-    record |= {"seconds": seconds | record["seconds"], "started": started, "drawn": drawn}
-    return _finished_record(settings, folder, record, head, earlier_rows)
+        return new_run(asked, fetched, head, means, dict(facts or {}))
 
 
 def screen(
@@ -155,26 +95,13 @@ def screen(
     :func:`run`; it is an error as well if there are no stations.
     """
     asked = RunSettings(configuration, output)
-    settings, folder = asked.settings, asked.folder
-    with locked_folder(folder):
+    with locked_folder(asked.folder):
         # Stations and their facts are those of the latest run
-        _require_stations(folder)
-        stations = _earlier_stations(settings, folder)
-        drawn = write_drawn_pairs(settings, folder, progress)
-        check_inputs(settings, folder)
-        earthquakes, known = earlier_facts(folder / RECORD)
-        earlier_rows = _begun(folder, settings, SCREENING, earthquakes)
-        started = now()
-        # A later run does everything that has changed since, whatever is recorded here
-        head = asked.head(None, {})
-        head["key"] = f"screening of stations as they were at {started}"
-        rejected = all_rejections([], stations)
-        # On a cluster the folder is shared until the report is written
-        with opened_executor(settings.engine, executor, folder) as used, compiling(progress):
-            record = _later_stages(settings, folder, stations, rejected, used, progress)
-        record |= {"started": started, "earthquakes": earthquakes, "drawn": drawn}
-        _add_stations(record, known)
-        return _finished_record(settings, folder, record, head, earlier_rows)
+        _require_stations(asked.folder)
+        _prepare_workers(asked.settings, executor)
+        from per_obspy.pipeline.stages import new_screening
+
+        return new_screening(asked, executor, progress)
 
 
 def report(
@@ -189,87 +116,26 @@ def report(
         If there is no finished run, or its files have changed.
     """
     asked = RunSettings(configuration, output)
-    settings, folder = asked.settings, asked.folder
-    with locked_folder(folder):
-        record = _finished(folder / RECORD)
-        stations = _usable(_earlier_stations(settings, folder))
-        made = reported(settings, folder, stations, progress)
-        outputs = record["outputs"] | file_hashes(folder, made.outputs)
-        # A picture or layer that failed is made by the next run
-        key = "" if made.faults else record["key"]
-        found = {"outputs": outputs, "faults": made.faults, "key": key}
-        return recorded(folder / RECORD, {**record, **found})
+    with locked_folder(asked.folder):
+        record = _finished(asked.folder / RECORD)
+        from per_obspy.pipeline.stages import new_report
+
+        return new_report(asked, record, progress)
 
 
-def _earlier_stations(settings: Run, folder: Path) -> list[FinishedStation]:
-    """Return the stations of the latest run; empty if only a ShakeMap served its pairs."""
-    records = settings.records
-    has_map = records is not None and records.shakemap is not None
-    if has_map and (folder / RECORD).is_file() and not any((folder / "stations").glob("*.json")):
-        return []
-    return stations_of_earlier_run(folder)
+def _prepare_workers(settings: Run, executor: Executor | None) -> None:
+    """Let workers load their libraries while this process loads its own, unless others work."""
+    if executor is None and settings.engine.dask is None:
+        prepare_workers(settings.workers or usable_processors())
 
 
-def _usable(stations: Sequence[FinishedStation]) -> list[FinishedStation]:
-    """Return the stations with usable records."""
-    return [station for station in stations if station.shard is not None]
+def _fetched_records(settings: Run, progress: Progress) -> "Fetched | None":
+    """Bring the configured FDSN records into their cache, None if there are none."""
+    if settings.records is None or settings.records.fdsn is None:
+        return None
+    from per_obspy.records.sources import fetched_records
 
-
-def _all_stages(
-    settings: Run,
-    folder: Path,
-    found: FoundStations,
-    means: tuple[Executor | None, Progress],
-    facts: Mapping[str, object],
-) -> dict[str, Any]:
-    """Do the stations and the stages after them, and return their part of ``run.json``."""
-    executor, progress = means
-    seconds = dict[str, float]()
-    with opened_executor(settings.engine, executor, folder) as used:
-        noted = noted_engine(folder / RECORD, used)
-        with timed(seconds, "stations"), compiling(progress), noted:
-            progress("stations", 0, len(found.jobs))
-            stations = finished_stations(found.jobs, settings.workers, used, progress)
-        _begun(folder, settings, SCREENING, found.earthquakes, facts)
-        # From here on no record is needed
-        rejected = all_rejections(found.rejected, stations)
-        record = _later_stages(settings, folder, stations, rejected, used, progress)
-    record["earthquakes"] = found.earthquakes
-    _add_stations(record, found.known)
-    record["intermediate"] = _intermediate_hashes(folder, stations, found.hashes)
-    return {**record, "seconds": seconds | record["seconds"]}
-
-
-def _add_stations(record: dict[str, Any], known: KnownStations) -> None:
-    """Add expected, received, late and rejected stations, with their pairs, to ``run.json``."""
-    used, served = record.pop("used"), record.pop("served")
-    record["stations"] = station_facts(known, used, served, record["counts"])
-
-
-def _begun(
-    folder: Path,
-    settings: Run,
-    stage: str,
-    earthquakes: Sequence[Any] = (),
-    facts: Mapping[str, object] | None = None,
-) -> int | None:
-    """Record a run as unfinished, and return the number of rows of the pair tables before it."""
-    rows = number_of_rows(folder / RECORD)
-    begun: dict[str, Any] = {
-        **(facts or {}),
-        "name": settings.name,
-        "state": UNFINISHED,
-        "stage": stage,
-        "earlier_rows": rows,
-    }
-    # The summary states the earthquake before the run is finished
-    begun["earthquakes"] = list(earthquakes)
-    write_status(folder / RECORD, "", {}, begun, indent=1)
-    # A table of an earlier run would be taken for one of this run
-    for name in ("risk", "rows", "buildings"):
-        for end in (".parquet", ".csv", ".columns.csv"):
-            remove_file(folder / f"{name}{end}")
-    return rows
+    return fetched_records(settings.records, progress)
 
 
 def _require_stations(folder: Path) -> None:
@@ -282,112 +148,6 @@ def _require_stations(folder: Path) -> None:
         raise CatalogError(
             str(folder / RECORD), "the run is unfinished: some stations are missing, run again"
         )
-
-
-def _finished_record(
-    settings: Run,
-    folder: Path,
-    record: dict[str, Any],
-    head: dict[str, Any],
-    earlier_rows: int | None,
-) -> Result:
-    """Write ``run.json``, with sentences on losses of rows."""
-    lost = losses(settings, record["counts"], earlier_rows)
-    # What failed unexpectedly is done again by the next run, and files that waited are taken
-    waited = record["stations"]["waiting"]
-    key = "" if record["failed"] or waited else head["key"]
-    return recorded(folder / RECORD, {**record, "losses": lost, **head, "key": key})
-
-
-def _later_stages(
-    settings: Run,
-    folder: Path,
-    stations: Sequence[FinishedStation],
-    rejected: Sequence[Rejection],
-    executor: Executor | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Do the stages after the stations and return their part of ``run.json``."""
-    seconds, usable = dict[str, float](), _usable(stations)
-    # The risk table, then everything that is read from it
-    with timed(seconds, "screening"), noted_engine(folder / RECORD, executor):
-        found = screened(settings, folder, usable, rejected, executor, progress)
-        table = _write_stations(usable, rejected, found, folder)
-    with timed(seconds, "report"):
-        made = reported(settings, folder, usable, progress)
-        outputs = [*found.outputs, *table.files, *made.outputs]
-    outcome = _outcome(found, stations)
-
-    return {
-        "name": settings.name,
-        **outcome,
-        # A picture or layer that failed is made by the next run
-        "failed": outcome["failed"] or bool(made.faults),
-        "faults": made.faults,
-        "used": _names_of(usable, found),
-        "served": found.served,
-        **engine_facts(executor),
-        "simulated": simulated_motion(settings, usable),
-        "warnings": table.warnings,
-        "pair_tables": {name: list(texts) for name, texts in found.pair_tables._asdict().items()},
-        "outputs": file_hashes(folder, outputs),
-        "versions": software_versions(),
-        "seconds": seconds,
-    }
-
-
-def _names_of(usable: Sequence[FinishedStation], found: Screened) -> list[str]:
-    """Return the names of the stations with known coordinates, which can serve pairs."""
-    unplaced = {rejection.name for rejection in found.unplaced}
-    return [station.station for station in usable if station.station not in unplaced]
-
-
-def _outcome(found: Screened, stations: Sequence[FinishedStation]) -> dict[str, Any]:
-    """Return state and counts of a run; rejections make its result partial."""
-    counts = found.counts
-    rejections = [count for name, count in counts.items() if name.startswith("rejected_")]
-    usable = _usable(stations)
-    # Stations that were done before, and those of simulated motion, are counted apart
-    of_stations = {
-        "stations": len(usable),
-        "stations_resumed": sum(station.resumed for station in stations),
-        "stations_simulated": simulated_stations(usable),
-    }
-    return {
-        "state": "complete" if counts["pairs"] else "nothing_usable",
-        "partial": any(rejections),
-        "failed": found.failed or any(station.failed for station in stations),
-        "counts": {**of_stations, **counts},
-    }
-
-
-def _write_stations(
-    usable: Sequence[FinishedStation],
-    rejected: Sequence[Rejection],
-    found: Screened,
-    folder: Path,
-) -> StationSummary:
-    """Write the table of the stations with the pairs that each serves."""
-    spectra = [station.spectra for station in usable if station.spectra is not None]
-    return write_stations(spectra, [*rejected, *found.unplaced], found.served.pairs, folder)
-
-
-def _intermediate_hashes(
-    folder: Path, stations: Sequence[FinishedStation], known: Mapping[Path, str]
-) -> dict[str, str]:
-    """Return the hashes of the files of the first stage, which are results too."""
-    folders = [folder / name for name in ("simulated", "stations")]
-    files = [path for parent in folders for path in parent.rglob("*")]
-    made = ("simulated.json", "pairs.csv", PAIRS, REJECTED, BUILDINGS)
-    files += [folder / name for name in made]
-    # What was hashed on the way is not opened again
-    hashes = dict(known)
-    hashes |= {station.shard: station.hash for station in stations if station.shard}
-    return {
-        str(path.relative_to(folder)): hashes.get(path) or file_hash(path)
-        for path in sorted(files)
-        if path.is_file() and not is_part(path)
-    }
 
 
 def _earlier_run(folder: Path, key: str) -> dict[str, Any] | None:

@@ -12,13 +12,11 @@ from obspy import Inventory, Stream
 from obspy.core.event import Event
 
 from per_obspy import config
-from per_obspy.errors import RecordRejected, Rejection, shortened
-from per_obspy.files import opened_hash
+from per_obspy.errors import Rejection, shortened
 from per_obspy.names import SHOWN, code_problem
 from per_obspy.progress import Progress, silent
-from per_obspy.records.archives.archive_files import open_file
 from per_obspy.records.asdf import find_asdf_stations, has_event, read_asdf_station
-from per_obspy.records.contents.file_list import files_below
+from per_obspy.records.contents.input_files import hash_if_readable
 from per_obspy.records.earthquakes.choice import (
     OneEarthquake,
     Reader,
@@ -27,7 +25,7 @@ from per_obspy.records.earthquakes.choice import (
     reader_of_event,
 )
 from per_obspy.records.earthquakes.groups import EventGroup, event_groups
-from per_obspy.records.event_file import EventFile, read_event, read_event_file
+from per_obspy.records.event_file import EventFile, read_event_file
 from per_obspy.records.fdsn.cache import FDSN, Fetched, fetch, fetched_stations
 from per_obspy.records.fdsn.request import window
 from per_obspy.records.folder import SourceContents, find_stations, read_station
@@ -221,31 +219,6 @@ def _warn_of_several_earthquakes(groups: Sequence[EventGroup]) -> None:
         )
 
 
-def input_files(records: config.Records | None, fetched: Fetched | None) -> list[Path]:
-    """Return every file on which the result may depend; of an SDS archive those of the window."""
-    if records is None:
-        return []
-    named = [records.folder, records.stationxml, records.event]
-    named += [table.file for table in records.columns]
-    if fetched:
-        named += [fetched.folder, fetched.event.path if fetched.event else None]
-    named += [records.asdf.file] if records.asdf else []
-    named += [records.shakemap, records.shakemap_uncertainty]
-    files = [path for place in named if place for path in _files_below(place)]
-    if records.sds:
-        event = read_event(records.event) if records.event else None
-        contents, _ = _sds(records, records.sds, event)
-        # Day files of the window
-        for paths in contents.stations.values():
-            files += paths
-    return [path for path in files if path.is_file()]
-
-
-def _files_below(place: Path) -> list[Path]:
-    """Return a file, or all files below a folder, sorted."""
-    return files_below(place)[0] if place.is_dir() else [place]
-
-
 def _event(records: config.Records, fetched: Fetched | None) -> EventFile | None:
     """Return the event: that of the configuration, else the fetched one, else the workspace's."""
     if fetched and fetched.event:  # which is that of the configuration if there is one
@@ -274,15 +247,6 @@ def _hashes(paths: Iterable[Path], known: dict[Path, str]) -> tuple[str, ...]:
         if path not in known:
             known[path] = hash_if_readable(path)
     return tuple(known[path] for path in paths)
-
-
-def hash_if_readable(path: Path) -> str:
-    """Return the hash of a file or of a member of an archive, empty if it cannot be read."""
-    try:
-        with open_file(path) as file:
-            return opened_hash(file)
-    except (OSError, RecordRejected):
-        return ""  # reading the station gives the reason
 
 
 def _contents(

@@ -6,15 +6,9 @@ from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
 from per_obspy.config import States
-
-#: States of a pair, likeliest first.
-STATES = ("yes", "likely", "possible", "unlikely", "no")
-
-#: State of a pair whose gap is unknown.
-UNKNOWN_STATE = "unknown"
-
-#: All states that a row can have.
-EVERY_STATE = (*STATES, UNKNOWN_STATE)
+from per_obspy.config.screening import EVERY_STATE as EVERY_STATE
+from per_obspy.config.screening import STATES as STATES
+from per_obspy.config.screening import UNKNOWN_STATE as UNKNOWN_STATE
 
 #: Columns by which rows are ordered, all ascending; ties are broken by ``pair_id``.
 KEYS = (

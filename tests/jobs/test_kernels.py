@@ -1,18 +1,49 @@
 """Compilation of all kernels ahead of use."""
 
+import importlib
+import os
+
 import pytest
+from numba import config
 
 from per_obspy.errors import Unfinished
-from per_obspy.jobs import kernels
+from per_obspy.jobs import kernels, worker_start
+
+#: A part that compiles one small kernel instead of many large ones.
+SMALL_PART = """
+import os
+from per_obspy.kernels._jit import kernel
+
+@kernel
+def third(value):
+    return value / 3.0
+
+def compile_part(name):
+    assert third(3.0) == 1.0
+    with open(os.path.join(os.path.dirname(__file__), f"{name}.process"), "w") as file:
+        file.write(str(os.getpid()))
+    return name
+"""
 
 
-def test_all_parts_are_compiled_in_processes(call):
-    # catches a part that a spawned process cannot import, and a command without progress
+def test_all_parts_are_compiled_in_processes(call, tmp_path, monkeypatch):
+    # catches a kernel that is compiled but not stored for others, and a command without progress
+    (tmp_path / "small_part.py").write_text(SMALL_PART)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(worker_start, "LOADED", ("per_obspy.kernels._jit",))
+    small_part = importlib.import_module("small_part")
+    monkeypatch.setattr(kernels, "compile_part", small_part.compile_part)
+    monkeypatch.setattr(kernels, "usable_processors", lambda: 2)
     code, out, err = call("warm-up")
     assert code == 0
     assert out == "all kernels are compiled\n"
     total = len(kernels.PARTS) + 1
     assert f"compiling kernels: {total} of {total}" in err
+    # the rest needs no process of its own
+    done_in = {file.stem: int(file.read_text()) for file in tmp_path.glob("*.process")}
+    assert set(done_in) == {*kernels.PARTS, kernels.REST}
+    assert {name for name, process in done_in.items() if process == os.getpid()} == {kernels.REST}
+    assert config.DISABLE_JIT or list((tmp_path / "__pycache__").glob("small_part.third-*.nbc"))
 
 
 def test_a_part_that_fails_is_named(monkeypatch):

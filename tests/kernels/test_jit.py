@@ -89,19 +89,25 @@ def test_without_a_folder_for_compiled_code_kernels_are_compiled_and_one_line_wa
 
 @compiled
 @pytest.mark.parametrize("decorator", DECORATORS)
-def test_compiled_code_is_saved_by_one_process_at_a_time(decorator):
+def test_compiled_code_is_saved_by_one_process_at_a_time(decorator, monkeypatch):
     # catches two processes that save two signatures under one name: one of them is then loaded for
     # the other, which computes something else
     @decorator
     def third(value):
         return value / 3.0
 
+    # the cache alone, as a kernel that is on the disk already would not be saved
+    saved = []
+    monkeypatch.setattr(
+        caching.FunctionCache, "save_overload", lambda _, *overload: saved.append(overload)
+    )
     folder = Path(third.stats.cache_path)
     folder.mkdir(parents=True, exist_ok=True)
     with FileLock(folder / ".lock"):
-        compiling = Thread(target=third, args=(1.0,))
-        compiling.start()
-        compiling.join(5.0)
-        assert compiling.is_alive()
-    compiling.join()
-    assert third(3.0) == 1.0
+        saving = Thread(target=third._cache.save_overload, args=("signature", "code"))
+        saving.start()
+        saving.join(0.3)
+        assert saving.is_alive()
+        assert saved == []
+    saving.join()
+    assert saved == [("signature", "code")]

@@ -1,12 +1,14 @@
 """
 A whole run: from a small simulated earthquake to its tables, again, after a change, after a crash.
 
-Covers per_obspy.progress too: every stage of a run counts up to its size.
+Covers per_obspy.pipeline.stages and per_obspy.progress too: every stage counts up to its size.
 """
 
 import json
 import os
 import shutil
+import subprocess
+import sys
 from collections import defaultdict
 from functools import partial
 
@@ -179,6 +181,50 @@ def test_the_same_again_does_nothing(copied):
     )
     assert result.did_nothing
     assert not progress
+
+
+def modules_after(code, folder):
+    """Return the names of all modules that a process has loaded after some code, and its output."""
+    listed = f"try:\n    {code}\nfinally:\n    print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{listed}"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=folder,
+    )
+    return set(done.stderr.split()), done.stdout
+
+
+#: Libraries of the stages, which take seconds to load.
+OF_STAGES = {"obspy", "numba", "scipy", "matplotlib", "pandas", "xarray", "duckdb"}
+
+
+def test_a_finished_run_answers_without_the_libraries_of_its_stages(copied):
+    # catches any import on the way that makes people wait three seconds for "up to date"
+    code = "from per_obspy.cli import main; sys.argv = ['per-obspy', 'run', 'run.toml']; main()"
+    modules, output = modules_after(code, copied)
+    assert output.startswith("Up to date")
+    assert "The 10 worst pairs" in output
+    assert not OF_STAGES & modules
+
+
+def test_the_key_of_a_run_of_files_needs_no_library_of_its_stages(tmp_path):
+    # catches a finished run of records, tables and footprints that is slower than a simulated one
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "one.mseed").write_bytes(b"one")
+    (tmp_path / "pairs.csv").write_text("pair_id\n")
+    text = 'name = "x"\noutput = "out"\n[records]\nfolder = "records"\n[pairs]\n'
+    (tmp_path / "table.toml").write_text(f'{text}file = "pairs.csv"\n')
+    (tmp_path / "drawn.toml").write_text(f'{text}footprints.file = "pairs.csv"\n')
+    code = (
+        "from per_obspy.pipeline.provenance import RunSettings; "
+        "print(*(sorted(RunSettings(f'{n}.toml', None).head(None, {})['inputs']) "
+        "for n in ('table', 'drawn')))"
+    )
+    modules, output = modules_after(code, tmp_path)
+    assert output == "['pairs.csv', 'records/one.mseed'] ['pairs.csv', 'records/one.mseed']\n"
+    assert not OF_STAGES & modules
 
 
 def test_a_damaged_result_is_made_again(copied):

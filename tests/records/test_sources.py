@@ -1,4 +1,8 @@
-"""Every source of a configuration under one contract."""
+"""
+Every source of a configuration under one contract.
+
+Covers per_obspy.records.contents.input_files too: the files on which a result depends.
+"""
 
 import re
 import tomllib
@@ -13,12 +17,13 @@ from per_obspy.config import Asdf, Columns, Fdsn, Records, Scenario, Sds, load
 from per_obspy.config import Simulation as Demo
 from per_obspy.errors import CatalogError
 from per_obspy.files import file_hash
+from per_obspy.records.contents.input_files import input_files
 from per_obspy.records.event_file import read_event
 from per_obspy.records.folder import read_station
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.records.simulation.earthquake import Simulation, simulate, write_simulation
 from per_obspy.records.simulation.station_metadata import scenario_event
-from per_obspy.records.sources import find_path_sources, find_sources, input_files
+from per_obspy.records.sources import find_path_sources, find_sources
 
 CHECKOUT = Path(__file__).parents[2]
 

@@ -1,9 +1,10 @@
 #!/bin/sh
-# Install per_obspy into an environment of its own, and compile its kernels: the steps of the
-# Dockerfile, which also work without a container.
+# Install per_obspy into an environment of its own, compile its kernels, check the program: the
+# steps of the Dockerfile, which also work without a container.
 #
 #   install.sh install SOURCE FOLDER    SOURCE: a checkout or wheel; FOLDER: new virtual environment
-#   install.sh compile FOLDER WORKFLOWS    WORKFLOWS: the folder with smoke.toml
+#   install.sh compile FOLDER    minutes of processor time; no kernel with WARM_UP=no
+#   install.sh check FOLDER    ask for the health of a watcher that has no event open, without rights
 #
 # PYTHON names the interpreter (python3), EXTRAS the optional libraries (gis,notify).
 # Kernels are kept in NUMBA_CACHE_DIR, else next to the package.
@@ -16,13 +17,31 @@ install)
   "$3/bin/python" -m pip install --quiet --disable-pip-version-check --no-cache-dir "$2${extras:+[$extras]}"
   ;;
 compile)
-  results=$(mktemp -d)
-  trap 'rm -rf "$results"' EXIT
-  "$2/bin/per-obspy" run "$3/smoke.toml" -o "$results" --quiet
-  "$2/bin/per-obspy" status "$results"
+  if [ "${WARM_UP:-yes}" = no ]; then
+    echo "no kernels are compiled, as WARM_UP=no: the first run does it"
+  else
+    "$2/bin/per-obspy" warm-up
+  fi
+  ;;
+check)
+  program=$(cd "$2/bin" && pwd)/per-obspy
+  watched=$(mktemp -d)
+  trap 'rm -rf "$watched"' EXIT
+  echo '{}' >"$watched/status.json"
+  chmod -R a+rX "$watched"
+  # root becomes the user of no rights, if that one can reach the interpreter
+  without_rights="setpriv --reuid=65534 --regid=65534 --clear-groups"
+  if [ "$(id -u)" != 0 ]; then
+    without_rights=
+  elif ! $without_rights "$2/bin/python" -c "" 2>/dev/null; then
+    echo "checked as root: the user of no rights cannot start $2/bin/python" >&2
+    without_rights=
+  fi
+  cd "$watched"
+  $without_rights "$program" status "$watched"
   ;;
 *)
-  sed -n '2,9s/^# \{0,1\}//p' "$0" >&2
+  sed -n '2,10s/^# \{0,1\}//p' "$0" >&2
   exit 2
   ;;
 esac

@@ -6,7 +6,8 @@ separate row, so that no contact is missing; one that is cut at a bend has the b
 both parts.
 """
 
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import NamedTuple
 
@@ -39,6 +40,9 @@ ROW_FLAGS: dict[str, str] = {
     "that the configuration assumes",
     "unknown_azimuth": "the axis is not given: a row of two along the worst azimuth",
 }
+
+#: One bit per flag.
+_CODES = {name: 1 << bit for bit, name in enumerate(ROW_FLAGS)}
 
 
 class Chains(NamedTuple):
@@ -99,16 +103,15 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         is in one of them.
     """
     cutter = _Cutter(contacts, angle, longest)
-    rows = list(chain.from_iterable(map(cutter.pieces, _followed(contacts, joints))))
-    order = contacts.order.tolist()
-    rows.sort(key=lambda row: min(order[pair] for pair, _ in row.links))
-    pair, turned, first = _flat(rows)
+    # Numbers in arrays: objects of all rows would need ten times the memory
+    rows = chain.from_iterable(map(cutter.pieces, _followed(contacts, joints)))
+    pair, turned, first, codes = _by_name(*_flat(rows), contacts.order)
     # Along the axis, whose azimuth is below 180 degrees
     azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
     pair, turned = _reversed(pair, turned, first, backwards)
     flags = {}
-    for name in ROW_FLAGS:
-        flags[name] = np.array([name in row.flags for row in rows], dtype=bool)
+    for name, code in _CODES.items():
+        flags[name] = (codes & code) > 0
     # And those that follow from their buildings and pairs
     for name, raised in _flags_of_buildings(contacts, joints, pair).items():
         if raised.size:
@@ -116,21 +119,36 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
     return Chains(pair, turned, first, azimuth, flags)
 
 
-def _flat(rows: Sequence[_Piece]) -> tuple[IntArray, BoolArray, IntArray]:
-    """Return pairs, a mask of the turned ones, and the index of the first pair of each row."""
-    # Link by link
-    links = [link for row in rows for link in row.links]
-    pair = np.array([link[0] for link in links], dtype=np.int64)
-    turned = np.array([link[1] for link in links], dtype=bool)
-    sizes = [0, *(len(row.links) for row in rows)]
-    return pair, turned, np.cumsum(sizes, dtype=np.int64)
+def _flat(rows: Iterable[_Piece]) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the end at which each contact is entered, and sizes and flags of the rows."""
+    # Arrays grow in place
+    ends, sizes, codes = array("q"), array("q"), array("q")
+    for row in rows:
+        ends.extend(2 * pair + turned for pair, turned in row.links)
+        sizes.append(len(row.links))
+        codes.append(sum(_CODES[name] for name in row.flags))
+    return np.array(ends, np.int64), np.array(sizes, np.int64), np.array(codes, np.int64)
+
+
+def _by_name(
+    ends: IntArray, sizes: IntArray, codes: IntArray, names: IntArray
+) -> tuple[IntArray, BoolArray, IntArray, IntArray]:
+    """Return pairs, which are turned, first contacts and flags, in the order of the rows' names."""
+    starts = np.cumsum(sizes) - sizes
+    smallest = np.minimum.reduceat(names[ends // 2], starts) if sizes.size else starts
+    order = np.argsort(smallest)
+    # Contacts of a row stay together
+    first = np.concatenate([[0], np.cumsum(sizes[order])])
+    source = np.repeat(starts[order] - first[:-1], sizes[order]) + np.arange(ends.size)
+    found = ends[source]
+    return found // 2, found % 2 == 1, first, codes[order]
 
 
 def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
     """Yield the chains of joined contacts; those that close are flagged as rings."""
-    joined = joints.joined.tolist()
-    done = contacts.repeated.tolist()
-    by_name = np.argsort(contacts.order, kind="stable").tolist()
+    joined = joints.joined.data
+    done = contacts.repeated.copy().data
+    by_name = np.argsort(contacts.order, kind="stable").data
     # Chains begin at a free end; the contacts that remain afterwards are rings
     for pair in by_name:
         for end in (2 * pair, 2 * pair + 1):
@@ -141,7 +159,7 @@ def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
             yield _Piece(_walked(2 * pair, joined, done), frozenset({"ring"}), closed=True)
 
 
-def _walked(end: int, joined: list[int], done: list[bool]) -> list[Link]:
+def _walked(end: int, joined: memoryview, done: memoryview) -> list[Link]:
     """Return the contacts from one end on, and mark them as done."""
     links = []
     while end >= 0 and not done[end // 2]:
@@ -156,9 +174,10 @@ class _Cutter:
     """Cuts chains into rows."""
 
     def __init__(self, contacts: Contacts, angle: float, longest: int) -> None:
-        self._buildings = contacts.buildings.tolist()
-        self._azimuth = contacts.azimuth.tolist()
-        self._gap = contacts.gap.tolist()
+        # Views give plain numbers without a copy
+        self._buildings = contacts.buildings.ravel().data
+        self._azimuth = contacts.azimuth.data
+        self._gap = contacts.gap.data
         self._angle = angle
         self._longest = longest
 
@@ -194,9 +213,9 @@ class _Cutter:
 
     def _repetition(self, links: list[Link]) -> tuple[int, int] | None:
         """Return the first contacts between two visits of one building, as a range."""
-        seen = {self._buildings[links[0][0]][links[0][1]]: 0}
+        seen = {self._buildings[2 * links[0][0] + links[0][1]]: 0}
         for place, (pair, turned) in enumerate(links, start=1):
-            building = self._buildings[pair][not turned]
+            building = self._buildings[2 * pair + (not turned)]
             if building in seen:
                 return seen[building], place
             seen[building] = place

@@ -9,6 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.dtypes import StringDType
 from numpy.typing import NDArray
 
 from per_obspy.checks import FloatArray
@@ -16,6 +19,9 @@ from per_obspy.constants import EARTH_RADIUS
 from per_obspy.errors import Rejection
 from per_obspy.inventory.building_rows.given import is_derived
 from per_obspy.inventory.table_columns import numbers_in
+
+#: Names that are converted together.
+TOGETHER = 50_000
 
 #: Largest distance between the positions that the pairs of a building give for it, m: a survey may
 #: give the middle of each wall, and blocks are that long.
@@ -86,13 +92,13 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     Contacts
     """
     # Buildings by their identifiers
-    pair_id = pairs["pair_id"].to_numpy(dtype=object)
+    order, found_names = _sorted_codes(pairs["pair_id"])
+    pair_id = found_names[order]
     codes, identifiers = _identified(pairs)
     is_ambiguous, rejected = _ambiguous(pairs, codes, identifiers)
     buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
     # Contacts that are described twice
     azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
-    order = np.asarray(pd.factorize(pair_id, sort=True)[0], dtype=np.int64)
     sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
     repeated, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
     return Contacts(
@@ -140,13 +146,28 @@ def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
     sides = []
     for name in ("building_id_1", "building_id_2"):
         given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
-        sides.append(given.fillna("").astype(str).to_numpy(dtype=object))
+        sides.append(given.fillna("").astype(str))
     # Sorted, so that numbers do not depend on the order of the table
-    text = np.stack(sides, axis=1).ravel()
-    text[text == ""] = None
-    codes, identifiers = pd.factorize(text, sort=True)
-    numbers = np.asarray(codes, dtype=np.int64).reshape(-1, 2)
-    return numbers, np.asarray(identifiers, dtype=object)
+    codes, names = _sorted_codes(pd.concat(sides, ignore_index=True))
+    # No identifier is the first of all texts
+    missing = int(names.size > 0 and names[0] == "")
+    numbers = np.stack(np.split(codes - missing, 2), axis=1)
+    return numbers, names[missing:]
+
+
+def _sorted_codes(texts: pd.Series) -> tuple[IntArray, NDArray[np.object_]]:
+    """Return the place of each text among those that occur, and these in alphabetical order."""
+    column = pa.Table.from_pandas(texts.to_frame("text"), preserve_index=False)["text"]
+    encoded = column.cast(pa.large_string()).combine_chunks().dictionary_encode()
+    order = pc.sort_indices(encoded.dictionary).to_numpy()
+    place = np.empty(order.size, dtype=np.int64)
+    place[order] = np.arange(order.size)
+    # Sixteen bytes per short text, a quarter of those of an object; some thousands at a time
+    names = np.empty(order.size, dtype=StringDType())
+    for first in range(0, order.size, TOGETHER):
+        some = encoded.dictionary.take(pa.array(order[first : first + TOGETHER]))
+        names[first : first + TOGETHER] = some.to_numpy(zero_copy_only=False)
+    return place[encoded.indices.to_numpy()], names
 
 
 def _ambiguous(
@@ -171,28 +192,31 @@ def _ambiguous(
 
 def _spread(pairs: pd.DataFrame, codes: IntArray) -> FloatArray:
     """Return the diagonal of the box around the positions of each identifier, m."""
-    # Boxes in space hold across the date line too
-    sides = [_on_sphere(pairs, i) for i in (1, 2)]
-    places = np.stack(sides, axis=1).reshape(-1, 3)
-    known = codes.ravel() >= 0
-    groups = pd.DataFrame(places[known]).groupby(codes.ravel()[known])
-    sizes = (groups.max() - groups.min()).to_numpy()
-    return np.asarray(EARTH_RADIUS * np.sqrt(np.square(sizes).sum(axis=1)))
+    # Ends in the order of their buildings, those without an identifier first
+    order = np.argsort(codes.ravel(), kind="stable")[np.count_nonzero(codes < 0) :]
+    first = np.flatnonzero(np.diff(codes.ravel()[order], prepend=-1))
+    squares = np.zeros(first.size)
+    # Boxes in space hold across the date line too; unknown positions count for none
+    for axis in range(3):
+        place = np.stack([_on_sphere(pairs, i, axis) for i in (1, 2)], axis=1).ravel()[order]
+        squares += np.square(np.fmax.reduceat(place, first) - np.fmin.reduceat(place, first))
+    return np.asarray(EARTH_RADIUS * np.sqrt(squares))
 
 
-def _on_sphere(pairs: pd.DataFrame, i: int) -> FloatArray:
-    """Return positions of building i on the unit sphere, (n_pairs, 3)."""
-    east = np.radians(numbers_in(pairs, f"longitude_{i}"))
+def _on_sphere(pairs: pd.DataFrame, i: int, axis: int) -> FloatArray:
+    """Return one of the three coordinates of building i on the unit sphere, (n_pairs,)."""
     north = np.radians(numbers_in(pairs, f"latitude_{i}"))
-    level = np.cos(north)
-    return np.stack([level * np.cos(east), level * np.sin(east), np.sin(north)], axis=1)
+    if axis == 2:
+        return np.asarray(np.sin(north))
+    east = np.radians(numbers_in(pairs, f"longitude_{i}"))
+    return np.asarray(np.cos(north) * (np.sin(east) if axis else np.cos(east)))
 
 
 def _own_names(pair_id: NDArray[np.object_], own: BoolArray) -> NDArray[np.object_]:
     """Return the names of the buildings that belong to one pair only."""
     rows, sides = np.nonzero(own)
     names = [f"{pair_id[row]}#{side + 1}" for row, side in zip(rows, sides, strict=True)]
-    return np.array(names, dtype=object)
+    return np.array(names, dtype=StringDType())
 
 
 def _repeated(

@@ -1,5 +1,6 @@
 """Values of buildings that a completed pair table contains, without derived or assumed ones."""
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,35 @@ PROPERTIES = (
     "yield_displacement",
     "hardening",
 )
+
+
+class GivenColumns(Mapping[str, FloatArray]):
+    """
+    Properties of :func:`given_values` that are read one after the other, when they are needed.
+
+    Parameters
+    ----------
+    read : callable
+        Return the columns of these names of all pairs, as far as the table has them.
+    """
+
+    def __init__(self, read: Callable[[Sequence[str]], pd.DataFrame]) -> None:
+        self._read = read
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return one property of both buildings, (n_pairs, 2)."""
+        names = {"derived": None}
+        for column in (name, "yield_displacement"):
+            names |= dict.fromkeys(f"{column}_{i}" for i in (1, 2))
+        return _given(self._read(list(names)), name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names of the properties."""
+        return iter(PROPERTIES)
+
+    def __len__(self) -> int:
+        """Return the number of properties."""
+        return len(PROPERTIES)
 
 
 def given_values(pairs: pd.DataFrame) -> dict[str, FloatArray]:
@@ -56,6 +86,6 @@ def _given(pairs: pd.DataFrame, name: str) -> FloatArray:
 def is_derived(derived: Any, column: str) -> NDArray[np.bool_]:
     """Return in which rows a column is among those that were derived, by their list in a text."""
     # Many rows share few texts
-    codes, texts = pd.factorize(np.asarray(derived, dtype=object), use_na_sentinel=False)
+    codes, texts = pd.factorize(pd.Series(derived), use_na_sentinel=False)
     has = np.array([column in str(text).split() for text in texts], dtype=bool)
     return has[codes] if has.size else np.zeros(len(derived), dtype=bool)

@@ -17,10 +17,10 @@ from typing import Any
 
 from per_obspy.errors import CatalogError
 from per_obspy.files import content_hash, file_hash, temporary_folder, writing
+from per_obspy.jobs.output_folder import RECORD
 from per_obspy.names import inside
 from per_obspy.operation.events.revision_changes import CHANGES, write_changes
 from per_obspy.pipeline.provenance import CONFIGURATION
-from per_obspy.pipeline.run import RECORD
 from per_obspy.resume import Status, StatusError, read_status, write_status
 
 #: Folder of the revisions, link to the newest, and description of each.

@@ -8,7 +8,6 @@ from per_obspy.config import Run, checked
 from per_obspy.config.changes import merged, parsed_changes
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError, printable
-from per_obspy.pipeline.inputs.event_section import event_section
 from per_obspy.pipeline.inputs.input_kinds import (
     PAIR_KINDS,
     RECORD_KINDS,
@@ -184,6 +183,8 @@ def _records_content(records: str, output: Path) -> dict[str, Any]:
     """Return the sections of a configuration that name the records."""
     kind = kind_of(records)
     if kind is Kind.EVENT_ID:
+        from per_obspy.pipeline.inputs.event_section import event_section
+
         return {"records": {"fdsn": event_section(records, output.absolute() / "fetched")}}
     # Motion that is simulated or mapped
     path = Path(records).absolute()

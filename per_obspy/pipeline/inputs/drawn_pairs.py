@@ -8,10 +8,8 @@ from per_obspy.config import Run
 from per_obspy.config.pairs import Footprints
 from per_obspy.errors import require_extra
 from per_obspy.files import content_hash, file_hash, remove_file
-from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.progress import Progress
 from per_obspy.resume import earlier_status, write_status
-from per_obspy.tables.table_files import write_rejected
 
 #: Table of the pairs, its rejections, and the status file by which they are kept.
 PAIRS, REJECTED, STATUS = "pairs.parquet", "pairs.rejected.csv", "pairs.json"
@@ -59,22 +57,30 @@ def write_drawn_pairs(settings: Run, folder: Path, progress: Progress) -> dict[s
     key = _key(footprints)
     if earlier := earlier_status(folder / STATUS, key):
         return {name: earlier[name] for name in COUNTED}
-    from per_obspy.inventory.footprints.buildings import write_buildings
-    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
-
     progress("finding pairs", 0, 1)
     remove_file(folder / STATUS)
+    counts = _write_found(footprints, folder)
+    # Written last: a killed search is done again
+    hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED, BUILDINGS)}
+    write_status(folder / STATUS, key, hashes, counts)
+    progress("finding pairs", 1, 1)
+    return counts
+
+
+def _write_found(footprints: Footprints, folder: Path) -> dict[str, int]:
+    """Find pairs, write them with their buildings and rejections, and return the numbers."""
+    # A finished run does not wait for these
+    from per_obspy.inventory.files.writing import write_pairs
+    from per_obspy.inventory.footprints.buildings import write_buildings
+    from per_obspy.inventory.footprints.footprint_pairs import find_footprint_pairs
+    from per_obspy.tables.table_files import write_rejected
+
     table, buildings = find_footprint_pairs(footprints.file, **_options(footprints))
     rejected = table.attrs["rejected"]
     write_pairs(table, folder / PAIRS)
     write_buildings(buildings, folder / BUILDINGS)
     write_rejected(rejected, folder / REJECTED)
-    # Written last: a killed search is done again
-    counts = dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
-    hashes = {name: file_hash(folder / name) for name in (PAIRS, REJECTED, BUILDINGS)}
-    write_status(folder / STATUS, key, hashes, counts)
-    progress("finding pairs", 1, 1)
-    return counts
+    return dict(zip(COUNTED, (len(table), len(rejected)), strict=True))
 
 
 def pair_table(settings: Run, folder: Path) -> Path | None:

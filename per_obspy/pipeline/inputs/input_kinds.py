@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from per_obspy.errors import CatalogError, reason_of
-from per_obspy.formats.text.station_table import is_station_table
 from per_obspy.inventory.schema import COLUMNS
 
 
@@ -251,13 +250,20 @@ def _text_kind(path: Path, head: bytes) -> Kind:
     names = [name.strip(" \"'").lower() for name in re.split(r"[,;\t]", header)]
     kind = _table_kind(names)
     # Tables of stations and lists of buildings have fewer names in common with pairs
-    if kind is None and path.suffix.lower() == ".csv" and is_station_table(head):
+    if kind is None and path.suffix.lower() == ".csv" and _is_station_table(head):
         return Kind.STATIONS
     if kind is None and set(names) & _EAST and set(names) & _NORTH:
         return Kind.FOOTPRINTS
     if kind is None and lines and lines[0].lstrip().startswith(("[", "{")) and _is_json(path):
         return Kind.FOOTPRINTS
     return kind or _SUFFIXES.get(path.suffix.lower(), Kind.RECORDS)
+
+
+def _is_station_table(head: bytes) -> bool:
+    """Return whether a file begins as a table of stations."""
+    from per_obspy.formats.text.station_table import is_station_table
+
+    return is_station_table(head)
 
 
 def _is_json(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from per_obspy.errors import Rejection
 from per_obspy.files import remove_file
 from per_obspy.inventory.building_rows.chains import Chains, chains_of
 from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray, contacts_of
-from per_obspy.inventory.building_rows.given import PROPERTIES, given_values
+from per_obspy.inventory.building_rows.given import GivenColumns
 from per_obspy.inventory.building_rows.joints import joints_of
 from per_obspy.inventory.table_columns import joined_names
 from per_obspy.jobs.building_rows import CHUNK, RowsJob, RowsPart, do_row_chunks, rows_rejections
@@ -35,20 +36,18 @@ from per_obspy.threads import usable_processors
 #: Columns of the pair table without which no pair names its buildings.
 IDENTIFIERS = ("building_id_1", "building_id_2")
 
-#: Columns of the risk table by which rows are found and placed; some may be absent.
+#: Columns of the risk table by which rows are found, and by which they are placed; some may be
+#: absent.
 FINDING = (
-    "rank",
     "pair_id",
     *IDENTIFIERS,
-    *(f"{name}_{i}" for name in ("longitude", "latitude", *PROPERTIES) for i in (1, 2)),
+    *(f"{name}_{i}" for name in ("longitude", "latitude") for i in (1, 2)),
     "gap",
     "azimuth",
     "facing_length",
     "derived",
-    "station",
-    "distance",
-    "azimuth_used",
 )
+PLACING = ("rank", "station", "distance", "azimuth_used")
 
 #: Contacts that are read together.
 TOGETHER = 50_000
@@ -176,12 +175,12 @@ def _enabled(rows: Rows, risk: Dataset) -> bool:
 
 def _found(rows: Rows, risk: Dataset) -> _Found:
     """Find the rows of all pairs, and their order of computation."""
-    names = [name for name in FINDING if name in risk.schema.names]
-    pairs = risk.to_table(columns=names, use_threads=False).to_pandas()
-    # From pairs to chains of contacts
-    contacts = contacts_of(pairs, rows.angle)
-    joints = joints_of(contacts, given_values(pairs), rows.angle)
+    read = partial(_columns, risk)
+    # From pairs to chains of contacts; each column is in memory only while it is needed
+    contacts = contacts_of(read(FINDING), rows.angle)
+    joints = joints_of(contacts, GivenColumns(read), rows.angle)
     chains = chains_of(contacts, joints, rows.angle, rows.longest)
+    pairs = read(PLACING)
     placed = placed_rows(chains, pairs, CHUNK)
     ranks = pairs["rank"].to_numpy(np.int64)[placed.contacts["pair"]]
     # Name and flags of each row at every contact of it
@@ -193,6 +192,15 @@ def _found(rows: Rows, risk: Dataset) -> _Found:
     rejected = (*contacts.rejected, *joints.rejected)
     served = served_buildings(pairs["station"], contacts.buildings)
     return _Found(table, contacts, first.size, rejected, served)
+
+
+def _columns(risk: Dataset, names: Sequence[str]) -> pd.DataFrame:
+    """Return columns of all pairs, as far as they exist; texts that repeat are kept once."""
+    known = [name for name in names if name in risk.schema.names]
+    shared = [name for name in ("derived", "station") if name in known]
+    table = risk.to_table(columns=known, use_threads=False)
+    found: pd.DataFrame = table.to_pandas(categories=shared, self_destruct=True)
+    return found
 
 
 def served_buildings(station: pd.Series, buildings: IntArray) -> dict[str, int]:
@@ -290,7 +298,7 @@ def _with_buildings(piece: pd.DataFrame, contacts: Contacts) -> pd.DataFrame:
     for side, number in (("left", turned), ("right", 1 - turned)):
         chosen = contacts.buildings[piece["pair"]][rows, number]
         columns[f"building_number_{side}"] = chosen
-        columns[f"building_id_{side}"] = contacts.names[chosen]
+        columns[f"building_id_{side}"] = contacts.names[chosen].astype(object)
     station = piece["station"].astype(str)
     return piece.drop(columns=["pair", "rank"]).assign(**columns, station=station)
 

@@ -19,6 +19,9 @@ NAMESPACE = "http://www.opengis.net/kml/2.2"
 #: Pairs of the file: viewers are slow with many more.
 ROWS = 1000
 
+#: Letters of markup, and how HTML writes them.
+_LETTERS = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "$": "&#36;"})
+
 
 def write_kml(
     worst: pd.DataFrame, classes: Sequence[str], title: str, path: Path, note: str = ""
@@ -76,8 +79,7 @@ def _add_mark(
 
 def _as_html(line: str) -> str:
     """Return a line with HTML markup escaped."""
-    letters = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "$": "&#36;"}
-    return "".join(letters.get(letter, letter) for letter in printable(line))
+    return printable(line).translate(_LETTERS)
 
 
 def _add_style(document: ElementTree.Element, name: str, colour: str) -> None:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from per_obspy.config import Design, Ensemble, Run
-from per_obspy.errors import CatalogError, require_extra
+from per_obspy.config import Run
+from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import stored_inventories
 from per_obspy.inventory.files.formats import pair_file
 from per_obspy.inventory.files.reading import checked_file
@@ -13,23 +13,6 @@ from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.pipeline.inputs.drawn_pairs import pair_table
 from per_obspy.pipeline.pairs import named_files, pair_simulation
 from per_obspy.records.shakemap import read_shakemap
-
-
-def require_extras(settings: Run | Design | Ensemble) -> None:
-    """
-    Check that the optional libraries of a screening are installed, before anything is computed.
-
-    Raises
-    ------
-    MissingExtra
-        If one is not.
-    """
-    if settings.geopackage:
-        require_extra("gis", "pyogrio", "shapely")
-    if settings.spreadsheet:
-        require_extra("spreadsheet", "openpyxl")
-    if isinstance(settings, Run) and settings.totals.h3 is not None:
-        require_extra("gis", "h3")
 
 
 def check_inputs(settings: Run, folder: Path) -> None:

@@ -1,4 +1,8 @@
-"""Faults of later stages stop a run before its first record is read."""
+"""
+Faults of later stages stop a run before its first record is read.
+
+Covers per_obspy.pipeline.inputs.extras too: libraries that are not installed.
+"""
 
 import datetime
 import shutil
@@ -11,13 +15,13 @@ import pytest
 from per_obspy.config import Run, load
 from per_obspy.errors import CatalogError, MissingExtra
 from per_obspy.inventory.catalogue import Origin, add_inventory
-from per_obspy.pipeline import run as whole_run
+from per_obspy.pipeline import stages
 from per_obspy.pipeline.ensemble import screen_scenarios
-from per_obspy.pipeline.preflight import check_inputs
+from per_obspy.pipeline.inputs.preflight import check_inputs
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening import warmup
 
-from .small_run import write_configuration
+from ..small_run import write_configuration
 
 PAIRS = '[pairs]\nfile = "pairs.csv"\n'
 HEADER = "pair_id,longitude_1,latitude_1,height_1,longitude_2,latitude_2,height_2,gap\n"
@@ -115,7 +119,7 @@ def test_no_thread_is_alive_after_a_run_that_fails(tmp_path, monkeypatch):
     def fails(*_):
         raise CatalogError("stations", "no luck")
 
-    monkeypatch.setattr(whole_run, "finished_stations", fails)
+    monkeypatch.setattr(stages, "finished_stations", fails)
     before = set(threading.enumerate())
     with pytest.raises(CatalogError, match="no luck"):
         run(tmp_path / "run.toml")
