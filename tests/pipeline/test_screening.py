@@ -15,8 +15,7 @@ from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
-from .results.test_page import content_of
-from .small_run import SPECTRA, InProcess, write_configuration
+from .small_run import SPECTRA, InProcess, page_content, write_configuration
 
 pytestmark = pytest.mark.usefixtures("plain_figures")
 
@@ -256,7 +255,7 @@ def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     # the page and the summary name the map, and where no record does, its earthquake
     text = (copied / "map" / "summary.txt").read_text()
     assert "Motion of ShakeMap x, version 3" in text.replace("\n", " ")
-    page = content_of(copied / "map" / "report.html")
+    page = page_content(copied / "map" / "report.html")
     assert "Motion of ShakeMap x, version 3" in page["event"]
     assert "no displacement history" in page["provenance"][-1][1]
     assert page["epicentre"] is not None

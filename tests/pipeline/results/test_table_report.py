@@ -31,7 +31,7 @@ from per_obspy.tables.risk import ranked_table
 from per_obspy.tables.totals import piece_totals
 
 from ...report.page.made_up import CLASSES, pair_table
-from .test_page import content_of
+from ..small_run import page_content
 
 SCENARIO = "[scenario]\nstations = 1\nmagnitude = 6.5\ndt = 0.02\n[pairs]\ncount = 4\n"
 SPECTRA = "[spectra]\ncount = 12\ndampings = [0.05]\nazimuth_step = 30\n"
@@ -91,8 +91,8 @@ def test_every_screening_has_everything(done, stem):
 
 
 def test_the_page_of_an_ensemble_knows_buildings_stations_and_histories(done):
-    ensemble = content_of(done["ensemble"] / "report.html")
-    run = content_of(done["risk"] / "report.html")
+    ensemble = page_content(done["ensemble"] / "report.html")
+    run = page_content(done["risk"] / "report.html")
     assert [row[0] for row in ensemble["stations"]["rows"]] == ["XX.S001 (one)"]
     assert [row[1:] for row in ensemble["stations"]["rows"]] == [
         row[1:] for row in run["stations"]["rows"]
@@ -111,7 +111,7 @@ def test_the_page_of_an_ensemble_knows_buildings_stations_and_histories(done):
 
 
 def test_the_page_of_a_spectrum_says_what_it_leaves_out(done):
-    content = content_of(done["design"] / "report.html")
+    content = page_content(done["design"] / "report.html")
     assert content["histories"] == {}
     assert content["stations"]["rows"] == []
     assert content["areas"]["rows"]
@@ -124,7 +124,7 @@ def test_every_screening_speaks_spanish(done, call, stem, tmp_path):
     configuration = done[stem].parent / f"{stem}.toml"
     code, _, errors = call("screen", configuration, "-o", tmp_path / "es", "--language", "es")
     assert code == 0, errors
-    content = content_of(tmp_path / "es" / "report.html")
+    content = page_content(tmp_path / "es" / "report.html")
     assert content["texts"]["close"] == "cerrar"
     text = (tmp_path / "es" / "summary.txt").read_text()
     assert "4 pares de edificios evaluados." in text
