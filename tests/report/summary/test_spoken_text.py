@@ -86,15 +86,15 @@ def test_the_summary_says_what_where_and_how_sure():
         "Earthquake of 2019-07-06 03:19:53 UTC. Magnitude 7.1.",
         "Epicentre 35.770 north, 117.600 west, depth 8 km.",
         "SIMULATED. THIS IS NOT AN EARTHQUAKE.",
-        "2 stations used: XX.A, XX.C. 1 stations missing or refused: XX.B.",
+        "Stations used, 2: XX.A, XX.C. Stations missing or refused, 1: XX.B.",
         "16 pairs of buildings screened.",
         "5 pairs that pound or are likely to.",
         "5 pairs expected to pound in all.",
         "5 pairs of the worst class, severe.",
         "60 cm per second largest expected impact velocity.",
-        "Measure the gap of 7 pairs whose gap is unknown.",
+        "Measure the unknown gaps; pairs with one: 7.",
         "1. P1: severe, impact 60 cm per second, contact in over 99 of 100, at 20.30000 south,",
-        "6 pairs have derived inputs",
+        "Pairs with derived inputs, such as periods by height: 6.",
     ):
         assert expected in text
     assert "SIMULATED" not in " ".join(summary_lines(make_facts(simulated=False)))
