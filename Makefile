@@ -17,7 +17,7 @@ figures: .venv/run
 
 test: .venv/test
 	@echo "== tests, doctests and README"
-	$(BIN)/python -m pytest -q -n auto --dist loadfile
+	$(BIN)/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 	@echo "== the kernels' tests once more without the compiler"
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist loadfile tests/kernels
 

@@ -16,6 +16,14 @@ settings.load_profile("compiling")
 
 CHECKOUT = Path(__file__).parents[1]
 
+#: Folders and modules of long tests, which begin first: no processor waits for one at the end.
+LONGEST = ("tests/workflows/", "tests/pipeline/", "tests/fuzzing/", "tests/operation/")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put long tests first; the order stays the same otherwise."""
+    items.sort(key=lambda item: not any(name in item.path.as_posix() for name in LONGEST))
+
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:

@@ -97,7 +97,7 @@ def input_sensitivity(
     return [
         _outcome(known["pair_id"].iloc[row], name, (low[row], high[row]), by_name, row)
         for name, (low, high, varies) in inputs.items()
-        for row in np.flatnonzero(varies & same).tolist()
+        for row in np.flatnonzero(varies & same & _found(known, name, by_name)).tolist()
     ]
 
 
@@ -116,6 +116,12 @@ def _variants(known: pd.DataFrame, inputs: dict[str, Ends]) -> pd.DataFrame:
 def _names(rows: pd.DataFrame, name: str, side: int) -> list[str]:
     """Return names of variants: number of the row, input and side."""
     return [f"{row} {name} {side}" for row in range(len(rows))]
+
+
+def _found(known: pd.DataFrame, name: str, found: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return which rows have an outcome at both values: a spectrum may not reach one of them."""
+    ends = [pd.Index(_names(known, name, side)).isin(found.index) for side in (0, 1)]
+    return np.asarray(ends[0] & ends[1])
 
 
 def _same(known: pd.DataFrame, found: pd.DataFrame) -> NDArray[np.bool_]:

@@ -99,7 +99,7 @@ def test_a_run_opens_each_record_and_shard_at_most_twice(folder, opens, layers):
         "event": 1,
         "shards": 2,
         "spectra": 1,
-        "risk": 6,
+        "risk": 14,
     }
 
 
@@ -126,7 +126,7 @@ def test_stages_of_their_own_open_each_file_at_most_twice(folder, opens):
     screen(folder / "counted.toml", executor=InProcess())
     counts = by_kind(opens(), folder)
     # rows of buildings take four of them, as in a whole run
-    assert counts.pop("risk") == 6
+    assert counts.pop("risk") == 14
     assert max(counts.values()) <= 2
     read_station_once.cache_clear()
     report(folder / "counted.toml")

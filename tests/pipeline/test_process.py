@@ -156,10 +156,10 @@ def test_the_spectra_have_the_same_notes_as_the_table(source, tmp_path):
     for note in notes:
         assert note.keys() >= NOTED
         assert any("Butterworth" in step for step in note["steps"])
-    # text keeps 16 digits
+    # the table has five digits
     table = pd.read_csv(tmp_path / "out" / "processed.csv")
     corners = sorted(note["highpass"] for note in notes)
-    assert corners == pytest.approx(sorted(table["highpass"]), rel=1e-12)
+    assert corners == pytest.approx(sorted(table["highpass"]), rel=5e-5)
 
 
 def is_resumed(source, folder, **options):

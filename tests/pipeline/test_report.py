@@ -62,7 +62,9 @@ def test_a_report_needs_a_finished_run(copied):
 
 def summary(folder):
     settings, table = load(folder / "run.toml", Run), folder / "out" / "risk.parquet"
-    return _summary(settings, table, folder, _region(settings, True, None), Report([], []))
+    return _summary(
+        settings, table, folder, _region(settings, True, None, folder / "out"), Report([], [])
+    )
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])

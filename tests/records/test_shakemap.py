@@ -147,7 +147,7 @@ WRONG = {
         grid_xml(FIELDS, make_rows()[:-1], (2, 3)),
         "grid_data has 5 rows of 9, its head has 2 x 3 nodes",
     ),
-    "another shape": (grid_xml(FIELDS, make_rows(), (3, 2)), "not those of a grid"),
+    "another shape": (grid_xml(FIELDS, make_rows(), (3, 2)), "do not form a grid"),
     "a shorter row": (
         grid_xml(FIELDS, [*make_rows()[:-1], (1, 2)], (2, 3)),
         "grid_data: .*columns changed",
@@ -177,7 +177,7 @@ WRONG = {
         grid_xml(FIELDS, _changed(LON=361), (2, 3)),
         "LON = 361 is not between -360 and 360",
     ),
-    "a node twice": (grid_xml(FIELDS, _changed(LON=10.0), (2, 3)), "not those of a grid"),
+    "a node twice": (grid_xml(FIELDS, _changed(LON=10.0), (2, 3)), "do not form a grid"),
     "another unit": (
         grid_xml(FIELDS, make_rows(), (2, 3)).replace("pctg", "gal"),
         "PSA03 is in 'gal'",

@@ -72,9 +72,9 @@ def test_two_scenarios_with_rates(tmp_path):
     result = screen_scenarios(tmp_path / "workflows" / "ensemble.toml")
     assert result.record["counts"] == {"pairs": 20, "rejected_pair": 0}
     table = pd.read_csv(tmp_path / "output" / "ensemble" / "ensemble.csv")
-    # one year of 0.014 earthquakes, each of which some pairs do not survive, and pairs that touch
+    # numbers have five digits; one year of 0.014 earthquakes, each of which some pairs do not survive, and pairs that touch
     # always meet in
-    assert table["annual_probability"].max() == pytest.approx(1.0 - np.exp(-0.014), rel=1e-9)
+    assert table["annual_probability"].max() == pytest.approx(1.0 - np.exp(-0.014), rel=5e-5)
     assert (table[table["gap"] == 0.0]["probability"] == 1.0).all()
     assert table["probability"].min() < 0.5
 
@@ -117,7 +117,10 @@ def test_cities_in_a_simulated_earthquake_and_in_that_of_mexico(city, real_data,
         assert touching["derived"].str.contains("gap_std").all()
         low = np.fmax(table["height_1"], table["height_2"]) < 12.0
         assert (table[(table["gap"] > 1.0) & low]["probability"] < 1e-6).all()
-    assert totals["expected_pounding"].sum() == pytest.approx(simulated["probability"].sum())
+    # five digits of each number
+    assert totals["expected_pounding"].sum() == pytest.approx(
+        simulated["probability"].sum(), rel=5e-5
+    )
     assert totals["area"].str.startswith("8a").all()  # H3 indexes of resolution 10
     assert simulated["flags"].str.contains("simulated").all()
     assert not mexico["flags"].str.contains("simulated").any()

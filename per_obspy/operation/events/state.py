@@ -168,7 +168,7 @@ def event_folder(folder: Path, event_id: str) -> Path:
     Examples
     --------
     >>> event_folder(Path("watched"), "../../etc").as_posix()
-    'watched/events/------etc-d5b8d71e'
+    'watched/events/------etc-492ebcf5'
     """
     return inside(folder / "events", file_name(event_id))
 
