@@ -72,8 +72,8 @@ def test_two_scenarios_with_rates(tmp_path):
     result = screen_scenarios(tmp_path / "workflows" / "ensemble.toml")
     assert result.record["counts"] == {"pairs": 20, "rejected_pair": 0}
     table = pd.read_csv(tmp_path / "output" / "ensemble" / "ensemble.csv")
-    # numbers have five digits; one year of 0.014 earthquakes, each of which some pairs do not survive, and pairs that touch
-    # always meet in
+    # numbers have five digits; one year of 0.014 earthquakes, each of which some pairs do not
+    # survive, and pairs that touch always meet in
     assert table["annual_probability"].max() == pytest.approx(1.0 - np.exp(-0.014), rel=5e-5)
     assert (table[table["gap"] == 0.0]["probability"] == 1.0).all()
     assert table["probability"].min() < 0.5
