@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from per_obspy import cli
+from per_obspy import cli, threads
 
 # The first example of a test may compile a kernel, which takes seconds. In CI every run tries the
 # same examples, so that a change is judged by itself; elsewhere each run tries new ones.
@@ -15,14 +15,6 @@ settings.register_profile("compiling", deadline=None, derandomize="CI" in os.env
 settings.load_profile("compiling")
 
 CHECKOUT = Path(__file__).parents[1]
-
-#: Folders and modules of long tests, which begin first: no processor waits for one at the end.
-LONGEST = ("tests/workflows/", "tests/pipeline/", "tests/fuzzing/", "tests/operation/")
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put long tests first; the order stays the same otherwise."""
-    items.sort(key=lambda item: not any(name in item.path.as_posix() for name in LONGEST))
 
 
 @pytest.fixture(scope="session")
@@ -32,6 +24,12 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real records are not at {folder}: set PER_OBSPY_DATA")
     return folder
+
+
+@pytest.fixture(autouse=True)
+def _threads(monkeypatch):
+    """Keep the number of threads of this process, which a worker in it limits to one."""
+    monkeypatch.setitem(threads._limit, "threads", threads._limit["threads"])
 
 
 @pytest.fixture
