@@ -2,8 +2,6 @@
 # Run a command of the environment as .venv/bin/per-obspy, or activate it: source .venv/bin/activate
 PYTHON ?= python3
 BIN := .venv/bin
-# One process more than processors: many tests wait for other processes
-WORKERS := $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN))
 
 .PHONY: demo figures test workflows rehearsal check docs wheel benchmark clean
 
@@ -19,9 +17,9 @@ figures: .venv/run
 
 test: .venv/test
 	@echo "== tests, doctests and README"
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -q -n auto --dist loadfile
 	@echo "== the kernels' tests once more without the compiler"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile tests/kernels
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist loadfile tests/kernels
 
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"

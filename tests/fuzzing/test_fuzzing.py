@@ -10,7 +10,7 @@ import pytest
 HERE = Path(__file__).parent
 
 #: Damaged copies of every kind of file; by hand thousands are read, see ``docs/security.md``.
-COUNT = 12
+COUNT = 6
 
 linux = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="the limit of memory needs Linux"
