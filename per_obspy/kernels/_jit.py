@@ -12,6 +12,8 @@ import numba
 from filelock import FileLock
 from numba.core.caching import FunctionCache
 
+from per_obspy.kernels._linking import KernelCompiler, LinkedFunction
+
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
 OPTIONS: dict[str, Any] = {
@@ -25,6 +27,10 @@ OPTIONS: dict[str, Any] = {
     # make ``isnan`` find no NaN
     "fastmath": {"contract", "nsz"},
     "boundscheck": False,
+    # No function pointer for C, which no kernel needs
+    "no_cfunc_wrapper": True,
+    # One step from all functions of a kernel to machine code
+    "pipeline_class": KernelCompiler,
 }
 
 
@@ -47,15 +53,16 @@ def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         try:
             kernel = numba.njit(**OPTIONS, **options)(function)
             # Without the compiler the kernel is the function itself
-            if kernel is not function:
-                kernel._cache = SharedCache(function)
-            return kernel
+            if kernel is function:
+                return function
+            kernel._cache = SharedCache(function)
         except RuntimeError as error:
             # Neither the package's folder nor that of the user can be written
             if "no locator available" not in str(error):
                 raise
             _warn_without_cache()
-            return numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+            kernel = numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+        return LinkedFunction(kernel)
 
     return compiled
 
