@@ -12,7 +12,12 @@ import numba
 from filelock import FileLock
 from numba.core.caching import FunctionCache
 
-from per_obspy.kernels._linking import KernelCompiler, LinkedFunction
+from per_obspy.kernels._linking import (
+    FunctionCompiler,
+    KernelCompiler,
+    LeanCompiler,
+    LinkedFunction,
+)
 
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
@@ -46,7 +51,9 @@ class SharedCache(FunctionCache):
                 super().save_overload(sig, data)
 
 
-def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def _compiler(
+    compiler: type[FunctionCompiler], **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles with some options, stored on disk where that is possible."""
 
     def compiled(function: Callable[..., Any]) -> Any:
@@ -62,7 +69,7 @@ def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
                 raise
             _warn_without_cache()
             kernel = numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
-        return LinkedFunction(kernel)
+        return LinkedFunction(kernel, compiler)
 
     return compiled
 
@@ -77,12 +84,12 @@ def _warn_without_cache() -> None:
         )
 
 
-kernel = _compiler()
+kernel = _compiler(FunctionCompiler)
 
 #: For kernels that allocate no memory: without reference counts, which cost short kernels more
 #: than arithmetic.
-lean = _compiler(_nrt=False)
+lean = _compiler(LeanCompiler, _nrt=False)
 
 #: For small kernels of inner loops, which the compiler otherwise leaves out of line as soon as
 #: their callers grow.
-inlined = _compiler(_nrt=False, forceinline=True)
+inlined = _compiler(LeanCompiler, _nrt=False, forceinline=True)

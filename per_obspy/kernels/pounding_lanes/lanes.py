@@ -18,7 +18,7 @@ pair alone: 32 lanes are always computed. The constants below are the rows of th
 
 import math
 
-from per_obspy.kernels._jit import inlined, lean
+from per_obspy.kernels._jit import lean
 
 #: Pairs that are computed side by side.
 PAIR_LANES = 32
@@ -241,7 +241,7 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         lanes[at(TILE_CONTACT, lane)] = least
 
 
-@inlined
+@lean
 def flag_structures(lanes, flags, i, peak, jump):
     """
     Bound structure i of every lane between the samples; flag lanes where it may peak or yield.
