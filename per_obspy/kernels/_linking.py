@@ -99,6 +99,9 @@ class LinkedFunction(CPUDispatcher):
         `FunctionCompiler` or `LeanCompiler`.
     """
 
+    #: Set by Numba.
+    _compiler: Any
+
     def __init__(self, kernel: Any, compiler: type[FunctionCompiler]) -> None:
         """Take the options of the kernel and its place on disk; compilation waits for a call."""
         options = {"targetoptions": kernel.targetoptions, "pipeline_class": compiler}
@@ -114,7 +117,7 @@ class LinkedFunction(CPUDispatcher):
         """Compile for a signature, once; return the key by which a call finds the code."""
         arguments, result = sigutils.normalize_signature(sig)
         with global_compiler_lock, self._compiling_counter:
-            known = self.overloads.get(tuple(arguments))
+            known: Any = self.overloads.get(tuple(arguments))
             if known is not None:
                 return known.entry_point
             details = {"dispatcher": self, "args": arguments, "return_type": result}
