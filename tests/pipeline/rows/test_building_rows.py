@@ -18,17 +18,15 @@ from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 
 from ..small_run import InProcess, write_configuration
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 TABLES = ("rows.parquet", "buildings.parquet", "buildings.csv", "totals.csv", "rejected.csv")
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(small_run):
     """A run of sixty pairs in rows."""
-    folder = tmp_path_factory.mktemp("rows")
-    record = run(write_configuration(folder), executor=InProcess()).record
-    return folder, record
+    return small_run, json.loads((small_run / "out" / "run.json").read_text())
 
 
 @pytest.fixture
