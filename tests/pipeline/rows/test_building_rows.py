@@ -13,7 +13,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from per_obspy.pipeline.run import report, run, screen
+from per_obspy.pipeline.run import report, screen
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
 
 from ..small_run import InProcess, write_configuration

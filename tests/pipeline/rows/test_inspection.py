@@ -7,6 +7,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.pipeline.rows.inspection import plan_inspection
 from per_obspy.report.plan.visits import Teams
 
+
 @pytest.fixture(scope="module")
 def finished(small_run):
     """Return the folder of a finished run of sixty pairs."""
