@@ -28,6 +28,7 @@ from per_obspy.pipeline.process import process_records
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.progress import silent
 from per_obspy.screening.ranking import STATES
+from per_obspy.tables.rounding import rounded_table
 
 from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
 
@@ -97,6 +98,8 @@ def test_csv_and_parquet_hold_the_same(finished):
     compare = partial(pd.testing.assert_frame_equal, check_dtype=False)
     compare(csv[others], parquet[others], rtol=5e-5, atol=0)
     compare(csv[places], parquet[places], rtol=0, atol=5.1e-8)
+    # and no digit is lost but by that rounding
+    compare(csv[numbers], rounded_table(parquet[numbers]), check_exact=True)
 
 
 def test_every_column_is_explained(finished):
