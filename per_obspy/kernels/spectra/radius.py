@@ -107,7 +107,7 @@ def run_strides(acceleration, table, checkpoints):
             p3, p4, p5 = acceleration[i + 3], acceleration[i + 4], acceleration[i + 5]
             p6, p7, p8 = acceleration[i + 6], acceleration[i + 7], acceleration[i + 8]
             for lane in range(LANES):
-                # Two sums each of displacement (u, f) and velocity (z, g): a chain of half the length
+                # Two sums each of displacement (u, f) and velocity (z, g): half as long a chain
                 u0, z0 = t[U + lane], t[Z + lane]
                 u = t[A11 + lane] * u0 + t[A12 + lane] * z0 + t[F0 + lane] * p0 + t[F1 + lane] * p1
                 z = t[A21 + lane] * u0 + t[A22 + lane] * z0 + t[G0 + lane] * p0 + t[G1 + lane] * p1
@@ -157,19 +157,11 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
     for tile in range(peaks.size):
         _mark_lanes(checkpoints, tile, peaks[tile], jumps[tile], pushes[tile], limits, marks)
         for first in range(0, LANES, GROUP):
-            count = 0
-            for k in range(GROUP):
-                count += marks[first + k]
-            if count == 0:
-                for k in range(GROUP):
-                    checkpoints[tile, 2, first + k] = 0.0
+            if not _any_marked(marks, first):
+                for lane in range(first, first + GROUP):
+                    checkpoints[tile, 2, lane] = 0.0
                 continue
-            # Step by step through the tile
-            for k in range(GROUP):
-                for row in range(8):
-                    group[(3 + row) * GROUP + k] = table[STEP + row, first + k]
-                for row in range(3):
-                    group[row * GROUP + k] = checkpoints[tile, row, first + k]
+            _open_group(table, checkpoints, tile, first, group)
             _run_steps(acceleration, tile * TILE, group)
             # Only marked lanes are raised, so that none depends on its neighbours
             for k in range(GROUP):
@@ -177,6 +169,25 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
                 checkpoints[tile, 2, first + k] = square
                 largest[0, first + k] = max(largest[0, first + k], square)
             _fill_limits(strongest, phases, dampings, largest, first, GROUP, limits)
+
+
+@kernel
+def _any_marked(marks, first):
+    """Return whether any lane of a group is marked."""
+    count = 0
+    for k in range(GROUP):
+        count += marks[first + k]
+    return count > 0
+
+
+@kernel
+def _open_group(table, checkpoints, tile, first, group):
+    """Fill state and squared radius before a tile, and the coefficients of a step."""
+    for k in range(GROUP):
+        for row in range(3):
+            group[row * GROUP + k] = checkpoints[tile, row, first + k]
+        for row in range(8):
+            group[(3 + row) * GROUP + k] = table[STEP + row, first + k]
 
 
 @kernel
