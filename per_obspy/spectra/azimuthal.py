@@ -172,17 +172,16 @@ def _spectra(
     fan = _fan(np.radians(half_turn[ascending]))
 
     # Oscillators whose steps are cut into equally many parts run together
-    lengths = np.empty((len(shares), half_turn.size, periods.size))
-    parts = _parts(2.0 * np.pi * dt / periods) if exact else np.ones(periods.size, dtype=np.int64)
+    lengths = np.empty((len(shares), periods.size, half_turn.size))
+    parts = _parts(2.0 * np.pi * dt / periods, exact)
     for count in np.unique(parts).tolist():
         chosen = np.flatnonzero(parts == count)
         oscillators = prepare_oscillators(dt / count, periods[chosen], dampings[chosen])
-        record = tiled_record(*(_with_steps_cut(component, count) for component in components))
-        work = partial(_block_squares, record, shares=shares, fan=fan, exact=exact)
-        squares = over_blocks(work, oscillators, record).reshape(len(shares), -1, chosen.size)
-        found = np.sqrt(squares) / oscillators.omegas**2 * record.scale
-        lengths[np.ix_(range(len(shares)), ascending, chosen)] = found[:, : half_turn.size]
-    return [spectrum.T.reshape(*shape, half_turn.size) for spectrum in lengths]
+        record = _record_with_steps_cut(components, count)
+        found = _lengths(record, oscillators, fan, shares, exact)[:, :, : half_turn.size]
+        # Back to the order of the arguments
+        lengths[:, chosen[:, np.newaxis], ascending] = found
+    return [spectrum.reshape(*shape, half_turn.size) for spectrum in lengths]
 
 
 def _row_of_azimuths(azimuths: ArrayLike) -> FloatArray:
@@ -191,10 +190,31 @@ def _row_of_azimuths(azimuths: ArrayLike) -> FloatArray:
     return row_of("azimuths", checks.finite("azimuths", row))
 
 
-def _parts(phases: FloatArray) -> NDArray[np.int64]:
+def _lengths(
+    record: TiledRecord,
+    oscillators: Oscillators,
+    fan: tuple[FloatArray, FloatArray],
+    shares: tuple[float, ...],
+    exact: bool,
+) -> FloatArray:
+    """Return the largest lengths of oscillators, (shares, n, azimuths of the fan), m."""
+    work = partial(_block_squares, record, shares=shares, fan=fan, exact=exact)
+    squares = over_blocks(work, oscillators, record)
+    lengths = np.sqrt(squares) / oscillators.omegas**2 * record.scale
+    return lengths.reshape(len(shares), -1, oscillators.size).transpose(0, 2, 1)
+
+
+def _parts(phases: FloatArray, exact: bool) -> NDArray[np.int64]:
     """Return the number of parts of a step, a power of two: bounds between samples stay tight."""
+    if not exact:
+        return np.ones(phases.size, dtype=np.int64)
     doublings = np.ceil(np.log2(np.maximum(phases / LONGEST_PHASE, 1.0)))
     return np.asarray(2 ** np.minimum(doublings, MOST_DOUBLINGS), dtype=np.int64)
+
+
+def _record_with_steps_cut(components: tuple[FloatArray, FloatArray], count: int) -> TiledRecord:
+    """Return both components with so many samples per step, ready for the kernels."""
+    return tiled_record(*(_with_steps_cut(component, count) for component in components))
 
 
 def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:

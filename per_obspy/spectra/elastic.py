@@ -238,6 +238,7 @@ def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> Float
     radius.pack(block.phases, block.dampings, table)
 
     for stretch in stretches(record):
+        # At every eighth step, then at all samples of tiles that may hold more
         radius.run_strides(stretch.north, table, tile_states)
         extremes = stretch.peaks[0], stretch.jumps[0]
         oscillators = block.phases, block.dampings, table
@@ -255,6 +256,7 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
     response.pack_response(block.weights, block.phases, block.dampings, packed)
 
     for stretch in stretches(record):
+        # At all samples
         response.run_response_tiles(stretch.north, stretch.east, packed, tile_states)
         if exact:
             _raise_between_samples(stretch, block, tile_states, largest)

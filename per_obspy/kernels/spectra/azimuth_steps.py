@@ -376,6 +376,7 @@ def raise_azimuths(
         oscillator = Oscillator(lane, phases[lane], dampings[lane], share)
         largest = best[lane]
         raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, largest)
+        # Between the samples only where the bounds of a step allow more
         if exact:
             count = list_steps(
                 north, east, peaks, jumps, checkpoints, oscillator, directions, largest, steps

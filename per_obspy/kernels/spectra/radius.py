@@ -92,6 +92,7 @@ def run_strides(acceleration, table, checkpoints):
     """
     # One line of memory with places that the compiler knows: it needs one pointer, not one per row
     t = aligned(1, LOCAL * LANES)[0]
+    # Coefficients and state
     t[:] = table[:LOCAL].ravel()
     for first in range(0, acceleration.size - 1, TILE):
         tile = first // TILE
@@ -111,12 +112,15 @@ def run_strides(acceleration, table, checkpoints):
                 u0, z0 = t[U + lane], t[Z + lane]
                 u = t[A11 + lane] * u0 + t[A12 + lane] * z0 + t[F0 + lane] * p0 + t[F1 + lane] * p1
                 z = t[A21 + lane] * u0 + t[A22 + lane] * z0 + t[G0 + lane] * p0 + t[G1 + lane] * p1
+                # The later samples of both
                 f = t[F4 + lane] * p4 + t[F5 + lane] * p5 + t[F6 + lane] * p6 + t[F7 + lane] * p7
                 g = t[G4 + lane] * p4 + t[G5 + lane] * p5 + t[G6 + lane] * p6 + t[G7 + lane] * p7
                 u = u + t[F2 + lane] * p2 + t[F3 + lane] * p3 + (f + t[F8 + lane] * p8)
                 z = z + t[G2 + lane] * p2 + t[G3 + lane] * p3 + (g + t[G8 + lane] * p8)
+                # State after the stride, and its radius
                 t[U + lane], t[Z + lane] = u, z
                 t[SQUARE + lane] = max(t[SQUARE + lane], u * u + z * z)
+        # Largest squared radius of the tile
         for lane in range(LANES):
             checkpoints[tile, 2, lane] = t[SQUARE + lane]
     # State for the next stretch of the record
@@ -146,6 +150,7 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
         Largest squared radii, raised in place, in the squared unit of the acceleration (over
         ``omega⁴``).
     """
+    # The radii looked at raise the limits of all tiles
     raise_to_tiles(checkpoints, peaks.size, largest)
     limits, marks, pushes = aligned(LIMITS, LANES), np.zeros(LANES, np.int64), np.empty(peaks.size)
     group = aligned(1, 11 * GROUP)[0]
@@ -161,6 +166,7 @@ def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkp
                 for lane in range(first, first + GROUP):
                     checkpoints[tile, 2, lane] = 0.0
                 continue
+            # Step by step through the tile
             _open_group(table, checkpoints, tile, first, group)
             _run_steps(acceleration, tile * TILE, group)
             # Only marked lanes are raised, so that none depends on its neighbours
@@ -195,6 +201,7 @@ def _fill_pushes(acceleration, pushes):
     """Fill the largest sum of ``|a|`` over half a stride of each tile, by the trapezoidal rule."""
     for tile in range(pushes.size):
         pushes[tile] = 0.0
+        # Every half stride of the tile
         for i in range(tile * TILE, (tile + 1) * TILE, 4):
             ends = 0.5 * (abs(acceleration[i]) + abs(acceleration[i + 4]))
             inner = abs(acceleration[i + 1]) + abs(acceleration[i + 2]) + abs(acceleration[i + 3])
