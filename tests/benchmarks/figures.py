@@ -23,8 +23,8 @@ from typing import Any
 FOLDER = Path(__file__).parent
 PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
 SCRIPTS = (
-    *("start_up", "formats", "spectra", "pounding", "rows", "pair_estimates", "footprints"),
-    "screening",
+    *("start_up", "formats", "spectra", "stations", "pounding", "rows", "pair_estimates"),
+    *("footprints", "screening"),
 )
 
 #: File that takes one line per figure while the scripts run.
