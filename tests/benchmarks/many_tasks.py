@@ -4,17 +4,17 @@ Memory of client and scheduler, and time per task, of many tiny tasks on a Dask 
 Run: ``python tests/benchmarks/many_tasks.py [TASKS ...]``, 1 000, 10 000 and 100 000 if not given;
 Linux only. The tasks go the way of a run's tasks: the executor keeps two per worker ahead of the
 results, and a worker checks versions and shared folder before and after each. Scheduler and two
-workers are processes of their own, started as on a cluster, new ones for each row. Results are
-counted and dropped, as those of a run are.
+workers are processes of their own, started as on a cluster. Results are checked and dropped.
 """
 
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from distributed import Client
 
@@ -32,7 +32,7 @@ FIRST = 50
 
 HEADER = (
     f"{'tasks':>8} {'ms per task':>12} {'client, ms':>11} {'scheduler, ms':>14} "
-    f"{'client before':>14} {'peak':>7} {'scheduler before':>17} {'peak':>7} MB"
+    f"{'client':>9} {'peak':>7} {'scheduler':>10} {'peak':>7} MB"
 )
 
 
@@ -41,11 +41,6 @@ def memory(kind: str) -> float:
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     (found,) = (line for line in lines if line.startswith(f"{kind}:"))
     return int(found.split()[1]) / 1024
-
-
-def spent() -> float:
-    """Return the processor time of this process, s."""
-    return time.process_time()
 
 
 def failed(content: bytes, reason: str) -> int:
@@ -78,8 +73,37 @@ def cluster(folder: Path) -> Iterator[str]:
             process.wait()
 
 
-def row(count: int) -> str:
-    """Do so many tasks and return a row of the table."""
+class Spent(NamedTuple):
+    """Seconds by the clock and of both processes, and their memory now and at its highest, MB."""
+
+    clock: float
+    client: float
+    scheduler: float
+    memory: tuple[float, float, float, float]
+
+
+def used(observer: Client) -> Spent:
+    """Return time and memory of client and scheduler so far."""
+    ask = observer.run_on_scheduler
+    now, highest = ask(memory, "VmRSS"), ask(memory, "VmHWM")
+    kept = (memory("VmRSS"), memory("VmHWM"), now, highest)
+    return Spent(time.perf_counter(), time.process_time(), ask(time.process_time), kept)
+
+
+def row(count: int, start: Spent, end: Spent) -> str:
+    """Return a row of the table."""
+    clock, client, scheduler = (
+        1e3 * (b - a) / max(count, 1) for a, b in zip(start[:3], end[:3], strict=True)
+    )
+    now, highest, there, highest_there = end.memory
+    return (
+        f"{count:>8} {clock:>12.2f} {client:>11.2f} {scheduler:>14.2f} "
+        f"{now:>9.1f} {highest:>7.1f} {there:>10.1f} {highest_there:>7.1f}"
+    )
+
+
+def main(counts: Sequence[int]) -> None:
+    """Print a row at the begin and after each number of tasks."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room)
         with (
@@ -91,28 +115,16 @@ def row(count: int) -> str:
             observer.wait_for_workers(WORKERS)
             work: Work[bytes, int] = Work(len, failed)
             assert sum(results([bytes(SIZE)] * FIRST, work, 1, executor)) == FIRST * SIZE
-            before = (memory("VmRSS"), observer.run_on_scheduler(memory, "VmRSS"))
-            start = (time.perf_counter(), spent(), observer.run_on_scheduler(spent))
-            total = sum(results((bytes(SIZE) for _ in range(count)), work, 1, executor))
-            end = (time.perf_counter(), spent(), observer.run_on_scheduler(spent))
-            peak = (memory("VmHWM"), observer.run_on_scheduler(memory, "VmHWM"))
-    assert total == count * SIZE  # every task once
-    clock, client, scheduler = (1e3 * (b - a) / count for a, b in zip(start, end, strict=True))
-    return (
-        f"{count:>8} {clock:>12.2f} {client:>11.2f} {scheduler:>14.2f} {before[0]:>14.1f} "
-        f"{peak[0]:>7.1f} {before[1]:>17.1f} {peak[1]:>7.1f}"
-    )
-
-
-def main(counts: tuple[int, ...]) -> None:
-    """Print a row per number of tasks, each of a process of its own."""
-    if len(counts) == 1:
-        print(row(counts[0]), flush=True)
-        return
-    print(HEADER, flush=True)
-    for count in counts:
-        subprocess.run([sys.executable, __file__, str(count)], check=True)
+            start = used(observer)
+            print(HEADER, row(0, start, start), sep="\n", flush=True)
+            tasks = (bytes(SIZE) for _ in range(max(counts)))
+            for number, result in enumerate(results(tasks, work, 1, executor), 1):
+                assert result == SIZE
+                if number in counts:
+                    print(row(number, start, used(observer)), flush=True)
+            assert number == max(counts)  # every task once
+            assert executor.facts()["events"] == []
 
 
 if __name__ == "__main__":
-    main(tuple(map(int, sys.argv[1:])) or TASKS)
+    main(list(map(int, sys.argv[1:])) or TASKS)

@@ -15,7 +15,9 @@ from ..pipeline.small_run import plain_figures, write_smallest_configuration
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
-ENSEMBLE = 'name = "one"\noutput = "one"\n[[scenario]]\nname = "a"\nrun = "run.toml"\nweight = 1.0\n'
+ENSEMBLE = (
+    'name = "one"\noutput = "one"\n[[scenario]]\nname = "a"\nrun = "run.toml"\nweight = 1.0\n'
+)
 
 
 @pytest.fixture(scope="module")
