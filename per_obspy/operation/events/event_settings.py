@@ -1,13 +1,17 @@
 """Settings of a watcher, and settings of the run of one earthquake derived from them."""
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from per_obspy.config import Fdsn, Records, Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
+from per_obspy.operation.events.relevance import Places
 from per_obspy.operation.events.state import EventState, moment
+from per_obspy.progress import Progress
 from per_obspy.records.fdsn.providers import base_url
 
 #: Windows of records begin at multiples of this, s, so that a small change of the origin time
@@ -23,6 +27,34 @@ SETTLE = 10.0
 #: Keys of one earthquake, which a watcher sets itself.
 OF_ONE_EVENT = ("event", "time")
 OF_ONE_WINDOW = ("event_id", "start", "end", "latitude", "longitude")
+
+
+class Watcher(NamedTuple):
+    """
+    Settings and state that the runs of all earthquakes share.
+
+    Attributes
+    ----------
+    settings : Run
+        With a section ``watch``.
+    folder : Path
+        Watched folder.
+    places : Places
+        Of the inventory.
+    now : callable
+        Returns the time, with its zone.
+    progress : callable
+        Called for every stage of a run.
+    executor : Executor or None
+        Where stations and chunks are done, if not in processes of this machine.
+    """
+
+    settings: Run
+    folder: Path
+    places: Places
+    now: Callable[[], datetime]
+    progress: Progress
+    executor: Executor | None
 
 
 def read_settings(file: Path) -> Run:

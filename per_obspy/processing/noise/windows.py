@@ -234,7 +234,8 @@ def same_onset(decision: Mapping[str, Any], source: Source, tolerance: float) ->
         If traces would decide of which there were no picks.
     """
     picks = {name: list(map(_of_ns, times)) for name, times in decision["picks"].items()}
-    computed = _rounded(p_arrival_at(*decision["place"], source))
+    latitude, longitude = decision["place"]
+    computed = _rounded(p_arrival_at(latitude, longitude, source))
     onset, method = first_wave(picks.__getitem__, computed, tolerance)
     return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])
 
