@@ -17,6 +17,7 @@ from per_obspy.jobs.output_folder import Result, file_hashes, recorded
 from per_obspy.operation.events.event_settings import read_settings
 from per_obspy.operation.events.state import EventState, read_event_states
 from per_obspy.operation.watch import Clock, Pass, watch_once
+from per_obspy.progress import Progress, silent
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
@@ -109,16 +110,17 @@ class City:
     """A watched city in a folder."""
 
     def __init__(
-        self, folder: Path, server: FdsnServer, clock: FakeClock, executor: Executor
+        self, folder: Path, server: FdsnServer, clock: FakeClock, executor: Executor | None
     ) -> None:
         self.clock, self.folder, self.executor = clock, folder / "out", executor
+        self.progress: Progress = silent
         self.settings = settings_of(write_city(folder, server))
 
     def at(self, seconds: float, **changes: object) -> Pass:
         """Return the outcome of one pass, so many seconds after the origin time."""
         section = self.settings.watch.model_copy(update=changes)
         settings = self.settings.model_copy(update={"watch": section})
-        return watch_once(settings, self.clock.at(seconds), executor=self.executor)
+        return watch_once(settings, self.clock.at(seconds), self.progress, self.executor)
 
     def state(self, name: str = "xx1") -> EventState:
         return read_event_states(self.folder)[0][name]
