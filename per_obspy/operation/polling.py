@@ -36,7 +36,7 @@ def is_over(watcher: Watcher, state: WatchState) -> bool:
 def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> WatchState:
     """Poll the list of earthquakes, and write changed states; a failure is noted."""
     watch, now = watch_of(watcher.settings), watcher.now()
-    state = read_watch_state(watcher.folder)
+    state = _state_of(watcher)
     if is_paused(now, state.not_before):
         errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
         return state
@@ -54,6 +54,14 @@ def polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerErro
         state = noted_poll(state, feed, now)
     write_watch_state(watcher.folder, state)
     return state
+
+
+def _state_of(watcher: Watcher) -> WatchState:
+    """Return the state of the watched folder; pauses of another list count no longer."""
+    watch = watch_of(watcher.settings)
+    source = str(watch.service or watch.folder)
+    state = read_watch_state(watcher.folder)
+    return state if state.source == source else WatchState(source=source, resting=state.resting)
 
 
 def _circle(watcher: Watcher) -> Circle:

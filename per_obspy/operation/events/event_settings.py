@@ -12,7 +12,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.operation.events.relevance import Places
 from per_obspy.operation.events.state import EventState, moment
 from per_obspy.progress import Progress
-from per_obspy.records.fdsn.providers import base_url
+from per_obspy.records.fdsn.providers import ROUTERS, base_url
 
 #: Windows of records begin at multiples of this, s, so that a small change of the origin time
 #: changes no window.
@@ -83,8 +83,11 @@ def read_settings(file: Path) -> Run:
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
     # An unknown service is a mistake at the start, not a failure of every poll
-    if settings.watch.service is not None:
-        base_url(settings.watch.service)
+    fdsn = settings.records.fdsn if settings.records else None
+    named = [settings.watch.service, *(fdsn.providers if fdsn else ())]
+    for provider in named:
+        if provider is not None and provider not in ROUTERS:
+            base_url(provider)
     return settings
 
 

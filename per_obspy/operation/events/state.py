@@ -130,6 +130,8 @@ class WatchState(_State):
 
     Attributes
     ----------
+    source : str
+        Service or folder to which all of this belongs.
     last_poll : str or None
         Time of the latest look at the list of earthquakes that succeeded, ISO 8601, UTC.
     since : str or None
@@ -146,6 +148,7 @@ class WatchState(_State):
         File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
     """
 
+    source: str = ""
     last_poll: Moment | None = None
     since: Moment | None = None
     failures: int = Field(0, ge=0)
