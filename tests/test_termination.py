@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from per_obspy import termination
+from per_obspy.config import Run, load
+from per_obspy.pipeline.run import run
 
-from .pipeline.small_run import SCENARIO, write_configuration
+from .pipeline.small_run import SCENARIO, InProcess, plain_figures, write_configuration
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
@@ -151,10 +153,10 @@ def small_run(folder, workers):
 
 
 def results_of(folder):
-    """Run to the end, and return the bytes of the tables."""
-    running = small_run(folder, workers=1)
-    _, errors = running.communicate(timeout=300)
-    assert running.returncode == 0, errors
+    """Run to the end in this process, and return the bytes of the tables."""
+    with plain_figures():
+        settings = load(folder / "run.toml", Run)
+        run(settings.model_copy(update={"workers": 1}), executor=InProcess())
     return {name: (folder / "out" / name).read_bytes() for name in TABLES}
 
 
@@ -186,6 +188,7 @@ def ended_run(folder, line, workers, number):
     # of two workers: both, the server that forks them, the run, and Python's tracker of resources
     while len(members(running.pid)) < (5 if workers == 2 else 1):
         assert running.poll() is None
+        time.sleep(0.02)
     # a service manager asks the run alone, the key of a terminal everything that it started
     code, seconds, errors = end(running, number, key=number == signal.SIGINT)
     while members(running.pid):

@@ -159,7 +159,7 @@ def test_a_list_that_fails_does_not_hold_up_runs(city, server):
     assert read_status(city.folder).last_error is None
 
 
-def test_the_pause_of_a_service_ends_with_another_address(city, server):
+def test_the_pause_of_a_service_ends_with_another_address(city):
     # A wrong address is mended: the user does not wait for the pause of the wrong one
     (error,) = city.at(30, service="http://127.0.0.1:9").errors
     assert "no answer" in str(error)

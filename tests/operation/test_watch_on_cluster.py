@@ -15,6 +15,7 @@ pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
 from per_obspy.jobs.cluster import dask_client
 
+
 @pytest.fixture
 def server():
     with serving(city_earthquake(stations=2)) as running:

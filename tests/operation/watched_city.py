@@ -78,13 +78,18 @@ def city_earthquake(stations: int = 3, magnitude: float = 6.5) -> Simulation:
 
 
 def write_city(
-    folder: Path, server: FdsnServer, watch: str = "", delays: Sequence[float] = DELAYS
+    folder: Path,
+    server: FdsnServer,
+    watch: str = "",
+    delays: Sequence[float] = DELAYS,
+    pairs: int = 30,
 ) -> Path:
     """Write the inventory and the configuration of the watcher, and return the configuration."""
     places = [(station.longitude, station.latitude) for station in server.inventory[0]]
     longitude, latitude = np.array(places).T
-    pairs = simulated_pairs(longitude, latitude, count=30, seed=1, radius=2000.0, touching=0.5)
-    write_pairs(pairs, folder / "pairs.csv")
+    near = {"radius": 2000.0, "touching": 0.5}
+    inventory = simulated_pairs(longitude, latitude, count=pairs, seed=1, **near)
+    write_pairs(inventory, folder / "pairs.csv")
     text = CONFIGURATION.format(url=server.url, watch=watch, delays=list(delays))
     (folder / "city.toml").write_text(text)
     return folder / "city.toml"
