@@ -133,9 +133,10 @@ def test_a_signal_that_is_held_back_waits():
 
 
 def write_run(folder):
-    """Write the configuration of a run of three stations and nine pairs."""
+    """Write the configuration of a run of two stations and five pairs."""
     write_configuration(folder)
-    (folder / "scenario.toml").write_text(SCENARIO.replace("count = 60", "count = 9"))
+    scenario = SCENARIO.replace("count = 60", "count = 5").replace("stations = 3", "stations = 2")
+    (folder / "scenario.toml").write_text(scenario)
 
 
 def small_run(folder, workers):
@@ -204,10 +205,10 @@ def test_a_run_that_is_ended_twice_leaves_no_process_and_goes_on_to_the_same_byt
     tmp_path, undisturbed
 ):
     write_run(tmp_path)
-    ended_run(tmp_path, "stations: 0 of 3", 2, signal.SIGTERM)
-    ended_run(tmp_path, "screening: 0 of 9", 1, signal.SIGINT)
+    ended_run(tmp_path, "stations: 0 of 2", 2, signal.SIGTERM)
+    ended_run(tmp_path, "screening: 0 of 5", 1, signal.SIGINT)
     stations = times(tmp_path / "out" / "stations", "*.json")
-    assert len(stations) == 3
+    assert len(stations) == 2
     assert results_of(tmp_path) == undisturbed
     # finished stations were not done again
     assert times(tmp_path / "out" / "stations", "*.json") == stations

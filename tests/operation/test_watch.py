@@ -338,7 +338,7 @@ def test_messages_show_the_revision_and_a_failing_one_is_in_the_status(city, ser
     assert read_status(city.folder).last_notification_error is None
 
 
-def test_only_a_station_that_comes_late_is_computed(city, server, monkeypatch):
+def test_only_what_changes_is_computed(city, server, simulation, monkeypatch):
     """With real runs, whose windows of records are the same at both delays."""
     monkeypatch.setattr(event_run, "run", run)
     server.silent = {"S002"}
@@ -346,18 +346,23 @@ def test_only_a_station_that_comes_late_is_computed(city, server, monkeypatch):
         city.at(201, delays=[200, 400])
         server.silent = set()
         city.at(401, delays=[200, 400])
-    assert city.revisions() == ["0001", "0002"]
+        # Neither a station nor a chunk of pairs or rows depends on the magnitude
+        server.events["xx1"] = magnified(simulation, 7.2)
+        city.at(500, delays=[200, 400])
+    assert city.revisions() == ["0001", "0002", "0003"]
     records = [
         json.loads((city.event() / "revisions" / name / "run.json").read_text())
         for name in city.revisions()
     ]
     counts = [record["counts"] for record in records]
-    assert [count["stations"] for count in counts] == [1, 2]
-    assert [count["stations_resumed"] for count in counts] == [0, 1]
+    assert [count["stations"] for count in counts] == [1, 2, 2]
+    assert [count["stations_resumed"] for count in counts] == [0, 1, 2]
+    assert [count["chunks_resumed"] for count in counts] == [0, 0, counts[2]["chunks"]]
+    assert counts[2]["row_chunks_resumed"] == counts[2]["row_chunks"] > 0
     described = dict(result_facts(city.event() / "latest").lines)
     assert described["earthquake"] == "2000-01-01T00:00:00, 2 stations"
     # People see which revision of which earthquake they have
-    for number, name in enumerate(city.revisions(), start=1):
+    for number, name in enumerate(city.revisions()[:2], start=1):
         folder = city.event() / "revisions" / name
         text = " ".join((folder / "summary.txt").read_text().split())
         assert f"xx1: Revision {number}, 00:0{number * 3}" in text
@@ -463,6 +468,8 @@ def test_file_that_is_no_quakeml_waits_while_it_is_young(city, tmp_path, simulat
     (error,) = city.at(100, **feed).errors
     assert isinstance(error, CatalogError)
     assert "a.xml: is no QuakeML" in str(error)
+    # No address in memory, which would be another message at each poll
+    assert "0x" not in str(error)
     assert city.revisions("event") == ["0001"]
     # It is tried again
     shutil.copy(tmp_path / "feed" / "b.xml", half)
