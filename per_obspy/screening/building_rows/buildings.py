@@ -29,7 +29,9 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
     Parameters
     ----------
     sides : DataFrame
-        From :func:`~.sides.sides_of`, all sides of a building one after the other, with ``area``.
+        Interfaces as seen from one of their buildings, all of a building one after the other:
+        columns of its row and pair without ``_left``, ``_right``, ``_1`` and ``_2``, with
+        ``neighbour_number``, ``neighbour_id``, ``direction`` (towards it, degrees) and ``area``.
     classes : mapping of str to float
         Name and smallest severity of each risk class, m/s, descending to 0.
     angle : float

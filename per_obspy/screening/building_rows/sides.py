@@ -27,48 +27,30 @@ OF_PAIRS = (
 )
 
 
-def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
+def directions(azimuth: Any, flags: Any) -> dict[str, FloatArray]:
     """
-    Return interfaces as seen from one of their two buildings.
+    Return the directions towards the neighbours on both sides of interfaces.
 
     Parameters
     ----------
-    interfaces : DataFrame
-        Columns ``row_columns.ROWS`` and ``OF_PAIRS``, and ``leftward``: whether the building is the
-        left one.
+    azimuth : (n,) array_like
+        Of the axes of the rows, from their first to their last buildings, degrees.
+    flags : (n,) array_like of str
+        Flags of the rows.
 
     Returns
     -------
-    DataFrame
-        The columns without ``_left``, ``_right``, ``_1`` and ``_2``, and ``neighbour_number``,
-        ``neighbour_id`` and ``direction`` (towards the neighbour, degrees; NaN if unknown).
+    dict of (n,) ndarray
+        ``direction_left`` (of the building on the left) and ``direction_right``, degrees; NaN if
+        the axis is unknown.
     """
-    at_left = interfaces["leftward"].to_numpy(bool)
-    columns = _own_columns(interfaces, at_left)
-    for name in ("number", "id"):
-        left, right = (interfaces[f"building_{name}_{side}"] for side in ("left", "right"))
-        columns[f"neighbour_{name}"] = right.where(at_left, left)
-    # Towards the neighbour
-    azimuth = interfaces["azimuth"] + np.where(at_left, 0.0, 180.0)
-    known = ~interfaces["flags"].str.contains("unknown_azimuth", regex=False)
-    columns["direction"] = (azimuth % 360.0).where(known)
-    return pd.DataFrame(columns)
-
-
-def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the columns of the pair, and those of the building of one side."""
-    columns: dict[str, Any] = {}
-    # Building 1 is on the left of a pair that is not turned
-    is_first = at_left ^ interfaces["turned"].to_numpy(bool)
-    for name in map(str, interfaces):
-        stem, _, end = name.rpartition("_")
-        if end == "left":
-            columns[stem] = interfaces[name].where(at_left, interfaces[f"{stem}_right"])
-        elif end == "1":
-            columns[stem] = interfaces[name].where(is_first, interfaces[f"{stem}_2"])
-        elif end not in ("right", "2"):
-            columns[name] = interfaces[name]
-    return columns
+    codes, texts = pd.factorize(np.asarray(flags, dtype=object))
+    known = np.array(["unknown_azimuth" not in text for text in texts], dtype=bool)[codes]
+    axis = np.asarray(azimuth, dtype=np.float64)
+    return {
+        f"direction_{side}": np.where(known, (axis + turn) % 360.0, np.nan)
+        for side, turn in (("left", 0.0), ("right", 180.0))
+    }
 
 
 class Groups:
