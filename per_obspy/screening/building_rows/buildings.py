@@ -122,8 +122,12 @@ def _position(sides: pd.DataFrame, groups: Groups, angle: float) -> NDArray[np.o
 
 def _contacts_in_row(sides: pd.DataFrame) -> FloatArray:
     """Return the number of sides with neighbours in the same row, for the building of each side."""
-    counted = sides.groupby(["building_number", "row_id"])["interface"].transform("size")
-    return counted.to_numpy(np.float64)
+    row, _ = pd.factorize(sides["row_id"])
+    building = sides["building_number"].to_numpy(np.int64)
+    # Sides of a building are ordered by their rows
+    begins = (np.diff(building, prepend=-1) != 0) | (np.diff(row, prepend=-1) != 0)
+    sizes = np.diff(np.flatnonzero(begins), append=building.size)
+    return np.repeat(sizes, sizes).astype(np.float64)
 
 
 def _hits(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray | NDArray[np.int64]]:

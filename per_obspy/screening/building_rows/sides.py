@@ -93,15 +93,21 @@ class Groups:
     def distinct(self, values: NDArray[np.int64], where: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the number of different values in some rows of each group."""
         group = np.repeat(np.arange(self.starts.size), self.sizes)[where]
-        pairs = np.unique(np.stack([group, values[where]], axis=1), axis=0)
-        return np.bincount(pairs[:, 0], minlength=self.starts.size).astype(np.int64)
+        # Group and place of the value as one number, each once
+        places, names = pd.factorize(values[where])
+        both = np.unique(group * (len(names) + 1) + places)
+        return np.bincount(both // (len(names) + 1), minlength=self.starts.size).astype(np.int64)
 
     def texts(self, values: NDArray[Any], join: Callable[[list[str]], str]) -> NDArray[np.object_]:
         """Return the different texts of each group, joined."""
-        joined = []
-        for start, size in zip(self.starts.tolist(), self.sizes.tolist(), strict=True):
-            joined.append(join(list(dict.fromkeys(values[start : start + size]))))
-        return np.array(joined, dtype=object)
+        texts = np.asarray(values, dtype=object)
+        joined = texts[self.starts]
+        # Few groups have different texts
+        differs = self.any(np.asarray(texts != np.repeat(joined, self.sizes), dtype=bool))
+        for group in np.flatnonzero(differs).tolist():
+            some = texts[self.starts[group] : self.starts[group] + self.sizes[group]]
+            joined[group] = join(list(dict.fromkeys(some.tolist())))
+        return joined
 
     def _reduced(self, function: np.ufunc, values: NDArray[Any]) -> FloatArray:
         """Apply a reduction to each group."""
