@@ -7,6 +7,7 @@ pieces; the buildings are then ordered by their ranking.
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -28,7 +29,6 @@ from per_obspy.tables.described import regrouped, schema_of, table_of, write_mea
 from per_obspy.tables.parts import (
     batches,
     bounded_database,
-    parquet_rows,
     text_columns,
 )
 from per_obspy.tables.risk import write_worst
@@ -37,11 +37,18 @@ from per_obspy.tables.totals import areas_of
 #: Sides of buildings that are reduced together, about.
 SIDES = 100_000
 
+#: Rows of a file that are read together.
+TOGETHER = 10_000
+
 #: Buildings that are written together.
 ROWS = 50_000
 
 #: Name of the column of areas in the file of contacts: that of the pair table may be any.
 AREA = "area_of_totals"
+
+#: Memory of the database, and its threads: one needs a quarter less processor time than two.
+MEMORY = "256MB"
+THREADS = 1
 
 _NUMBER = Column("building_number", "int64", "1", "")
 
@@ -84,6 +91,23 @@ class BuildingWays(NamedTuple):
     angle: float
 
 
+@contextmanager
+def small_database(folder: Path) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Yield a database of little memory, which leaves the rest to a temporary folder inside."""
+    with bounded_database(folder) as database:
+        database.execute(f"SET memory_limit = '{MEMORY}'")
+        database.execute(f"SET threads = {THREADS}")
+        yield database
+
+
+@contextmanager
+def stored_rows(file: Path) -> Iterator[pa.RecordBatchReader]:
+    """Yield the rows of a Parquet file once, for a database; a dataset would read far ahead."""
+    with pq.ParquetFile(file.absolute(), pre_buffer=False) as stored:
+        rows = stored.iter_batches(TOGETHER, use_threads=False)
+        yield pa.RecordBatchReader.from_batches(stored.schema_arrow, rows)
+
+
 def write_buildings(
     folder: Path, contacts: Path, ways: BuildingWays, facts: Mapping[str, str], csv_rows: int
 ) -> list[Path]:
@@ -106,7 +130,7 @@ def write_buildings(
     """
     names = ("buildings.parquet", "buildings.csv", "buildings.columns.csv")
     table, text, columns = files = [folder / name for name in names]
-    with temporary_folder(folder) as room, bounded_database(room) as database:
+    with temporary_folder(folder) as room, small_database(room) as database:
         # Buildings in the order of their numbers, then in that of their ranking
         unranked = room / "unranked.parquet"
         with pq.ParquetWriter(unranked, schema_of(UNRANKED)) as writer:
@@ -203,18 +227,19 @@ def _write_ranked(
 ) -> None:
     """Write all buildings in the order of their ranking, with their rank from 1."""
     # By their ranking, without the numbers by which they were made
-    database.register("buildings", parquet_rows([unranked]))
     names = ", ".join(column.name for column in BUILDINGS[1:])
     query = f"SELECT {names} FROM buildings ORDER BY {_ORDER}"
     statement = {"per_obspy": json.dumps({"version": version("per_obspy"), **facts})}
     schema = schema_of(BUILDINGS, statement)
     dictionaries = text_columns(schema)
-    found = (pa.Table.from_batches([batch]) for batch in batches(database, query, ROWS))
     before, unnumbered = 0, pa.schema(list(schema)[1:])
     with (
+        stored_rows(unranked) as stored,
         written_whole(table) as part,
         pq.ParquetWriter(part, schema, use_dictionary=dictionaries) as writer,
     ):
+        database.register("buildings", stored)
+        found = (pa.Table.from_batches([batch]) for batch in batches(database, query, ROWS))
         # Ranks count from 1
         for rows in regrouped(found, unnumbered, ROWS):
             rank = pa.array(np.arange(before + 1, before + 1 + rows.num_rows))

@@ -26,12 +26,12 @@ from per_obspy.screening.building_rows.members import NEEDED
 from per_obspy.screening.building_rows.placed import ChunkNumbers
 from per_obspy.screening.building_rows.sides import OF_PAIRS
 from per_obspy.tables.building_rows import TOGETHER as GROUP
-from per_obspy.tables.buildings import AREA
+from per_obspy.tables.buildings import AREA, small_database, stored_rows
 from per_obspy.tables.described import regrouped
-from per_obspy.tables.parts import batches, bounded_database, parquet_rows
+from per_obspy.tables.parts import batches
 
 #: Pairs of a piece, about.
-PIECE = 50_000
+PIECE = 20_000
 
 #: Columns of contacts that describe their rows.
 OF_ROWS = (
@@ -93,15 +93,15 @@ def all_rows(pairs: PairColumns, rows: Rows, area: str | None, room: Path) -> Al
         carried, columns[AREA] = [*carried, AREA], area
     noted = _Noted([], [], [], Counter())
     found, ordered = room / "found.parquet", room / "contacts.parquet"
-    with bounded_database(room) as database:
+    with small_database(room) as database:
         numbers = building_numbers(pairs, database)
         piece = piece_numbers(numbers, PIECE)
         pieces = pieces_of(pairs, numbers, piece, columns, database)
         parts = (found_rows(some, rows, carried) for some in pieces)
         _write((noted.add(part) for part in parts), found)
     ends = np.sort(np.concatenate(noted.own))
-    with bounded_database(room) as database:
-        database.register("found", parquet_rows([found]))
+    with small_database(room) as database, stored_rows(found) as stored:
+        database.register("found", stored)
         tables = _completed(batches(database, _ORDER, PIECE), numbers.count, ends)
         contacts = _write(tables, ordered)
     found.unlink()

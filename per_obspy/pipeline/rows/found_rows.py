@@ -43,7 +43,7 @@ FINDING = (
 PLACING = ("rank", "station", "distance", "azimuth_used")
 
 #: Rows that are taken from the database together.
-TOGETHER = 50_000
+TOGETHER = 20_000
 
 
 class FoundRows(NamedTuple):

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 #: Pairs that are read together.
-TOGETHER = 50_000
+TOGETHER = 20_000
 
 
 class PairColumns(NamedTuple):

@@ -95,8 +95,9 @@ class Groups:
         group = np.repeat(np.arange(self.starts.size), self.sizes)[where]
         # Group and place of the value as one number, each once
         places, names = pd.factorize(values[where])
-        both = np.unique(group * (len(names) + 1) + places)
-        return np.bincount(both // (len(names) + 1), minlength=self.starts.size).astype(np.int64)
+        both = np.sort(group * (len(names) + 1) + places)
+        once = both[np.diff(both, prepend=-1) > 0]
+        return np.bincount(once // (len(names) + 1), minlength=self.starts.size).astype(np.int64)
 
     def texts(self, values: NDArray[Any], join: Callable[[list[str]], str]) -> NDArray[np.object_]:
         """Return the different texts of each group, joined."""
