@@ -112,8 +112,9 @@ def test_totals_count_every_building_once(finished):
 def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     before = content(copied)
     shutil.rmtree(copied / "out" / "rows")
-    for name in ("building_rows.TOGETHER", "building_rows.CHUNK"):
+    for name in ("all_rows.PIECE", "all_rows.CHUNK", "found_rows.TOGETHER"):
         monkeypatch.setattr(f"per_obspy.pipeline.rows.{name}", size)
+    monkeypatch.setattr("per_obspy.pipeline.rows.pair_columns.TOGETHER", size)
     monkeypatch.setattr("per_obspy.tables.buildings.SIDES", size)
     assert screened(copied)["row_chunks"] > 3
     assert content(copied) == before
