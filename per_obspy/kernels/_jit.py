@@ -90,6 +90,9 @@ kernel = _compiler(FunctionCompiler)
 #: than arithmetic.
 lean = _compiler(LeanCompiler, _nrt=False)
 
+#: The same for loops over lanes, which become vectors before they are merged into their callers.
+vectorised = _compiler(FunctionCompiler, _nrt=False)
+
 #: For small kernels of inner loops, which the compiler otherwise leaves out of line as soon as
 #: their callers grow.
 inlined = _compiler(LeanCompiler, _nrt=False, forceinline=True)

@@ -6,9 +6,9 @@ for all of it and wraps it for Python. In a chain of calls the last function goe
 often as the chain is long. Here a function that kernels call is translated to LLVM's intermediate
 code only; a kernel that Python calls links the code of all, and generates machine code once.
 
-Functions without memory of their own are not even optimised before that. Those with memory are:
-their loops over arrays become vectors before they are merged into their callers, without which
-spectra take some percent longer.
+Scalar functions are not even optimised before that. Those with loops over arrays are: the loops
+become vectors before they are merged into their callers, without which spectra take some percent
+longer.
 """
 
 from typing import Any
@@ -82,7 +82,7 @@ class FunctionCompiler(Compiler):
 
 
 class LeanCompiler(FunctionCompiler):
-    """Compiler of functions without memory of their own."""
+    """Compiler of scalar functions."""
 
     library = LeanLibrary
 

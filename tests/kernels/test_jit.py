@@ -14,7 +14,7 @@ from per_obspy.kernels import _jit
 
 compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="kernels run uncompiled")
 
-DECORATORS = [_jit.kernel, _jit.lean, _jit.inlined]
+DECORATORS = [_jit.kernel, _jit.lean, _jit.vectorised, _jit.inlined]
 
 
 @pytest.mark.parametrize("decorator", DECORATORS)

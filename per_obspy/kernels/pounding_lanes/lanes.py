@@ -18,7 +18,7 @@ pair alone: 32 lanes are always computed. The constants below are the rows of th
 
 import math
 
-from per_obspy.kernels._jit import lean
+from per_obspy.kernels._jit import lean, vectorised
 
 #: Pairs that are computed side by side.
 PAIR_LANES = 32
@@ -90,7 +90,7 @@ def contact_value(lanes, lane, left, right, velocity, ground):
     )
 
 
-@lean
+@vectorised
 def start_tile(lanes, north, east):
     """Store the states at the start of a tile, and begin its extremes with them."""
     for lane in range(PAIR_LANES):
@@ -125,7 +125,7 @@ def step_structure(lanes, first, lane, u, z, high, low, radius_squared, ground, 
     return after, z, max(high, after), min(low, after), max(radius_squared, after * after + z * z)
 
 
-@lean
+@vectorised
 def advance_one_step(lanes, n0, e0, n1, e1):
     """Step every lane from one north and east acceleration to the next."""
     second = STRUCTURE_ROWS
@@ -170,7 +170,7 @@ def advance_one_step(lanes, n0, e0, n1, e1):
         lanes[at(TILE_CONTACT, lane)] = least
 
 
-@lean
+@vectorised
 def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
     """Step every lane four times, without a store between the steps."""
     second = STRUCTURE_ROWS
@@ -241,7 +241,7 @@ def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
         lanes[at(TILE_CONTACT, lane)] = least
 
 
-@lean
+@vectorised
 def flag_structures(lanes, flags, i, peak, jump):
     """
     Bound structure i of every lane between the samples; flag lanes where it may peak or yield.
@@ -295,7 +295,7 @@ def flag_structures(lanes, flags, i, peak, jump):
         flags[lane] |= (PEAK_FLAGS[i] if rises else 0) | (EVENT_FLAG if yields else 0)
 
 
-@lean
+@vectorised
 def flag_contacts(lanes, flags):
     """Flag lanes whose pair may meet or part."""
     second = STRUCTURE_ROWS

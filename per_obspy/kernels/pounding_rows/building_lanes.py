@@ -8,7 +8,7 @@ has the rows of structure 1 and of the contact function; the rows of structure 2
 states of the last four steps.
 """
 
-from per_obspy.kernels._jit import lean
+from per_obspy.kernels._jit import lean, vectorised
 from per_obspy.kernels.pounding_lanes.lanes import (
     AXIS_COSINE,
     AXIS_SINE,
@@ -53,7 +53,7 @@ def _contact_value(lanes, lane, displacement, velocity, ground):
     )
 
 
-@lean
+@vectorised
 def start_tile(lanes, north, east):
     """Store the states at the start of a tile, and begin its extremes with them."""
     for lane in range(PAIR_LANES):
@@ -78,7 +78,7 @@ def start_tile(lanes, north, east):
         lanes[at(TILE_CONTACT, lane)] = contact
 
 
-@lean
+@vectorised
 def advance_one_step(lanes, n0, e0, n1, e1):
     """Step every lane from one north and east acceleration to the next."""
     for lane in range(PAIR_LANES):
@@ -109,7 +109,7 @@ def advance_one_step(lanes, n0, e0, n1, e1):
         lanes[at(TILE_CONTACT, lane)] = min(lanes[at(TILE_CONTACT, lane)], contact)
 
 
-@lean
+@vectorised
 def advance_four_steps(lanes, n0, e0, n1, e1, n2, e2, n3, e3, n4, e4):
     """Step every lane four times, without a load of its state between the steps."""
     for lane in range(PAIR_LANES):
