@@ -31,6 +31,7 @@ from per_obspy.screening.building_rows.placed import PlacedRows, placed_rows
 from per_obspy.tables.building_rows import write_rows
 from per_obspy.tables.buildings import BuildingWays, write_buildings
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows, some_columns
+from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.threads import usable_processors
 
 #: Columns of the pair table without which no pair names its buildings.
@@ -108,7 +109,7 @@ def building_rows(
     settings : Run
         Settings of the run.
     folder : Path
-        Of the results, with ``risk.parquet``.
+        Of the results, with the risk table.
     ground : GroundFiles
         The stations.
     facts : mapping of str to str
@@ -119,7 +120,7 @@ def building_rows(
         Called for every chunk.
     """
     # Opened for its columns, then once for every pass over it
-    risk = parquet_rows([folder / "risk.parquet"])
+    risk = parquet_rows(table_files(folder))
     if not _enabled(settings.rows, risk):
         return NO_ROWS
     found = _found(settings.rows, risk)
