@@ -287,6 +287,8 @@ def print_nothing(result: "Result") -> None:
 
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
+    from per_obspy.tables.ranked.ranked_files import listed_outputs
+
     folder, record = result.folder, result.record
     if result.did_nothing:
         print("Up to date: these inputs were run before.")
@@ -297,7 +299,7 @@ def print_result(result: "Result") -> None:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
         _print_worst(folder, 10)
-    for name in sorted({*record["outputs"], "run.json", "configuration.toml"}):
+    for name in listed_outputs({*record["outputs"], "run.json", "configuration.toml"}):
         print(f"  {folder / name}")
 
 

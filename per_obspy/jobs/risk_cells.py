@@ -83,7 +83,7 @@ class CellJob(NamedTuple):
 
 class Means(NamedTuple):
     """
-    Where the work is done, and how it is reported.
+    Place of the work, and the callback for its progress.
 
     Attributes
     ----------
@@ -126,24 +126,32 @@ def write_cells(
     Unfinished
         If the machine failed in some; the next run does these.
     """
+    # A folder of its own, which a killed run leaves to the next
     work, paths = folder / WORK, [part.path for part in parts if part.path]
     schema = joined_schema(paths)
     key = content_hash({"facts": dict(facts), "size": size, "parts": _hashes(parts)})
     cells = _arranged(paths, work, schema, (key, size), means)
     whole = ranked_schema(schema, facts)
-    _made(work / DATASET)
-    jobs = (
-        CellJob(tuple(rows), whole, work / DATASET / f"{cell}.parquet", f"{key} {cell}")
+    made = _made(work / DATASET)
+    jobs = [
+        CellJob(tuple(rows), whole, made / f"{cell}.parquet", f"{key} {cell}")
         for cell, rows in sorted(cells.items())
-    )
-    total, found = CellCounts(Counter(), Counter()), list[Path]()
-    for file, counts in new_and_resumed(jobs, _earlier_cell, _WRITTEN, *means[:2]):
-        found.append(file)
+    ]
+    # All cells, then the folder under its name
+    counts = _written(jobs, means)
+    _publish(work, {job.file for job in jobs}, folder / DATASET)
+    return RiskFiles(table_files(folder), *counts)
+
+
+def _written(jobs: Sequence[CellJob], means: Means) -> CellCounts:
+    """Write all cells and return their numbers together."""
+    total = CellCounts(Counter(), Counter())
+    found = new_and_resumed(jobs, _earlier_cell, _WRITTEN, *means[:2])
+    for done, counts in enumerate(found, start=1):
         total.states.update(counts.states)
         total.stations.update(counts.stations)
-        means.progress("cells", len(found), len(cells))
-    _publish(work, set(found), folder / DATASET)
-    return RiskFiles(table_files(folder), *total)
+        means.progress("cells", done, len(jobs))
+    return total
 
 
 def write_texts(table: Sequence[Path], folder: Path, csv_rows: int) -> list[Path]:
@@ -171,6 +179,7 @@ def _arranged(
     """Arrange all parts, and return the rows of each cell in the order of the parts."""
     key, size = cells
     found = list[dict[str, CellRows]]()
+    # Ranks come from the order of the whole, everything else from the part alone
     with temporary_folder(_made(work)) as room:
         jobs = [
             ArrangeJob(part, ranks, schema, size, work / "arranged" / f"{part.stem}.arrow", key)
@@ -220,21 +229,20 @@ def _earlier_part(job: ArrangeJob) -> dict[str, CellRows] | None:
     return {cell: CellRows(job.file, *rows) for cell, rows in status["rows"].items()}
 
 
-def _write(job: CellJob) -> tuple[Path, CellCounts]:
+def _write(job: CellJob) -> CellCounts:
     """Write one cell and its status."""
     counts = write_cell(job.rows, job.schema, job.file, job.file.parent.parent)
     outputs = {f"{DATASET}/{job.file.name}": file_hash(job.file)}
     write_status(_status_file(job), job.key, outputs, counts._asdict())
-    return job.file, counts
+    return counts
 
 
-def _earlier_cell(job: CellJob) -> tuple[Path, CellCounts] | None:
-    """Return a cell that an earlier run has written, None if it has not."""
+def _earlier_cell(job: CellJob) -> CellCounts | None:
+    """Return the numbers of a cell that an earlier run has written, None if it has not."""
     status = earlier_status(_status_file(job), job.key)
     if status is None:
         return None
-    counts = CellCounts(Counter(status["states"]), Counter(status["stations"]))
-    return job.file, counts
+    return CellCounts(Counter(status["states"]), Counter(status["stations"]))
 
 
 def _status_file(job: CellJob) -> Path:

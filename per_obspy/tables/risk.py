@@ -63,6 +63,7 @@ def write_risk(
     """
     names = ("risk.parquet", "risk.csv", "risk.columns.csv")
     table, text, columns = files = [folder / name for name in names]
+    # Schema of the parts, and of the table
     schema = joined_schema(parts)
     whole = ranked_schema(schema, facts)
     with written_whole(table) as part, written_whole(text) as lines:

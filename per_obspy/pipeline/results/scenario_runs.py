@@ -148,6 +148,7 @@ def _stations(run: ScenarioRun) -> Sequence[Any]:
 def _rows_of(risk: Sequence[Path], names: Sequence[str]) -> pd.DataFrame:
     """Return the rows of some pairs with the columns for a history, except the rank."""
     wanted = [name for name in ("pair_id", *HISTORY_COLUMNS) if name != "rank"]
+    # Columns that a run may lack are left out
     known = set(pq.read_schema(risk[0].absolute()).names)
     rows = parquet_rows(risk, [name for name in wanted if name in known])
     named = rows.to_table(filter=pc.field("pair_id").isin(names), use_threads=False)

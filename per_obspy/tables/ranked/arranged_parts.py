@@ -103,9 +103,11 @@ def write_arranged(
     dict of str to CellRows
         Rows of every cell of the part.
     """
+    # The whole part is in memory, as it was when its chunk was computed
     rows = pa.concat_tables(part_rows(part, schema)).combine_chunks()
     rows = rows.add_column(0, "rank", pa.array(np.fromfile(ranks, dtype="<i8")))
     names = _cells_of(rows, size)
+    # Within a cell rows stay in the order of their ranks
     order = np.argsort(names, kind="stable")
     arranged = rows.take(order)
     with (

@@ -54,6 +54,7 @@ def write_cell(rows: Sequence[CellRows], schema: pa.Schema, path: Path, room: Pa
         written_whole(path) as part,
         pq.ParquetWriter(part, schema, use_dictionary=dictionaries) as writer,
     ):
+        # Pieces of a constant number of rows, so that the file has the same bytes every time
         for piece in _by_rank(_fewer(rows, merged), ROWS):
             writer.write_table(piece.cast(schema))
             count_values(piece["state"], counts.states)

@@ -5,7 +5,7 @@ Files of a ranked table in a folder of results.
 cell, each with its worst row first.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePath
 
@@ -47,6 +47,26 @@ def table_outputs(outputs: Mapping[str, str], name: str = "risk") -> dict[str, s
     """
     places = (f"{name}.parquet", name)
     return {file: digest for file, digest in outputs.items() if PurePath(file).parts[0] in places}
+
+
+def table_name(folder: Path, name: str = "risk") -> str:
+    """Return the name of a ranked table in a folder of results: a file, or a folder of cells."""
+    return f"{name}/" if (folder / name).is_dir() else f"{name}.parquet"
+
+
+def listed_outputs(outputs: Iterable[str], name: str = "risk") -> list[str]:
+    """
+    Return the names of outputs in their order, with all cells of a dataset as one.
+
+    Examples
+    --------
+    >>> listed_outputs(["run.json", "risk/lat35_lon139.parquet", "risk/no_place.parquet"])
+    ['risk/ (2 cells)', 'run.json']
+    """
+    names = sorted(outputs)
+    others = [file for file in names if PurePath(file).parts[0] != name]
+    cells = len(names) - len(others)
+    return sorted([*others, f"{name}/ ({cells} cells)"]) if cells else others
 
 
 def remove_table(folder: Path, name: str = "risk") -> None:

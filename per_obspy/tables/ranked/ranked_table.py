@@ -85,6 +85,7 @@ class RankedTable:
 
     def _between(self, first: int, last: int, names: Sequence[str]) -> pa.Table:
         """Return the rows from one rank to another, in their order."""
+        # An empty table has the columns if no file has such a row
         read = list(dict.fromkeys(["rank", *names]))
         found = [self.schema.remove_metadata().empty_table().select(read)]
         for path in self._files:

@@ -27,7 +27,7 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
-from per_obspy.tables.risk import ranked_table
+from per_obspy.tables.ranked.ranked_table import ranked_table
 from per_obspy.tables.totals import piece_totals
 
 from ...report.page.made_up import CLASSES, pair_table
@@ -234,7 +234,7 @@ def test_pieces_leave_no_memory_behind(tmp_path):
     parquet.write_table(pa.Table.from_pandas(table), tmp_path / "risk.parquet")
     notes, totals, before = Notes(CLASSES), [], []
     for _ in range(4):
-        with ranked_table(tmp_path / "risk.parquet") as file:
+        with ranked_table([tmp_path / "risk.parquet"]) as file:
             for piece in file.pieces():
                 notes.add(piece)
                 totals.append(piece_totals(piece, Totals(), CLASSES))
