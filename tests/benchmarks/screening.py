@@ -32,6 +32,8 @@ SIZES = (10_000, 100_000, 1_000_000)
 EXACT = 1_000_000
 #: Pairs that are written at once.
 TOGETHER = 250_000
+#: Columns of names.
+NAMES = ("pair_id", "building_id_1", "building_id_2")
 SCENARIO = Path(__file__).parents[2] / "catalogs" / "demo" / "scenario.toml"
 
 RECORDS = f'''
@@ -62,9 +64,9 @@ def write_inventory(path: Path, count: int, stations: Path) -> None:
     for seed, first in enumerate(range(0, count, TOGETHER)):
         settings = wanted.model_copy(update={"count": min(TOGETHER, count - first), "seed": seed})
         table = simulated_pairs(longitude, latitude, **settings.model_dump())
-        rows = pa.Table.from_pandas(
-            table.assign(pair_id=f"{seed}-" + table["pair_id"]), preserve_index=False
-        )
+        # Every part has pairs and buildings of its own
+        own = {name: f"{seed}-" + table[name] for name in table if name in NAMES}
+        rows = pa.Table.from_pandas(table.assign(**own), preserve_index=False)
         writer = writer or pq.ParquetWriter(path, rows.schema)
         writer.write_table(rows)
     assert writer is not None
