@@ -1,4 +1,4 @@
-"""Names of cells: their corner, one cell for pairs without place, nothing but numbers."""
+"""Names of cells: their corner, one cell for pairs without a place, numbers only."""
 
 import numpy as np
 import pytest
