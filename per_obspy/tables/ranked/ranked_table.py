@@ -60,6 +60,13 @@ class RankedTable:
                 for batch in file.iter_batches(ROWS, columns=columns):
                     yield batch.to_pandas()
 
+    def batches(self, size: int, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
+        """Yield some columns of all rows, so many at a time, cell by cell."""
+        known = [name for name in columns if name in self.schema.names]
+        for path in self._files:
+            with self._opened(path) as file:
+                yield from file.iter_batches(size, columns=known, use_threads=False)
+
     def ranked(self, count: int, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
         """Yield the worst rows in the order of their ranks, ``ROWS`` at a time."""
         known = self.schema.names
