@@ -6,7 +6,7 @@ one pair only are numbered after those with an identifier, in the order of the p
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -140,7 +140,9 @@ def _write(tables: Iterator[pa.Table], path: Path) -> int:
     return count
 
 
-def _completed(found: Iterable[pa.RecordBatch], named: int, ends: IntArray) -> Iterator[pa.Table]:
+def _completed(
+    found: Iterable[pa.RecordBatch], named: int, ends: IntArray
+) -> Iterator[pa.Table]:
     """Yield contacts with the numbers of all buildings, of the rows and of the chunks."""
     chunks, row, chunk = ChunkNumbers(CHUNK), -1, 0
     for batch in found:

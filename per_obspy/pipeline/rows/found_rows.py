@@ -5,7 +5,8 @@ Pairs that share a building with others of a piece are in that piece: every row,
 that is known of a building, is found in one piece. Only connected pairs are never divided.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -255,7 +256,9 @@ def _raised(chains: Chains, placed: PlacedRows, first: IntArray) -> dict[str, Bo
     }
 
 
-def _row_names(placed: PlacedRows, contacts: Contacts, first: IntArray) -> NDArray[np.object_]:
+def _row_names(
+    placed: PlacedRows, contacts: Contacts, first: IntArray
+) -> NDArray[np.object_]:
     """Return the name of each row: that of its first pair in alphabetical order."""
     order = contacts.order[placed.contacts["pair"]]
     smallest = np.minimum.reduceat(order, first)

@@ -50,7 +50,9 @@ class BuildingNumbers(NamedTuple):
     count: int
 
 
-def building_numbers(pairs: PairColumns, database: duckdb.DuckDBPyConnection) -> BuildingNumbers:
+def building_numbers(
+    pairs: PairColumns, database: duckdb.DuckDBPyConnection
+) -> BuildingNumbers:
     """
     Number the buildings of all pairs by their identifiers.
 
