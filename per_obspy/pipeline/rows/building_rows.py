@@ -110,6 +110,7 @@ def _parts(
         parts.append(part)
         done += part.rows
         progress("rows", done, found.contacts)
+    # Parts of an earlier table would be taken for parts of this one
     _remove_others(folder / "rows", parts)
     return sorted(parts, key=lambda part: part.number)
 
@@ -146,9 +147,7 @@ def _enabled(rows: Rows, pairs: PairColumns) -> bool:
     return set(IDENTIFIERS) <= set(pairs.names)
 
 
-def _jobs(
-    settings: Run, folder: Path, ground: GroundFiles, found: AllRows
-) -> Iterator[RowsJob]:
+def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsJob]:
     """Yield one job per chunk of rows."""
     exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
@@ -164,6 +163,7 @@ def _chunks(file: Path) -> Iterator[tuple[int, pa.Table]]:
     with pq.ParquetFile(file, pre_buffer=False) as contacts:
         names = [name for name in (*OF_ROWS, *OF_CHUNKS) if name in contacts.schema_arrow.names]
         waiting = contacts.schema_arrow.empty_table().select(["chunk", *names])
+        # Some thousands at a time
         for group in range(contacts.num_row_groups):
             rows = contacts.read_row_group(group, columns=["chunk", *names], use_threads=False)
             waiting = pa.concat_tables([waiting, rows.select(waiting.column_names)])

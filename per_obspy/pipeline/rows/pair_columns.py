@@ -20,7 +20,7 @@ class PairColumns(NamedTuple):
     ----------
     names : tuple of str
         Its columns.
-    count : int
+    pairs : int
         Number of pairs.
     batches : callable
         Yield some columns of all pairs in the order of their ranks, some thousands at a time;
@@ -28,7 +28,7 @@ class PairColumns(NamedTuple):
     """
 
     names: tuple[str, ...]
-    count: int
+    pairs: int
     batches: Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
@@ -40,6 +40,6 @@ def pair_columns(path: Path) -> Iterator[PairColumns]:
 
         def batches(wanted: Sequence[str]) -> Iterator[pa.RecordBatch]:
             known = [name for name in wanted if name in names]
-            return file.iter_batches(TOGETHER, columns=known, use_threads=False)
+            yield from file.iter_batches(TOGETHER, columns=known, use_threads=False)
 
         yield PairColumns(names, int(file.metadata.num_rows), batches)
