@@ -82,7 +82,8 @@ def notify_result(
     if record["state"] != "complete":
         return notify_failure(settings, folder, name, "no pair or no station was usable")
     # Counts that were notified before are no news
-    counts = class_counts(folder)
+    place = shown or folder
+    counts = class_counts(place)
     earlier = _latest(folder).get("classes")
     if earlier == counts:
         return ()
@@ -91,7 +92,6 @@ def notify_result(
     known = earlier if isinstance(earlier, dict) else None
     change = "first result" if known is None else f"changed from {_words(known)}"
     title = f"{name}: {words} ({change})"
-    place = shown or folder
     text = _text(place / "summary.txt") or title
     message = Message("first" if known is None else "changed", title, text, _report(place))
     return _sent(settings, folder, message, {"classes": counts})

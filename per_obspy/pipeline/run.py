@@ -29,6 +29,7 @@ def run(
     executor: Executor | None = None,
     progress: Progress = silent,
     facts: Mapping[str, object] | None = None,
+    fetched: "Fetched | None" = None,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -45,6 +46,8 @@ def run(
         Called for every stage: name, done, total.
     facts : mapping, optional
         Plain values for ``run.json`` that change no result, such as the number of a revision.
+    fetched : Fetched, optional
+        Records of FDSN services, if they have been fetched; otherwise they are fetched here.
 
     Returns
     -------
@@ -67,7 +70,7 @@ def run(
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         asked.write()
-        fetched = _fetched_records(settings, progress)
+        fetched = fetched or _fetched_records(settings, progress)
         # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():

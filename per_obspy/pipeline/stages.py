@@ -49,9 +49,7 @@ from per_obspy.pipeline.stations import (
 )
 from per_obspy.progress import Progress, timed
 from per_obspy.records.fdsn.cache import Fetched
-from per_obspy.resume import (
-    write_status,
-)
+from per_obspy.resume import write_status
 from per_obspy.screening.warmup import compiling
 from per_obspy.tables.station_summary import StationSummary, write_stations
 

@@ -59,6 +59,9 @@ class Contacts(NamedTuple):
         Whether an identifier of the pair belongs to buildings at different places.
     rejected : tuple of Rejection
         One for each repeated contact and each ambiguous identifier.
+    places : tuple of tuple of int
+        Buildings of each rejection, by whose numbers rejections are ordered: one for an ambiguous
+        identifier, both for a repeated contact.
     """
 
     buildings: IntArray
@@ -73,6 +76,7 @@ class Contacts(NamedTuple):
     repeated: BoolArray
     ambiguous: BoolArray
     rejected: tuple[Rejection, ...]
+    places: tuple[tuple[int, ...], ...]
 
 
 def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
@@ -96,11 +100,13 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     pair_id = found_names[order]
     codes, identifiers = _identified(pairs)
     is_ambiguous, rejected = _ambiguous(pairs, codes, identifiers)
+    places = [(code,) for code in np.flatnonzero(is_ambiguous).tolist()]
     buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
     # Contacts that are described twice
     azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
     sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
-    repeated, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
+    repeated, again, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
+    ends = [tuple(pair) for pair in np.sort(buildings[again], axis=1).tolist()]
     return Contacts(
         buildings=buildings,
         names=names,
@@ -114,6 +120,7 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         repeated=repeated,
         ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
         rejected=(*rejected, *found),
+        places=(*places, *ends),
     )
 
 
@@ -145,14 +152,19 @@ def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
     """Return a code per pair and side, -1 without an identifier, and the identifiers, sorted."""
     sides = []
     for name in ("building_id_1", "building_id_2"):
-        given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
-        sides.append(given.fillna("").astype(str))
+        sides.append(identifiers_of(pairs, name))
     # Sorted, so that numbers do not depend on the order of the table
     codes, names = _sorted_codes(pd.concat(sides, ignore_index=True))
     # No identifier is the first of all texts
     missing = int(names.size > 0 and names[0] == "")
     numbers = np.stack(np.split(codes - missing, 2), axis=1)
     return numbers, names[missing:]
+
+
+def identifiers_of(pairs: pd.DataFrame, name: str) -> pd.Series:
+    """Return a column of identifiers of buildings as texts, empty where there is none."""
+    given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
+    return given.fillna("").astype(str)
 
 
 def _sorted_codes(texts: pd.Series) -> tuple[IntArray, NDArray[np.object_]]:
@@ -226,12 +238,12 @@ def _repeated(
     gap: FloatArray,
     order: NDArray[np.intp],
     angle: float,
-) -> tuple[BoolArray, tuple[Rejection, ...]]:
-    """Return which pairs repeat the contact of another one with at most their gap, and why."""
+) -> tuple[BoolArray, list[int], tuple[Rejection, ...]]:
+    """Return which pairs repeat a contact with at most their gap, these in order, and why."""
     ends = np.sort(buildings, axis=1)[order]
     same = (ends[1:] == ends[:-1]).all(axis=1)
     repeated = np.zeros(gap.size, dtype=bool)
-    reasons, kept = [], list[int]()
+    reasons, again, kept = [], list[int](), list[int]()
     # The narrowest gap comes first; only few pairs have the buildings of another
     for place in np.flatnonzero(same).tolist():
         # A new group of pairs of the same buildings, or one more of it
@@ -243,8 +255,9 @@ def _repeated(
             kept.append(row)
             continue
         repeated[row] = True
+        again.append(row)
         reasons.append(_repetition(pair_id, gap, row, twin[0]))
-    return repeated, tuple(reasons)
+    return repeated, again, tuple(reasons)
 
 
 def _one_axis(first: float, second: float, angle: float) -> bool:

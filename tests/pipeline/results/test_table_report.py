@@ -50,7 +50,8 @@ def done(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("every")
     (folder / "scenario.toml").write_text(SCENARIO)
-    run = f'name = "small"\noutput = "run"\n{WANTED}simulation = "scenario.toml"\n{SPECTRA}'
+    head = 'name = "small"\noutput = "run"\nworkers = 1\nsimulation = "scenario.toml"\n'
+    run = f"{head}{WANTED}{SPECTRA}"
     (folder / "run.toml").write_text(run)
     result = CliRunner().invoke(app, ["run", str(folder / "run.toml")])
     assert result.exit_code == 0, result.output
