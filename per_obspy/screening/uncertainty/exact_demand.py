@@ -94,16 +94,19 @@ PAIR = (
 #: Columns of one building, besides those at nodes, from which the exact demand follows.
 BUILDING = ("participation", "yield_displacement", "hardening", "per", "contact_mass")
 
-#: Columns from which a population follows; ``_1`` and ``_2`` are added to those of a building.
-NEEDED = (
-    *PAIR,
-    *("gap_std", "assumed_gap", "absolute_gap", "demand_rule", "demand_exact"),
-    *("correlation", "correlation_record", "correlation_linearized", "impact_velocity_exact"),
-)
+#: Columns of one building from which a population follows.
 NEEDED_OF_BUILDING = (
     *BUILDING,
     *("period", "damping", "period_log_std", "damping_log_std", "amplification_exact"),
     *("equivalent_period", "equivalent_damping", "equivalent_per"),
+)
+
+#: Columns from which a population follows.
+NEEDED = (
+    *PAIR,
+    *("gap_std", "assumed_gap", "absolute_gap", "demand_rule", "demand_exact"),
+    *("correlation", "correlation_record", "correlation_linearized", "impact_velocity_exact"),
+    *(f"{name}_{i}" for name in NEEDED_OF_BUILDING for i in (1, 2)),
 )
 
 
@@ -144,8 +147,7 @@ def record_population(station: StationMotion, table: Table, screening: Screening
         ``population.COLUMNS``. Where the exact demand decides without uncertain inputs, the
         results of the exact history.
     """
-    of_buildings = (f"{name}_{i}" for name in NEEDED_OF_BUILDING for i in (1, 2))
-    table = only(table, (*NEEDED, *of_buildings))
+    table = only(table, NEEDED)
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
     # estimates, which show too which pairs of derived periods may touch
