@@ -3,8 +3,8 @@ Memory and processor time of finding rows of buildings, as tables grow.
 
 Run: ``python tests/benchmarks/finding_rows.py RISK COPIES...``, where RISK is a ``risk.parquet``
 with identifiers of buildings. Each number of copies is measured in a process of its own, whose
-copies have names of their own. Memory is the largest resident size; the slope between two numbers of
-copies is that of a further pair.
+copies have names of their own. Memory is the largest resident size; the slope between two numbers
+of copies is that of a further pair.
 """
 
 import resource

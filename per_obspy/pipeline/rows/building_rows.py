@@ -111,6 +111,7 @@ def _parts(
         parts.append(part)
         done += part.rows
         progress("rows", done, found.contacts)
+    # Parts of an earlier table would be taken for parts of this one
     _remove_others(folder / "rows", parts)
     return sorted(parts, key=lambda part: part.number)
 
@@ -163,6 +164,7 @@ def _chunks(file: Path) -> Iterator[tuple[int, pa.Table]]:
     with pq.ParquetFile(file, pre_buffer=False) as contacts:
         names = [name for name in (*OF_ROWS, *OF_CHUNKS) if name in contacts.schema_arrow.names]
         waiting = contacts.schema_arrow.empty_table().select(["chunk", *names])
+        # Some thousands at a time
         for group in range(contacts.num_row_groups):
             rows = contacts.read_row_group(group, columns=["chunk", *names], use_threads=False)
             waiting = pa.concat_tables([waiting, rows.select(waiting.column_names)])

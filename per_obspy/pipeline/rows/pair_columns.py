@@ -22,7 +22,7 @@ class PairColumns(NamedTuple):
     ----------
     names : tuple of str
         Its columns.
-    count : int
+    pairs : int
         Number of pairs.
     batches : callable
         Yield some columns of all pairs, in the same order every time, some thousands at a time;
@@ -30,7 +30,7 @@ class PairColumns(NamedTuple):
     """
 
     names: tuple[str, ...]
-    count: int
+    pairs: int
     batches: Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
