@@ -91,15 +91,15 @@ def test_a_run_opens_each_record_and_shard_at_most_twice(folder, opens, layers):
     write_counted(folder, layers)
     assert run(folder / "counted.toml", executor=InProcess()).record["counts"]["pairs"]
     # records: headers and hash together, then the samples; event, metadata: once for all stations;
-    # station files: hash with spectra, then the motion; risk table: rows of buildings (columns,
-    # how they stand, histories, buildings), the report, and its hash
+    # station files: hash with spectra, then the motion; risk table: rows of buildings (one opening
+    # for both passes: identifiers, then the columns of pairs), the report, and its hash
     assert by_kind(opens(), folder) == {
         "records": 2,
         "metadata": 1,
         "event": 1,
         "shards": 2,
         "spectra": 1,
-        "risk": 14,
+        "risk": 3,
     }
 
 
@@ -125,8 +125,8 @@ def test_stages_of_their_own_open_each_file_at_most_twice(folder, opens):
     finished(folder, opens)
     screen(folder / "counted.toml", executor=InProcess())
     counts = by_kind(opens(), folder)
-    # rows of buildings take four of them, as in a whole run
-    assert counts.pop("risk") == 14
+    # rows of buildings, the report, and the hash, as in a whole run
+    assert counts.pop("risk") == 3
     assert max(counts.values()) <= 2
     read_station_once.cache_clear()
     report(folder / "counted.toml")

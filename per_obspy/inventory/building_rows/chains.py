@@ -16,10 +16,7 @@ import numpy as np
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray
 from per_obspy.inventory.building_rows.joints import Joints
-
-#: Contacts of a chain beyond which it is halved before anything else: the other cuts take one part
-#: at a time, and a damaged table may make one chain of all its pairs.
-HALVED = 1000
+from per_obspy.inventory.building_rows.walks import HALVED, Walks, stays_whole, walks_of
 
 #: One contact of a chain: its pair, and whether building 1 of the pair is the later one.
 Link = tuple[int, bool]
@@ -102,10 +99,8 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         In the order of the smallest name of a pair of each row; every pair that repeats no other
         is in one of them.
     """
-    cutter = _Cutter(contacts, angle, longest)
-    # Numbers in arrays: objects of all rows would need ten times the memory
-    rows = chain.from_iterable(map(cutter.pieces, _followed(contacts, joints)))
-    pair, turned, first, codes = _by_name(*_flat(rows), contacts.order)
+    rows = _rows(contacts, joints.joined, angle, longest)
+    pair, turned, first, codes = _by_name(*rows, contacts.order)
     # Along the axis, whose azimuth is below 180 degrees
     azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
     pair, turned = _reversed(pair, turned, first, backwards)
@@ -117,6 +112,31 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         if raised.size:
             flags[name] |= np.logical_or.reduceat(raised, first[:-1])
     return Chains(pair, turned, first, azimuth, flags)
+
+
+def _rows(
+    contacts: Contacts, joined: IntArray, angle: float, longest: int
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the end at which each contact is entered, and sizes and flags of the rows."""
+    walks = walks_of(contacts, joined)
+    whole = stays_whole(contacts, walks, angle, longest)
+    # Few chains are cut, one by one
+    cutter = _Cutter(contacts, angle, longest)
+    others = chain(_pieces_of(walks, ~whole), _others(contacts, joined, walks.ends // 2))
+    cut = _flat(chain.from_iterable(map(cutter.pieces, others)))
+    # Rows of both kinds; those that are not cut have no flag
+    ends = np.concatenate([walks.ends[np.repeat(whole, walks.sizes)], cut[0]])
+    sizes = np.concatenate([walks.sizes[whole], cut[1]])
+    codes = np.concatenate([np.zeros(int(whole.sum()), dtype=np.int64), cut[2]])
+    return ends, sizes, codes
+
+
+def _pieces_of(walks: Walks, some: BoolArray) -> Iterator[_Piece]:
+    """Yield some of the chains."""
+    starts = np.cumsum(walks.sizes) - walks.sizes
+    for start, size in zip(starts[some].tolist(), walks.sizes[some].tolist(), strict=True):
+        ends = walks.ends[start : start + size].tolist()
+        yield _Piece([(end // 2, end % 2 == 1) for end in ends], frozenset())
 
 
 def _flat(rows: Iterable[_Piece]) -> tuple[IntArray, IntArray, IntArray]:
@@ -144,19 +164,21 @@ def _by_name(
     return found // 2, found % 2 == 1, first, codes[order]
 
 
-def _followed(contacts: Contacts, joints: Joints) -> Iterator[_Piece]:
-    """Yield the chains of joined contacts; those that close are flagged as rings."""
-    joined = joints.joined.data
-    done = contacts.repeated.copy().data
-    by_name = np.argsort(contacts.order, kind="stable").data
+def _others(contacts: Contacts, joined: IntArray, followed: IntArray) -> Iterator[_Piece]:
+    """Yield the chains that are not followed yet; those that close are flagged as rings."""
+    done = contacts.repeated.copy()
+    done[followed] = True
+    by_name = np.argsort(contacts.order, kind="stable")
+    left = by_name[~done[by_name]].tolist()
     # Chains begin at a free end; the contacts that remain afterwards are rings
-    for pair in by_name:
+    for pair in left:
         for end in (2 * pair, 2 * pair + 1):
             if not done[pair] and joined[end] < 0:
-                yield _Piece(_walked(end, joined, done), frozenset())
-    for pair in by_name:
+                yield _Piece(_walked(end, joined.data, done.data), frozenset())
+    for pair in left:
         if not done[pair]:
-            yield _Piece(_walked(2 * pair, joined, done), frozenset({"ring"}), closed=True)
+            links = _walked(2 * pair, joined.data, done.data)
+            yield _Piece(links, frozenset({"ring"}), closed=True)
 
 
 def _walked(end: int, joined: memoryview, done: memoryview) -> list[Link]:

@@ -59,6 +59,9 @@ class Contacts(NamedTuple):
         Whether an identifier of the pair belongs to buildings at different places.
     rejected : tuple of Rejection
         One for each repeated contact and each ambiguous identifier.
+    places : tuple of tuple of int
+        Buildings of each rejection, by whose numbers rejections are ordered: one for an ambiguous
+        identifier, both for a repeated contact.
     """
 
     buildings: IntArray
@@ -73,6 +76,7 @@ class Contacts(NamedTuple):
     repeated: BoolArray
     ambiguous: BoolArray
     rejected: tuple[Rejection, ...]
+    places: tuple[tuple[int, ...], ...]
 
 
 def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
@@ -99,12 +103,12 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
     # Contacts that are described twice
     azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
-    sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
-    repeated, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
+    by_ends = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
+    repeated, found = _repeated(pair_id, buildings, azimuth, gap, by_ends, angle)
     return Contacts(
         buildings=buildings,
         names=names,
-        named=np.arange(names.size) < len(identifiers),
+        named=np.arange(names.size) < identifiers.size,
         azimuth=azimuth,
         gap=gap,
         facing_length=_facing(pairs),
@@ -112,9 +116,16 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         pair_id=pair_id,
         order=order,
         repeated=repeated,
-        ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
+        ambiguous=np.logical_or(*is_ambiguous[codes].T),
         rejected=(*rejected, *found),
+        places=_places(is_ambiguous, buildings[by_ends[repeated[by_ends]]]),
     )
+
+
+def _places(is_ambiguous: BoolArray, again: IntArray) -> tuple[tuple[int, ...], ...]:
+    """Return the buildings of each rejection: ambiguous ones, then those of repeated contacts."""
+    both = [tuple(row) for row in np.sort(again, axis=1).tolist()]
+    return (*((code,) for code in np.flatnonzero(is_ambiguous).tolist()), *both)
 
 
 def _facing(pairs: pd.DataFrame) -> FloatArray:
@@ -143,16 +154,19 @@ def _numbered(
 
 def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
     """Return a code per pair and side, -1 without an identifier, and the identifiers, sorted."""
-    sides = []
-    for name in ("building_id_1", "building_id_2"):
-        given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
-        sides.append(given.fillna("").astype(str))
+    sides = [identifiers_of(pairs, name) for name in ("building_id_1", "building_id_2")]
     # Sorted, so that numbers do not depend on the order of the table
     codes, names = _sorted_codes(pd.concat(sides, ignore_index=True))
     # No identifier is the first of all texts
     missing = int(names.size > 0 and names[0] == "")
     numbers = np.stack(np.split(codes - missing, 2), axis=1)
     return numbers, names[missing:]
+
+
+def identifiers_of(pairs: pd.DataFrame, name: str) -> pd.Series:
+    """Return a column of identifiers of buildings as texts, empty where there is none."""
+    given = pairs[name] if name in pairs else pd.Series("", index=pairs.index)
+    return given.fillna("").astype(str)
 
 
 def _sorted_codes(texts: pd.Series) -> tuple[IntArray, NDArray[np.object_]]:

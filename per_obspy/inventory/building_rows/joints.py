@@ -37,6 +37,10 @@ class Joints(NamedTuple):
         that they are not joined there; with too many contacts to be one building.
     rejected : tuple of Rejection
         One for each contradiction and each crowded building.
+    places : tuple of tuple of int
+        Numbers by which rejections are ordered, the last of which is that of the building: alone
+        for a crowded building, after those of the property and of the step in the order of the
+        contacts of its building for a contradiction.
     """
 
     joined: IntArray
@@ -44,6 +48,7 @@ class Joints(NamedTuple):
     contradictory: BoolArray
     crowded: BoolArray
     rejected: tuple[Rejection, ...]
+    places: tuple[tuple[int, ...], ...]
 
 
 class _Candidates(NamedTuple):
@@ -51,11 +56,13 @@ class _Candidates(NamedTuple):
 
     first: IntArray
     second: IntArray
+    step: IntArray
     bend: FloatArray
 
     def chosen(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "_Candidates":
         """Return some of them."""
-        return _Candidates(self.first[rows], self.second[rows], self.bend[rows])
+        ends = self.first[rows], self.second[rows]
+        return _Candidates(*ends, self.step[rows], self.bend[rows])
 
 
 def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float) -> Joints:
@@ -79,7 +86,7 @@ def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float)
     # Ends that face each other, without those whose pairs contradict each other
     count = contacts.names.size
     found, crowded = _candidates(contacts, angle)
-    agrees, reasons = _agreement(contacts, given, found)
+    agrees, reasons, differing = _agreement(contacts, given, found)
     contradictory = _at_buildings(contacts, found.chosen(~agrees), count)
     # The best candidates, each end once; the others are forks
     possible = found.chosen(agrees)
@@ -88,8 +95,10 @@ def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float)
     joined[possible.first[taken]] = possible.second[taken]
     joined[possible.second[taken]] = possible.first[taken]
     forks = _at_buildings(contacts, possible.chosen(~taken), count)
-    crowds = tuple(_crowd(contacts.names[number]) for number in np.flatnonzero(crowded))
-    return Joints(joined, forks, contradictory, crowded, (*crowds, *reasons))
+    crowds = np.flatnonzero(crowded).tolist()
+    rejected = (*(_crowd(contacts.names[number]) for number in crowds), *reasons)
+    places = (*((number,) for number in crowds), *differing)
+    return Joints(joined, forks, contradictory, crowded, rejected, places)
 
 
 def _candidates(contacts: Contacts, angle: float) -> tuple[_Candidates, BoolArray]:
@@ -103,42 +112,46 @@ def _candidates(contacts: Contacts, angle: float) -> tuple[_Candidates, BoolArra
     # Sort ends by building, so that those of one building are adjacent
     ends = np.flatnonzero(usable & ~crowded[building])
     ends = ends[np.lexsort([np.repeat(contacts.order, 2)[ends], building[ends]])]
-    first, second = _at_one_building(ends, building)
+    first, second, step = _at_one_building(ends, building)
     # Opposite directions differ by 180 degrees
     bend = np.abs((directions[first] - directions[second]) % 360.0 - 180.0)
     opposite = bend <= angle
-    return _Candidates(first[opposite], second[opposite], bend[opposite]), crowded
+    return _Candidates(first, second, step, bend).chosen(opposite), crowded
 
 
 def _at_one_building(ends: IntArray, building: IntArray) -> IntArray:
-    """Return every two ends at one building, (2, n), from ends in the order of their buildings."""
-    found = [np.empty((2, 0), dtype=np.int64)]
+    """Return two ends and their distance in the order of the ends of one building, (3, n)."""
+    found = [np.empty((3, 0), dtype=np.int64)]
     # Neighbours in that order, then those one further apart, as long as there are any
     for step in range(1, MOST_CONTACTS):
         first, second = ends[:-step], ends[step:]
         together = building[first] == building[second]
         if not together.any():
             break
-        found.append(np.stack([first[together], second[together]]))
+        steps = np.full(int(together.sum()), step)
+        found.append(np.stack([first[together], second[together], steps]))
     return np.concatenate(found, axis=1)
 
 
 def _agreement(
     contacts: Contacts, given: Mapping[str, FloatArray], found: _Candidates
-) -> tuple[BoolArray, list[Rejection]]:
-    """Return which candidates agree about their building, and the contradictions of the others."""
+) -> tuple[BoolArray, list[Rejection], list[tuple[int, ...]]]:
+    """Return which candidates agree about their building, and contradictions with their places."""
     agrees = np.ones(found.first.size, dtype=bool)
-    rejected = []
-    for name, values in given.items():
+    building = contacts.buildings.ravel()[found.first]
+    rejected, places = list[Rejection](), list[tuple[int, ...]]()
+    for number, (name, values) in enumerate(given.items()):
         first, second = values.ravel()[found.first], values.ravel()[found.second]
         # NaN means unknown and contradicts no value
         limit = AGREEMENT * np.maximum(np.abs(first), np.abs(second))
         differs = np.abs(first - second) > limit
+        # Each contradiction with the numbers of its property, step and building
         for row in np.flatnonzero(differs).tolist():
             numbers = float(first[row]), float(second[row])
             rejected.append(_contradiction(contacts, found, row, name, numbers))
+            places.append((number, int(found.step[row]), int(building[row])))
         agrees &= ~differs
-    return agrees, rejected
+    return agrees, rejected, places
 
 
 def _contradiction(

@@ -29,7 +29,9 @@ def building_table(sides: pd.DataFrame, classes: Mapping[str, float], angle: flo
     Parameters
     ----------
     sides : DataFrame
-        From :func:`~.sides.sides_of`, all sides of a building one after the other, with ``area``.
+        Interfaces as seen from one of their buildings, all of a building one after the other:
+        columns of its row and pair without ``_left``, ``_right``, ``_1`` and ``_2``, with
+        ``neighbour_number``, ``neighbour_id``, ``direction`` (towards it, degrees) and ``area``.
     classes : mapping of str to float
         Name and smallest severity of each risk class, m/s, descending to 0.
     angle : float
@@ -120,8 +122,12 @@ def _position(sides: pd.DataFrame, groups: Groups, angle: float) -> NDArray[np.o
 
 def _contacts_in_row(sides: pd.DataFrame) -> FloatArray:
     """Return the number of sides with neighbours in the same row, for the building of each side."""
-    counted = sides.groupby(["building_number", "row_id"])["interface"].transform("size")
-    return counted.to_numpy(np.float64)
+    row, _ = pd.factorize(sides["row_id"])
+    building = sides["building_number"].to_numpy(np.int64)
+    # Sides of a building are ordered by their rows
+    begins = (np.diff(building, prepend=-1) != 0) | (np.diff(row, prepend=-1) != 0)
+    sizes = np.diff(np.flatnonzero(begins), append=building.size)
+    return np.repeat(sizes, sizes).astype(np.float64)
 
 
 def _hits(sides: pd.DataFrame, groups: Groups) -> dict[str, FloatArray | NDArray[np.int64]]:

@@ -1,5 +1,10 @@
-"""Station of each row, and the order of computation of rows: station by station."""
+"""
+Station of each row, and the order of computation of rows: station by station.
 
+Rows are placed a piece of the table at a time; chunks are numbered when all rows are in order.
+"""
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +26,7 @@ class PlacedRows(NamedTuple):
     contacts : DataFrame
         One row per contact: ``pair`` (its row in the pair table), ``turned``, ``row`` (number from
         0), ``interface`` (from 1), ``buildings`` (of the row), ``azimuth`` (of the row, degrees),
-        ``station`` (that follows the row) and ``chunk``.
+        ``station`` (that follows the row).
     order : (n_rows,) ndarray of int
         Number that each row has in the chains.
     several_stations : (n_rows,) ndarray of bool
@@ -33,9 +38,9 @@ class PlacedRows(NamedTuple):
     several_stations: NDArray[np.bool_]
 
 
-def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
+def placed_rows(chains: Chains, pairs: pd.DataFrame) -> PlacedRows:
     """
-    Assign a station to every row, and group whole rows of one station into chunks.
+    Assign a station to every row, and order the rows by station, then as they are.
 
     The station is the one that serves most pairs of the row; of several that serve equally many it
     is the one nearer to its pairs, then the first by name. It is empty where most pairs have none.
@@ -46,8 +51,6 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
         Rows of contacts.
     pairs : DataFrame
         ``station, distance, azimuth_used`` of each pair.
-    size : int
-        Contacts of a chunk, as far as rows are whole.
     """
     # Stations in the order of their names
     sizes = np.diff(chains.first)
@@ -56,14 +59,12 @@ def placed_rows(chains: Chains, pairs: pd.DataFrame, size: int) -> PlacedRows:
     order = np.lexsort([np.arange(sizes.size), station]).astype(np.int64)
     # Contacts in the order of their rows
     place = np.argsort(order)
-    chunk = _chunks(sizes[order], station[order], size)
     contacts = pd.DataFrame({"pair": chains.pair, "turned": chains.turned}).assign(
         interface=np.arange(row.size) - chains.first[row] + 1,
         buildings=sizes[row] + 1,
         azimuth=_azimuths(chains, pairs)[row],
         station=pd.Categorical.from_codes(station[row], _names(pairs)),
         row=place[row],
-        chunk=chunk[place[row]],
     )
     ordered = contacts.sort_values("row", kind="stable", ignore_index=True)
     return PlacedRows(ordered, order, several[order])
@@ -98,12 +99,31 @@ def _stations(row: IntArray, pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.
     return first["code"].to_numpy(dtype=np.int64), np.asarray(several)
 
 
-def _chunks(sizes: IntArray, station: IntArray, size: int) -> IntArray:
-    """Return the chunk number of each row: one station and limited contacts per chunk."""
-    chunk, number, contacts, before = np.empty(sizes.size, dtype=np.int64), 0, 0, -1
-    # Rows of one station, as long as there is room
-    for row, (count, code) in enumerate(zip(sizes.tolist(), station.tolist(), strict=True)):
-        if row and (code != before or contacts + count > size):
-            number, contacts = number + 1, 0
-        chunk[row], contacts, before = number, contacts + count, code
-    return chunk
+class ChunkNumbers:
+    """
+    Numbers of chunks: whole rows of one station, and a limited number of contacts.
+
+    A class, because rows arrive in pieces.
+
+    Parameters
+    ----------
+    size : int
+        Contacts of a chunk, as far as rows are whole.
+    """
+
+    def __init__(self, size: int) -> None:
+        """Begin with chunk 0."""
+        self._size = size
+        self._number, self._contacts, self._station = 0, 0, ""
+
+    def add(self, contacts: Sequence[int], stations: Sequence[str]) -> IntArray:
+        """Return the chunk of each of the next rows, by their contacts and stations."""
+        found = []
+        for count, station in zip(contacts, stations, strict=True):
+            # Rows of one station, as long as there is room
+            is_full = station != self._station or self._contacts + count > self._size
+            if self._contacts and is_full:
+                self._number, self._contacts = self._number + 1, 0
+            self._contacts, self._station = self._contacts + count, station
+            found.append(self._number)
+        return np.array(found, dtype=np.int64)

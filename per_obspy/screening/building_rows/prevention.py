@@ -43,15 +43,19 @@ def prevention(
     # Where one pair finds no measure there is none for the building
     damping = values(sides, "supplemental_damping")
     bumper = values(sides, "bumper_restitution")
-    found: dict[str, FloatArray | NDArray[np.object_]] = {
+    found = {
         "missing_gap": _all_known(groups, missing, groups.largest(missing)),
         "supplemental_damping": _all_known(groups, damping, groups.largest(damping)),
         "bumper_restitution": _all_known(groups, bumper, groups.smallest(bumper)),
     }
     hit = groups.largest(np.nan_to_num(values(sides, "impact_velocity"))) > 0.0
-    rows = zip(*found.values(), hit, neighbour, strict=True)
-    sentences = [_sentence(*row) for row in rows]
-    return {"prevention": np.array(sentences, dtype=object), **found}
+    # Buildings that need a measure have sentences of their own
+    sentences = np.where(np.isnan(found["missing_gap"]), MEASURE, np.where(hit, ELSEWHERE, NOTHING))
+    sentences, needed = sentences.astype(object), np.flatnonzero(found["missing_gap"] > 0.0)
+    names = neighbour.to_numpy(dtype=object)[needed].tolist()
+    rows = zip(*(column[needed].tolist() for column in found.values()), names, strict=True)
+    sentences[needed] = [_sentence(*row) for row in rows]
+    return {"prevention": sentences, **found}
 
 
 def _all_known(groups: Groups, column: FloatArray, reduced: FloatArray) -> FloatArray:
@@ -59,13 +63,8 @@ def _all_known(groups: Groups, column: FloatArray, reduced: FloatArray) -> Float
     return np.where(groups.any(np.isnan(column)), np.nan, reduced)
 
 
-def _sentence(missing: float, damping: float, bumper: float, hit: bool, neighbour: str) -> str:
-    """Return the measures of one building in words."""
-    if np.isnan(missing):
-        return MEASURE
-    if missing <= 0.0:
-        return ELSEWHERE if hit else NOTHING
-    # Every measure that there is
+def _sentence(missing: float, damping: float, bumper: float, neighbour: str) -> str:
+    """Return every measure for one building in words."""
     parts = [f"up to {max(missing, SHORTEST):.3f} m more gap (to {neighbour} first)"]
     if damping > 0.0:
         parts.append(f"or {damping:.2f} of critical more damping in it and its neighbours")

@@ -27,48 +27,31 @@ OF_PAIRS = (
 )
 
 
-def sides_of(interfaces: pd.DataFrame) -> pd.DataFrame:
+def directions(azimuth: Any, flags: Any) -> dict[str, FloatArray]:
     """
-    Return interfaces as seen from one of their two buildings.
+    Return the directions towards the neighbours on both sides of interfaces.
 
     Parameters
     ----------
-    interfaces : DataFrame
-        Columns ``row_columns.ROWS`` and ``OF_PAIRS``, and ``leftward``: whether the building is the
-        left one.
+    azimuth : (n,) array_like
+        Of the axes of the rows, from their first to their last buildings, degrees.
+    flags : (n,) array_like of str
+        Flags of the rows.
 
     Returns
     -------
-    DataFrame
-        The columns without ``_left``, ``_right``, ``_1`` and ``_2``, and ``neighbour_number``,
-        ``neighbour_id`` and ``direction`` (towards the neighbour, degrees; NaN if unknown).
+    dict of (n,) ndarray
+        ``direction_left`` (of the building on the left) and ``direction_right``, degrees; NaN if
+        the axis is unknown.
     """
-    at_left = interfaces["leftward"].to_numpy(bool)
-    columns = _own_columns(interfaces, at_left)
-    for name in ("number", "id"):
-        left, right = (interfaces[f"building_{name}_{side}"] for side in ("left", "right"))
-        columns[f"neighbour_{name}"] = right.where(at_left, left)
-    # Towards the neighbour
-    azimuth = interfaces["azimuth"] + np.where(at_left, 0.0, 180.0)
-    known = ~interfaces["flags"].str.contains("unknown_azimuth", regex=False)
-    columns["direction"] = (azimuth % 360.0).where(known)
-    return pd.DataFrame(columns)
-
-
-def _own_columns(interfaces: pd.DataFrame, at_left: NDArray[np.bool_]) -> dict[str, Any]:
-    """Return the columns of the pair, and those of the building of one side."""
-    columns: dict[str, Any] = {}
-    # Building 1 is on the left of a pair that is not turned
-    is_first = at_left ^ interfaces["turned"].to_numpy(bool)
-    for name in map(str, interfaces):
-        stem, _, end = name.rpartition("_")
-        if end == "left":
-            columns[stem] = interfaces[name].where(at_left, interfaces[f"{stem}_right"])
-        elif end == "1":
-            columns[stem] = interfaces[name].where(is_first, interfaces[f"{stem}_2"])
-        elif end not in ("right", "2"):
-            columns[name] = interfaces[name]
-    return columns
+    # Many rows share few texts
+    codes, texts = pd.factorize(np.asarray(flags, dtype=object))
+    known = np.array(["unknown_azimuth" not in text for text in texts], dtype=bool)[codes]
+    axis = np.asarray(azimuth, dtype=np.float64)
+    return {
+        f"direction_{side}": np.where(known, (axis + turn) % 360.0, np.nan)
+        for side, turn in (("left", 0.0), ("right", 180.0))
+    }
 
 
 class Groups:
@@ -111,15 +94,22 @@ class Groups:
     def distinct(self, values: NDArray[np.int64], where: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the number of different values in some rows of each group."""
         group = np.repeat(np.arange(self.starts.size), self.sizes)[where]
-        pairs = np.unique(np.stack([group, values[where]], axis=1), axis=0)
-        return np.bincount(pairs[:, 0], minlength=self.starts.size).astype(np.int64)
+        # Group and place of the value as one number, each once
+        places, names = pd.factorize(values[where])
+        both = np.sort(group * (len(names) + 1) + places)
+        once = both[np.diff(both, prepend=-1) > 0]
+        return np.bincount(once // (len(names) + 1), minlength=self.starts.size).astype(np.int64)
 
     def texts(self, values: NDArray[Any], join: Callable[[list[str]], str]) -> NDArray[np.object_]:
         """Return the different texts of each group, joined."""
-        joined = []
-        for start, size in zip(self.starts.tolist(), self.sizes.tolist(), strict=True):
-            joined.append(join(list(dict.fromkeys(values[start : start + size]))))
-        return np.array(joined, dtype=object)
+        texts = np.asarray(values, dtype=object)
+        joined = texts[self.starts]
+        # Few groups have different texts
+        differs = self.any(np.asarray(texts != np.repeat(joined, self.sizes), dtype=bool))
+        for group in np.flatnonzero(differs).tolist():
+            some = texts[self.starts[group] : self.starts[group] + self.sizes[group]]
+            joined[group] = join(list(dict.fromkeys(some.tolist())))
+        return joined
 
     def _reduced(self, function: np.ufunc, values: NDArray[Any]) -> FloatArray:
         """Apply a reduction to each group."""

@@ -5,6 +5,7 @@ Tested here as well: per_obspy.screening.building_rows.sides,
 per_obspy.screening.building_rows.prevention and per_obspy.screening.building_rows.row_columns.
 """
 
+import duckdb
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,8 +13,9 @@ import pytest
 from per_obspy.screening.building_rows.buildings import building_table
 from per_obspy.screening.building_rows.prevention import ELSEWHERE, MEASURE, NOTHING
 from per_obspy.screening.building_rows.row_columns import BUILDINGS, ROWS
-from per_obspy.screening.building_rows.sides import OF_PAIRS, sides_of
+from per_obspy.screening.building_rows.sides import OF_PAIRS, directions
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
+from per_obspy.tables.buildings import sides_query
 
 CLASSES = {"high": 0.2, "low": 0.0}
 
@@ -69,9 +71,10 @@ def interfaces(**columns):
 
 def buildings(angle=30.0, **columns):
     table = interfaces(**columns)
-    both = pd.concat([table.assign(leftward=True), table.assign(leftward=False)])
-    sides = sides_of(both.reset_index(drop=True))
-    sides = sides.sort_values(["building_number", "row_id", "interface"], ignore_index=True)
+    table = table.assign(**directions(table["azimuth"], table["flags"]))
+    with duckdb.connect() as database:
+        database.register("interfaces", table)
+        sides = database.sql(sides_query(list(table))).to_arrow_table().to_pandas()
     return building_table(sides, CLASSES, angle).set_index("building_id")
 
 
