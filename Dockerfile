@@ -1,8 +1,10 @@
 # per_obspy as a watcher: docs/operation.md. Build: docker build -t per-obspy .
 # All steps are those of workflows/container/install.sh, which CI runs without a container.
-FROM python:3.12-slim
+# Any base with Python 3.11 or newer, its venv and certificates: --build-arg BASE=...
+ARG BASE=python:3.12-slim
+FROM ${BASE}
 
-RUN useradd --system --uid 10001 --home-dir /var/cache/per-obspy --create-home per-obspy \
+RUN useradd --uid 10001 --home-dir /var/cache/per-obspy --create-home per-obspy \
  && install -d -o per-obspy -g per-obspy /data /var/cache/per-obspy/numba
 ENV NUMBA_CACHE_DIR=/var/cache/per-obspy/numba MPLCONFIGDIR=/var/cache/per-obspy/matplotlib \
     PATH=/opt/per-obspy/bin:$PATH PYTHONDONTWRITEBYTECODE=1
@@ -12,9 +14,11 @@ COPY per_obspy /src/per_obspy
 COPY workflows/container /src/workflows/container
 RUN /src/workflows/container/install.sh install /src /opt/per-obspy
 
-# Kernels are compiled as the user that runs them, who keeps those of another processor too
+# Kernels are compiled as the user that runs them, who keeps those of another processor too. Any user may write there
+# (docker run --user): where Numba cannot write, it compiles everything at each start.
 USER per-obspy
-RUN /src/workflows/container/install.sh compile /opt/per-obspy
+RUN /src/workflows/container/install.sh compile /opt/per-obspy \
+ && chmod -R a+rwX "$NUMBA_CACHE_DIR" "$MPLCONFIGDIR"
 RUN /src/workflows/container/install.sh check /opt/per-obspy
 
 WORKDIR /data

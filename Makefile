@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo figures test workflows rehearsal check docs wheel benchmark clean
+.PHONY: demo figures test workflows rehearsal check docs wheel benchmark extras clean
 
 demo: .venv/run
 	@echo "== simulate an earthquake, process its records, screen 2 000 pairs of buildings"
@@ -16,10 +16,10 @@ figures: .venv/run
 	$(BIN)/python workflows/readme_figures.py
 
 test: .venv/test
-	@echo "== tests, doctests and README"
-	$(BIN)/python -m pytest -q -n auto --dist loadfile
+	@echo "== tests, doctests and README; make workflows has the rest"
+	$(BIN)/python -m pytest -q -n auto --dist worksteal --ignore tests/workflows/test_snakefile.py
 	@echo "== the kernels' tests once more without the compiler"
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist loadfile tests/kernels
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --dist worksteal tests/kernels
 
 workflows: .venv/test .venv/workflows
 	@echo "== two scenarios and their ensemble by Snakemake, killed and resumed"
@@ -71,6 +71,13 @@ benchmark: .venv/benchmark
 	@echo "== compile the kernels (once, one to two minutes)"
 	$(BIN)/per-obspy warm-up
 	@touch $@
+
+# All at once, which takes less time than one after the other
+EXTRAS := check docs test workflows
+extras: .venv/run
+	@echo "== install what $(EXTRAS) need"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[check,docs,test,workflows]'
+	@touch $(EXTRAS:%=.venv/%)
 
 .venv/%: .venv/run
 	@echo "== install what '$*' needs"

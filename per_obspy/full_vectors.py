@@ -111,5 +111,5 @@ def _speed(variables: Mapping[str, str]) -> float:
 def _store() -> Path:
     """Return the file of the speeds: in the folder of compiled kernels."""
     folder = os.environ.get("NUMBA_CACHE_DIR")
-    beside = Path(__file__).parent / "kernels" / "__pycache__"
-    return (Path(folder) if folder else beside) / "vector_speeds.json"
+    caches = Path(folder) if folder else Path(__file__).parent / "kernels" / "__pycache__"
+    return caches / "vector_speeds.json"

@@ -19,6 +19,8 @@ from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
+from .pipeline.small_run import plain_reports
+
 ROW = {
     "pair_id": "a", "longitude_1": 0.3, "latitude_1": 0.1, "height_1": 10.0,
     "longitude_2": 0.3001, "latitude_2": 0.1, "height_2": 12.0, "gap": 0.05,
@@ -59,6 +61,13 @@ source = "a survey"
 licence = "CC0-1.0"
 date = 2026-11-21
 """
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _plain_reports():
+    """Write figures, PDF and page of runs as short files: no test here looks at one."""
+    with plain_reports():
+        yield
 
 
 def _table(*rows):

@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from per_obspy import termination
+from per_obspy.config import Run, load
+from per_obspy.pipeline.run import run
 
-from .pipeline.small_run import SCENARIO, write_configuration
+from .pipeline.small_run import SCENARIO, InProcess, plain_figures, write_configuration
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
 
@@ -131,9 +133,10 @@ def test_a_signal_that_is_held_back_waits():
 
 
 def write_run(folder):
-    """Write the configuration of a run of three stations and nine pairs."""
+    """Write the configuration of a run of two stations and five pairs."""
     write_configuration(folder)
-    (folder / "scenario.toml").write_text(SCENARIO.replace("count = 60", "count = 9"))
+    scenario = SCENARIO.replace("count = 60", "count = 5").replace("stations = 3", "stations = 2")
+    (folder / "scenario.toml").write_text(scenario)
 
 
 def small_run(folder, workers):
@@ -151,10 +154,10 @@ def small_run(folder, workers):
 
 
 def results_of(folder):
-    """Run to the end, and return the bytes of the tables."""
-    running = small_run(folder, workers=1)
-    _, errors = running.communicate(timeout=300)
-    assert running.returncode == 0, errors
+    """Run to the end in this process, and return the bytes of the tables."""
+    with plain_figures():
+        settings = load(folder / "run.toml", Run)
+        run(settings.model_copy(update={"workers": 1}), executor=InProcess())
     return {name: (folder / "out" / name).read_bytes() for name in TABLES}
 
 
@@ -186,6 +189,7 @@ def ended_run(folder, line, workers, number):
     # of two workers: both, the server that forks them, the run, and Python's tracker of resources
     while len(members(running.pid)) < (5 if workers == 2 else 1):
         assert running.poll() is None
+        time.sleep(0.02)
     # a service manager asks the run alone, the key of a terminal everything that it started
     code, seconds, errors = end(running, number, key=number == signal.SIGINT)
     while members(running.pid):
@@ -201,10 +205,10 @@ def test_a_run_that_is_ended_twice_leaves_no_process_and_goes_on_to_the_same_byt
     tmp_path, undisturbed
 ):
     write_run(tmp_path)
-    ended_run(tmp_path, "stations: 0 of 3", 2, signal.SIGTERM)
-    ended_run(tmp_path, "screening: 0 of 9", 1, signal.SIGINT)
+    ended_run(tmp_path, "stations: 0 of 2", 2, signal.SIGTERM)
+    ended_run(tmp_path, "screening: 0 of 5", 1, signal.SIGINT)
     stations = times(tmp_path / "out" / "stations", "*.json")
-    assert len(stations) == 3
+    assert len(stations) == 2
     assert results_of(tmp_path) == undisturbed
     # finished stations were not done again
     assert times(tmp_path / "out" / "stations", "*.json") == stations

@@ -64,7 +64,7 @@ def rehearse(folder: Path, server: FdsnServer) -> None:
     server.events["xx1"], server.silent = early, {"S003", "S004"}
     # The list of earthquakes fails at first, and a service of records for one station
     server.fail("event", "*", status(503, Retry_After="20"))
-    server.fail("dataselect", "S001", *[status(503, Retry_After="120")] * 2)
+    server.fail("dataselect", "S001", *[status(503, Retry_After="60")] * 2)
     report(folder, 0, "the event service demands a pause", expected=1)
     first = started(folder, 61, workers=2)
     kill_worker(first.process)
@@ -75,7 +75,7 @@ def rehearse(folder: Path, server: FdsnServer) -> None:
     kill_watcher(folder, started(folder, 301, workers=1).process)
     report(folder, 305, "watcher killed and started again, late stations")
     server.events["xx1"] = final
-    report(folder, 600, "magnitude 6.3 becomes 6.8")
+    report(folder, 600, "magnitude 6.3 becomes 6.8", most=0)
     report(folder, 901, "nothing new")
 
 
@@ -113,9 +113,14 @@ def ended(watcher: Started) -> tuple[str, ...]:
 
 
 def report(
-    folder: Path, delay: float, event: str, watcher: Started | None = None, expected: int = 0
+    folder: Path,
+    delay: float,
+    event: str,
+    watcher: Started | None = None,
+    expected: int = 0,
+    most: int | None = None,
 ) -> None:
-    """Print the revision that a pass has made, and the time from the origin to it."""
+    """Print the revision that a pass has made, and the time from origin; check what it computed."""
     since = watcher.since if watcher else time.perf_counter()
     errors = ended(watcher) if watcher else one_pass(folder, delay, InProcess())
     seconds = time.perf_counter() - since
@@ -125,7 +130,10 @@ def report(
     record = folder / LATEST / "run.json"
     counts = json.loads(record.read_text())["counts"] if record.is_file() else {}
     known = f"revision {made[-1]}, {counts['stations']} stations" if made else "no revision"
-    done = f"{counts['stations'] - counts['stations_resumed']} computed" if made else ""
+    computed = counts["stations"] - counts["stations_resumed"] if made else 0
+    if most is not None and computed > most:
+        sys.exit(f"{delay:g} s: {computed} stations computed, expected {most}")
+    done = f"{computed} computed" if made else ""
     print(f"{delay:4.0f} s + {seconds:4.1f} s of work: {known}, {done:11s} ({event})", flush=True)
 
 

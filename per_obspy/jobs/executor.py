@@ -30,7 +30,7 @@ def dask_executor(address: str | None) -> Iterator[Executor | None]:
     Raises
     ------
     CatalogError
-        If the address is none.
+        If the address has none of these forms.
     MissingExtra
         If Dask is not installed.
     """
@@ -45,7 +45,7 @@ def dask_executor(address: str | None) -> Iterator[Executor | None]:
 
 def on_cluster(settings: Run, address: str | None) -> Run:
     """
-    Return settings whose every run connects to a Dask cluster by itself; as they are without one.
+    Return settings whose every run connects to a Dask cluster by itself; unchanged without one.
 
     A program of many runs outlives a scheduler that is started again.
 
@@ -59,7 +59,7 @@ def on_cluster(settings: Run, address: str | None) -> Run:
     Raises
     ------
     CatalogError
-        If the address is none.
+        If the address has none of its forms.
     MissingExtra
         If Dask is not installed.
     """

@@ -2,7 +2,8 @@
 Work on one station, from its records to its station file, independent of other stations.
 
 A station file is a netCDF file; its status file (:mod:`per_obspy.resume`) of the same name also
-holds the rejections. A station for which both are complete is not done again.
+holds the rejections and the decisions that depend on the earthquake. A station for which both are
+complete is not done again; one that another earthquake leaves as it is gets the new hypocentre.
 """
 
 import os
@@ -12,7 +13,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,6 +21,13 @@ import xarray as xr
 from per_obspy.config import Processing, Spectra
 from per_obspy.errors import CatalogError, PerError, Rejection, TryLater
 from per_obspy.files import bytes_hash, file_hash, remove_file
+from per_obspy.jobs.event_facts import (
+    hypocentre_attributes,
+    is_of_event,
+    moved_shard,
+    source_facts,
+    source_of_job,
+)
 from per_obspy.jobs.parallel import Work, results
 from per_obspy.machine import raise_machine_fault
 from per_obspy.processing.chain import process_station
@@ -33,7 +41,8 @@ from per_obspy.spectra.storage import read_spectra, without_motion, write_spectr
 
 if TYPE_CHECKING:
     from obspy import Inventory, Stream
-    from obspy.core.event import Event
+
+    from per_obspy.processing.noise.windows import Source
 
 #: Suffix of a station file with spectra.
 SPECTRA = ".nc"
@@ -58,28 +67,18 @@ class Products(NamedTuple):
     facts: Mapping[str, object] = MappingProxyType({})
 
 
-def spectra_shard(job: "StationJob", stream: "Stream", event: "Event | None") -> Products:
+def spectra_shard(job: "StationJob", stream: "Stream", source: "Source | None") -> Products:
     """Write the spectra of a station as its station file if any record is usable."""
-    clean, unfit = process_station(taken(stream), job.processing, event)
+    clean, unfit = process_station(taken(stream), job.processing, source)
     if not clean:
         return Products(unfit)
     # Spectra at periods in equal steps of their logarithm
     grid = job.spectra
     periods = np.geomspace(grid.shortest, grid.longest, grid.count)
     dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
-    dataset.attrs |= _hypocentre(event)
+    dataset.attrs |= hypocentre_attributes(job.event and job.event.event)
     write_spectra(dataset, job.shard)
     return Products(unfit, (job.shard,))
-
-
-def _hypocentre(event: "Event | None") -> dict[str, float]:
-    """Return the hypocentre, degrees and m, if it is known."""
-    origin = event and (event.preferred_origin() or next(iter(event.origins), None))
-    if not origin or None in (origin.longitude, origin.latitude, origin.depth):
-        return {}
-    return {
-        f"hypocentre_{name}": float(origin[name]) for name in ("longitude", "latitude", "depth")
-    }
 
 
 class StationJob(NamedTuple):
@@ -107,7 +106,7 @@ class StationJob(NamedTuple):
     product : callable
         Function that makes the files from the records: see :func:`spectra_shard`.
     key : str
-        Hash of all inputs of the station file; :func:`do_stations` computes it.
+        Hash of all inputs of the station file but the earthquake; :func:`do_stations` computes it.
     """
 
     station: str
@@ -119,7 +118,7 @@ class StationJob(NamedTuple):
     shard: Path
     hashes: tuple[str, ...] = ()
     reader: "partial[tuple[Stream, tuple[Rejection, ...]]]" = partial(read_station)
-    product: "Callable[[StationJob, Stream, Event | None], Products]" = spectra_shard
+    product: "Callable[[StationJob, Stream, Source | None], Products]" = spectra_shard
     key: str = ""
 
 
@@ -136,7 +135,7 @@ class FinishedStation(NamedTuple):
     rejected : tuple of Rejection
         Rejected inputs, each with its reasons.
     resumed : bool
-        Whether an earlier run had done it.
+        Whether an earlier run had processed it.
     hash : str
         Of the station file; empty if there is none.
     spectra : Dataset or None
@@ -198,8 +197,11 @@ def _prepared(job: StationJob) -> StationJob | FinishedStation:
 
 def do_station(job: StationJob) -> FinishedStation:
     """Write a station file and its status file, and return the finished station."""
+    if known := _unchanged_by_event(job):
+        return known
     remove_file(job.shard)
-    products = _products(job)
+    decisions = list[dict[str, Any]]()
+    products = _products(job, decisions)
     has_shard = job.shard in products.files
     digest, spectra = _read_shard(job.shard) if has_shard else ("", None)
     # The status comes last: it is valid for whole files only
@@ -207,17 +209,44 @@ def do_station(job: StationJob) -> FinishedStation:
     outputs = {_from_status(job.shard, file): file_hash(file) for file in others}
     outputs |= {job.shard.name: digest} if has_shard else {}
     facts = {"shard": digest or None, "rejected": products.rejected, **products.facts}
+    facts |= {"source": source_facts(job.event), "decisions": decisions}
     write_status(_status_file(job.shard), job.key, outputs, facts)
     shard = job.shard if has_shard else None
     return FinishedStation(job.station, shard, products.rejected, False, digest, spectra)
 
 
-def _products(job: StationJob) -> Products:
+def _unchanged_by_event(job: StationJob) -> FinishedStation | None:
+    """
+    Return the station of an earlier run for whose processing the earthquake is the same, else None.
+
+    Its files get the facts of the earthquake now.
+    """
+    status = _known_status(job)
+    if status is None or job.event is None:
+        return None
+    rejected = _stored_rejections(status)
+    found = FinishedStation(job.station, job.shard, rejected, True)
+    if not is_of_event(status, job.event, job.processing) or not _whole_station(found, status):
+        return None
+    shard = status["shard"]
+    if shard and job.shard.suffix == SPECTRA:
+        if not moved_shard(job.shard, status["source"], job.event):
+            return None
+        shard = file_hash(job.shard)
+    # As if the station had been done with this earthquake at first
+    outputs = {**status["outputs"], **({job.shard.name: shard} if shard else {})}
+    rest = {name: fact for name, fact in status.items() if name not in ("key", "outputs")}
+    facts = {**rest, "shard": shard, "source": source_facts(job.event)}
+    status = write_status(_status_file(job.shard), job.key, outputs, facts)
+    return _whole_station(found, status)
+
+
+def _products(job: StationJob, decisions: list[dict[str, Any]]) -> Products:
     """Read the records of a station and make its products; an unusable station is a rejection."""
     source = _file_names(job)
     try:
         stream, unread = job.reader(job.source, job.inventory, job.station)
-        products = job.product(job, stream, job.event.event if job.event else None)
+        products = job.product(job, stream, source_of_job(job.event, decisions))
     except TryLater:
         raise  # no property of the station
     except PerError as error:
@@ -256,10 +285,10 @@ def _from_status(shard: Path, file: Path) -> str:
 
 
 def _key(job: StationJob) -> str:
-    """Return the hash of all inputs of the products of a station."""
+    """Return the hash of all inputs of the products of a station but the earthquake."""
     settings = [job.processing.model_dump_json(), job.spectra.model_dump_json()]
     files = [f"{path.name} {digest}" for path, digest in zip(job.source, job.hashes, strict=True)]
-    files += [f"{job.event.path.name} {job.event.hash}"] if job.event else []
+    files += ["with an earthquake"] if job.event else []
     # Reader and product are known by name, so that other processes find the same
     steps = [job.reader.func.__name__, job.reader.keywords, job.product.__name__]
     metadata = [metadata_text(job.inventory)] if job.inventory else []
@@ -268,15 +297,22 @@ def _key(job: StationJob) -> str:
 
 
 def _earlier(job: StationJob) -> FinishedStation | None:
-    """Return the station of an earlier run if its key is the same and its files are complete."""
+    """Return the station of an earlier run if all its inputs are the same and its files whole."""
+    status = _known_status(job)
+    if status is None or status.get("source") != source_facts(job.event):
+        return None
+    rejected = _stored_rejections(status)
+    return _whole_station(FinishedStation(job.station, job.shard, rejected, True), status)
+
+
+def _known_status(job: StationJob) -> Status | None:
+    """Return the status of a station if its key is the same; None if it is not or is damaged."""
     try:
         status = read_status(_status_file(job.shard))
-        rejected = _stored_rejections(status)
+        _stored_rejections(status)
     except StatusError:
         return None
-    if status["key"] != job.key:
-        return None
-    return _whole_station(FinishedStation(job.station, job.shard, rejected, True), status)
+    return status if status["key"] == job.key else None
 
 
 def _whole_station(station: FinishedStation, status: Status) -> FinishedStation | None:

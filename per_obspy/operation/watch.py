@@ -15,15 +15,15 @@ from typing import NamedTuple
 
 from per_obspy import termination
 from per_obspy.config import Run, Watch
-from per_obspy.errors import CatalogError, PerError, ServiceError, TryLater, shortened
+from per_obspy.errors import PerError, TryLater, shortened
 from per_obspy.jobs.output_folder import locked_folder
-from per_obspy.operation.events.due import Task, due_task, is_paused, next_due, pause
-from per_obspy.operation.events.event_feed import Feed, noted_poll, read_feed
-from per_obspy.operation.events.event_run import Watcher, arrivals_of, done_task
-from per_obspy.operation.events.failures import after_pause, failed, known_fault
-from per_obspy.operation.events.open_events import listed_states, present_state
-from per_obspy.operation.events.relevance import Circle, circle_around, inventory_places
-from per_obspy.operation.events.revisions import WORK, point_latest, revision_folder
+from per_obspy.operation.events.due import INCOMPLETE, Task, due_task, next_due, pause
+from per_obspy.operation.events.event_run import arrivals_of, done_task
+from per_obspy.operation.events.event_settings import Watcher, watch_of
+from per_obspy.operation.events.failures import failed, known_fault
+from per_obspy.operation.events.late_records import is_look_due, looked
+from per_obspy.operation.events.relevance import inventory_places
+from per_obspy.operation.events.revisions import WORK, point_latest
 from per_obspy.operation.events.state import (
     EventState,
     WatchState,
@@ -32,18 +32,14 @@ from per_obspy.operation.events.state import (
     iso,
     moment,
     read_event_states,
-    read_watch_state,
-    write_event_state,
-    write_watch_state,
 )
-from per_obspy.operation.notified_run import notify_failure, notify_result, undelivered
+from per_obspy.operation.notified_run import undelivered
+from per_obspy.operation.outbox import deliver, deliver_waiting, message_waits
+from per_obspy.operation.polling import confirm, is_over, keep, polled
 from per_obspy.operation.status import WatchStatus, write_status
 from per_obspy.progress import Progress, silent
 
 log = logging.getLogger(__name__)
-
-#: Reason of another run of an earthquake whose records are not complete.
-INCOMPLETE = "services of records did not answer everything: asked again"
 
 
 def utc_now() -> datetime:
@@ -145,13 +141,8 @@ def watch_forever(
                 failures += 1
                 log.error("%s", error)
                 seconds = pause(failures)
-            end = termination.requested() or used.wait(min(max(seconds, 1.0), _poll(settings)))
-
-
-def _poll(settings: Run) -> float:
-    """Return the time between two polls, s."""
-    assert settings.watch is not None
-    return settings.watch.poll
+            longest = watch_of(settings).poll
+            end = termination.requested() or used.wait(min(max(seconds, 1.0), longest))
 
 
 def _watcher(
@@ -172,14 +163,17 @@ def _one_pass(watcher: Watcher, running: bool) -> Pass:
     errors = list[PerError]()
     for event_id in states:
         _point_latest(event_folder(watcher.folder, event_id), errors)
-    state = _polled(watcher, states, errors)
-    _confirm(watcher, states, errors)
-    while not termination.requested() and (found := _most_urgent(watcher, states)):
+    deliver_waiting(watcher, states)
+    state = polled(watcher, states, errors)
+    confirm(watcher, states, errors)
+    come = _records_that_came(watcher, states, errors)
+    while not termination.requested() and (found := _most_urgent(watcher, states, come)):
         event_id, task = found
+        come.discard(event_id)
         states[event_id] = _attempt(watcher, states[event_id], task, errors)
         # A new and larger earthquake does not wait for the runs of all others
-        if _is_over(watcher, state):
-            state = _polled(watcher, states, errors)
+        if is_over(watcher, state):
+            state = polled(watcher, states, errors)
     return _ended(watcher, states, state, errors, running)
 
 
@@ -191,104 +185,36 @@ def _point_latest(folder: Path, errors: list[PerError]) -> None:
         errors.append(error)
 
 
-def _is_over(watcher: Watcher, state: WatchState) -> bool:
-    """Return whether the time between two polls has passed, or the clock was put back."""
-    now = watcher.now()
-    if state.last_poll is None or is_paused(now, state.not_before):
-        return False
-    elapsed = (now - moment(state.last_poll)).total_seconds()
-    return not 0.0 <= elapsed < _poll(watcher.settings)
-
-
-def _polled(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> WatchState:
-    """Poll the list of earthquakes, and write changed states; a failure is noted."""
-    watch, now = _watch_of(watcher), watcher.now()
-    state = read_watch_state(watcher.folder)
-    if is_paused(now, state.not_before):
-        errors.append(TryLater(f"{state.last_error}; asked again after {state.not_before}"))
-        return state
-    try:
-        feed = read_feed(watch, state, _circle(watcher), now)
-    except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for the list
-        fault = known_fault(error)
-        errors.append(fault)
-        state = _failed_poll(state, fault, now)
-    else:
-        errors += _problems(watch, feed)
-        for known in listed_states(watch, watcher.places, states, feed, now):
-            _keep(watcher, states, known)
-        # The list comes last: states that it opened are written
-        state = noted_poll(state, feed, now)
-    write_watch_state(watcher.folder, state)
-    return state
-
-
-def _watch_of(watcher: Watcher) -> Watch:
-    """Return the section of the watcher."""
-    assert watcher.settings.watch is not None
-    return watcher.settings.watch
-
-
-def _circle(watcher: Watcher) -> Circle:
-    """Return the circle within which an earthquake can be relevant."""
-    reach = max(reach.distance for reach in _watch_of(watcher).magnitudes)
-    return circle_around(watcher.places, reach)
-
-
-def _problems(watch: Watch, feed: Feed) -> list[PerError]:
-    """Return an error per line or file of a list that cannot be read."""
-    # Lines of a service may be mended there, files of a folder by its user
-    if watch.folder is None:
-        return [ServiceError(problem) for problem in feed.problems]
-    return [CatalogError(str(watch.folder), problem) for problem in feed.problems]
-
-
-def _failed_poll(state: WatchState, fault: PerError, now: datetime) -> WatchState:
-    """Return the state after a list that could not be read."""
-    failures = state.failures + 1
-    update = {
-        "failures": failures,
-        "not_before": after_pause(now, failures, fault),
-        "last_error": shortened(str(fault)),
-    }
-    return state.model_copy(update=update)
-
-
-def _keep(watcher: Watcher, states: dict[str, EventState], state: EventState) -> None:
-    """Write the state of an earthquake, and remember it."""
-    write_event_state(event_folder(watcher.folder, state.event_id), state)
-    before = states.get(state.event_id)
-    if state.state == "closed" and (before is None or before.state != "closed"):
-        log.info("%s: closed: %s", shortened(state.event_id, 80), state.reason)
-    states[state.event_id] = state
-
-
-def _confirm(watcher: Watcher, states: dict[str, EventState], errors: list[PerError]) -> None:
-    """Ask for the open earthquakes that no list has confirmed for a while."""
-    watch = _watch_of(watcher)
+def _records_that_came(
+    watcher: Watcher, states: dict[str, EventState], errors: list[PerError]
+) -> set[str]:
+    """Request missing records between the delays; return the earthquakes of which some came."""
+    come = set[str]()
     for state in list(states.values()):
-        now = watcher.now()
-        elapsed = (now - moment(state.confirmed)).total_seconds()
-        recent = 0.0 <= elapsed < watch.confirm
-        if state.state != "open" or recent or is_paused(now, state.not_before):
+        if not is_look_due(watcher, state) or termination.requested():
             continue
         try:
-            present = present_state(watch, watcher.places, state, now)
-        except Exception as error:  # noqa: BLE001 - the other earthquakes are confirmed
+            after, has_come = looked(watcher, state)
+        except Exception as error:  # noqa: BLE001 - the runs that are due do not wait for these
             errors.append(known_fault(error))
-            # The service of all others fails as well
-            return
-        _keep(watcher, states, present)
+            after, has_come = changed(state, looked=iso(watcher.now())), False
+        keep(watcher, states, after)
+        if has_come:
+            come.add(state.event_id)
+    return come
 
 
-def _most_urgent(watcher: Watcher, states: dict[str, EventState]) -> tuple[str, Task] | None:
+def _most_urgent(
+    watcher: Watcher, states: dict[str, EventState], come: set[str]
+) -> tuple[str, Task] | None:
     """Return the earthquake whose run comes next: those without a result first, larger first."""
-    now, watch = watcher.now(), _watch_of(watcher)
+    now, watch = watcher.now(), watch_of(watcher.settings)
     arrivals = arrivals_of(watcher.settings)
     # The identifier makes the order certain
     found = []
     for state in states.values():
-        task = due_task(now, state, watch.delays, _has_arrivals(state, arrivals, now, watch.poll))
+        has_come = state.event_id in come or _has_arrivals(state, arrivals, now, watch.poll)
+        task = due_task(now, state, watch.delays, has_come)
         if task is not None:
             found.append((state.revision > 0, -(state.magnitude or 0.0), state.event_id, task))
     if not found:
@@ -322,27 +248,20 @@ def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerEr
         after = changed(done.state, failures=0, not_before=None, last_error=None)
     else:
         after = failed(done.state, INCOMPLETE, watcher.now(), None)
-    _keep(watcher, {state.event_id: state}, after)
+    # The message waits on the disk before the state says that the run is done
     if done.result is not None:
-        # Its folder works on: people are shown the revision, which never changes
-        folder = event_folder(watcher.folder, state.event_id)
-        shown = revision_folder(folder, after.revision) if after.revision else None
-        notify_result(watcher.settings.notify, done.result, _label(watcher, state), shown)
+        message_waits(watcher, after)
+    keep(watcher, {state.event_id: state}, after)
+    deliver(watcher, after)
     return after
 
 
 def _failure(watcher: Watcher, state: EventState) -> EventState:
     """Write the state of an earthquake whose run failed, and notify people."""
-    _keep(watcher, {state.event_id: state}, state)
-    work = event_folder(watcher.folder, state.event_id) / WORK
-    reason = state.last_error or ""
-    notify_failure(watcher.settings.notify, work, _label(watcher, state), reason)
+    message_waits(watcher, state, state.last_error or "")
+    keep(watcher, {state.event_id: state}, state)
+    deliver(watcher, state)
     return state
-
-
-def _label(watcher: Watcher, state: EventState) -> str:
-    """Return the title of messages about an earthquake."""
-    return f"{watcher.settings.name}: {state.event_id}"
 
 
 def _ended(
@@ -353,10 +272,10 @@ def _ended(
     running: bool,
 ) -> Pass:
     """Close the pass: earthquakes that are too old are finished, and the status is written."""
-    now, watch = watcher.now(), _watch_of(watcher)
+    now, watch = watcher.now(), watch_of(watcher.settings)
     for known in list(states.values()):
         if _is_finished(known, watch, now):
-            _keep(watcher, states, changed(known, state="finished"))
+            keep(watcher, states, changed(known, state="finished"))
     # The next look at the list, or a run before it
     following = now + timedelta(seconds=watch.poll)
     for known in states.values():

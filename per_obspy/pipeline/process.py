@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from obspy import Stream
-from obspy.core.event import Event
 
 from per_obspy.config import Engine, Processing, Spectra
 from per_obspy.errors import Rejection
@@ -16,6 +15,7 @@ from per_obspy.jobs.executor import opened_executor
 from per_obspy.jobs.station import FinishedStation, Products, StationJob
 from per_obspy.pipeline.stations import all_rejections, finished_stations, station_jobs
 from per_obspy.processing.chain import process_instruments, process_station
+from per_obspy.processing.noise.windows import Source
 from per_obspy.processing.notes import taken
 from per_obspy.processing.station.structures import kept_apart
 from per_obspy.processing.unprocessed import before_processing
@@ -126,23 +126,23 @@ def _structure(job: StationJob) -> Path:
     return job.shard.parent.with_name(STRUCTURES) / job.shard.name
 
 
-def records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
+def records_shard(job: StationJob, stream: Stream, source: Source | None) -> Products:
     """Write the processed records of a station as its station file, structures in another file."""
     ground, structure = kept_apart(taken(stream))
-    clean, unfit = process_station(chain(taken(ground), structure), job.processing, event)
-    return _write_records(job, clean, unfit, _write_structure(job, structure, event))
+    clean, unfit = process_station(chain(taken(ground), structure), job.processing, source)
+    return _write_records(job, clean, unfit, _write_structure(job, structure, source))
 
 
-def drawn_records_shard(job: StationJob, stream: Stream, event: Event | None) -> Products:
+def drawn_records_shard(job: StationJob, stream: Stream, source: Source | None) -> Products:
     """Write the station file as :func:`records_shard` does, and draw one page per record."""
-    clean, unfit = process_station(stream, job.processing, event)
+    clean, unfit = process_station(stream, job.processing, source)
     # Each page shows a record before and after
     pages = job.shard.with_suffix(".pdf")
     if clean:
         traces = ((trace, before_processing(stream, trace, job.processing)) for trace in clean)
         draw_records(traces, pages)
     _, structure = kept_apart(stream)
-    products = _write_records(job, clean, unfit, _write_structure(job, structure, event))
+    products = _write_records(job, clean, unfit, _write_structure(job, structure, source))
     return products._replace(files=(*products.files, pages)) if clean else products
 
 
@@ -157,11 +157,11 @@ def _write_records(
     return Products(rejected, (job.shard, *structure.files), facts)
 
 
-def _write_structure(job: StationJob, structure: Stream, event: Event | None) -> Products:
+def _write_structure(job: StationJob, structure: Stream, source: Source | None) -> Products:
     """Write the records of all sensors in structures, and empty the stream."""
     path = _structure(job)
     remove_file(path)
-    instruments, rejected = process_instruments(taken(structure), job.processing, event)
+    instruments, rejected = process_instruments(taken(structure), job.processing, source)
     # All instruments in one file
     built = Stream([trace for traces in instruments for trace in traces])
     if not built:

@@ -17,6 +17,7 @@ from per_obspy.jobs.parallel import prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.tables.ranked.ranked_files import table_outputs
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def run(
     executor: Executor | None = None,
     progress: Progress = silent,
     facts: Mapping[str, object] | None = None,
+    fetched: "Fetched | None" = None,
 ) -> Result:
     """
     Do a whole run: records to spectra to risk table to figures.
@@ -45,6 +47,8 @@ def run(
         Called for every stage: name, done, total.
     facts : mapping, optional
         Plain values for ``run.json`` that change no result, such as the number of a revision.
+    fetched : Fetched, optional
+        Records of FDSN services, if they have been fetched; otherwise they are fetched here.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def run(
     settings, folder = asked.settings, asked.folder
     with locked_folder(folder):
         asked.write()
-        fetched = _fetched_records(settings, progress)
+        fetched = fetched or _fetched_records(settings, progress)
         # Inputs are hashed here only to compare them with those of a finished run
         head = None
         if (folder / RECORD).is_file():
@@ -169,8 +173,8 @@ def _finished(file: Path) -> dict[str, Any]:
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
-    names = ("risk.parquet", "spectra.nc")
-    needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
+    spectra = {name: one for name, one in record["outputs"].items() if name == "spectra.nc"}
+    needed = table_outputs(record["outputs"]) | spectra
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
         raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")

@@ -191,7 +191,8 @@ def simulated_motion(settings: Run, stations: Sequence[FinishedStation]) -> bool
 def _waiting_stations(names: Sequence[str]) -> str:
     """Return a message with the number and first names of stations to be tried again."""
     others = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{len(names)} stations wait for another run: {', '.join(names[:NAMED])}{others}"
+    count = "1 station waits" if len(names) == 1 else f"{len(names)} stations wait"
+    return f"{count} for another run: {', '.join(names[:NAMED])}{others}"
 
 
 def all_rejections(

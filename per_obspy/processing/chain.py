@@ -10,7 +10,7 @@ from obspy.core.event import Event
 from per_obspy.config import Processing
 from per_obspy.errors import RecordRejected, Rejection
 from per_obspy.processing.instrument import process_instrument
-from per_obspy.processing.noise.windows import source_of
+from per_obspy.processing.noise.windows import Source, source_of
 from per_obspy.processing.notes import rejection, taken
 from per_obspy.processing.station.components import instruments, is_horizontal, oriented
 from per_obspy.processing.station.merging import merged
@@ -76,7 +76,7 @@ def process(
 
 
 def process_station(
-    stream: Iterable[Trace], settings: Processing, event: Event | None = None
+    stream: Iterable[Trace], settings: Processing, event: Event | Source | None = None
 ) -> tuple[Stream, tuple[Rejection, ...]]:
     """
     Process a station and return the best instrument with a row for each other trace.
@@ -88,7 +88,7 @@ def process_station(
         code holds them, raw records leave memory on the way.
     settings : Processing
         Every number of the chain.
-    event : obspy Event, optional
+    event : obspy Event or Source, optional
         Its origin helps to find the first wave, its magnitude gives a corner without noise.
 
     Returns
@@ -121,7 +121,7 @@ def process_station(
 
 
 def process_instruments(
-    stream: Iterable[Trace], settings: Processing, event: Event | None = None
+    stream: Iterable[Trace], settings: Processing, event: Event | Source | None = None
 ) -> tuple[list[Stream], tuple[Rejection, ...]]:
     """
     Process every instrument of a station by itself, the preferred instrument first.
@@ -141,7 +141,9 @@ def process_instruments(
     rejected : tuple of Rejection
     """
     whole, broken = merged(stream)
-    source = source_of(event) if event is not None and event.origins else None
+    source = source_of(event) if isinstance(event, Event) and event.origins else None
+    if isinstance(event, Source):
+        source = event
     processed, rejected = [], list(broken)
     # Each instrument by itself
     for instrument in instruments(oriented(taken(whole))):

@@ -15,7 +15,12 @@ from per_obspy.errors import Rejection
 from per_obspy.processing.already_processed import passed_through
 from per_obspy.processing.filter.baseline_and_corners import corners_noted, offset_kept
 from per_obspy.processing.filter.butterworth import filtered, padded
-from per_obspy.processing.filter.corners import corners_shared, usable_periods_noted
+from per_obspy.processing.filter.corners import (
+    Corner,
+    corners_shared,
+    fallback_highpass,
+    usable_periods_noted,
+)
 from per_obspy.processing.instrument_response import in_acceleration
 from per_obspy.processing.noise.windows import Source, noise_window_noted, trimmed
 from per_obspy.processing.notes import copied, is_processed, taken
@@ -128,11 +133,18 @@ def _baseline_steps(
     """Return the check for outliers among the components and the choice of baseline and corners."""
     outliers = outlier_findings(stream, settings.checks)
     magnitude = source.magnitude if source else _header_magnitude(stream)
+
+    def fallback() -> Corner:
+        corner = fallback_highpass(magnitude, settings.fallback_highpass, settings.unknown_highpass)
+        if source is not None:
+            source.note(highpass=list(corner))
+        return corner
+
     # The permanent offset is kept on request only
     if settings.permanent_offset:
         chosen: Step = partial(offset_kept, settings=settings)
     else:
-        chosen = partial(corners_noted, settings=settings, magnitude=magnitude)
+        chosen = partial(corners_noted, settings=settings, fallback=fallback)
     return lambda single: judged(single[0], outliers.get(single[0].id, [])), chosen
 
 

@@ -9,6 +9,7 @@ files are handed over as bytes.
 import bz2
 import glob
 import gzip
+import re
 import tarfile
 import tempfile
 import zipfile
@@ -203,5 +204,6 @@ def _unknown(content: bytes) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return the message of an error on one line."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    """Return the message of an error on one line; an object in memory is the content."""
+    message = re.sub(r"'?<_io\.\w+ object at 0x[0-9a-f]+>'?", "the content", str(error))
+    return f"{type(error).__name__}: {' '.join(message.split())}"

@@ -29,6 +29,9 @@ LONGEST_PHASE = 1.0
 #: slower.
 MOST_DOUBLINGS = 6
 
+#: Share of the squared velocity in the square that is largest.
+RADIUS, DISPLACEMENT = 1.0, 0.0
+
 #: Every whole degree of a half turn, degrees; the other half repeats it.
 EVERY_AZIMUTH = np.arange(180.0)
 
@@ -79,7 +82,7 @@ def azimuthal_per_spectrum(
     >>> azimuthal_per_spectrum(north, east, 0.01, [1.0], azimuths=[0, 90]).round(4)
     array([[0.0047, 0.0063]])
     """
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=True)
+    return _spectra(north, east, dt, periods, damping, azimuths, (RADIUS,))[0]
 
 
 def azimuthal_sd_spectrum(
@@ -95,7 +98,25 @@ def azimuthal_sd_spectrum(
 
     Arguments and shape of the result are those of `azimuthal_per_spectrum`.
     """
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=True)
+    return _spectra(north, east, dt, periods, damping, azimuths, (DISPLACEMENT,))[0]
+
+
+def azimuthal_spectra(
+    north: ArrayLike,
+    east: ArrayLike,
+    dt: float,
+    periods: ArrayLike,
+    damping: ArrayLike = REFERENCE_DAMPING,
+    azimuths: ArrayLike = EVERY_AZIMUTH,
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Compute `azimuthal_per_spectrum` and `azimuthal_sd_spectrum` from one pass over the record, m.
+
+    Arguments and shapes of both results are those of `azimuthal_per_spectrum`, without traces.
+    """
+    both = RADIUS, DISPLACEMENT
+    per, sd = _spectra(north, east, dt, periods, damping, azimuths, both)
+    return per, sd
 
 
 def sampled_azimuthal_per_spectrum(
@@ -111,7 +132,7 @@ def sampled_azimuthal_per_spectrum(
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=1.0, exact=False)
+    return _spectra(north, east, dt, periods, damping, azimuths, (RADIUS,), exact=False)[0]
 
 
 def sampled_azimuthal_sd_spectrum(
@@ -127,20 +148,20 @@ def sampled_azimuthal_sd_spectrum(
 
     For benchmarks and tests against programs that look at samples only; arguments as there.
     """
-    return _spectrum(north, east, dt, periods, damping, azimuths, share=0.0, exact=False)
+    return _spectra(north, east, dt, periods, damping, azimuths, (DISPLACEMENT,), exact=False)[0]
 
 
-def _spectrum(
+def _spectra(
     north: ArrayLike,
     east: ArrayLike,
     dt: float,
     periods: ArrayLike,
     damping: ArrayLike,
     azimuths: ArrayLike,
-    share: float,
-    exact: bool,
-) -> FloatArray:
-    """Return the largest ``sqrt(u² + share z²)`` along each azimuth."""
+    shares: tuple[float, ...],
+    exact: bool = True,
+) -> list[FloatArray]:
+    """Return the largest ``sqrt(u² + share z²)`` along each azimuth, one array per share."""
     components = two_components(north, east)
     dt = checks.number("dt", dt, checks.positive)
     (periods, dampings), shape = grid_of(periods, damping)
@@ -151,15 +172,16 @@ def _spectrum(
     fan = _fan(np.radians(half_turn[ascending]))
 
     # Oscillators whose steps are cut into equally many parts run together
-    lengths = np.empty((half_turn.size, periods.size))
-    parts = _parts(2.0 * np.pi * dt / periods) if exact else np.ones(periods.size, dtype=np.int64)
+    lengths = np.empty((len(shares), periods.size, half_turn.size))
+    parts = _parts(2.0 * np.pi * dt / periods, exact)
     for count in np.unique(parts).tolist():
-        chosen = parts == count
+        chosen = np.flatnonzero(parts == count)
         oscillators = prepare_oscillators(dt / count, periods[chosen], dampings[chosen])
-        record = tiled_record(*(_with_steps_cut(component, count) for component in components))
-        found = _lengths(record, oscillators, fan, share, exact)
-        lengths[np.ix_(ascending, chosen)] = found[: half_turn.size]
-    return lengths.T.reshape(*shape, half_turn.size)
+        record = _record_with_steps_cut(components, count)
+        found = _lengths(record, oscillators, fan, shares, exact)[:, :, : half_turn.size]
+        # Back to the order of the arguments
+        lengths[:, chosen[:, np.newaxis], ascending] = found
+    return [spectrum.reshape(*shape, half_turn.size) for spectrum in lengths]
 
 
 def _row_of_azimuths(azimuths: ArrayLike) -> FloatArray:
@@ -172,19 +194,27 @@ def _lengths(
     record: TiledRecord,
     oscillators: Oscillators,
     fan: tuple[FloatArray, FloatArray],
-    share: float,
+    shares: tuple[float, ...],
     exact: bool,
 ) -> FloatArray:
-    """Return the largest lengths of oscillators, (azimuths of the fan, n), m."""
-    work = partial(_block_squares, record, share=share, fan=fan, exact=exact)
+    """Return the largest lengths of oscillators, (shares, n, azimuths of the fan), m."""
+    work = partial(_block_squares, record, shares=shares, fan=fan, exact=exact)
     squares = over_blocks(work, oscillators, record)
-    return np.asarray(np.sqrt(squares) / oscillators.omegas**2 * record.scale)
+    lengths = np.sqrt(squares) / oscillators.omegas**2 * record.scale
+    return lengths.reshape(len(shares), -1, oscillators.size).transpose(0, 2, 1)
 
 
-def _parts(phases: FloatArray) -> NDArray[np.int64]:
+def _parts(phases: FloatArray, exact: bool) -> NDArray[np.int64]:
     """Return the number of parts of a step, a power of two: bounds between samples stay tight."""
+    if not exact:
+        return np.ones(phases.size, dtype=np.int64)
     doublings = np.ceil(np.log2(np.maximum(phases / LONGEST_PHASE, 1.0)))
     return np.asarray(2 ** np.minimum(doublings, MOST_DOUBLINGS), dtype=np.int64)
+
+
+def _record_with_steps_cut(components: tuple[FloatArray, FloatArray], count: int) -> TiledRecord:
+    """Return both components with so many samples per step, ready for the kernels."""
+    return tiled_record(*(_with_steps_cut(component, count) for component in components))
 
 
 def _with_steps_cut(acceleration: FloatArray, count: int) -> FloatArray:
@@ -225,50 +255,29 @@ def _block_squares(
     record: TiledRecord,
     block: Oscillators,
     *,
-    share: float,
+    shares: tuple[float, ...],
     fan: tuple[FloatArray, FloatArray],
     exact: bool,
 ) -> FloatArray:
-    """Return the largest squares of one block, (azimuths, lanes), scaled acceleration / omega²."""
+    """Return the largest squares of one block, scaled acceleration / omega², (rows, lanes)."""
     packed, state = np.empty((8, blocks.LANES)), np.zeros((4, blocks.LANES))
     tile_states = np.empty((blocks.TILES, 6, blocks.LANES))
-    steps = np.empty((blocks.TILES * blocks.TILE, azimuth_steps.COLUMNS))
-    largest = np.zeros((blocks.LANES, fan[0].shape[1]))
+    largest = np.zeros((len(shares), blocks.LANES, fan[0].shape[1]))
     kernels.pack_steps(block.phases, block.dampings, packed)
 
     # All lanes run together, then each is turned into every azimuth
     for stretch in stretches(record):
         kernels.run_azimuth_tiles(stretch.north, stretch.east, packed, state, tile_states)
-        for lane in range(block.size):
-            oscillator = _oscillator(block, lane, share)
-            kernels.raise_azimuths_to_samples(
-                *stretch[:2], tile_states, oscillator, fan[0], largest[lane]
+        for share, squares in zip(shares, largest, strict=True):
+            azimuth_steps.raise_azimuths(
+                *stretch[:4], tile_states, *block[:2], share, exact, *fan, squares[: block.size]
             )
-            if exact:
-                _raise_between_samples(stretch, tile_states, oscillator, fan, steps, largest[lane])
 
     # In free vibration the radius never grows, the displacement may
-    if share == 0.0:
-        kernels.free_displacements(state, block.dampings, block.size, fan[0], largest)
-    return largest.T
-
-
-def _oscillator(block: Oscillators, lane: int, share: float) -> kernels.Oscillator:
-    """Return one oscillator of a block as the kernels take it."""
-    return kernels.Oscillator(lane, float(block.phases[lane]), float(block.dampings[lane]), share)
-
-
-def _raise_between_samples(
-    stretch: TiledRecord,
-    tile_states: FloatArray,
-    oscillator: kernels.Oscillator,
-    fan: tuple[FloatArray, FloatArray],
-    steps: FloatArray,
-    largest: FloatArray,
-) -> None:
-    """Raise the largest squares of one oscillator along every azimuth by those between samples."""
-    count = azimuth_steps.list_steps(*stretch[:4], tile_states, oscillator, fan[0], largest, steps)
-    azimuth_steps.search_steps(steps[:count], oscillator, *fan, largest)
+    if DISPLACEMENT in shares:
+        displacements = largest[shares.index(DISPLACEMENT)]
+        kernels.free_displacements(state, block.dampings, block.size, fan[0], displacements)
+    return np.concatenate([squares.T for squares in largest])
 
 
 def rotd(spectrum: ArrayLike, percentile: float) -> FloatArray:

@@ -220,24 +220,31 @@ def row_of(name: str, values: FloatArray) -> FloatArray:
     return values
 
 
+def _raise_between_samples(
+    stretch: TiledRecord, block: Oscillators, tile_states: FloatArray, largest: FloatArray
+) -> None:
+    """Raise the largest values to those of a stretch, between the samples too."""
+    # Only the tiles whose bounds allow a larger value are run again
+    selected = select_tiles(stretch, block, tile_states, largest)
+    states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
+    raise_between_samples(stretch, block, tile_states, states, selected, largest)
+
+
 def _radius_block(record: TiledRecord, block: Oscillators, exact: bool) -> FloatArray:
     """Return the largest squared radii, (1, lanes), in units of scaled acceleration / omega²."""
-    packed, state = np.empty((radius.ROWS, blocks.LANES)), np.empty((2, blocks.LANES))
+    table = np.empty((radius.ROWS, blocks.LANES))
     tile_states = np.empty((blocks.TILES, 3, blocks.LANES))
     largest = np.zeros((1, blocks.LANES))
-    radius.pack(block.phases, block.dampings, packed)
-    radius.start_at_rest(record.north[0], packed, state)
+    radius.pack(block.phases, block.dampings, table)
 
     for stretch in stretches(record):
-        radius.run_tiles(stretch.north, packed, state, tile_states)
-        if not exact:
-            raise_to_samples(stretch, tile_states, largest)
-            continue
-        # Only the tiles whose bounds allow a larger radius are run again
-        selected = select_tiles(stretch, block, tile_states, largest)
-        states = np.empty(selected.shape)
-        radius.states_before(stretch.north, packed, tile_states, selected, states)
-        raise_between_samples(stretch, block, tile_states, states, selected, largest)
+        # At every eighth step, then at all samples of tiles that may hold more
+        radius.run_strides(stretch.north, table, tile_states)
+        extremes = stretch.peaks[0], stretch.jumps[0]
+        oscillators = block.phases, block.dampings, table
+        radius.raise_to_samples(stretch.north, *extremes, *oscillators, tile_states, largest)
+        if exact:
+            _raise_between_samples(stretch, block, tile_states, largest)
     return largest
 
 
@@ -249,14 +256,12 @@ def _response_block(record: TiledRecord, block: Oscillators, exact: bool) -> Flo
     response.pack_response(block.weights, block.phases, block.dampings, packed)
 
     for stretch in stretches(record):
+        # At all samples
         response.run_response_tiles(stretch.north, stretch.east, packed, tile_states)
-        if not exact:
+        if exact:
+            _raise_between_samples(stretch, block, tile_states, largest)
+        else:
             raise_to_samples(stretch, tile_states, largest)
-            continue
-        # Only the tiles whose bounds allow a larger value are run again
-        selected = select_tiles(stretch, block, tile_states, largest)
-        states = np.ascontiguousarray(tile_states[selected[:, 0], :2, selected[:, 1]])
-        raise_between_samples(stretch, block, tile_states, states, selected, largest)
     response.free_vibration(packed, block.dampings, largest)
     return largest
 

@@ -27,8 +27,7 @@ from per_obspy.constants import (
 from per_obspy.errors import RecordRejected
 from per_obspy.spectra.azimuthal import (
     EVERY_AZIMUTH,
-    azimuthal_per_spectrum,
-    azimuthal_sd_spectrum,
+    azimuthal_spectra,
     rotd,
 )
 from per_obspy.spectra.elastic import response_spectra
@@ -238,8 +237,7 @@ def _azimuthal_spectra(
         return xr.Dataset()
     north, east = motion
     # Every degree for the percentiles, of which the stored azimuths are a part
-    per = azimuthal_per_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)
-    sd = azimuthal_sd_spectrum(north, east, dt, periods, dampings, EVERY_AZIMUTH)
+    per, sd = azimuthal_spectra(north, east, dt, periods, dampings, EVERY_AZIMUTH)
     azimuth = {"units": "degree", "long_name": "azimuth, clockwise from north"}
     return xr.Dataset(
         _by_azimuth("per", per, "pseudo energy radius", step)

@@ -36,8 +36,10 @@ def write_spectra(dataset: xr.Dataset, path: Path) -> None:
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f":
             encoding[name] = {"zlib": variable.ndim > 0, "complevel": 4, "shuffle": True}
+    # In the order in which they are read, so that the bytes do not depend on how it was made
+    ordered = dataset[[*dataset.data_vars, *dataset.coords]]
     with written_whole(path) as part:
-        dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
+        ordered.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 
 def read_spectra(path: Path, content: bytes | None = None) -> xr.Dataset:

@@ -3,14 +3,16 @@ Name the figures that became worse by more than a tenth from one file of benchma
 
     python tests/benchmarks/compare.py OLD NEW
 
-Exit code 1 if there are any, 2 if no figure can be compared. Peers are left out. Only files of one
-machine in the same state compare: the load before each script is printed with its figures.
+Exit code 1 if there are any, 2 if the files cannot be compared: one is damaged, they have no figure
+in common, or they are of different machines, whose ratios are printed all the same. Peers are left
+out. Only files of one machine in the same state compare: the load before each script is printed
+with its figures.
 """
 
 import sys
 from pathlib import Path
 
-from figures import LESS_IS_BETTER, Figure, read
+from figures import LESS_IS_BETTER, Damaged, Figure, read
 
 #: Smallest ratio that is named.
 WORSE = 1.1
@@ -41,13 +43,17 @@ def worse(old: list[Figure], new: list[Figure]) -> tuple[list[str], int]:
 
 def main(old: Path, new: Path) -> int:
     """Print the worse figures, and return the exit code."""
-    before, after = read(old), read(new)
+    try:
+        before, after = read(old), read(new)
+    except Damaged as damaged:
+        print(damaged, file=sys.stderr)
+        return 2
     machines = {one["machine"] for one in before + after}
     if len(machines) > 1:
         print(f"different machines: {'; '.join(sorted(machines))}")
     lines, compared = worse(before, after)
     print("\n".join([*lines, f"{compared} figures compared"]))
-    if not compared:
+    if not compared or len(machines) > 1:
         return 2
     return int(bool(lines))
 

@@ -8,6 +8,7 @@ page. A script calls `note` for every figure; run alone, it only prints.
 """
 
 import json
+import math
 import os
 import platform
 import re
@@ -21,13 +22,23 @@ from typing import Any
 
 FOLDER = Path(__file__).parent
 PAGE, TEMPLATE = FOLDER.parents[1] / "docs" / "benchmarks.md", FOLDER / "page.md"
-SCRIPTS = ("start_up", "formats", "spectra", "pounding", "rows", "pair_estimates", "footprints")
+SCRIPTS = (
+    *("start_up", "formats", "spectra", "stations", "pounding", "rows", "pair_estimates"),
+    *("footprints", "screening"),
+)
 
 #: File that takes one line per figure while the scripts run.
 LINES = "PER_OBSPY_FIGURES"
 
 #: Units of which less is better; of all others more is better.
 LESS_IS_BETTER = ("s", "ms", "us", "ns", "GB")
+
+#: Type of each field of a figure.
+FIELDS: dict[str, type] = {
+    **dict.fromkeys(("script", "name", "unit", "peer", "peer_version", "of", "remark"), str),
+    **dict.fromkeys(("machine", "revision", "date"), str),
+    **dict.fromkeys(("value", "load_before"), float),
+}
 
 Figure = dict[str, Any]
 
@@ -110,9 +121,39 @@ def measured(scripts: Iterable[str], lines: Path) -> list[Figure]:
 
 
 def read(path: Path) -> list[Figure]:
-    """Read the figures of a file."""
-    figures: list[Figure] = json.loads(path.read_text("utf-8"))["figures"]
+    """
+    Read the figures of a file.
+
+    Raises
+    ------
+    Damaged
+        If it is no file of figures, or a figure lacks a field or has a value that is no measure.
+    """
+    try:
+        figures: list[Figure] = json.loads(path.read_text("utf-8"))["figures"]
+        problems = [problem for one in figures if (problem := _problem(one))]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise Damaged(f"{path}: no file of figures: {type(error).__name__} {error}") from error
+    if problems:
+        raise Damaged(f"{path}: {problems[0]}")
     return figures
+
+
+class Damaged(ValueError):
+    """A file of figures cannot be used; the message is one line."""
+
+
+def _problem(figure: Figure) -> str:
+    """Return the first fault of a figure, empty if there is none."""
+    name = f"figure {figure.get('name')!r} of {figure.get('script')!r}"
+    for field, kind in FIELDS.items():
+        value = figure.get(field)
+        known = (int, float) if kind is float else kind
+        if not isinstance(value, known) or isinstance(value, bool):
+            return f"{name}: {field} is {value!r}"
+    # Ratios need a value above zero
+    is_measure = math.isfinite(figure["value"]) and figure["value"] > 0.0
+    return "" if is_measure else f"{name}: value is {figure['value']!r}"
 
 
 def digits(value: float) -> str:
@@ -145,9 +186,10 @@ def page(figures: list[Figure], template: str) -> str:
 
 def main(path: Path, scripts: list[str]) -> None:
     """Measure, write the JSON file, and the page."""
+    # A damaged file is found before hours of measurements
+    kept = read(path) if scripts and path.is_file() else []
     found = measured(scripts or SCRIPTS, path.with_suffix(".lines"))
     again = {figure["script"] for figure in found}
-    kept = read(path) if scripts and path.is_file() else []
     figures = [figure for figure in kept if figure["script"] not in again] + found
     path.write_text(json.dumps({"figures": figures}, indent=1) + "\n", "utf-8")
     PAGE.write_text(page(figures, TEMPLATE.read_text("utf-8")), "utf-8")

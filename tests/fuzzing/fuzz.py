@@ -169,6 +169,9 @@ def main(arguments: list[str]) -> None:
         for folder in sorted(FINDINGS.iterdir()):
             report(folder.name, kept_copies(folder.name))
         return
+    # The first record loads what ObsPy needs; processes of all kinds have it then
+    first = entries()["peer_at2"]
+    problem_of(first, first.content())
     count, seed = int(arguments[0]), int((arguments[1:] or ["0"])[0])
     for name in arguments[2:] or entries():
         report(name, new_copies(name, count, seed))

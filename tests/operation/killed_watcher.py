@@ -4,7 +4,8 @@ Kill a watcher at random moments, let another one go on, and compare its tables.
 Usage: ``python killed_watcher.py COUNT [SEED]``. Half of the kills meet the first run of an
 earthquake, the others the run for a station that came later. Prints one JSON object: the number of
 kills, how many of them met a watcher at work, and every fault. It is a program of its own because
-only a process without threads can be forked safely; the services are a second process.
+only a process without threads can be forked safely; the services are a second process. Each city
+writes its messages to a file: one per revision, whenever its watcher is killed.
 """
 
 import json
@@ -12,7 +13,6 @@ import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,57 +27,73 @@ from fdsn_server import serving  # noqa: E402 - after the path
 from small_run import InProcess, plain_figure  # noqa: E402 - after the path
 from watched_city import FakeClock, city_earthquake, settings_of, write_city  # noqa: E402 - after the path
 
+from per_obspy.config import Notify  # noqa: E402 - after the path
 from per_obspy.files import is_part  # noqa: E402 - after the path
 from per_obspy.operation.watch import watch_once  # noqa: E402 - after the path
 from per_obspy.pipeline import report  # noqa: E402 - after the path
+from per_obspy.pipeline.results import result_files  # noqa: E402 - after the path
 from per_obspy.records.simulation.earthquake import Simulation  # noqa: E402 - after the path
 
 #: Tables that must be the same to the byte.
 TABLES = ("risk.parquet", "stations.csv", "rejected.csv", "rows.parquet", "buildings.parquet")
 TABLES = (*TABLES, "totals.csv", "event.xml")
 
+#: Functions that write a figure, which is most of the time of a small run and not compared.
+FIGURES = (
+    (report, "draw_overview"),
+    (report, "draw_record_to_pair"),
+    (result_files, "write_page"),
+)
+
 #: Newest revision in the folder of a city.
 LATEST = Path("out", "events", "xx1", "latest")
 
 
-def serve() -> None:
-    """Serve an earthquake until the input ends; a line names the stations without records."""
-    with serving(_simulation()) as server:
-        print(server.url, flush=True)
-        for line in sys.stdin:
+def serve(simulation: Simulation, orders: int, answers: int) -> None:
+    """Serve an earthquake until the orders end; a line names the stations without records."""
+    with serving(simulation) as server, os.fdopen(orders) as lines:
+        os.write(answers, f"{server.url}\n".encode())
+        for line in lines:
             server.silent = set(line.split())
-            print("done", flush=True)
-
-
-def _simulation() -> Simulation:
-    """Return the earthquake of the city."""
-    return city_earthquake(stations=2)
+            os.write(answers, b"done\n")
 
 
 class Services:
-    """The services, in a process of their own."""
+    """The services, in a process of their own, which is forked before there is any thread."""
 
     def __init__(self) -> None:
-        command = [sys.executable, str(HERE), "--serve"]
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        self.process = subprocess.Popen(command, text=True, **pipes)
-        self.url = self.process.stdout.readline().strip()
-        self.inventory = _simulation().inventory
+        simulation = city_earthquake(stations=2)
+        self.inventory = simulation.inventory
+        orders, self.orders = os.pipe()
+        self.answers, answers = os.pipe()
+        self.process = os.fork()
+        if not self.process:
+            os.close(self.orders)
+            try:
+                serve(simulation, orders, answers)
+            finally:
+                os._exit(0)
+        os.close(orders)
+        os.close(answers)
+        self.lines = os.fdopen(self.answers)
+        self.url = self.lines.readline().strip()
 
     def silence(self, *stations: str) -> None:
         """Let these stations have no records, and all others have some."""
-        self.process.stdin.write(f"{' '.join(stations)}\n")
-        self.process.stdin.flush()
-        self.process.stdout.readline()
+        os.write(self.orders, f"{' '.join(stations)}\n".encode())
+        self.lines.readline()
 
     def end(self) -> None:
-        self.process.stdin.close()
-        self.process.wait()
+        os.close(self.orders)
+        os.waitpid(self.process, 0)
 
 
 def one_pass(city: Path, seconds: float) -> None:
     """Do one pass of the watcher of a city; raise an error if anything fails."""
     settings = settings_of(city / "city.toml")
+    # One line per message
+    command = ("sh", "-c", f"echo $PER_OBSPY_KIND >> {city}/messages")
+    settings = settings.model_copy(update={"notify": Notify(command=command)})
     found = watch_once(settings, FakeClock().at(seconds), executor=InProcess())
     for error in found.errors:
         raise error
@@ -120,18 +136,22 @@ def faults_of(city: Path, expected: Path, revisions: list[str]) -> list[str]:
         for name in TABLES
         if (city / LATEST / name).read_bytes() != (expected / LATEST / name).read_bytes()
     ]
+    # At least once: twice if the kill comes between a delivery and its note
+    sent, due = ((place / "messages").read_text().split() for place in (city, expected))
+    if sent not in (due, [*due, due[-1]]):
+        faults.append(f"messages {sent}, expected {due}")
     return faults + [f"{path.name} is left" for path in city.rglob("*") if is_part(path)]
 
 
 def main(folder: Path, count: int, seed: int) -> None:
     """Kill a number of watchers, and print the faults after the kills."""
-    for name in ("draw_overview", "draw_record_to_pair"):
-        setattr(report, name, plain_figure)
+    for room, name in FIGURES:
+        setattr(room, name, plain_figure)
     services, chance = Services(), random.Random(seed)
     # The first pass compiles; the second tells how long one takes
     early, late, first = folder / "early", folder / "late", folder / "first"
     first.mkdir()
-    write_city(first, services)
+    write_city(first, services, pairs=8)
     services.silence("S002")
     shutil.copytree(first, early, symlinks=True)
     one_pass(early, 61)
@@ -167,9 +187,6 @@ def timed_pass(city: Path) -> float:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--serve":
-        serve()
-    else:
-        with tempfile.TemporaryDirectory() as temporary:
-            chosen = int(sys.argv[2]) if sys.argv[2:] else 1
-            main(Path(temporary), int(sys.argv[1]), chosen)
+    with tempfile.TemporaryDirectory() as temporary:
+        chosen = int(sys.argv[2]) if sys.argv[2:] else 1
+        main(Path(temporary), int(sys.argv[1]), chosen)

@@ -1,6 +1,7 @@
 """A small simulated city for a watcher, and a service on loopback with its earthquake."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -14,8 +15,10 @@ from per_obspy.inventory.files.writing import write_pairs
 from per_obspy.inventory.simulated import simulated_pairs
 from per_obspy.jobs.output_folder import Result, file_hashes, recorded
 from per_obspy.operation.events.event_settings import read_settings
-from per_obspy.operation.watch import Clock
-from per_obspy.records.fdsn.cache import fetch, fetched_stations
+from per_obspy.operation.events.state import EventState, read_event_states
+from per_obspy.operation.watch import Clock, Pass, watch_once
+from per_obspy.progress import Progress, silent
+from per_obspy.records.fdsn.cache import Fetched, fetched_stations
 from per_obspy.records.simulation.earthquake import Simulation, simulate
 
 ORIGIN = datetime(2000, 1, 1, tzinfo=UTC)
@@ -75,13 +78,18 @@ def city_earthquake(stations: int = 3, magnitude: float = 6.5) -> Simulation:
 
 
 def write_city(
-    folder: Path, server: FdsnServer, watch: str = "", delays: Sequence[float] = DELAYS
+    folder: Path,
+    server: FdsnServer,
+    watch: str = "",
+    delays: Sequence[float] = DELAYS,
+    pairs: int = 30,
 ) -> Path:
     """Write the inventory and the configuration of the watcher, and return the configuration."""
     places = [(station.longitude, station.latitude) for station in server.inventory[0]]
     longitude, latitude = np.array(places).T
-    pairs = simulated_pairs(longitude, latitude, count=30, seed=1, radius=2000.0, touching=0.5)
-    write_pairs(pairs, folder / "pairs.csv")
+    near = {"radius": 2000.0, "touching": 0.5}
+    inventory = simulated_pairs(longitude, latitude, count=pairs, seed=1, **near)
+    write_pairs(inventory, folder / "pairs.csv")
     text = CONFIGURATION.format(url=server.url, watch=watch, delays=list(delays))
     (folder / "city.toml").write_text(text)
     return folder / "city.toml"
@@ -103,11 +111,48 @@ def other_event(
     return Event(origins=[origin], magnitudes=sizes)
 
 
+class City:
+    """A watched city in a folder."""
+
+    def __init__(
+        self, folder: Path, server: FdsnServer, clock: FakeClock, executor: Executor | None
+    ) -> None:
+        self.clock, self.folder, self.executor = clock, folder / "out", executor
+        self.progress: Progress = silent
+        self.settings = settings_of(write_city(folder, server))
+
+    def at(self, seconds: float, **changes: object) -> Pass:
+        """Return the outcome of one pass, so many seconds after the origin time."""
+        section = self.settings.watch.model_copy(update=changes)
+        settings = self.settings.model_copy(update={"watch": section})
+        return watch_once(settings, self.clock.at(seconds), self.progress, self.executor)
+
+    def state(self, name: str = "xx1") -> EventState:
+        return read_event_states(self.folder)[0][name]
+
+    def event(self, name: str = "xx1") -> Path:
+        return self.folder / "events" / name
+
+    def revisions(self, name: str = "xx1") -> list[str]:
+        return sorted(path.name for path in self.event(name).glob("revisions/*"))
+
+    def changes(self) -> list[tuple[str, ...]]:
+        table = pd.read_csv(self.event() / "latest" / "changes.csv", dtype=str).fillna("")
+        return list(table.itertuples(index=False, name=None))
+
+
+def magnified(simulation: Simulation, magnitude: float) -> Event:
+    """Return the earthquake with another magnitude."""
+    event = simulation.event.copy()
+    event.magnitudes[0].mag = magnitude
+    return event
+
+
 def quick_run(settings: Run, *others: object) -> Result:
     """Stand in for a whole run: tables that depend on event and records, as those of a run do."""
-    folder, facts = settings.output, others[-1]
+    folder, facts = settings.output, others[3]
     (folder / "stations").mkdir(parents=True, exist_ok=True)
-    records = fetched_files(settings)
+    records = fetched_files(settings, others[4])
     magnitude = (settings.records.event or folder).read_text().partition("<mag>")[2][:60]
     # One pair per station, of a state that follows from the earthquake
     state = "yes" if "7" in magnitude else "no"
@@ -126,9 +171,8 @@ def quick_run(settings: Run, *others: object) -> Result:
     return recorded(folder / "run.json", record)
 
 
-def fetched_files(settings: Run) -> list[Path]:
+def fetched_files(settings: Run, fetched: Fetched | None) -> list[Path]:
     """Return the records of the window of an earthquake, or those of its folder."""
-    if settings.records.fdsn is None:
+    if fetched is None:
         return sorted(settings.records.folder.iterdir())
-    fetched = fetch(settings.records.fdsn, settings.records.event)
     return sorted(files[0] for files in fetched_stations(fetched).stations.values())

@@ -1,9 +1,11 @@
 """
-Kill the smallest run before its n-th change of the file system, for every n; then run it again.
+Copy the folder of the smallest run before its n-th change of the file system, for every n; go on.
 
-Usage: ``python killed_runs.py FOLDER EVENT...``, events of Python's audit hook. Prints one JSON
-object: the number of kills, and every fault of the runs that came after them. It is a program of
-its own because only a process without threads can be forked safely.
+Usage: ``python killed_runs.py FOLDER EVENT...``, events of Python's audit hook. Such a copy is what
+a process leaves that is killed at this moment: part files, the lock, tables of earlier stages. A
+run goes on in each of them. Prints one JSON object: the number of copies, and every fault of the
+runs in them. It is a program of its own because only a process without threads can be forked
+safely, and because an audit hook stays for ever.
 """
 
 import json
@@ -15,32 +17,30 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from small_run import InProcess, plain_figures, write_smallest_configuration
+from small_run import InProcess, plain_reports, write_smallest_configuration
 
 from per_obspy.files import is_part
 from per_obspy.pipeline.run import run
-
-#: Exit code of a process that was killed.
-KILLED = 9
 
 #: Results that must be the same after every kill.
 COMPARED = ("risk.csv", "risk.parquet", "rejected.csv", "totals.csv", "pairs.csv")
 
 
-def kill_at(number: int, events: list[str], folder: Path) -> None:
-    """End this process before the n-th change of a folder, as a killed process ends."""
-    left = number
+def copy_before_changes(events: list[str], out: Path, copies: Path) -> None:
+    """Copy a folder before each change in it, as a killed process leaves it."""
+    number = count(1)
+    is_copied = False
 
     def hook(event: str, arguments: tuple[object, ...]) -> None:
-        nonlocal left
-        if event not in events or not str(arguments[0]).startswith(str(folder)):
+        nonlocal is_copied
+        if is_copied or event not in events or not str(arguments[0]).startswith(str(out)):
             return
         if event == "open" and not set(str(arguments[1] or "")) & set("wax+"):
             return
-        # A killed process runs no handler
-        left -= 1
-        if not left:
-            os._exit(KILLED)
+        # The copy itself changes files
+        is_copied = True
+        shutil.copytree(out, copies / str(next(number)))
+        is_copied = False
 
     sys.addaudithook(hook)
 
@@ -58,46 +58,47 @@ def ending_of(work) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def killed_run(configuration: Path, number: int, events: list[str]) -> None:
-    """Run, and be killed before the n-th change."""
-    kill_at(number, events, configuration.parent / "out")
-    run(configuration, executor=InProcess())
-
-
-def faults_after(configuration: Path, expected: dict[str, bytes]) -> list[str]:
-    """Run again after a kill, and return the faults of the results."""
-    if ending_of(lambda: run(configuration, executor=InProcess())):
-        return ["the next run fails"]
+def faults_of(configuration: Path, expected: dict[str, bytes]) -> list[str]:
+    """Run, and return the faults of the results."""
+    try:
+        run(configuration, executor=InProcess())
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is the fault that is looked for
+        return [f"the next run fails: {error!r}"]
     folder = configuration.parent / "out"
     faults = [name for name in expected if (folder / name).read_bytes() != expected[name]]
     return faults + [f"{path.name} is left" for path in folder.rglob("*") if is_part(path)]
 
 
 def main(folder: Path, events: list[str]) -> None:
-    """Kill runs until one completes, and print the faults after the kills."""
-    with plain_figures():
-        kill_and_repeat(folder, events)
+    """Go on from every copy of a run, and print the faults."""
+    with plain_reports():
+        copy_and_go_on(folder, events)
 
 
-def kill_and_repeat(folder: Path, events: list[str]) -> None:
-    """Kill runs as `main` describes; figures are short files."""
+def copy_and_go_on(folder: Path, events: list[str]) -> None:
+    """Copy and go on as `main` describes; figures and page are short files."""
     # The first run also compiles, so that the other ones are quick
     (folder / "whole").mkdir()
     whole = run(write_smallest_configuration(folder / "whole"), executor=InProcess()).folder
     expected = {name: (whole / name).read_bytes() for name in COMPARED}
-    found = dict[int, list[str]]()
-    for number in count(1):
-        place = folder / str(number)
-        place.mkdir()
-        configuration = write_smallest_configuration(place)
-        code = ending_of(lambda: killed_run(configuration, number, events))  # noqa: B023
-        if code == 0:
-            break
-        faults = faults_after(configuration, expected)
-        if code != KILLED or faults:
-            found[number] = [*faults, f"exit code {code}"]
-        shutil.rmtree(place)
-    print(json.dumps({"kills": number - 1, "faults": found}))
+    copies, place = folder / "copies", folder / "again"
+    for made in (copies, place / "out"):
+        made.mkdir(parents=True)
+    configuration, out = write_smallest_configuration(place), place / "out"
+
+    def copied_run() -> None:
+        copy_before_changes(events, out, copies)
+        run(configuration, executor=InProcess())
+
+    # In a process that ends: part files of a living one would stay
+    found = {0: ["the run that is copied fails"]} if ending_of(copied_run) else {}
+    left = sorted(copies.iterdir(), key=lambda copy: int(copy.name))
+    for copy in left:
+        shutil.rmtree(out)
+        copy.rename(out)
+        if faults := faults_of(configuration, expected):
+            found[int(copy.name)] = faults
+    print(json.dumps({"kills": len(left), "faults": found}))
 
 
 if __name__ == "__main__":

@@ -4,9 +4,9 @@ import json
 import re
 import zlib
 from base64 import b64decode
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +33,15 @@ class InProcess(Executor):
 
 
 def write_configuration(folder: Path, text: str = "") -> Path:
-    """Write the configuration of the run, with further lines, and return its path."""
+    """
+    Write the configuration of the run, with further lines, and return its path.
+
+    One worker is this process itself: processes of a pool cost seconds each, and only tests of the
+    pool need them.
+    """
     (folder / "scenario.toml").write_text(SCENARIO)
     file = folder / "run.toml"
-    head = 'name = "small"\noutput = "out"\nsimulation = "scenario.toml"\n'
+    head = 'name = "small"\noutput = "out"\nworkers = 1\nsimulation = "scenario.toml"\n'
     file.write_text(f"{head}{text}{SPECTRA}")
     return file
 
@@ -55,14 +60,43 @@ def plain_figure(*arguments: object) -> None:
         part.write_bytes(b"a figure")
 
 
+def plain_page(_settings: object, folder: Path, *_others: object) -> None:
+    """Write the page of a run as a short file."""
+    plain_figure(folder / "report.html")
+
+
+#: Functions that draw, and those that write short files instead; the page is the last.
+PLAIN = (
+    (report, "draw_overview", plain_figure),
+    (report, "draw_record_to_pair", plain_figure),
+    (result_files, "write_page", plain_figure),
+    (report, "write_run_page", plain_page),
+)
+REAL = tuple((module, name, getattr(module, name)) for module, name, _ in PLAIN)
+
+
 @contextmanager
-def plain_figures() -> Iterator[None]:
-    """Write the figures and the PDF of every run in here as short files."""
+def replaced(functions: Iterable[tuple[object, str, object]]) -> Iterator[None]:
+    """Replace functions of modules for a while."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "draw_overview", plain_figure)
-        patch.setattr(report, "draw_record_to_pair", plain_figure)
-        patch.setattr(result_files, "write_page", plain_figure)
+        for module, name, function in functions:
+            patch.setattr(module, name, function)
         yield
+
+
+def plain_figures() -> AbstractContextManager[None]:
+    """Write the figures and the PDF of every run in here as short files."""
+    return replaced(PLAIN[:-1])
+
+
+def plain_reports() -> AbstractContextManager[None]:
+    """Write figures, PDF and page as short files: they take two thirds of a small run."""
+    return replaced(PLAIN)
+
+
+def real_reports() -> AbstractContextManager[None]:
+    """Write figures, PDF and page as they are, whatever surrounds it."""
+    return replaced(REAL)
 
 
 def page_content(path: Path) -> dict[str, Any]:
@@ -77,6 +111,6 @@ def page_content(path: Path) -> dict[str, Any]:
 def write_folder_configuration(folder: Path, output: str, text: str = "") -> Path:
     """Write the configuration of a run of the records in a folder, and return its path."""
     file = folder / "folder.toml"
-    head = f'name = "folder"\noutput = "{output}"\n[records]\nfolder = "records"\n'
+    head = f'name = "folder"\noutput = "{output}"\nworkers = 1\n[records]\nfolder = "records"\n'
     file.write_text(f'{head}[pairs]\nfile = "out/pairs.csv"\n{text}')
     return file

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from per_obspy.pipeline import stages
 from per_obspy.pipeline.run import run
 
 from .small_run import InProcess, write_smallest_configuration
@@ -46,7 +47,7 @@ FILES = (
 )
 
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 
 @pytest.fixture(scope="module")
@@ -84,22 +85,56 @@ def damage(path: Path, kind: str) -> None:
     path.write_bytes(damaged[kind])
 
 
-@pytest.mark.parametrize("kind", ["truncated", "a byte changed", "emptied", "removed"])
-def test_a_damaged_file_does_not_change_the_result(finished, tmp_path, kind):
-    # would catch products of the run that are taken as they are, and tracebacks
+KINDS = ("truncated", "a byte changed", "emptied", "removed")
+
+#: Parts are compared with their hash when they are needed, which a finished run does not.
+PARTS = tuple(name for name in FILES if name.startswith(("chunks/", "rows/")))
+
+
+class Begun(Exception):
+    """A run has found work to do."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_damaged_file_is_noticed(finished, monkeypatch, kind):
+    # would catch products of the run that are taken as they are
+    def begins(*_):
+        raise Begun
+
+    monkeypatch.setattr(stages, "new_run", begins)
+    unnoticed = set()
+    for name in FILES:
+        path = finished / "out" / name
+        content = path.read_bytes()
+        damage(path, kind)
+        try:
+            assert run(finished / "run.toml", executor=InProcess()).did_nothing
+            unnoticed.add(name)
+        except Begun:
+            pass
+        path.write_bytes(content)
+    # A run writes the configuration anew each time, whatever was there; its record has hashes of
+    # all other files and none of itself, so that another letter of a text stays
+    harmless = {*PARTS, "configuration.toml", *(["run.json"] if kind == "a byte changed" else [])}
+    assert unnoticed == harmless
+
+
+@pytest.mark.parametrize("shift", range(len(KINDS)))
+def test_a_damaged_file_does_not_change_the_result(finished, tmp_path, shift):
+    # Each file alone, each in one way: four kinds in turn
     out, whole = finished / "out", tmp_path / "whole"
     shutil.copytree(out, whole)
     before, wrong = contents(whole), {}
-    for name in FILES:
+    for number, name in list(enumerate(FILES))[shift :: len(KINDS)]:
+        kind = KINDS[(number // len(KINDS)) % len(KINDS)]
         damage(out / name, kind)
         run(finished / "run.toml", executor=InProcess())
         after = contents(out)
         changed = [file for file in before if after.get(file) != before[file]]
-        # The record states when the run began; parts are compared with their hash when needed
-        parts = ("run.json", "chunks/", "rows/")
-        changed = [file for file in changed if not file.startswith(parts)]
+        # The record states when the run began
+        changed = [file for file in changed if file not in ("run.json", *PARTS)]
         if changed:
-            wrong[name] = changed
+            wrong[f"{name} {kind}"] = changed
         # Chunks are part of a folder whose place is in their key: restored in place
         shutil.rmtree(out)
         shutil.copytree(whole, out)

@@ -13,6 +13,8 @@ from per_obspy import cli
 
 from .small_run import SPECTRA
 
+pytestmark = pytest.mark.usefixtures("plain_reports")
+
 PAIRS = """\
 pair_id,longitude_1,latitude_1,height_1,period_1,longitude_2,latitude_2,height_2,period_2,gap
 a,0.3,0.0,12,0.5,0.3001,0.0,12,1.0,0.05

@@ -31,7 +31,6 @@ from .small_run import (
 
 resource = pytest.importorskip("resource", reason="limits of files exist on POSIX only")
 
-RUN = "workers = 1\n"
 ENSEMBLE = (
     'name = "e"\noutput = "joined"\n[[scenario]]\nname = "a"\nrun = "run.toml"\nweight = 1.0\n'
 )
@@ -63,14 +62,14 @@ def no_room(size: int):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """A finished run of one station."""
     folder = tmp_path_factory.mktemp("whole")
-    run(write_smallest_configuration(folder, RUN), executor=InProcess())
+    run(write_smallest_configuration(folder), executor=InProcess())
     return folder
 
 
@@ -97,7 +96,7 @@ SIZES = (0, 500, 8_000, 20_000, 40_000)
 @pytest.mark.parametrize("size", SIZES)
 def test_a_run_without_room_goes_on_when_there_is_room(call, whole, tmp_path, size):
     # would catch a table of some stations, a traceback, or "Up to date" afterwards
-    configuration = write_smallest_configuration(tmp_path, RUN)
+    configuration = write_smallest_configuration(tmp_path)
     with no_room(size):
         ending = call("run", configuration)
     check_ending(ending, tmp_path)
@@ -201,7 +200,7 @@ def small_disk(tmp_path):
 
 @pytest.mark.parametrize("room", [0, 8_192, 16_384, 40_960, 90_112])
 def test_a_full_disk_ends_a_run_in_one_line(call, whole, tmp_path, small_disk, room):
-    configuration = write_smallest_configuration(tmp_path, RUN)
+    configuration = write_smallest_configuration(tmp_path)
     # Fill the disk up to the room that is left
     filler = small_disk / "filler"
     filler.write_bytes(bytes(shutil.disk_usage(small_disk).free - room))

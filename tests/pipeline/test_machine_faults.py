@@ -24,14 +24,14 @@ from .small_run import InProcess, write_configuration, write_smallest_configurat
 COMPARED = ("risk.csv", "risk.parquet", "rejected.csv", "totals.csv", "stations.csv")
 
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """A finished run of one station."""
     folder = tmp_path_factory.mktemp("whole")
-    run(write_smallest_configuration(folder, "workers = 1\n"), executor=InProcess())
+    run(write_smallest_configuration(folder), executor=InProcess())
     return folder
 
 

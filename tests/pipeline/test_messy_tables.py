@@ -22,7 +22,7 @@ from per_obspy.config import Scenario
 from per_obspy.inventory.schema import COLUMNS
 from per_obspy.records.simulation.earthquake import simulate, write_simulation
 
-from .small_run import SPECTRA, plain_figures
+from .small_run import SPECTRA, plain_reports
 
 PAGE = Path(__file__).parents[2] / "docs" / "messy_tables.md"
 JUDGED = ["gap", "height_1", "mass_1", "demand", "probability", "state"]
@@ -71,7 +71,7 @@ def tried(tmp_path_factory):
         table = pd.read_parquet("out/risk.parquet").set_index("pair_id").sort_index()
         return Outcome(*said, table[JUDGED])
 
-    with pytest.MonkeyPatch.context() as patch, plain_figures():
+    with pytest.MonkeyPatch.context() as patch, plain_reports():
         patch.chdir(folder)
         yield tried
 

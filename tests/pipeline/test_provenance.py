@@ -12,6 +12,8 @@ from per_obspy.pipeline.run import run
 
 from .small_run import InProcess, write_smallest_configuration
 
+pytestmark = pytest.mark.usefixtures("plain_reports")
+
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):

@@ -13,7 +13,7 @@ from per_obspy.pipeline.run import run, screen
 from per_obspy.records.processed_files import write_description, write_processed
 from per_obspy.screening.columns import RECORD_FLAGS
 
-from .small_run import SPECTRA, InProcess, write_configuration, write_folder_configuration
+from .small_run import SPECTRA, InProcess, write_folder_configuration
 
 DOUBLED, ALONE, FILM = "XX.S003", "XX.S002", "XX.S001"
 
@@ -45,14 +45,14 @@ def _shift(trace):
     trace.data[first:last] += round(0.1 * float(np.abs(trace.data).max()))
 
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(small_run, tmp_path_factory):
     """A run of stations with a second event, with one horizontal, and with undated film."""
     folder = tmp_path_factory.mktemp("warnings")
-    run(write_configuration(folder), executor=InProcess())
+    shutil.copytree(small_run, folder, dirs_exist_ok=True)
     # The same records, stations changed
     shutil.copytree(folder / "out" / "simulated", folder / "records")
     for path in sorted((folder / "records").glob("*.mseed")):

@@ -16,18 +16,20 @@ from per_obspy.errors import CatalogError
 from per_obspy.pipeline import report as report_stage
 from per_obspy.pipeline.report import Report, _region, _summary
 from per_obspy.pipeline.run import report, run
-from per_obspy.tables import risk
+from per_obspy.tables.ranked import ranked_table
 
-from .small_run import InProcess, plain_figure, write_configuration
+from .small_run import InProcess, real_reports, write_configuration
+
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 PAIRS = '[pairs]\nfile = "pairs.csv"\n'
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(small_run, tmp_path_factory):
     """A run of a given inventory in which some pairs were observed."""
     folder = tmp_path_factory.mktemp("report")
-    run(write_configuration(folder), executor=InProcess())
+    shutil.copytree(small_run, folder, dirs_exist_ok=True)
     pairs = pd.read_csv(folder / "out" / "pairs.csv", dtype=str)
     # Pounding, no pounding, and not looked at
     pairs["observed"] = ["1", "0", ""] * 20
@@ -61,7 +63,7 @@ def test_a_report_needs_a_finished_run(copied):
 
 
 def summary(folder):
-    settings, table = load(folder / "run.toml", Run), folder / "out" / "risk.parquet"
+    settings, table = load(folder / "run.toml", Run), [folder / "out" / "risk.parquet"]
     return _summary(
         settings, table, folder, _region(settings, True, None, folder / "out"), Report([], [])
     )
@@ -70,7 +72,7 @@ def summary(folder):
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
     # would catch rows lost between pieces, and a worst pair of a later piece
-    monkeypatch.setattr(risk, "ROWS", size)
+    monkeypatch.setattr(ranked_table, "ROWS", size)
     found = summary(copied)
     table = pd.read_parquet(copied / "out" / "risk.parquet")
     named = table[table["station"] != ""].iloc[0]
@@ -85,7 +87,7 @@ def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
 
 def test_a_large_table_is_shown_in_equal_steps(copied, monkeypatch):
     monkeypatch.setattr(report_stage, "SHOWN", 20)
-    monkeypatch.setattr(risk, "ROWS", 7)
+    monkeypatch.setattr(ranked_table, "ROWS", 7)
     count = parquet.read_metadata(copied / "out" / "risk.parquet").num_rows
     step = -(-count // 20)
     assert summary(copied).shown["rank"].tolist() == list(range(1, count + 1, step))
@@ -154,7 +156,8 @@ def test_hostile_names_and_values_reach_every_file(copied, call):
     head = (copied / "run.toml").read_text().replace("geopackage = true\n", "")
     (copied / "run.toml").write_text("geopackage = true\n" + head)
     folder = copied / "out [2]"
-    code, output, errors = call("run", copied / "run.toml", "-o", folder)
+    with real_reports():
+        code, output, errors = call("run", copied / "run.toml", "-o", folder)
     assert code == 0, errors
     record = json.loads((folder / "run.json").read_text())
     assert (record["faults"], record["failed"]) == ([], False)
@@ -179,9 +182,7 @@ def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, faili
     # would catch a traceback after all the work, totals of some rows, and an old picture
     text = (copied / "run.toml").read_text()
     (copied / "run.toml").write_text("geopackage = true\n" + text)
-    for name in ("draw_overview", "draw_record_to_pair"):
-        monkeypatch.setattr(report_stage, name, plain_figure)
-    monkeypatch.setattr(risk, "ROWS", 25)
+    monkeypatch.setattr(ranked_table, "ROWS", 25)
     assert call("report", copied / "run.toml")[0] == 0
     totals = (copied / "out" / "totals.csv").read_bytes()
 

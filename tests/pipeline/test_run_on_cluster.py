@@ -10,21 +10,16 @@ import pytest
 from per_obspy.errors import CatalogError, Unfinished
 from per_obspy.jobs import chunk
 from per_obspy.jobs.executor import dask_executor
-from per_obspy.pipeline import report
 from per_obspy.pipeline.run import run
 
-from .small_run import InProcess, plain_figure, write_smallest_configuration
+from .small_run import InProcess, write_smallest_configuration
 
 distributed = pytest.importorskip("distributed", reason="an extra: per_obspy[dask]")
 
+pytestmark = pytest.mark.usefixtures("plain_reports")
+
 #: Results that must have the same bytes wherever the work is done.
 COMPARED = ("risk.csv", "risk.parquet", "rejected.csv", "totals.csv", "stations.csv")
-
-
-@pytest.fixture(autouse=True)
-def _short_figures(monkeypatch):
-    for name in ("draw_overview", "draw_record_to_pair"):
-        monkeypatch.setattr(report, name, plain_figure)
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +37,8 @@ def folder_of(parent, name):
 
 
 def test_a_cluster_makes_the_bytes_of_one_machine(scheduler, tmp_path):
-    own = write_smallest_configuration(folder_of(tmp_path, "own"), "workers = 1\n")
-    other = write_smallest_configuration(folder_of(tmp_path, "other"), "workers = 1\n")
+    own = write_smallest_configuration(folder_of(tmp_path, "own"))
+    other = write_smallest_configuration(folder_of(tmp_path, "other"))
     run(own, executor=InProcess())
     with dask_executor(scheduler) as executor:
         record = run(other, executor=executor).record

@@ -11,13 +11,14 @@ from numpy.testing import assert_allclose
 from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
+from per_obspy.pipeline.results.shown_pair import find_pair
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
 
-from .small_run import SPECTRA, InProcess, page_content, write_configuration
+from .small_run import SPECTRA, InProcess, page_content, real_reports, write_configuration
 
-pytestmark = pytest.mark.usefixtures("plain_figures")
+pytestmark = pytest.mark.usefixtures("plain_reports")
 
 RESULTS = (
     *("risk.csv", "risk.parquet", "risk.columns.csv", "rejected.csv", "totals.csv"),
@@ -27,10 +28,10 @@ CHUNK = "per_obspy.pipeline.screening.CHUNK"
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(small_run, tmp_path_factory):
     """A run whose inventory has rows that are rejected, in one chunk."""
     folder = tmp_path_factory.mktemp("chunks")
-    run(write_configuration(folder), executor=InProcess())
+    shutil.copytree(small_run, folder, dirs_exist_ok=True)
     lines = (folder / "out" / "pairs.csv").read_text().splitlines()
     # A name that occurs twice, a broken line, and the first row once more
     lines[20] = lines[20].replace(lines[20].split(",")[0], lines[3].split(",")[0])
@@ -86,11 +87,65 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     assert results(copied) == before
 
 
+def set_dataset(folder, pairs):
+    """Let the ranked table be a dataset by cell from so many pairs on."""
+    lines = f'dataset_from = {pairs}\ndataset_cell = 0.1\n[pairs]\nfile = "pairs.csv"\n'
+    write_configuration(folder, lines)
+
+
+def test_a_dataset_by_cell_gives_the_same_results(copied, call):
+    # would catch a reader that takes the first cell for the worst pairs, or totals of one cell
+    before, out = results(copied), copied / "out"
+    one = pd.read_parquet(out / "risk.parquet")
+    page = page_content(out / "report.html")
+    set_dataset(copied, len(one))
+    record = run(copied / "run.toml", executor=InProcess()).record
+    cells = sorted(path.relative_to(out).as_posix() for path in (out / "risk").iterdir())
+    assert len(cells) > 1
+    assert set(cells) <= set(record["outputs"])
+    whole = pd.concat([pd.read_parquet(out / name) for name in cells])
+    pd.testing.assert_frame_equal(whole.sort_values("rank", ignore_index=True), one)
+    # everything that is made of it
+    (out / "risk.parquet").write_bytes(before["risk.parquet"])
+    assert results(copied) == before
+    (out / "risk.parquet").unlink()
+    # its rejections name another folder, its provenance the settings
+    for found in (made := page_content(out / "report.html"), page):
+        del found["rejected"], found["provenance"]
+    assert made == page
+    # again from the dataset alone
+    totals = (out / "totals.csv").read_bytes()
+    report(copied / "run.toml")
+    assert (out / "totals.csv").read_bytes() == totals
+    assert run(copied / "run.toml", executor=InProcess()).did_nothing
+    assert find_pair("#2", out).row["pair_id"] == one["pair_id"][1]
+    status, said, _ = call("info", out)
+    assert status == 0
+    assert one["pair_id"][0] in said
+    # a cell that has changed is found out
+    (out / cells[0]).write_bytes(b"PAR1")
+    with pytest.raises(CatalogError, match="has changed since the run wrote it"):
+        report(copied / "run.toml")
+
+
+def test_fewer_pairs_are_one_file_again(copied):
+    before, out = results(copied), copied / "out"
+    pairs = len(pd.read_parquet(out / "risk.parquet"))
+    (out / "risk").mkdir()
+    (out / "risk" / "lat0_lon0.parquet").write_bytes(before["risk.parquet"])
+    set_dataset(copied, pairs + 1)
+    screened(copied)
+    assert results(copied) == before
+    assert not (out / "risk").exists()
+
+
 def test_results_do_not_depend_on_workers(copied, monkeypatch):
     before = results(copied)
     shutil.rmtree(copied / "out" / "rows")
     for name in (CHUNK, "per_obspy.pipeline.rows.building_rows.CHUNK"):
         monkeypatch.setattr(name, 20)
+    text = (copied / "run.toml").read_text()
+    (copied / "run.toml").write_text(text.replace("workers = 1", "workers = 2"))
     screen(copied / "run.toml")
     assert results(copied) == before
 
@@ -236,7 +291,8 @@ def write_map_configuration(folder, reach):
 def test_a_map_serves_pairs_that_no_station_reaches(copied, reach):
     # reach 1 m: no pair has a station, there is no worst pair with a record to draw
     write_map_configuration(copied, reach)
-    record = run(copied / "map.toml", executor=InProcess()).record
+    with real_reports():
+        record = run(copied / "map.toml", executor=InProcess()).record
     table = pd.read_parquet(copied / "map" / "risk.parquet")
     mapped = table["demand_rule"] == "shakemap"
     assert mapped.any()

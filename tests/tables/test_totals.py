@@ -6,6 +6,7 @@ import pytest
 import shapely
 
 from per_obspy.config import Totals
+from per_obspy.tables.rounding import rounded_table
 from per_obspy.tables.totals import (
     piece_totals,
     region_totals,
@@ -88,6 +89,9 @@ def test_totals_as_text_are_the_totals(risk, tmp_path):
     read = pd.read_csv(tmp_path / "totals.csv", keep_default_na=False)
     # five digits: half a unit of the last of 10 000
     pd.testing.assert_frame_equal(read, table, check_dtype=False, rtol=5e-5)
+    # and no digit is lost but by that rounding
+    same = rounded_table(table, own=table.columns)
+    pd.testing.assert_frame_equal(read, same, check_dtype=False, check_exact=True)
 
 
 def test_names_of_areas_are_no_formulas(tmp_path):

@@ -1,6 +1,6 @@
 """Probabilities against exact outcomes in simulated motion: the calibration on few pairs."""
 
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -76,25 +76,15 @@ def test_pairs_that_touch_pound_and_are_told_so(calibration, at_stations):
     assert (touching["probability"] == 1.0).all()
 
 
-def test_the_tables_replace_the_measured_part_of_their_page(tmp_path):
+@pytest.mark.usefixtures("calibration")
+def test_the_tables_replace_the_measured_part_of_their_page(monkeypatch, tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
         "By hand.\n\n## Measured in simulated earthquakes\n\nlong ago\n", encoding="utf-8"
     )
-    command = [
-        sys.executable,
-        str(WORKFLOWS / "calibration.py"),
-        "-o",
-        str(page),
-        "-e",
-        "1",
-        "-n",
-        "60",
-        "-s",
-        "1",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    few = ["-e", "1", "-n", "60", "-s", "1"]
+    monkeypatch.setattr(sys, "argv", ["calibration.py", "-o", str(page), *few])
+    runpy.run_path(str(WORKFLOWS / "calibration.py"), run_name="__main__")
     said, measured = page.read_text(encoding="utf-8").split("## Measured in simulated earthquakes")
     assert said == "By hand.\n\n"
     assert "1 earthquakes, 180 pairs" in measured

@@ -1,8 +1,7 @@
 """Scripts that redraw the paper and repeat its reliability, with and without real records."""
 
-import os
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -13,21 +12,38 @@ from per_obspy import single_hit
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
 
 
-def _start(script: str, data: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    strict = ["-W", "error", "-W", "ignore:SelectableGroups:DeprecationWarning"]
-    command = [sys.executable, *strict, str(WORKFLOWS / script), *arguments]
-    environment = os.environ | {"PER_OBSPY_DATA": str(data)}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+@pytest.fixture
+def start(monkeypatch, capsys):
+    """Return the exit code, output and errors of a script in this process, which has libraries."""
+
+    def started(script: str, data: Path, *arguments: str) -> tuple[object, str, str]:
+        monkeypatch.syspath_prepend(WORKFLOWS)
+        monkeypatch.setenv("PER_OBSPY_DATA", str(data))
+        monkeypatch.setattr(sys, "argv", [script, *arguments])
+        code: object = 0
+        try:
+            runpy.run_path(str(WORKFLOWS / script), run_name="__main__")
+        except SystemExit as ended:
+            code = ended.code
+        return code, *capsys.readouterr()
+
+    return started
 
 
-def _run(script: str, data: Path, *arguments: str) -> str:
-    done = _start(script, data, *arguments)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+@pytest.fixture
+def output_of(start):
+    """Return the output of a script that ends well."""
+
+    def output_of(script: str, data: Path, *arguments: str) -> str:
+        code, output, errors = start(script, data, *arguments)
+        assert not code, errors
+        return output
+
+    return output_of
 
 
-def test_figures_of_the_simulated_lakebed(tmp_path):
-    said = _run("paper_figures.py", tmp_path / "absent", "-o", str(tmp_path), "-n", "5")
+def test_figures_of_the_simulated_lakebed(output_of, tmp_path):
+    said = output_of("paper_figures.py", tmp_path / "absent", "-o", str(tmp_path), "-n", "5")
     drawn = {path.name for path in tmp_path.glob("*.png")}
     assert drawn == {f"fig{number}_simulated_lakebed.png" for number in range(1, 9)} | {
         "correlation_ductility.png"
@@ -52,23 +68,23 @@ def test_the_docstring_of_single_hit_says_what_the_page_on_reliability_says():
 
 
 @pytest.mark.real_data
-def test_the_tables_replace_the_measured_part_of_their_page(real_data, tmp_path):
+def test_the_tables_replace_the_measured_part_of_their_page(output_of, real_data, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("By hand.\n\n## Measured\n\nlong ago\n", encoding="utf-8")
-    said = _run("reliability_tables.py", real_data, "-o", str(page), "-n", "3")
+    said = output_of("reliability_tables.py", real_data, "-o", str(page), "-n", "3")
     assert page.read_text(encoding="utf-8") == f"By hand.\n\n## Measured\n\n{said}"
     # three pairs, both ways, sixteen components
     assert "of 96 cases" in said
 
 
-def test_the_tables_need_real_records(tmp_path):
-    done = _start("reliability_tables.py", tmp_path / "absent")
-    assert done.returncode == 2
-    assert "PER_OBSPY_DATA" in done.stderr
+def test_the_tables_need_real_records(start, tmp_path):
+    code, _, errors = start("reliability_tables.py", tmp_path / "absent")
+    assert code == 2
+    assert "PER_OBSPY_DATA" in errors
 
 
-def test_estimates_for_yielding_pairs(tmp_path):
-    said = _run("yielding_estimates.py", tmp_path / "absent", "-s", "2", "-n", "15")
+def test_estimates_for_yielding_pairs(output_of, tmp_path):
+    said = output_of("yielding_estimates.py", tmp_path / "absent", "-s", "2", "-n", "15")
     rows = re.findall(
         r"simulated (\w+), 15 pairs \| ([\w .()]+) \| (\d+\.\d+), \d+\.\d+, (\d+)%", said
     )

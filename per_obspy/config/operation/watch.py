@@ -92,6 +92,15 @@ class Watch(Section):
     poll: float = Field(
         60.0, ge=1, le=86_400, description="time between two polls of the list of earthquakes, s"
     )
+    records_poll: float = Field(
+        120.0,
+        ge=1,
+        le=86_400,
+        description=(
+            "shortest time between two requests for missing records of an earthquake between the "
+            "delays, s; it grows to a tenth of the time since the origin"
+        ),
+    )
     confirm: float = Field(
         900.0,
         ge=1,

@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from per_obspy.config.engine import local_workers
 from per_obspy.errors import CatalogError, ServiceError, printable, reason_of, require_extra
@@ -85,11 +86,12 @@ def _local_cluster(address: str) -> Any:
 
 
 def present_workers(client: Any) -> Mapping[str, tuple[str, int]]:
-    """Return the workers of a cluster: address -> machine, threads."""
-    known = client.scheduler_info(n_workers=-1)["workers"]
+    """Return the workers of a cluster: address -> machine by address, threads."""
+    # ``scheduler_info`` has no workers while the client refreshes it in the background
+    known = client.nthreads()
     return {
-        str(address): (str(facts["host"]), int(facts["nthreads"]))
-        for address, facts in known.items()
+        str(address): (urlsplit(address).hostname or "unknown", int(threads))
+        for address, threads in known.items()
     }
 
 

@@ -91,7 +91,7 @@ class DaskExecutor(ElasticExecutor):
         Parameters
         ----------
         folder : Path
-            Absolute; workers see it under the same path.
+            Absolute; made if need be; workers see it under the same path.
         engine : Engine
             Retries and patience.
 
@@ -103,6 +103,8 @@ class DaskExecutor(ElasticExecutor):
             If there is no scheduler, or no fit worker within the time that is configured.
         """
         self._engine = engine
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
         with temporary_folder(folder) as shared:
             self._shared = Shared(shared, secrets.token_hex(16))
             with writing(shared):

@@ -18,9 +18,11 @@ from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.oscillator.within_step import radius_bound, rate_bounds
 from per_obspy.kernels.spectra.azimuth_samples import (
     GROUP,
+    Oscillator,
     excess_over_floor,
     fill_forms,
     floor_form,
+    raise_azimuths_to_samples,
     rerun_tile,
 )
 from per_obspy.kernels.spectra.peaks_within_steps import raise_to_step_peaks
@@ -339,3 +341,44 @@ def _add_problems(step, first, directions, best, largest, problems, azimuths, co
             azimuths[count] = azimuth
             count += 1
     return count
+
+
+@kernel
+def raise_azimuths(
+    north, east, peaks, jumps, checkpoints, phases, dampings, share, exact, directions, edges, best
+):
+    """
+    Raise the largest squares of all oscillators along all azimuths to those of a stretch.
+
+    Parameters
+    ----------
+    north, east : (tiles * TILE + 1,) ndarray
+        Components of the ground acceleration, scaled to a peak of order one.
+    peaks, jumps : (2, tiles) ndarray
+        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`, of
+        either component.
+    checkpoints : (TILES, 6, LANES) ndarray
+        From `azimuth_samples.run_azimuth_tiles`.
+    phases, dampings : (LANES,) ndarray
+        Phase ``omega * dt`` of a step, rad; fraction of critical.
+    share : float
+        1 for the radius, 0 for the displacement.
+    exact : bool
+        Whether the motion between the samples counts.
+    directions, edges : (5, n_azimuths), (5, n_groups) ndarray
+        As of `search_steps`.
+    best : (oscillators, n_azimuths) ndarray
+        Largest squares of the first oscillators of the block, raised in place, in the squared unit
+        of the acceleration (over ``omega⁴``).
+    """
+    steps = np.empty((peaks.shape[1] * TILE, COLUMNS))
+    for lane in range(best.shape[0]):
+        oscillator = Oscillator(lane, phases[lane], dampings[lane], share)
+        largest = best[lane]
+        raise_azimuths_to_samples(north, east, checkpoints, oscillator, directions, largest)
+        # Between the samples only where the bounds of a step allow more
+        if exact:
+            count = list_steps(
+                north, east, peaks, jumps, checkpoints, oscillator, directions, largest, steps
+            )
+            search_steps(steps[:count], oscillator, directions, edges, largest)

@@ -1,174 +1,271 @@
 r"""
 Largest radius ``sqrt(u² + (v / omega)²)`` of a block of oscillators under one ground acceleration.
 
-Time runs outside, oscillators inside, four steps at a time. The state is rotated so that the
-acceleration at the end of a step enters one axis only, shifted by that input, and scaled so that
-the acceleration at the start enters the same axis with factor 1, which leaves eight multiply-adds
-per step::
-
-    s1' = a11 s1 + (a12 s2 + a);  s2' = a21 s1 + (a22 s2 + b a);  radius² = (s1' + d a')² + s2'²
-
-A rotation keeps radii. Displacements are counted in ``a / omega²``, time as phase.
+Over a stride of eight steps the state is a matrix times the state before, plus a weighted sum of
+the samples in between: 25 operations for eight steps, where step by step they take 80. The radius
+``r`` is looked at after every stride. In between it grows by ``|a|`` per unit of phase at most, and
+``r²`` exceeds the larger of two values by an eighth of their squared distance times the second
+derivative at most. Tiles where both bounds allow a new largest radius are run again step by step.
+Displacements are counted in ``a / omega²``, time as phase.
 """
 
 import math
 
 import numpy as np
 
+from per_obspy.kernels._aligned import aligned
 from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.oscillator.exact_step import SMALLEST_INPUT, step_coefficients
-from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
+from per_obspy.kernels.spectra.tile_search import LANES, SMALLEST_STATE, TILE, raise_to_tiles
 
-#: Rows of packed oscillators: a11, a12, a21, a22, b, d; scale, cosine and sine of the rotation.
-ROWS = 9
+#: Steps after which the radius is looked at. The more, the fewer operations per step, and the more
+#: tiles are run again: of white noise below 20 Hz with 8 an eighth, with 4 a fifteenth.
+STRIDE = 8
+#: Rows of a block's table, one column per oscillator: state ``u, z`` (0, 1), largest squared radius
+#: (2), matrix of a stride, weights of its samples in displacement and in velocity; the eight
+#: coefficients of a step. One table, because the compiler would have to prove of several arrays
+#: that they do not overlap.
+MATRIX, DISPLACED, MOVED = 3, 7, 16
+STEP, ROWS = 25, 33
+#: Rows that a stride uses, and where each begins in one line of memory.
+LOCAL = STEP
+U, Z, SQUARE, A11, A12, A21, A22 = (row * LANES for row in range(DISPLACED))
+F0, F1, F2, F3, F4, F5, F6, F7, F8 = (row * LANES for row in range(DISPLACED, MOVED))
+G0, G1, G2, G3, G4, G5, G6, G7, G8 = (row * LANES for row in range(MOVED, STEP))
+#: Neighbouring oscillators whose tiles are run again together: two of the widest vectors, so that
+#: one is computed while the other waits for the step before.
+GROUP = 16
+#: Rows by which tiles are ruled out: radius from which a tile is looked at, and what a unit of the
+#: sum of ``|a|`` takes from it, the phase of a step; bound of the radius; largest squared radius;
+#: twice the damping; growth of a radius backwards over a stride.
+LIMITS = 6
 
 
 @kernel
-def pack(phases, dampings, packed):
+def pack(phases, dampings, table):
     """
-    Fill the coefficients of the rotated, shifted and scaled step of each oscillator.
+    Fill the rows of oscillators at rest.
 
     Parameters
     ----------
     phases, dampings : (LANES,) ndarray
         Phase ``omega * dt`` of a step, rad; fraction of critical.
-    packed : (ROWS, LANES) ndarray
-        Receives the rows a11, a12, a21, a22, b, d of the module's equations, then scale, cosine and
-        sine of the rotation, dimensionless.
+    table : (ROWS, LANES) ndarray
+        Receives a state of zero, matrix and weights of a stride, and the coefficients of a step.
     """
+    table[:] = 0.0
     for lane in range(LANES):
-        # Rotation that turns the input at the end of a step into the first axis
-        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(
-            1.0, dampings[lane], phases[lane]
-        )
-        size = math.hypot(b12, b22)
-        c, s = b12 / size, b22 / size
-        # Step matrix in the rotated axes
-        packed[0, lane] = c * (a11 * c + a12 * s) + s * (a21 * c + a22 * s)
-        packed[1, lane] = c * (a12 * c - a11 * s) + s * (a22 * c - a21 * s)
-        packed[2, lane] = c * (a21 * c + a22 * s) - s * (a11 * c + a12 * s)
-        packed[3, lane] = c * (a22 * c - a21 * s) - s * (a12 * c - a11 * s)
-        # Scale: input at the start of a step, with that of the shift
-        entering = packed[0, lane] * size + c * b11 + s * b21
-        scale = math.copysign(max(abs(entering), SMALLEST_INPUT * size), entering)
-        packed[4, lane] = (packed[2, lane] * size + c * b21 - s * b11) / scale
-        packed[5, lane] = size / scale
-        packed[6, lane] = scale
-        packed[7, lane] = c
-        packed[8, lane] = s
+        coefficients = step_coefficients(1.0, dampings[lane], phases[lane])
+        stride_matrix = step_coefficients(1.0, dampings[lane], STRIDE * phases[lane])
+        for row in range(8):
+            table[STEP + row, lane] = coefficients[row]
+        for row in range(4):
+            table[MATRIX + row, lane] = stride_matrix[row]
+        # Weights of the samples: those of a step, moved on by the steps after it
+        a11, a12, a21, a22, b11, b12, b21, b22 = coefficients
+        for sample in range(STRIDE):
+            for earlier in range(sample + 1):
+                u, z = table[DISPLACED + earlier, lane], table[MOVED + earlier, lane]
+                table[DISPLACED + earlier, lane] = a11 * u + a12 * z
+                table[MOVED + earlier, lane] = a21 * u + a22 * z
+            # The step itself: its first sample was the last one of the step before
+            table[DISPLACED + sample, lane] += b11
+            table[MOVED + sample, lane] += b21
+            table[DISPLACED + sample + 1, lane] = b12
+            table[MOVED + sample + 1, lane] = b22
 
 
 @kernel
-def start_at_rest(acceleration, packed, state):
+def run_strides(acceleration, table, checkpoints):
     """
-    Fill the shifted state of oscillators at rest.
-
-    Parameters
-    ----------
-    acceleration : float
-        First sample of the ground acceleration, scaled.
-    packed : (ROWS, LANES) ndarray
-        Rows from `pack`.
-    state : (2, LANES) ndarray
-        Receives both parts of the shifted state, in the unit of the acceleration.
-    """
-    for lane in range(LANES):
-        state[0, lane] = -packed[5, lane] * acceleration
-        state[1, lane] = 0.0
-
-
-@kernel
-def run_tiles(acceleration, packed, state, checkpoints):
-    """
-    Advance a block over the samples; store a checkpoint per tile.
+    Advance a block over whole tiles; store a checkpoint per tile.
 
     Parameters
     ----------
     acceleration : (tiles * TILE + 1,) ndarray
         Ground acceleration, scaled to a peak of order one.
-    packed : (ROWS, LANES) ndarray
-        Rows from `pack`.
-    state : (2, LANES) ndarray
-        Shifted state before the first sample, replaced by that at the last one.
+    table : (ROWS, LANES) ndarray
+        Rows from `pack`; the state is advanced to the last sample.
     checkpoints : (TILES, 3, LANES) ndarray
-        Receives, per tile, the shifted state before it (2 rows) and the largest squared radius at
-        its samples, in the squared unit of the acceleration (over ``omega⁴``).
+        Receives, per tile, the state ``u, z`` before it (2 rows) and the largest squared radius
+        after its strides, in the unit of the acceleration (over ``omega²``) or its square.
     """
-    # Local copies of a size that the compiler knows: it makes vectors
-    a11, a12, a21, a22 = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    b, d = np.empty(LANES), np.empty(LANES)
-    s1, s2, largest = np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    for lane in range(LANES):
-        a11[lane], a12[lane], a21[lane] = packed[0, lane], packed[1, lane], packed[2, lane]
-        a22[lane], b[lane], d[lane] = packed[3, lane], packed[4, lane], packed[5, lane]
-        s1[lane], s2[lane] = state[0, lane], state[1, lane]
+    # One line of memory with places that the compiler knows: it needs one pointer, not one per row
+    t = aligned(1, LOCAL * LANES)[0]
+    # Coefficients and state
+    t[:] = table[:LOCAL].ravel()
     for first in range(0, acceleration.size - 1, TILE):
-        # Start of a tile: denormal states become zero, the largest radius is that of the state
         tile = first // TILE
         for lane in range(LANES):
-            u = s1[lane] if abs(s1[lane]) > SMALLEST_STATE else 0.0
-            z = s2[lane] if abs(s2[lane]) > SMALLEST_STATE else 0.0
-            y = u + d[lane] * acceleration[first]
-            s1[lane], s2[lane], largest[lane] = u, z, y * y + z * z
+            # Denormal states become zero; the largest radius begins with that of the state
+            u = t[U + lane] if abs(t[U + lane]) > SMALLEST_STATE else 0.0
+            z = t[Z + lane] if abs(t[Z + lane]) > SMALLEST_STATE else 0.0
+            t[U + lane], t[Z + lane], t[SQUARE + lane] = u, z, u * u + z * z
             checkpoints[tile, 0, lane], checkpoints[tile, 1, lane] = u, z
-        for i in range(first, first + TILE, 4):
-            # Samples of four steps
+        for i in range(first, first + TILE, STRIDE):
+            # Samples of a stride
             p0, p1, p2 = acceleration[i], acceleration[i + 1], acceleration[i + 2]
-            p3, p4 = acceleration[i + 3], acceleration[i + 4]
+            p3, p4, p5 = acceleration[i + 3], acceleration[i + 4], acceleration[i + 5]
+            p6, p7, p8 = acceleration[i + 6], acceleration[i + 7], acceleration[i + 8]
             for lane in range(LANES):
-                u, z, best = s1[lane], s2[lane], largest[lane]
-                # First step, s to (x, w); y undoes the shift
-                x = a11[lane] * u + (a12[lane] * z + p0)
-                w = a21[lane] * u + (a22[lane] * z + b[lane] * p0)
-                y = x + d[lane] * p1
-                best = max(best, y * y + w * w)
-                # Second step, back to (u, z)
-                u = a11[lane] * x + (a12[lane] * w + p1)
-                z = a21[lane] * x + (a22[lane] * w + b[lane] * p1)
-                y = u + d[lane] * p2
-                best = max(best, y * y + z * z)
-                # Third step
-                x = a11[lane] * u + (a12[lane] * z + p2)
-                w = a21[lane] * u + (a22[lane] * z + b[lane] * p2)
-                y = x + d[lane] * p3
-                best = max(best, y * y + w * w)
-                # Fourth step
-                u = a11[lane] * x + (a12[lane] * w + p3)
-                z = a21[lane] * x + (a22[lane] * w + b[lane] * p3)
-                y = u + d[lane] * p4
-                best = max(best, y * y + z * z)
-                # State and largest value are stored once per four steps
-                s1[lane], s2[lane], largest[lane] = u, z, best
-        # Undo the scale
+                # Two sums each of displacement (u, f) and velocity (z, g): half as long a chain
+                u0, z0 = t[U + lane], t[Z + lane]
+                u = t[A11 + lane] * u0 + t[A12 + lane] * z0 + t[F0 + lane] * p0 + t[F1 + lane] * p1
+                z = t[A21 + lane] * u0 + t[A22 + lane] * z0 + t[G0 + lane] * p0 + t[G1 + lane] * p1
+                # The later samples of both
+                f = t[F4 + lane] * p4 + t[F5 + lane] * p5 + t[F6 + lane] * p6 + t[F7 + lane] * p7
+                g = t[G4 + lane] * p4 + t[G5 + lane] * p5 + t[G6 + lane] * p6 + t[G7 + lane] * p7
+                u = u + t[F2 + lane] * p2 + t[F3 + lane] * p3 + (f + t[F8 + lane] * p8)
+                z = z + t[G2 + lane] * p2 + t[G3 + lane] * p3 + (g + t[G8 + lane] * p8)
+                # State after the stride, and its radius
+                t[U + lane], t[Z + lane] = u, z
+                t[SQUARE + lane] = max(t[SQUARE + lane], u * u + z * z)
+        # Largest squared radius of the tile
         for lane in range(LANES):
-            checkpoints[tile, 2, lane] = packed[6, lane] * packed[6, lane] * largest[lane]
+            checkpoints[tile, 2, lane] = t[SQUARE + lane]
     # State for the next stretch of the record
     for lane in range(LANES):
-        state[0, lane], state[1, lane] = s1[lane], s2[lane]
+        table[0, lane], table[1, lane] = t[U + lane], t[Z + lane]
 
 
 @kernel
-def states_before(acceleration, packed, checkpoints, chosen, states):
+def raise_to_samples(acceleration, peaks, jumps, phases, dampings, table, checkpoints, largest):
     """
-    Fill displacement and velocity before the chosen tiles.
+    Raise the largest squared radii to those at the samples.
 
     Parameters
     ----------
     acceleration : (tiles * TILE + 1,) ndarray
         Ground acceleration, scaled to a peak of order one.
-    packed : (ROWS, LANES) ndarray
+    peaks, jumps : (tiles,) ndarray
+        Largest absolute acceleration and change over a step, from `tile_search.tile_extremes`.
+    phases, dampings : (LANES,) ndarray
+        Phase ``omega * dt`` of a step, rad; fraction of critical.
+    table : (ROWS, LANES) ndarray
         Rows from `pack`.
     checkpoints : (TILES, 3, LANES) ndarray
-        From `run_tiles`.
-    chosen : (count, 2) ndarray of int
-        Tile and lane, from `tile_search.choose_tiles`.
-    states : (count, 2) ndarray
-        Receives ``u`` and ``z = v / omega``, in the unit of the acceleration (over ``omega²``).
+        From `run_strides`; its last row receives the largest squared radius at all samples of a
+        tile, or zero where neither they nor the motion between them can exceed the largest.
+    largest : (1, LANES) ndarray
+        Largest squared radii, raised in place, in the squared unit of the acceleration (over
+        ``omega⁴``).
     """
-    for number in range(chosen.shape[0]):
-        tile, lane = chosen[number]
-        scale, c, s = packed[6, lane], packed[7, lane], packed[8, lane]
-        # Undo shift and scale, then the rotation
-        along = scale * (checkpoints[tile, 0, lane] + packed[5, lane] * acceleration[tile * TILE])
-        across = scale * checkpoints[tile, 1, lane]
-        states[number, 0], states[number, 1] = c * along - s * across, s * along + c * across
+    # The radii looked at raise the limits of all tiles
+    raise_to_tiles(checkpoints, peaks.size, largest)
+    limits, marks, pushes = aligned(LIMITS, LANES), np.zeros(LANES, np.int64), np.empty(peaks.size)
+    group = aligned(1, 11 * GROUP)[0]
+    _fill_pushes(acceleration, pushes)
+    strongest = pushes.max()
+    for lane in range(LANES):
+        limits[5, lane] = math.exp(STRIDE * dampings[lane] * phases[lane])
+    _fill_limits(strongest, phases, dampings, largest, 0, LANES, limits)
+    for tile in range(peaks.size):
+        _mark_lanes(checkpoints, tile, peaks[tile], jumps[tile], pushes[tile], limits, marks)
+        for first in range(0, LANES, GROUP):
+            if not _any_marked(marks, first):
+                for lane in range(first, first + GROUP):
+                    checkpoints[tile, 2, lane] = 0.0
+                continue
+            # Step by step through the tile
+            _open_group(table, checkpoints, tile, first, group)
+            _run_steps(acceleration, tile * TILE, group)
+            # Only marked lanes are raised, so that none depends on its neighbours
+            for k in range(GROUP):
+                square = group[2 * GROUP + k] if marks[first + k] > 0 else 0.0
+                checkpoints[tile, 2, first + k] = square
+                largest[0, first + k] = max(largest[0, first + k], square)
+            _fill_limits(strongest, phases, dampings, largest, first, GROUP, limits)
+
+
+@kernel
+def _any_marked(marks, first):
+    """Return whether any lane of a group is marked."""
+    count = 0
+    for k in range(GROUP):
+        count += marks[first + k]
+    return count > 0
+
+
+@kernel
+def _open_group(table, checkpoints, tile, first, group):
+    """Fill state and squared radius before a tile, and the coefficients of a step."""
+    for k in range(GROUP):
+        for row in range(3):
+            group[row * GROUP + k] = checkpoints[tile, row, first + k]
+        for row in range(8):
+            group[(3 + row) * GROUP + k] = table[STEP + row, first + k]
+
+
+@kernel
+def _fill_pushes(acceleration, pushes):
+    """Fill the largest sum of ``|a|`` over half a stride of each tile, by the trapezoidal rule."""
+    for tile in range(pushes.size):
+        pushes[tile] = 0.0
+        # Every half stride of the tile
+        for i in range(tile * TILE, (tile + 1) * TILE, 4):
+            ends = 0.5 * (abs(acceleration[i]) + abs(acceleration[i + 4]))
+            inner = abs(acceleration[i + 1]) + abs(acceleration[i + 2]) + abs(acceleration[i + 3])
+            pushes[tile] = max(pushes[tile], ends + inner)
+
+
+@kernel
+def _fill_limits(strongest, phases, dampings, largest, first, count, limits):
+    """Fill the numbers by which tiles are ruled out, from the largest squared radii."""
+    for lane in range(first, first + count):
+        # Half a stride back or forth to the nearest radius that was looked at
+        phase, growth, root = phases[lane], limits[5, lane], math.sqrt(largest[0, lane])
+        limits[0, lane] = root / growth
+        limits[1, lane] = phase
+        limits[2, lane] = (root + phase * strongest) * growth
+        limits[3, lane] = largest[0, lane]
+        limits[4, lane] = 2.0 * dampings[lane]
+
+
+@kernel
+def _mark_lanes(checkpoints, tile, peak, jump, push, limits, marks):
+    """Mark the lanes of which a tile may hold a new largest radius by 1."""
+    for lane in range(LANES):
+        square = checkpoints[tile, 2, lane]
+        phase, radius, viscosity = limits[1, lane], limits[2, lane], limits[4, lane]
+        least = max(limits[0, lane] - phase * push, 0.0)
+        # Second derivative as in `within_step.rate_bounds`; 1 + 2 xi² exceeds sqrt(1 + 4 xi²)
+        rate = phase * ((1.0 + 0.5 * viscosity * viscosity) * radius + peak)
+        bend = rate * (4.0 * viscosity * radius + 2.0 * peak) + 2.0 * radius * jump
+        highest = square + (0.125 * STRIDE * STRIDE) * phase * bend
+        marks[lane] = (square >= least * least) & (highest > limits[3, lane])
+
+
+@kernel
+def _run_steps(acceleration, first, g):
+    """Run a group over the samples of one tile: state, squared radius, coefficients of a step."""
+    for i in range(first, first + TILE, 4):
+        # Samples of four steps
+        p0, p1, p2 = acceleration[i], acceleration[i + 1], acceleration[i + 2]
+        p3, p4 = acceleration[i + 3], acceleration[i + 4]
+        for k in range(GROUP):
+            u0, z0 = g[k], g[GROUP + k]
+            a11, a12, a21, a22 = (
+                g[3 * GROUP + k],
+                g[4 * GROUP + k],
+                g[5 * GROUP + k],
+                g[6 * GROUP + k],
+            )
+            b11, b12, b21 = g[7 * GROUP + k], g[8 * GROUP + k], g[9 * GROUP + k]
+            b22 = g[10 * GROUP + k]
+            # First step (Nigam & Jennings)
+            u1 = a11 * u0 + (a12 * z0 + (b11 * p0 + b12 * p1))
+            z1 = a21 * u0 + (a22 * z0 + (b21 * p0 + b22 * p1))
+            # Second step
+            u2 = a11 * u1 + (a12 * z1 + (b11 * p1 + b12 * p2))
+            z2 = a21 * u1 + (a22 * z1 + (b21 * p1 + b22 * p2))
+            # Third step
+            u3 = a11 * u2 + (a12 * z2 + (b11 * p2 + b12 * p3))
+            z3 = a21 * u2 + (a22 * z2 + (b21 * p2 + b22 * p3))
+            # Fourth step
+            u4 = a11 * u3 + (a12 * z3 + (b11 * p3 + b12 * p4))
+            z4 = a21 * u3 + (a22 * z3 + (b21 * p3 + b22 * p4))
+            # Largest squared radius
+            early = max(u1 * u1 + z1 * z1, u2 * u2 + z2 * z2)
+            late = max(u3 * u3 + z3 * z3, u4 * u4 + z4 * z4)
+            g[k], g[GROUP + k] = u4, z4
+            g[2 * GROUP + k] = max(g[2 * GROUP + k], early, late)

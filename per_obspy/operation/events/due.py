@@ -15,6 +15,9 @@ from per_obspy.operation.events.state import EventState, moment
 #: Pauses after failures, s: the shortest, which doubles, and the longest.
 SHORTEST_PAUSE, LONGEST_PAUSE = 60.0, 3600.0
 
+#: Failure that holds up only its own repetition: the run was done with what there is.
+INCOMPLETE = "services of records did not answer everything: asked again"
+
 #: Difference between two clocks that is no jump, s.
 TOLERANCE = 60.0
 
@@ -50,10 +53,10 @@ def due_task(
     delays : sequence of float
         s, rising.
     has_arrivals : bool
-        Whether record files have come or changed since the latest run.
+        Whether records have come or changed since the latest run.
     """
     passed = passed_delays(now, state, delays)
-    if state.state == "closed" or not passed or is_paused(now, state.not_before):
+    if state.state == "closed" or not passed or is_held(now, state):
         return None
     # A finished earthquake is screened again only if it is updated
     is_open = state.state == "open"
@@ -61,10 +64,20 @@ def due_task(
         "delay": is_open and not is_done(now, state, passed[-1]),
         "update": state.changed,
         "records": is_open and has_arrivals,
-        "retry": is_open and (not state.complete or state.failures > 0),
+        "retry": is_open and not is_paused(now, state.not_before) and _is_unfinished(state),
     }
     reasons = tuple(name for name, holds in conditions.items() if holds)
     return Task(passed[-1], reasons) if reasons else None
+
+
+def _is_unfinished(state: EventState) -> bool:
+    """Return whether the latest run has failed, or lacked an answer of a service."""
+    return not state.complete or state.failures > 0
+
+
+def is_held(now: datetime, state: EventState) -> bool:
+    """Return whether no run of an earthquake is tried, because the latest one failed."""
+    return state.last_error != INCOMPLETE and is_paused(now, state.not_before)
 
 
 def passed_delays(now: datetime, state: EventState, delays: Sequence[float]) -> list[float]:

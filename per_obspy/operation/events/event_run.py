@@ -1,25 +1,23 @@
 """Run of one watched earthquake: current facts, records, results and a revision."""
 
 import hashlib
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
-from datetime import datetime
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from per_obspy.config import Run
-from per_obspy.errors import ServiceError
 from per_obspy.files import file_hash, written_whole
 from per_obspy.jobs.output_folder import Result
 from per_obspy.operation.events.due import Task
 from per_obspy.operation.events.event_feed import present_event
 from per_obspy.operation.events.event_settings import (
+    Watcher,
     has_other_sources,
     settings_of_event,
     watch_of,
 )
+from per_obspy.operation.events.late_records import fetched_for, has_missing, records_hash
 from per_obspy.operation.events.open_events import DELETED, closed, judged, with_facts
-from per_obspy.operation.events.relevance import Places
 from per_obspy.operation.events.revisions import (
     content_of,
     newest_revision,
@@ -30,39 +28,10 @@ from per_obspy.operation.events.revisions import (
 )
 from per_obspy.operation.events.state import EventState, changed, event_folder, iso
 from per_obspy.pipeline.run import run
-from per_obspy.progress import Progress
 from per_obspy.records.contents.file_list import files_below
 from per_obspy.records.contents.growing import file_states, growing_files
-from per_obspy.records.fdsn.cache import Fetched, fetch, fetched_stations
-from per_obspy.records.fdsn.cut_records import cut_records_aside
-
-
-class Watcher(NamedTuple):
-    """
-    Settings and state that the runs of all earthquakes share.
-
-    Attributes
-    ----------
-    settings : Run
-        With a section ``watch``.
-    folder : Path
-        Watched folder.
-    places : Places
-        Of the inventory.
-    now : callable
-        Returns the time, with its zone.
-    progress : callable
-        Called for every stage of a run.
-    executor : Executor or None
-        Where stations and chunks are done, if not in processes of this machine.
-    """
-
-    settings: Run
-    folder: Path
-    places: Places
-    now: Callable[[], datetime]
-    progress: Progress
-    executor: Executor | None
+from per_obspy.records.fdsn.cache import Fetched, fetched_stations
+from per_obspy.tables.ranked.ranked_files import table_outputs
 
 
 class Done(NamedTuple):
@@ -126,18 +95,20 @@ def _run_with_records(
     watch, (task, started) = watch_of(watcher.settings), occasion
     # Records that come while the run goes on are for the next one
     arrivals = arrivals_of(watcher.settings)
-    fetched = _fetched(settings, watcher.progress)
+    fetched = fetched_for(watcher, settings)
     complete = fetched is None or fetched.is_complete
     passed = [delay for delay in watch.delays if delay <= task.delay]
     done = {**state.done, **{f"{delay:g}": started for delay in passed}}
     state = changed(state, changed=False, complete=complete, done=done, arrivals=arrivals)
+    missing = has_missing(settings, fetched)
+    state = changed(state, fetched=records_hash(fetched), missing=missing)
     # The number is in the page and the summary
     if not _has_records(settings, fetched):
         return Done(state, "no records yet")
     folder = event_folder(watcher.folder, state.event_id)
     number = max(state.revision, newest_revision(folder)) + 1
     facts = {"event_id": state.event_id, "revision": number, "revised": started}
-    result = run(settings, None, watcher.executor, watcher.progress, facts)
+    result = run(settings, None, watcher.executor, watcher.progress, facts, fetched)
     return _published(folder, state, result, occasion)
 
 
@@ -147,20 +118,6 @@ def _write_if_new(file: Path, content: bytes) -> None:
         return
     with written_whole(file) as part:
         part.write_bytes(content)
-
-
-def _fetched(settings: Run, progress: Progress) -> Fetched | None:
-    """Fetch the records of services into the folder of an earthquake; return None without any."""
-    assert settings.records is not None
-    request, event = settings.records.fdsn, settings.records.event
-    if request is None:
-        return None
-    try:
-        with cut_records_aside(request):
-            return fetch(request, event, progress, again=True)
-    except ServiceError:
-        # With the records that were set aside at their place
-        return fetch(request, event, progress)
 
 
 def _has_records(settings: Run, fetched: Fetched | None) -> bool:
@@ -193,7 +150,7 @@ def arrivals_of(settings: Run) -> str:
 def _published(folder: Path, state: EventState, result: Result, occasion: tuple[Task, str]) -> Done:
     """Make a revision of the results of a run, if they differ from those of the newest one."""
     record, newest = result.record, newest_revision(folder)
-    if "risk.parquet" not in record["outputs"]:
+    if not table_outputs(record["outputs"]):
         return Done(state, "no pair could be screened: see work/rejected.csv", result)
     # Unchanged results are no new revision
     shown = content_of(record, file_hash(folder / "event.xml"))

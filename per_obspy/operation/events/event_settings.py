@@ -1,14 +1,18 @@
 """Settings of a watcher, and settings of the run of one earthquake derived from them."""
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from per_obspy.config import Fdsn, Records, Run, Watch, Window, checked
 from per_obspy.config.section import read_toml
 from per_obspy.errors import CatalogError
+from per_obspy.operation.events.relevance import Places
 from per_obspy.operation.events.state import EventState, moment
-from per_obspy.records.fdsn.providers import base_url
+from per_obspy.progress import Progress
+from per_obspy.records.fdsn.providers import ROUTERS, base_url
 
 #: Windows of records begin at multiples of this, s, so that a small change of the origin time
 #: changes no window.
@@ -23,6 +27,34 @@ SETTLE = 10.0
 #: Keys of one earthquake, which a watcher sets itself.
 OF_ONE_EVENT = ("event", "time")
 OF_ONE_WINDOW = ("event_id", "start", "end", "latitude", "longitude")
+
+
+class Watcher(NamedTuple):
+    """
+    Settings and state that the runs of all earthquakes share.
+
+    Attributes
+    ----------
+    settings : Run
+        With a section ``watch``.
+    folder : Path
+        Watched folder.
+    places : Places
+        Of the inventory.
+    now : callable
+        Returns the time, with its zone.
+    progress : callable
+        Called for every stage of a run.
+    executor : Executor or None
+        Where stations and chunks are done, if not in processes of this machine.
+    """
+
+    settings: Run
+    folder: Path
+    places: Places
+    now: Callable[[], datetime]
+    progress: Progress
+    executor: Executor | None
 
 
 def read_settings(file: Path) -> Run:
@@ -51,8 +83,11 @@ def read_settings(file: Path) -> Run:
     settings = checked(Run, {**content, "records": placed}, str(file), file.resolve().parent)
     assert settings.watch is not None
     # An unknown service is a mistake at the start, not a failure of every poll
-    if settings.watch.service is not None:
-        base_url(settings.watch.service)
+    fdsn = settings.records.fdsn if settings.records else None
+    named = [settings.watch.service, *(fdsn.providers if fdsn else ())]
+    for provider in named:
+        if provider is not None and provider not in ROUTERS:
+            base_url(provider)
     return settings
 
 

@@ -74,6 +74,12 @@ class EventState(_State):
         Whether the services of records answered everything at its latest run.
     arrivals : str
         Hash of the names, sizes and times of the record files at its latest run.
+    fetched : str
+        Hash of the records of services at its latest run.
+    missing : bool
+        Whether a station that a service lists has no records, or incomplete ones.
+    looked : str or None
+        Time of the latest request for missing records between two runs.
     revision : int
         Number of its newest revision, 0 if there is none.
     failures : int
@@ -103,6 +109,9 @@ class EventState(_State):
     changed: bool = True
     complete: bool = True
     arrivals: str = ""
+    fetched: str = ""
+    missing: bool = False
+    looked: Moment | None = None
     revision: int = Field(0, ge=0)
     failures: int = Field(0, ge=0)
     not_before: Moment | None = None
@@ -121,6 +130,8 @@ class WatchState(_State):
 
     Attributes
     ----------
+    source : str
+        Service or folder to which all of this belongs.
     last_poll : str or None
         Time of the latest look at the list of earthquakes that succeeded, ISO 8601, UTC.
     since : str or None
@@ -131,15 +142,19 @@ class WatchState(_State):
         Time before which the list is not asked for again.
     last_error : str or None
         Why the latest look failed.
+    resting : dict
+        Host of a service -> time before which it is not asked for records, as it demanded.
     seen : dict
         File of a folder of QuakeML -> size in bytes and time of change in ns, as it was read.
     """
 
+    source: str = ""
     last_poll: Moment | None = None
     since: Moment | None = None
     failures: int = Field(0, ge=0)
     not_before: Moment | None = None
     last_error: str | None = None
+    resting: dict[str, Moment] = Field(default_factory=dict)
     seen: dict[str, tuple[int, int]] = Field(default_factory=dict)
 
 

@@ -23,6 +23,7 @@ from per_obspy.pipeline.rows.pair_columns import PairColumns, pair_columns
 from per_obspy.progress import Progress
 from per_obspy.tables.building_rows import write_rows
 from per_obspy.tables.buildings import BuildingWays, write_buildings
+from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.threads import usable_processors
 
 
@@ -71,7 +72,7 @@ def building_rows(
     settings : Run
         Settings of the run.
     folder : Path
-        Of the results, with ``risk.parquet``.
+        Of the results, with the risk table.
     ground : GroundFiles
         The stations.
     facts : mapping of str to str
@@ -81,7 +82,7 @@ def building_rows(
     progress : callable
         Called for every chunk.
     """
-    with pair_columns(folder / "risk.parquet") as pairs, temporary_folder(folder) as room:
+    with pair_columns(table_files(folder)) as pairs, temporary_folder(folder) as room:
         if not _enabled(settings.rows, pairs):
             return NO_ROWS
         found = all_rows(pairs, settings.rows, settings.totals.area, room)

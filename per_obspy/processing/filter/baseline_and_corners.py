@@ -1,6 +1,6 @@
 """Baseline and corners of one record, chosen together so that the displacement is clean."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from obspy import Stream, Trace
@@ -17,7 +17,6 @@ from per_obspy.processing.filter.corners import (
     SHIFTED_BASELINE,
     Corner,
     clean_corner,
-    fallback_highpass,
     highest_corner,
     lowest_highpass,
     measured_noise,
@@ -46,7 +45,7 @@ from per_obspy.processing.quality.findings import Finding, below, judged
 FEWEST = 10
 
 
-def corners_noted(stream: Stream, settings: Processing, magnitude: float | None) -> Stream:
+def corners_noted(stream: Stream, settings: Processing, fallback: Callable[[], Corner]) -> Stream:
     """
     Return a copy of one record without its baseline, tapered, with the corners of its filter.
 
@@ -56,8 +55,9 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
         One trace, m/s2, with ``noise`` (s) in ``stats.per_obspy``.
     settings : Processing
         Every number of the chain.
-    magnitude : float or None
-        Of the event.
+    fallback : callable
+        Returns the high-pass corner of a record without measurable noise, see
+        :func:`.corners.fallback_highpass`.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def corners_noted(stream: Stream, settings: Processing, magnitude: float | None)
         spectra = within(spectra, *(corner.frequency for corner in outer))
     checked = judged(level[0], _noise_findings(spectra, settings))
     # Corners by noise, then the baseline and the high-pass corner by displacement
-    lowest, lowpass = _limits(checked[0], spectra, outer, settings, magnitude)
+    lowest, lowpass = _limits(checked[0], spectra, outer, settings, fallback)
     if settings.highpass is not None:
         ready = tapered(checked, settings.taper)
         highpass = Corner(settings.highpass, "configuration")
@@ -241,7 +241,7 @@ def _limits(
     spectra: NoiseSpectra | None,
     outer: tuple[Corner, Corner],
     settings: Processing,
-    magnitude: float | None,
+    fallback: Callable[[], Corner],
 ) -> tuple[Corner, Corner]:
     """Return the lowest high-pass and the highest low-pass corner; note the noise on the trace."""
     lowest, lowpass = outer
@@ -249,8 +249,7 @@ def _limits(
     band = clear_band(spectra, threshold) if spectra else None
     if spectra is None or band is None:
         # Without measurable noise the magnitude decides
-        table, unknown = settings.fallback_highpass, settings.unknown_highpass
-        lowest = max(fallback_highpass(magnitude, table, unknown), lowest)
+        lowest = max(fallback(), lowest)
     else:
         # Ends of the clear band, unless it reaches the outermost corners
         low, high = band

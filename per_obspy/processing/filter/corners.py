@@ -78,8 +78,9 @@ def fallback_highpass(
         return Corner(unknown, f"{FROM_CONSTANT}neither noise nor magnitude known")
     reached = [size for size in by_magnitude if magnitude >= size]
     if not reached:
-        return Corner(unknown, f"{FROM_CONSTANT}magnitude {magnitude:g} is below the table")
-    reason = f"{FROM_TABLE} recorded, magnitude {magnitude:g}"
+        return Corner(unknown, f"{FROM_CONSTANT}the magnitude is below the table")
+    # The row, not the magnitude: an update within the row changes no record
+    reason = f"{FROM_TABLE} recorded, magnitude from {max(reached):g}"
     return Corner(by_magnitude[max(reached)], reason)
 
 

@@ -1,8 +1,9 @@
 """Noise windows: end of the noise by picks and, for a known event, by the travel time of P."""
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from obspy import Stream, Trace, UTCDateTime
 from obspy.core.event import Event
@@ -21,6 +22,12 @@ METRES_PER_KILOMETRE = 1000.0
 #: Depth of a hypocentre whose depth is unknown, km.
 UNKNOWN_DEPTH = 10
 
+#: Digits after the point of a computed P time, s: its error is that of the origin and the model.
+P_DIGITS = 1
+
+#: Traces whose picks are tried in turn: P moves the vertical most.
+DIRECTIONS = ("vertical", "horizontal")
+
 
 class Source(NamedTuple):
     """
@@ -36,6 +43,9 @@ class Source(NamedTuple):
         m.
     magnitude : float or None
         The preferred one, or the first.
+    decisions : list of dict or None
+        Collects every decision of the processing that depends on the event, with its causes: see
+        :mod:`per_obspy.processing.decisions`.
     """
 
     time: UTCDateTime
@@ -43,9 +53,15 @@ class Source(NamedTuple):
     longitude: float
     depth: float
     magnitude: float | None
+    decisions: list[dict[str, Any]] | None = None
+
+    def note(self, **decision: object) -> None:
+        """Collect a decision, each once."""
+        if self.decisions is not None and decision not in self.decisions:
+            self.decisions.append(decision)
 
 
-def source_of(event: Event) -> Source:
+def source_of(event: Event, decisions: list[dict[str, Any]] | None = None) -> Source:
     """Return the preferred origin and magnitude of an event with at least one origin."""
     origin = event.preferred_origin() or event.origins[0]
     magnitude = event.preferred_magnitude() or next(iter(event.magnitudes), None)
@@ -53,7 +69,7 @@ def source_of(event: Event) -> Source:
     unknown = UNKNOWN_DEPTH * METRES_PER_KILOMETRE
     depth = unknown if origin.depth is None else max(origin.depth, 0.0)
     size = None if magnitude is None else float(magnitude.mag)
-    return Source(origin.time, origin.latitude, origin.longitude, depth, size)
+    return Source(origin.time, origin.latitude, origin.longitude, depth, size, decisions)
 
 
 def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
@@ -65,12 +81,20 @@ def p_arrival(trace: Trace, source: Source) -> UTCDateTime | None:
     Kennett & Engdahl 1991, Geophys. J. Int. 105, 429-465 (iasp91), as in ObsPy.
     """
     place = trace.stats.get("coordinates")
-    if not place:
-        return None
-    degrees = locations2degrees(source.latitude, source.longitude, place.latitude, place.longitude)
+    return p_arrival_at(place.latitude, place.longitude, source) if place else None
+
+
+def p_arrival_at(latitude: float, longitude: float, source: Source) -> UTCDateTime | None:
+    """Compute the arrival time of the first P wave at a place; see `p_arrival`."""
+    degrees = locations2degrees(source.latitude, source.longitude, latitude, longitude)
     kilometres = source.depth / METRES_PER_KILOMETRE
     arrivals = _model().get_travel_times(kilometres, degrees, phase_list=["ttp"])
     return source.time + arrivals[0].time if arrivals else None
+
+
+def _rounded(time: UTCDateTime | None) -> UTCDateTime | None:
+    """Return a time rounded to `P_DIGITS`, so that a negligible change of origin changes none."""
+    return None if time is None else UTCDateTime(round(time.timestamp, P_DIGITS))
 
 
 @lru_cache(maxsize=1)
@@ -145,11 +169,42 @@ def _onset(
     stream: Stream, tolerance: float, source: Source | None
 ) -> tuple[UTCDateTime | None, str]:
     """Return the time of the first wave, None if there is no clear one, and the method."""
-    computed = p_arrival(stream[0], source) if source and stream else None
-    # The vertical first: P moves it most
-    for direction in ("vertical", "horizontal"):
+    computed = _rounded(p_arrival(stream[0], source)) if source and stream else None
+    picks = dict[str, list[UTCDateTime]]()
+
+    def picked(direction: str) -> list[UTCDateTime]:
         group = [trace for trace in stream if is_horizontal(trace) == (direction == "horizontal")]
-        times = _picked_times(group)
+        return picks.setdefault(direction, _picked_times(group))
+
+    onset, method = first_wave(picked, computed, tolerance)
+    if source is not None and computed is not None and onset is not None:
+        place = stream[0].stats.coordinates
+        source.note(
+            place=[float(place.latitude), float(place.longitude)],
+            picks={name: [time.ns for time in times] for name, times in picks.items()},
+            onset=onset.ns,
+            method=method,
+        )
+    return onset, method
+
+
+def first_wave(
+    picked: Callable[[str], Sequence[UTCDateTime]], computed: UTCDateTime | None, tolerance: float
+) -> tuple[UTCDateTime | None, str]:
+    """
+    Return the time of the first wave, None if there is no clear one, and the method.
+
+    Parameters
+    ----------
+    picked : callable
+        Returns the picks of the traces of a direction, one of `DIRECTIONS`.
+    computed : UTCDateTime or None
+        P wave by the travel time.
+    tolerance : float
+        Between a pick and the computed P, s.
+    """
+    for direction in DIRECTIONS:
+        times = picked(direction)
         if computed is not None:
             times = [time for time in times if abs(time - computed) <= tolerance]
         if times:
@@ -158,6 +213,36 @@ def _onset(
     if computed is not None:
         return computed, f"travel time of P, {MODEL}"
     return None, "no clear onset"
+
+
+def same_onset(decision: Mapping[str, Any], source: Source, tolerance: float) -> bool:
+    """
+    Return whether an event leads to the same first wave as that of an earlier processing.
+
+    Parameters
+    ----------
+    decision : mapping
+        Collected by a `Source`.
+    source : Source
+        The event now.
+    tolerance : float
+        Between a pick and the computed P, s.
+
+    Raises
+    ------
+    KeyError
+        If traces would decide of which there were no picks.
+    """
+    picks = {name: list(map(_of_ns, times)) for name, times in decision["picks"].items()}
+    latitude, longitude = decision["place"]
+    computed = _rounded(p_arrival_at(latitude, longitude, source))
+    onset, method = first_wave(picks.__getitem__, computed, tolerance)
+    return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])
+
+
+def _of_ns(number: int) -> UTCDateTime:
+    """Return the time so many ns after 1970."""
+    return UTCDateTime(ns=number)
 
 
 def _picked_times(traces: list[Trace]) -> list[UTCDateTime]:

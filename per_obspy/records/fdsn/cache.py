@@ -83,6 +83,7 @@ def fetch(
     event: Path | None = None,
     progress: Progress = silent,
     again: bool = False,
+    pauses: dict[str, float] | None = None,
 ) -> Fetched:
     """
     Download the missing parts of a request into the cache; ask for none if it is complete.
@@ -97,6 +98,8 @@ def fetch(
         Called for every station: stage, done, total.
     again : bool
         Whether to ask again for stations without data at every service.
+    pauses : dict, optional
+        Host -> s for which it is not asked; gets the pauses that services demand.
 
     Raises
     ------
@@ -106,6 +109,9 @@ def fetch(
         If services fail and the cache has no station at all, or the window is not over yet.
     """
     pool = _pool(request)
+    if pauses is not None:
+        # A pause counts from the next fetch on: requests under way are not called off
+        pool = pool._replace(resting=dict(pauses), demanded=pauses)
     fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
@@ -124,7 +130,7 @@ def fetch(
     remove_dead_parts(request.cache)
     rejected, complete = _fetch_missing(pool, request, fetched, progress)
     if complete:
-        write_status(status_file, key, _cached_hashes(fetched.folder), {"rejected": rejected})
+        write_status(status_file, key, cached_hashes(fetched.folder), {"rejected": rejected})
     fetched = fetched._replace(rejected=tuple(rejected), is_complete=complete)
     if not complete and not fetched_stations(fetched).stations:
         raise ServiceError(f"no station could be fetched; {'; '.join(rejected[0].reasons)}")
@@ -178,8 +184,8 @@ def _known_rejections(status: Status | None) -> tuple[Rejection, ...] | None:
         return None
 
 
-def _cached_hashes(folder: Path) -> dict[str, str]:
-    """Return the hashes of all files of stations, seen from the cache."""
+def cached_hashes(folder: Path) -> dict[str, str]:
+    """Return the hashes of all files of stations in a folder of a cache, seen from the cache."""
     hashes = dict[str, str]()
     for path in sorted(folder.glob("*.json")):
         with suppress(StatusError):

@@ -50,6 +50,15 @@ def cut_records_aside(request: Fdsn) -> Iterator[None]:
         _restore(request.cache)
 
 
+def has_cut_records(request: Fdsn) -> bool:
+    """Return whether the cache has records that end before the window of a request."""
+    files = request.cache.glob(f"*-*-*/*{SUFFIX}")
+    end = UTCDateTime(request.end or 0) - CUT
+    return any(
+        _ends(file) < end for file in files if not is_part(file) and _is_of(file.parent, request)
+    )
+
+
 def _is_of(folder: Path, request: Fdsn) -> bool:
     """Return whether a folder of a cache is that of the window of a request."""
     times = [UTCDateTime(time or 0) for time in (request.start, request.end)]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
+from types import MappingProxyType
 from typing import NamedTuple
 from urllib.parse import unquote, urljoin, urlsplit, urlunsplit
 
@@ -72,6 +73,10 @@ class WebPool(NamedTuple):
         Bytes.
     longest_pause : float
         s; a service that demands a longer pause is given up at once.
+    resting : mapping
+        Host -> s for which it is not asked, as it has demanded earlier.
+    demanded : dict or None
+        Collects the hosts that are given up and the pause that each demands, s.
     """
 
     connections: urllib3.PoolManager
@@ -80,6 +85,8 @@ class WebPool(NamedTuple):
     longest: float
     largest: int
     longest_pause: float = math.inf
+    resting: Mapping[str, float] = MappingProxyType({})
+    demanded: dict[str, float] | None = None
 
 
 class Answer(NamedTuple):
@@ -146,14 +153,25 @@ def whole_answer(pool: WebPool, url: str, parameters: Mapping[str, str]) -> Answ
     ServiceError
         If there is no answer, it takes too long or is too large, or it is another fault.
     """
+    if rest := pool.resting.get(host(url)):
+        reason = f"is not asked for another {rest:.0f} s, as it demanded by Retry-After"
+        raise PassingFault(f"{public_url(url)}: {reason}", rest)
     for attempt in range(1, pool.retries + 2):
         try:
             return _within(pool, url, lambda: _attempt(pool, url, parameters))
         except PassingFault as fault:
             if attempt > pool.retries or (fault.pause or 0.0) > pool.longest_pause:
+                _note_demand(pool, url, fault)
                 raise
             time.sleep(_pause(pool.wait, attempt, fault.pause))
     raise AssertionError  # the last attempt returns or raises
+
+
+def _note_demand(pool: WebPool, url: str, fault: PassingFault) -> None:
+    """Collect the pause that a service demands, the longest of each host."""
+    if pool.demanded is not None and fault.pause:
+        name = host(url)
+        pool.demanded[name] = max(pool.demanded.get(name, 0.0), fault.pause)
 
 
 def _pause(wait: float, attempt: int, demanded: float | None) -> float:

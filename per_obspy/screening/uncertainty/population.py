@@ -86,8 +86,10 @@ def population(uncertain: Uncertain, pairs: Table, nodes: FloatArray) -> Columns
     deviates = np.ascontiguousarray(nodes[:, [DEMAND, GAP]].T)
     # one node of certain buildings is all nodes
     every = np.broadcast_to(uncertain.motion.rows(), (len(RelativeMotion._fields), *shape))
+    # always writable: a read-only array would compile the kernel a second time
+    every = np.require(every, requirements=["C", "W"])
     outcome = np.empty((OUTCOME_ROWS, len(facts[0])))
-    fill_outcomes(np.ascontiguousarray(every), facts, deviates, outcome)
+    fill_outcomes(every, facts, deviates, outcome)
     # the lognormal gap has no share of exactly 0, at which any motion is contact
     moving = (uncertain.motion.demand > 0.0).mean(axis=1)
     outcome[0] = np.maximum(outcome[0], one_wall_chance(pairs) * moving)

@@ -13,6 +13,7 @@ import pytest
 from per_obspy.config.engine import Engine
 from per_obspy.errors import ServiceError, TryLater, Unfinished
 from per_obspy.jobs.cluster import worker_side
+from per_obspy.jobs.cluster.dask_client import present_workers
 from per_obspy.jobs.cluster.dask_executor import DaskExecutor
 from per_obspy.jobs.parallel import AHEAD, Work, results
 
@@ -71,6 +72,19 @@ def test_every_task_has_a_result_or_a_reason(executor, tmp_path):
     assert sum(worker["tasks"] for worker in facts["workers"]) == 3
     assert facts["events"] == []
     assert list(tmp_path.iterdir()) == []  # would catch files of tasks that stay
+
+
+def test_no_worker_is_missed_while_the_client_refreshes_its_own_list(client, monkeypatch):
+    def then_refreshed(do, *arguments, **named):
+        found = sync(do, *arguments, **named)
+        # as in the background every two seconds, without any worker (distributed 2026.8)
+        sync(client._update_scheduler_info)
+        return found
+
+    sync = client.sync
+    monkeypatch.setattr(client, "sync", then_refreshed)
+    # would catch workers at work that are reported as killed
+    assert [threads for _, threads in present_workers(client).values()] == [1, 1]
 
 
 def test_few_tasks_are_ahead_of_their_results(executor, tmp_path):

@@ -14,6 +14,8 @@ from per_obspy.progress import silent
 
 from ..small_run import InProcess
 
+pytestmark = pytest.mark.usefixtures("plain_reports")
+
 #: Width of a building and of the gap to its neighbour, degrees: about 11 m and 0.6 m.
 WIDTH, GAP = 1e-4, 5e-6
 

@@ -5,22 +5,32 @@ Tests of per_obspy.pipeline.results.page, per_obspy.pipeline.results.page_drawin
 per_obspy.report.page.drawn_histories.
 """
 
+import json
 import re
+import shutil
 
 import pandas as pd
 import pytest
 
-from per_obspy.pipeline.run import report, run
+from per_obspy.pipeline.run import report
 
-from ..small_run import InProcess, page_content, write_configuration
+from ..small_run import page_content, write_configuration
+
+pytestmark = pytest.mark.usefixtures("plain_figures")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(small_run, tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    result = run(write_configuration(folder), executor=InProcess())
-    assert "report.html" in result.record["outputs"]
+    shutil.copytree(small_run, folder, dirs_exist_ok=True)
+    assert "report.html" in json.loads((folder / "out" / "run.json").read_text())["outputs"]
     return folder
+
+
+@pytest.fixture
+def copied(folder, tmp_path):
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    return tmp_path
 
 
 @pytest.fixture(scope="module")
@@ -111,19 +121,18 @@ def test_areas_of_the_page_are_those_of_the_totals(folder, content):
     assert set(area["texts"]) == set(totals["area"])
 
 
-def test_report_writes_the_page_in_the_language_of_the_configuration(folder):
-    configuration = write_configuration(folder, '[report]\nlanguage = "es"\n')
-    report(configuration, folder / "out")
-    assert page_content(folder / "out" / "report.html")["texts"]["close"] == "cerrar"
+def test_report_writes_the_page_in_the_language_of_the_configuration(copied):
+    configuration = write_configuration(copied, '[report]\nlanguage = "es"\n')
+    report(configuration, copied / "out")
+    assert page_content(copied / "out" / "report.html")["texts"]["close"] == "cerrar"
 
 
-def test_revision_of_the_run_is_on_the_page(folder):
+def test_revision_of_the_run_is_on_the_page(copied):
     """Its number is that of the configuration; its time the beginning of the run."""
-    configuration = write_configuration(folder, "[report]\nrevision = 3\n")
-    report(configuration, folder / "out")
-    shown = page_content(folder / "out" / "report.html")["revision"]
+    configuration = write_configuration(copied, "[report]\nrevision = 3\n")
+    report(configuration, copied / "out")
+    shown = page_content(copied / "out" / "report.html")["revision"]
     assert re.fullmatch(r"Revision 3(, \d\d:\d\d UTC)?", shown)
-    report(write_configuration(folder), folder / "out")
 
 
 def test_rejections_are_counted_and_their_beginning_shown(content):
@@ -131,7 +140,7 @@ def test_rejections_are_counted_and_their_beginning_shown(content):
     assert content["rejected"]["note"] == "No input was rejected."
 
 
-def test_language_on_the_command_line(folder, call):
-    code, _, error = call("report", folder / "run.toml", "-o", folder / "out", "--language", "es")
+def test_language_on_the_command_line(copied, call):
+    code, _, error = call("report", copied / "run.toml", "-o", copied / "out", "--language", "es")
     assert (code, error) == (0, error)
-    assert page_content(folder / "out" / "report.html")["language"] == "es"
+    assert page_content(copied / "out" / "report.html")["language"] == "es"

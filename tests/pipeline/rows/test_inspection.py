@@ -5,20 +5,13 @@ import pytest
 
 from per_obspy.errors import CatalogError
 from per_obspy.pipeline.rows.inspection import plan_inspection
-from per_obspy.pipeline.run import run
 from per_obspy.report.plan.visits import Teams
-
-from ..small_run import InProcess, write_configuration
-
-pytestmark = pytest.mark.usefixtures("plain_figures")
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(small_run):
     """Return the folder of a finished run of sixty pairs."""
-    folder = tmp_path_factory.mktemp("plan")
-    run(write_configuration(folder), executor=InProcess())
-    return folder / "out"
+    return small_run / "out"
 
 
 def teams(longitude, latitude):

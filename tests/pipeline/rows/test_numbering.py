@@ -18,7 +18,7 @@ def numbered(tmp_path):
     def number(**columns):
         path = tmp_path / "risk.parquet"
         pq.write_table(pa.table(columns), path)
-        with pair_columns(path) as pairs, small_database(tmp_path) as database:
+        with pair_columns([path]) as pairs, small_database(tmp_path) as database:
             return building_numbers(pairs, database)
 
     return number

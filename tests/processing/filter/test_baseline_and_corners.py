@@ -1,5 +1,7 @@
 """Baseline and corners chosen together: noise, configuration, shifts during the shaking."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from obspy import Stream, Trace
@@ -8,6 +10,7 @@ from obspy.core import AttribDict
 from per_obspy.config import Check, Checks, Processing
 from per_obspy.errors import RecordRejected
 from per_obspy.processing.filter.baseline_and_corners import corners_noted
+from per_obspy.processing.filter.corners import fallback_highpass
 
 RATE = 100.0
 SETTINGS = Processing()
@@ -18,12 +21,17 @@ def record(samples, noise=20.0):
     return Stream([Trace(samples, header)])
 
 
+def noted_corners(stream, settings, magnitude):
+    table, unknown = settings.fallback_highpass, settings.unknown_highpass
+    return corners_noted(stream, settings, partial(fallback_highpass, magnitude, table, unknown))
+
+
 def noisy(samples, level, seed=21):
     return samples + level * np.random.default_rng(seed).normal(size=samples.size)
 
 
 def test_a_quiet_record_gets_the_widest_band(earthquake):
-    chosen = corners_noted(record(noisy(earthquake(), 1e-5)), SETTINGS, None)[0].stats.per_obspy
+    chosen = noted_corners(record(noisy(earthquake(), 1e-5)), SETTINGS, None)[0].stats.per_obspy
     assert chosen.highpass < 0.05
     assert chosen.lowpass == 37.5
     assert chosen.lowpass_source == "0.75 Nyquist"
@@ -33,7 +41,7 @@ def test_a_quiet_record_gets_the_widest_band(earthquake):
 
 def test_more_noise_means_a_narrower_band(earthquake):
     quiet, loud = (
-        corners_noted(record(noisy(earthquake(), level)), SETTINGS, None)[0].stats.per_obspy
+        noted_corners(record(noisy(earthquake(), level)), SETTINGS, None)[0].stats.per_obspy
         for level in (0.01, 0.1)
     )
     # both ends of the band move inwards, because of the noise
@@ -45,21 +53,21 @@ def test_more_noise_means_a_narrower_band(earthquake):
 
 def test_noise_without_a_signal_is_rejected():
     with pytest.raises(RecordRejected, match="signal-to-noise ratio of the best octave"):
-        corners_noted(record(noisy(np.zeros(12000), 1.0)), SETTINGS, None)
+        noted_corners(record(noisy(np.zeros(12000), 1.0)), SETTINGS, None)
 
 
 @pytest.mark.parametrize(("magnitude", "source"), [(4.0, "table"), (None, "constant")])
 def test_without_noise_the_table_or_the_constant_is_the_lowest_corner(
     earthquake, magnitude, source
 ):
-    chosen = corners_noted(record(earthquake()[2000:], 0.0), SETTINGS, magnitude)[0].stats.per_obspy
+    chosen = noted_corners(record(earthquake()[2000:], 0.0), SETTINGS, magnitude)[0].stats.per_obspy
     assert chosen.highpass >= chosen.lowest_highpass == (0.3 if magnitude else 0.08)
     assert source in chosen.lowest_highpass_source
 
 
 def test_corners_of_the_configuration_are_not_searched(earthquake):
     settings = Processing(highpass=0.4, lowpass=20.0)
-    chosen = corners_noted(record(earthquake()), settings, None)[0].stats.per_obspy
+    chosen = noted_corners(record(earthquake()), settings, None)[0].stats.per_obspy
     assert (chosen.highpass, chosen.lowpass, chosen.highpass_source) == (0.4, 20.0, "configuration")
 
 
@@ -70,7 +78,7 @@ def test_a_baseline_that_shifts_during_the_shaking_costs_the_long_periods(earthq
     shift = np.where(time > 50, 0.02, np.where(time > 21, -0.2, 0.0))
     settings = Processing(highpass_range=(0.001, 0.15))
     shifted = record(noisy(earthquake(shaking=6.0) + shift, 1e-5))
-    chosen = corners_noted(shifted, settings, None)[0].stats.per_obspy
+    chosen = noted_corners(shifted, settings, None)[0].stats.per_obspy
     assert chosen.baseline in ("displacement polynomial", "two segments", "velocity residual")
     assert chosen.highpass == 0.15
     assert "baseline shifts" in chosen.highpass_source
@@ -79,18 +87,18 @@ def test_a_baseline_that_shifts_during_the_shaking_costs_the_long_periods(earthq
 def test_a_displacement_that_no_corner_cleans_is_rejected(earthquake):
     settings = Processing(highpass_range=(0.001, 0.012), drift=1e-6)
     with pytest.raises(RecordRejected, match="displacement drifts with every baseline"):
-        corners_noted(record(noisy(earthquake(), 1e-4)), settings, None)
+        noted_corners(record(noisy(earthquake(), 1e-4)), settings, None)
 
 
 def test_levels_of_the_configuration_decide():
     lenient = Processing(checks=Checks(signal_to_noise=Check(threshold=2.0, level="warn")))
     samples = noisy(np.zeros(12000), 1.0) + np.sin(np.arange(12000) / 30)
-    chosen = corners_noted(record(samples), lenient, None)[0].stats.per_obspy
+    chosen = noted_corners(record(samples), lenient, None)[0].stats.per_obspy
     assert chosen.highpass > 0
 
 
 def test_inputs_stay_unchanged(earthquake):
     given = record(noisy(earthquake(), 1e-4))
     before = given.copy()
-    corners_noted(given, SETTINGS, None)
+    noted_corners(given, SETTINGS, None)
     assert given == before

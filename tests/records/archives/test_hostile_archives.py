@@ -26,7 +26,7 @@ from per_obspy.records.archives.zip_archive import PackedZip
 from per_obspy.records.folder import find_stations
 from per_obspy.records.sources import find_sources
 
-MANY = 200_000
+MANY = 50_000
 
 
 def tar(path: Path, members: Iterable[tuple[str, bytes]], mode: str = "w") -> Path:

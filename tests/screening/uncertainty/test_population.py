@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from screening_samples import make_pairs, make_station
 
 import per_obspy
+from per_obspy.screening.uncertainty import population
 from per_obspy.screening.uncertainty.population import COLUMNS
 
 #: Two buildings at the station itself, where the motion is the record's.
@@ -37,6 +38,21 @@ def test_without_doubt_the_population_is_the_exact_history(station):
         assert_allclose(table[name], exact, rtol=0)
     amplified = table[["amplification_exact_1", "amplification_exact_2"]].max(axis=1).clip(lower=1)
     assert_allclose(table["expected_amplification"], amplified, rtol=0)
+
+
+@pytest.mark.parametrize("pair", [GIVEN, {**GIVEN, **DOUBT}, DERIVED])
+def test_the_kernel_gets_one_kind_of_arrays(pair, station, monkeypatch):
+    # catches read-only arrays, for which Numba compiles once more, after the warm-up
+    kernel, writable = population.fill_outcomes, []
+
+    def noted(*arrays):
+        writable.extend(array.flags.writeable for array in arrays)
+        return kernel(*arrays)
+
+    monkeypatch.setattr(population, "fill_outcomes", noted)
+    _table(station, [{**pair, "gap": 0.02}])
+    assert writable
+    assert all(writable)
 
 
 def test_a_little_doubt_changes_the_population_a_little(station):
