@@ -22,8 +22,8 @@ WIDEST = """
 import re
 from numba import float64, int64
 from per_obspy.kernels.vector_width import run_oscillators
-run_oscillators.compile((int64, float64[:, ::1]))
-text = next(iter(run_oscillators.inspect_asm().values()))
+run_oscillators.kernel.compile((int64, float64[:, ::1]))
+text = next(iter(run_oscillators.kernel.inspect_asm().values()))
 found = re.findall(r"(?:fmadd|max)\\w*pd.*%([yz])mm", text)
 print(max(found, key=found.count))
 """

@@ -12,6 +12,13 @@ import numba
 from filelock import FileLock
 from numba.core.caching import FunctionCache
 
+from per_obspy.kernels._linking import (
+    FunctionCompiler,
+    KernelCompiler,
+    LeanCompiler,
+    LinkedFunction,
+)
+
 #: Options of every kernel. No ``parallel=True``: two threads that call such kernels abort the
 #: process on Numba's workqueue layer, so the only threads are one level above the kernels.
 OPTIONS: dict[str, Any] = {
@@ -25,6 +32,10 @@ OPTIONS: dict[str, Any] = {
     # make ``isnan`` find no NaN
     "fastmath": {"contract", "nsz"},
     "boundscheck": False,
+    # No function pointer for C, which no kernel needs
+    "no_cfunc_wrapper": True,
+    # One step from all functions of a kernel to machine code
+    "pipeline_class": KernelCompiler,
 }
 
 
@@ -40,22 +51,25 @@ class SharedCache(FunctionCache):
                 super().save_overload(sig, data)
 
 
-def _compiler(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def _compiler(
+    compiler: type[FunctionCompiler], **options: Any
+) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles with some options, stored on disk where that is possible."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
             kernel = numba.njit(**OPTIONS, **options)(function)
             # Without the compiler the kernel is the function itself
-            if kernel is not function:
-                kernel._cache = SharedCache(function)
-            return kernel
+            if kernel is function:
+                return function
+            kernel._cache = SharedCache(function)
         except RuntimeError as error:
             # Neither the package's folder nor that of the user can be written
             if "no locator available" not in str(error):
                 raise
             _warn_without_cache()
-            return numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+            kernel = numba.njit(**(OPTIONS | {"cache": False}), **options)(function)
+        return LinkedFunction(kernel, compiler)
 
     return compiled
 
@@ -70,12 +84,12 @@ def _warn_without_cache() -> None:
         )
 
 
-kernel = _compiler()
+kernel = _compiler(FunctionCompiler)
 
 #: For kernels that allocate no memory: without reference counts, which cost short kernels more
 #: than arithmetic.
-lean = _compiler(_nrt=False)
+lean = _compiler(LeanCompiler, _nrt=False)
 
 #: For small kernels of inner loops, which the compiler otherwise leaves out of line as soon as
 #: their callers grow.
-inlined = _compiler(_nrt=False, forceinline=True)
+inlined = _compiler(LeanCompiler, _nrt=False, forceinline=True)
