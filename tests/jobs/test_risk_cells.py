@@ -1,4 +1,9 @@
-"""The risk table by cell: the rows and ranks of the one table, resumed, whole or not at all."""
+"""
+The risk table by cell: the rows and ranks of the one table, resumed, whole or not at all.
+
+Covers ``per_obspy.tables.ranked.arranged_parts``, ``per_obspy.tables.ranked.cell_files`` and
+``per_obspy.tables.ranked.ranked_files``.
+"""
 
 import pickle
 import shutil
