@@ -64,7 +64,7 @@ def rehearse(folder: Path, server: FdsnServer) -> None:
     server.events["xx1"], server.silent = early, {"S003", "S004"}
     # The list of earthquakes fails at first, and a service of records for one station
     server.fail("event", "*", status(503, Retry_After="20"))
-    server.fail("dataselect", "S001", *[status(503, Retry_After="60")] * 2)
+    server.fail("dataselect", "S001", status(503, Retry_After="60"))
     report(folder, 0, "the event service demands a pause", expected=1)
     first = started(folder, 61, workers=2)
     kill_worker(first.process)

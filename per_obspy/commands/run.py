@@ -287,6 +287,8 @@ def print_nothing(result: "Result") -> None:
 
 def print_result(result: "Result") -> None:
     """Print the counts of a run, its worst pairs and its files."""
+    from per_obspy.tables.ranked.ranked_files import listed_outputs
+
     folder, record = result.folder, result.record
     if result.did_nothing:
         print("Up to date: these inputs were run before.")
@@ -296,8 +298,8 @@ def print_result(result: "Result") -> None:
     if "evaluation.json" in record["outputs"]:
         _print_evaluation(json.loads((folder / "evaluation.json").read_text(encoding="utf-8")))
     if "risk.csv" in record["outputs"]:
-        _print_worst(folder / "risk.parquet", 10)
-    for name in sorted({*record["outputs"], "run.json", "configuration.toml"}):
+        _print_worst(folder, 10)
+    for name in listed_outputs({*record["outputs"], "run.json", "configuration.toml"}):
         print(f"  {folder / name}")
 
 
@@ -370,21 +372,20 @@ def _print_evaluation(found: dict[str, Any]) -> None:
         print(f"Brier score {found['brier_score']:.3f}; the share alone {share_alone:.3f}")
 
 
-def _print_worst(path: Path, count: int) -> None:
+def _print_worst(folder: Path, count: int) -> None:
     """Print the worst pairs as a table."""
     titles = list(SHOWN.values())
-    worst = _first_rows(path, list(SHOWN), count)
+    worst = _worst_rows(folder, list(SHOWN), count)
     print_table(f"The {len(worst)} worst pairs", titles, worst)
 
 
-def _first_rows(path: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
-    """Return the first rows of a Parquet file; empty cells are None."""
+def _worst_rows(folder: Path, columns: "Sequence[str]", count: int) -> list[tuple[object, ...]]:
+    """Return the worst rows of the risk table; empty cells are None."""
     # Without libraries of tables, which a finished run would wait for
-    import pyarrow as pa
-    import pyarrow.parquet
+    from per_obspy.tables.ranked.ranked_files import table_files
+    from per_obspy.tables.ranked.ranked_table import ranked_table
 
-    with pa.parquet.ParquetFile(path.absolute()) as file:
-        rows = next(file.iter_batches(count, columns=list(columns)), None)
-    found = [] if rows is None else rows.to_pylist()
+    with ranked_table(table_files(folder)) as table:
+        found = [row for rows in table.ranked(count, columns) for row in rows.to_pylist()]
     # In the order of the columns that was asked for
     return list(map(itemgetter(*columns), found))

@@ -48,6 +48,15 @@ class Run(Section):
         ge=1,
         description="largest number of rows in risk.csv, the worst ones; the Parquet file has all",
     )
+    dataset_from: int = Field(
+        20_000_000,
+        ge=1,
+        description="number of pairs from which the ranked table is a folder risk/ with one "
+        "Parquet file per cell, instead of one file risk.parquet",
+    )
+    dataset_cell: float = Field(
+        1.0, ge=0.1, le=90.0, description="width and height of a cell of the folder risk/, degrees"
+    )
     geopackage: bool = Field(
         False, description="write risk.gpkg, risk.qgz and GeoParquet; needs per_obspy[gis]"
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from per_obspy.config import Processing
 from per_obspy.processing.decisions import same_decisions
@@ -10,13 +10,12 @@ from per_obspy.processing.noise.windows import Source, source_of
 from per_obspy.records.event_file import EventFile
 from per_obspy.spectra.storage import read_spectra, write_spectra
 
-if TYPE_CHECKING:
-    from obspy.core.event import Event
 
-
-def hypocentre_attributes(event: "Event | None") -> dict[str, float]:
+def hypocentre_attributes(file: EventFile | None) -> dict[str, float]:
     """Return the hypocentre as attributes of a station file, degrees and m; empty if unknown."""
-    origin = event and (event.preferred_origin() or next(iter(event.origins), None))
+    if file is None:
+        return {}
+    origin = file.event.preferred_origin() or next(iter(file.event.origins), None)
     if not origin or None in (origin.longitude, origin.latitude, origin.depth):
         return {}
     return {
@@ -40,7 +39,7 @@ def source_facts(event: EventFile | None) -> dict[str, object] | None:
         "time": source.time.ns,
         "place": [source.latitude, source.longitude, source.depth],
         "magnitude": source.magnitude,
-        "hypocentre": hypocentre_attributes(event.event),
+        "hypocentre": hypocentre_attributes(event),
     }
 
 
@@ -81,7 +80,7 @@ def moved_shard(shard: Path, before: Mapping[str, Any], event: EventFile) -> boo
     is_possible : bool
         False if one of both hypocentres is unknown: that of the headers is in its place.
     """
-    known, new = before.get("hypocentre"), hypocentre_attributes(event.event)
+    known, new = before.get("hypocentre"), hypocentre_attributes(event)
     if known == new:
         return True
     if not known or not new:

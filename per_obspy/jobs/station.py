@@ -76,7 +76,7 @@ def spectra_shard(job: "StationJob", stream: "Stream", source: "Source | None") 
     grid = job.spectra
     periods = np.geomspace(grid.shortest, grid.longest, grid.count)
     dataset = station_spectra(clean, periods, grid.dampings, grid.azimuth_step)
-    dataset.attrs |= hypocentre_attributes(job.event and job.event.event)
+    dataset.attrs |= hypocentre_attributes(job.event)
     write_spectra(dataset, job.shard)
     return Products(unfit, (job.shard,))
 
@@ -199,6 +199,7 @@ def do_station(job: StationJob) -> FinishedStation:
     """Write a station file and its status file, and return the finished station."""
     if known := _unchanged_by_event(job):
         return known
+    # Whatever an earlier run has left is of other inputs
     remove_file(job.shard)
     decisions = list[dict[str, Any]]()
     products = _products(job, decisions)
@@ -228,6 +229,7 @@ def _unchanged_by_event(job: StationJob) -> FinishedStation | None:
     found = FinishedStation(job.station, job.shard, rejected, True)
     if not is_of_event(status, job.event, job.processing) or not _whole_station(found, status):
         return None
+    # The hypocentre is part of a station file with spectra
     shard = status["shard"]
     if shard and job.shard.suffix == SPECTRA:
         if not moved_shard(job.shard, status["source"], job.event):

@@ -19,6 +19,7 @@ from per_obspy.operation.logs import without_secrets
 from per_obspy.operation.notification import Message, notify
 from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
+from per_obspy.tables.ranked.ranked_files import table_files
 
 log = logging.getLogger(__name__)
 
@@ -117,12 +118,12 @@ def class_counts(folder: Path) -> dict[str, int]:
     """Return the number of pairs in each class of the risk table of a folder, by name."""
     import duckdb
 
-    table = folder / "risk.parquet"
-    if not table.is_file():
+    table = table_files(folder)
+    if not table:
         return {}
     query = "SELECT risk_class, count(*) FROM read_parquet(?) GROUP BY 1 ORDER BY 1"
     with duckdb.connect() as database:
-        rows = database.execute(query, [str(table)]).fetchall()
+        rows = database.execute(query, [[str(path) for path in table]]).fetchall()
     return {str(label): int(count) for label, count in rows}
 
 

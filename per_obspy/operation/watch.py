@@ -248,7 +248,7 @@ def _attempt(watcher: Watcher, state: EventState, task: Task, errors: list[PerEr
         after = changed(done.state, failures=0, not_before=None, last_error=None)
     else:
         after = failed(done.state, INCOMPLETE, watcher.now(), None)
-    # The message waits on the disk before the state says that the run is done
+    # The message waits on the disk before the run counts as done
     if done.result is not None:
         message_waits(watcher, after)
     keep(watcher, {state.event_id: state}, after)

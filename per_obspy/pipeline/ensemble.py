@@ -32,6 +32,7 @@ from per_obspy.pipeline.run import run
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import earlier_status
 from per_obspy.tables.ensemble import Scenarios, write_ensemble
+from per_obspy.tables.ranked.ranked_files import table_files, table_outputs
 
 #: Written last.
 RECORD = "ensemble.json"
@@ -148,9 +149,9 @@ def _prefixed(name: str, progress: Progress) -> Progress:
     return lambda stage, done, total: progress(f"{name}: {stage}", done, total)
 
 
-def _risk_table(result: Result) -> Path | None:
-    """Return the risk table of a run, None without a usable pair."""
-    return result.folder / "risk.parquet" if "risk.parquet" in result.record["outputs"] else None
+def _risk_table(result: Result) -> list[Path]:
+    """Return the files of the risk table of a run, none without a usable pair."""
+    return table_files(result.folder) if table_outputs(result.record["outputs"]) else []
 
 
 def _head(settings: Ensemble, configuration: Path, runs: Mapping[str, Result]) -> dict[str, Any]:
@@ -165,6 +166,12 @@ def _head(settings: Ensemble, configuration: Path, runs: Mapping[str, Result]) -
     return {"key": key, **content, "simulated": simulated}
 
 
+def _risk_hash(outputs: Mapping[str, str]) -> str | None:
+    """Return the hash of the risk table of a run, None without a usable pair."""
+    table = table_outputs(outputs)
+    return content_hash(table) if len(table) > 1 else next(iter(table.values()), None)
+
+
 def _facts(scenario: EnsembleScenario, result: Result, folder: Path) -> dict[str, Any]:
     """Return the facts of a scenario; paths are seen from the folder of the configuration."""
     record = result.record
@@ -175,7 +182,7 @@ def _facts(scenario: EnsembleScenario, result: Result, folder: Path) -> dict[str
         "run": os.path.relpath(scenario.run, folder),
         "output": os.path.relpath(result.folder, folder),
         "key": record["key"],
-        "risk": record["outputs"].get("risk.parquet"),
+        "risk": _risk_hash(record["outputs"]),
         "state": record["state"],
         "simulated": record["simulated"],
         "pairs": record["counts"]["pairs"],

@@ -30,7 +30,8 @@ from per_obspy.report.summary.statements import event_sentences
 from per_obspy.report.words import number
 from per_obspy.screening.uncertainty.unknown_gaps import UNKNOWN_CLASS
 from per_obspy.spectra.storage import region, write_spectra
-from per_obspy.tables.risk import RankedTable, ranked_table
+from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked.ranked_table import RankedTable, ranked_table
 from per_obspy.tables.totals import (
     PieceTotals,
     RegionTotals,
@@ -111,12 +112,12 @@ def reported(
     """
     progress("report", 0, 1)
     simulated = simulated_motion(settings, stations)
-    report, risk = Report([], []), folder / "risk.parquet"
+    report, risk = Report([], []), table_files(folder)
     spectra = _write_spectra(stations, folder / "spectra.nc") if stations else None
     if spectra is not None:
         report.outputs.append(folder / "spectra.nc")
     # Without a pair there is no risk table
-    if risk.exists():
+    if risk:
         place = _region(settings, simulated, spectra, folder)
         summary = _summary(settings, risk, folder, place, report)
         # Totals, layers and the comparison with observations need no record
@@ -187,7 +188,9 @@ def _write_spectra(stations: Sequence[FinishedStation], path: Path) -> xr.Datase
     return spectra
 
 
-def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Report) -> RiskSummary:
+def _summary(
+    settings: Run, risk: Sequence[Path], folder: Path, place: Region, report: Report
+) -> RiskSummary:
     """Read the risk table once, and write its layers; return totals, worst pairs and notes."""
     is_whole = settings.geopackage or settings.spreadsheet
     columns = None if is_whole else _needed_columns(settings)
@@ -203,11 +206,11 @@ def _summary(settings: Run, risk: Path, folder: Path, place: Region, report: Rep
         # All rows, or those that a layer left when it failed; a table that fails is a fault
         deque(noted, maxlen=0)
         if sum(pieces.rows) != table.pairs:
-            raise CatalogError(str(risk), "cannot be read to its end: run again")
-        worst = table.row(pieces.first_named[0]) if pieces.first_named else None
+            raise CatalogError(str(risk[0]), "cannot be read to its end: run again")
+        worst = table.row(min(pieces.first_named)) if pieces.first_named else None
     return RiskSummary(
         worst,
-        pd.concat(pieces.shown, ignore_index=True),
+        pd.concat(pieces.shown).sort_values("rank", ignore_index=True),
         pd.concat(pieces.observed or [pd.DataFrame()], ignore_index=True),
         _totals(settings, pieces, folder),
         pieces.notes,
@@ -254,8 +257,8 @@ def _noted(table: RankedTable, settings: Run, found: _Pieces) -> Iterator[pd.Dat
     for piece in table.pieces():
         found.rows.append(len(piece))
         rank = piece["rank"].to_numpy()
-        # Rows with a record; ranks count from 1, rows from 0
-        named = rank[(piece["station"] != "").to_numpy()] - 1
+        # Rows with a record
+        named = rank[(piece["station"] != "").to_numpy()]
         found.first_named.extend(named[:1].tolist())
         found.shown.append(piece.loc[rank % step == 1 % step, SHOWN_COLUMNS])
         if "observed" in piece:

@@ -17,6 +17,7 @@ from per_obspy.jobs.parallel import prepare_workers
 from per_obspy.pipeline.provenance import RunSettings
 from per_obspy.progress import Progress, silent
 from per_obspy.resume import StatusError, changed_outputs, earlier_status, read_status
+from per_obspy.tables.ranked.ranked_files import table_outputs
 from per_obspy.threads import usable_processors
 
 if TYPE_CHECKING:
@@ -172,8 +173,8 @@ def _finished(file: Path) -> dict[str, Any]:
     if record.get("state") == UNFINISHED:
         raise CatalogError(str(file), "no finished run here: the last one is unfinished, run again")
     # Other results are written again
-    names = ("risk.parquet", "spectra.nc")
-    needed = {name: record["outputs"][name] for name in names if name in record["outputs"]}
+    spectra = {name: one for name, one in record["outputs"].items() if name == "spectra.nc"}
+    needed = table_outputs(record["outputs"]) | spectra
     changed = changed_outputs(file, {**record, "outputs": needed})
     if changed:
         raise CatalogError(str(changed[0]), "has changed since the run wrote it: run again")

@@ -1,11 +1,14 @@
 """Second stage: pairs and the stations become the risk table, chunk by chunk."""
 
+import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
+
+import pyarrow.parquet as pq
 
 from per_obspy.config import Run
 from per_obspy.errors import CatalogError, Rejection
@@ -14,6 +17,7 @@ from per_obspy.inventory.files.reading import PairInventory
 from per_obspy.inventory.gap_units import gap_suspicions
 from per_obspy.jobs.chunk import CHUNK, ChunkJob, Part, do_chunks, rejections
 from per_obspy.jobs.ground_files import GroundFiles, ground_files
+from per_obspy.jobs.risk_cells import WORK, Means, write_cells, write_texts
 from per_obspy.jobs.station import FinishedStation
 from per_obspy.pipeline.pairs import pair_files
 from per_obspy.pipeline.results.served_stations import Served
@@ -112,9 +116,9 @@ def screened(
     states, served, rows = Counter[str](), Counter[str](), NO_ROWS
     outputs = [folder / "rejected.csv"]
     # The parts of the chunks become one table, worst pair first
-    if tables := [part.path for part in parts if part.path]:
+    if any(part.path for part in parts):
         facts = _facts(settings, stations)
-        files, states, served = _ranked(tables, folder, facts, settings.csv_rows, progress)
+        files, states, served = _ranked(settings, folder, parts, facts, executor, progress)
         # Rows of buildings are read from it
         rows = building_rows(settings, folder, ground, facts, executor, progress)
         outputs += files + rows.outputs
@@ -126,11 +130,25 @@ def screened(
 
 
 def _ranked(
-    tables: Sequence[Path], folder: Path, facts: dict[str, str], csv_rows: int, progress: Progress
+    settings: Run,
+    folder: Path,
+    parts: Sequence[Part],
+    facts: dict[str, str],
+    executor: Executor | None,
+    progress: Progress,
 ) -> RiskFiles:
-    """Write the risk table of all parts."""
+    """Write the risk table of all parts, in one file or one per cell."""
+    tables = [part.path for part in parts if part.path]
+    pairs = sum(pq.read_metadata(table.absolute()).num_rows for table in tables)
+    if pairs >= settings.dataset_from:
+        means = Means(settings.workers or usable_processors(), executor, progress)
+        risk = write_cells(parts, folder, facts, settings.dataset_cell, means)
+        texts = write_texts(risk.files, folder, settings.csv_rows)
+        return risk._replace(files=[*risk.files, *texts])
     progress("ranking", 0, 1)
-    risk = write_risk(tables, folder, facts, csv_rows)
+    risk = write_risk(tables, folder, facts, settings.csv_rows)
+    # Cells that a killed run has begun are of no use
+    shutil.rmtree(folder / WORK, ignore_errors=True)
     progress("ranking", 1, 1)
     return risk
 

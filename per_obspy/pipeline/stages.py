@@ -51,6 +51,7 @@ from per_obspy.progress import Progress, timed
 from per_obspy.records.fdsn.cache import Fetched
 from per_obspy.resume import write_status
 from per_obspy.screening.warmup import compiling
+from per_obspy.tables.ranked.ranked_files import remove_table
 from per_obspy.tables.station_summary import StationSummary, write_stations
 
 
@@ -189,6 +190,7 @@ def _begun(
     begun["earthquakes"] = list(earthquakes)
     write_status(folder / RECORD, "", {}, begun, indent=1)
     # A table of an earlier run would be taken for one of this run
+    remove_table(folder)
     for name in ("risk", "rows", "buildings"):
         for end in (".parquet", ".csv", ".columns.csv"):
             remove_file(folder / f"{name}{end}")

@@ -37,7 +37,7 @@ def same_decisions(
     """
     try:
         return all(_is_same(decision, source, settings) for decision in decisions)
-    except (KeyError, TypeError, ValueError, OverflowError):
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
         return False
 
 

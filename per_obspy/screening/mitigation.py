@@ -18,11 +18,11 @@ from per_obspy.kernels.pairs.added_damping import least_dampings
 from per_obspy.pounding.correlation.white_noise import ddc_correlation
 from per_obspy.pounding.critical_gap import critical_gap, srss_gap
 from per_obspy.pounding.mitigation.bumpers import required_restitution
-from per_obspy.screening.by_record.exact_damping import least_exact_damping
+from per_obspy.screening.by_record.exact_damping import NEEDED, least_exact_damping
 from per_obspy.screening.by_record.station_motion import StationMotion, nearest_azimuth
 from per_obspy.screening.by_record.stored_spectra import stored_log
 from per_obspy.screening.by_record.yielding import governing, governing_radii
-from per_obspy.screening.values import Columns, Table, both, chosen, values
+from per_obspy.screening.values import Columns, Table, both, chosen, only, values
 
 #: Largest damping that is added, fraction of critical.
 LARGEST_DAMPING = 0.4
@@ -71,7 +71,8 @@ def mitigation_columns(
     exact = separated & np.asarray(table["demand_rule"] == "exact")
     estimated = separated & ~exact
     if exact.any():
-        damping[exact] = least_exact_damping(station, chosen(table, exact), LARGEST_DAMPING)
+        needed = only(table, NEEDED)
+        damping[exact] = least_exact_damping(station, chosen(needed, exact), LARGEST_DAMPING)
     if estimated.any():
         damping[estimated] = _supplemental_damping(station, chosen(table, estimated))
     if pounds.any():

@@ -39,6 +39,11 @@ def chosen(table: Table, rows: NDArray[Any]) -> Columns:
     return {name: np.asarray(table[name])[rows] for name in table}
 
 
+def only(table: Table, names: Iterable[str]) -> Columns:
+    """Return some columns of a table, as far as it has them; rows of few are chosen faster."""
+    return {name: np.asarray(table[name]) for name in names if name in table}
+
+
 def joined(parts: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
     """Join parts with equal columns in the order of their row numbers."""
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))

@@ -23,7 +23,7 @@ from per_obspy.pounding.structure import Structure
 from per_obspy.progress import Progress
 from per_obspy.screening.risk import risk_table
 from per_obspy.spectra.azimuthal import azimuthal_per_spectrum, azimuthal_sd_spectrum
-from per_obspy.spectra.elastic import response_spectra
+from per_obspy.spectra.elastic import per_spectrum, response_spectra
 from per_obspy.spectra.per_pair import azimuth_maxima
 
 #: Stage that the first run waits for.
@@ -94,7 +94,8 @@ def _relative() -> None:
 
 
 def _spectra() -> None:
-    """Compile the kernels of station spectra, by component and by azimuth."""
+    """Compile the kernels of station spectra, by component and by azimuth, and of PER alone."""
+    per_spectrum(PULSE, INTERVAL, [0.5], [0.05])
     response_spectra(PULSE, INTERVAL, [0.5], [0.05])
     azimuthal_per_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])
     azimuthal_sd_spectrum(PULSE, PULSE, INTERVAL, [0.5], [0.05])

@@ -147,6 +147,7 @@ def _pieces(
     database: duckdb.DuckDBPyConnection, rows: Path, contacts: Path, totals: Totals
 ) -> Iterator[pd.DataFrame]:
     """Yield the sides of buildings in pieces; all sides of a building are in one piece."""
+    # The first ones have the columns of all
     interfaces = _interfaces(rows, contacts, totals)
     first = next(interfaces)
     source = (batch for table in chain([first], interfaces) for batch in table.to_batches())
@@ -206,6 +207,7 @@ def _interfaces(rows: Path, contacts: Path, totals: Totals) -> Iterator[pa.Table
             table = first.read_row_group(group, columns=list(_OF_ROWS), use_threads=False)
             pairs = second.read_row_group(group, columns=carried, use_threads=False)
             area = _areas(table, pairs, totals)
+            # Columns that the pair table does not have are empty
             for name in OF_PAIRS:
                 column = pairs[name] if name in known else pa.nulls(pairs.num_rows, pa.float64())
                 table = table.append_column(name, column)

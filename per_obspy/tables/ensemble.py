@@ -1,7 +1,7 @@
 """Files of an ensemble: risk tables of all scenarios, joined pair by pair on disk."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +20,8 @@ from per_obspy.screening.region.ensemble import (
     ensemble_rows,
 )
 from per_obspy.tables.parts import bounded_database, parquet_rows
-from per_obspy.tables.risk import ROWS, write_worst
+from per_obspy.tables.ranked.ranked_table import ROWS
+from per_obspy.tables.risk import write_worst
 from per_obspy.tables.table_files import write_described, write_rejected
 
 _TYPES = {"float64": pa.float64(), "int64": pa.int64(), "str": pa.string()}
@@ -33,14 +34,14 @@ class Scenarios(NamedTuple):
     Attributes
     ----------
     tables : dict
-        Risk table of each, Parquet; None for a scenario without a usable pair.
+        Files of the risk table of each; none for a scenario without a usable pair.
     weights : dict
         Weight of each, or its rate (1/year).
     yearly : bool
         Whether they are rates.
     """
 
-    tables: dict[str, Path | None]
+    tables: Mapping[str, Sequence[Path]]
     weights: dict[str, float]
     yearly: bool
 
@@ -107,12 +108,12 @@ def _join(scenarios: Scenarios, path: Path) -> None:
     tables = list(scenarios.tables.values())
     with bounded_database(path.parent) as database:
         for number, table in enumerate(tables):
-            if table is not None:
-                database.register(f"table{number}", parquet_rows([table]))
+            if table:
+                database.register(f"table{number}", parquet_rows(table))
         database.execute(_join_query(tables), {"path": str(path)})
 
 
-def _join_query(tables: list[Path | None]) -> str:
+def _join_query(tables: Sequence[Sequence[Path]]) -> str:
     """Return the query that joins the risk tables ``table0``, ``table1`` ... by pair."""
     # Without any table there is still a header
     zeros = ", ".join(f"0::DOUBLE AS {name}" for name in ("probability", *SAME, *SEVERITY))

@@ -171,22 +171,28 @@ def _merged_groups(parts: Sequence[Path], schema: pa.Schema, room: Path) -> list
 
 def _merged(parts: Sequence[Path], schema: pa.Schema, size: int) -> Iterator[pa.Table]:
     """Yield the rows of few parts in their order, so many at a time."""
-    rows = {_number(part): _Rows(part, schema) for part in parts}
-    # Order of the whole: for each row the part in which it is the next one
+    rows = {part_number(part): WaitingRows(part_rows(part, schema), schema) for part in parts}
+    # For each row of the whole the part in which it is the next one
+    left = np.empty(0, np.int64)
+    for order in parts_in_order(parts, size):
+        left = np.concatenate([left, order])
+        # The database gives batches of fewer rows than are asked for
+        while left.size >= size:
+            yield next_rows(rows, left[:size])
+            left = left[size:]
+    if left.size:
+        yield next_rows(rows, left)
+
+
+def parts_in_order(parts: Sequence[Path], size: int) -> Iterator[NDArray[np.int64]]:
+    """Yield the number of the part of each row in the order of the whole, at most so many."""
     with bounded_database(parts[0].parent) as database:
         database.register("parts", parquet_rows(parts, [_PART, *KEYS, "pair_id"]))
-        left = np.empty(0, np.int64)
         for batch in batches(database, _ORDER, size):
-            left = np.concatenate([left, np.asarray(batch[_PART], dtype=np.int64)])
-            # The database gives batches of fewer rows than are asked for
-            while left.size >= size:
-                yield _next_rows(rows, left[:size])
-                left = left[size:]
-        if left.size:
-            yield _next_rows(rows, left)
+            yield np.asarray(batch[_PART], dtype=np.int64)
 
 
-def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
+def next_rows(rows: dict[int, "WaitingRows"], order: NDArray[np.int64]) -> pa.Table:
     """Take the next rows of each part and return them in the order of the whole."""
     numbers, counts = np.unique(order, return_counts=True)
     taken = zip(numbers.tolist(), counts.tolist(), strict=True)
@@ -197,12 +203,21 @@ def _next_rows(rows: dict[int, "_Rows"], order: NDArray[np.int64]) -> pa.Table:
     return pa.concat_tables(pieces).take(place)
 
 
-class _Rows:
-    """Rows of one part in order; the file is closed between reads."""
+class WaitingRows:
+    """
+    Rows of one part in order, read as they are taken.
 
-    def __init__(self, part: Path, schema: pa.Schema) -> None:
+    Parameters
+    ----------
+    groups : iterator of Table
+        Consecutive rows.
+    schema : Schema
+        Of all groups.
+    """
+
+    def __init__(self, groups: Iterator[pa.Table], schema: pa.Schema) -> None:
         self._left = schema.empty_table()
-        self._groups = _groups(part, schema)
+        self._groups = groups
 
     def take(self, count: int) -> pa.Table:
         """Return the next rows."""
@@ -212,8 +227,8 @@ class _Rows:
         return taken
 
 
-def _groups(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
-    """Yield the row groups of a part with the columns of the whole."""
+def part_rows(part: Path, schema: pa.Schema) -> Iterator[pa.Table]:
+    """Yield the rows of a part with the columns of the whole; the file is closed between reads."""
     for index in range(pq.read_metadata(part.absolute()).num_row_groups):
         with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
             names = [name for name in schema.names if name in file.schema_arrow.names]
@@ -232,7 +247,7 @@ def _conforming(table: pa.Table, schema: pa.Schema) -> pa.Table:
     return pa.table(columns, schema=schema)
 
 
-def _number(part: Path) -> int:
+def part_number(part: Path) -> int:
     """Return the number of a part."""
     with pq.ParquetFile(part.absolute(), pre_buffer=False) as file:
         number: int = file.read_row_group(0, columns=[_PART])[_PART][0].as_py()

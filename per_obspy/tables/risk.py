@@ -3,8 +3,7 @@
 import json
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -12,18 +11,16 @@ from typing import NamedTuple
 
 import duckdb
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import arrow_cells, header
 from per_obspy.tables.parts import bounded_database, joined_rows, joined_schema, text_columns
+from per_obspy.tables.ranked.cell_files import count_values
+from per_obspy.tables.ranked.ranked_table import ROWS, RankedTable, ranked_table
 from per_obspy.tables.rounding import rounded_arrow
 from per_obspy.tables.table_files import write_columns
-
-#: Rows that are read and written together.
-ROWS = 50_000
 
 
 class RiskFiles(NamedTuple):
@@ -33,7 +30,8 @@ class RiskFiles(NamedTuple):
     Attributes
     ----------
     files : list of Path
-        ``risk.parquet``, ``risk.csv`` and ``risk.columns.csv``.
+        ``risk.parquet``, or one file per cell in ``risk/``; ``risk.csv`` and
+        ``risk.columns.csv``.
     states : Counter
         Number of pairs in each state.
     stations : Counter
@@ -43,52 +41,6 @@ class RiskFiles(NamedTuple):
     files: list[Path]
     states: Counter[str]
     stations: Counter[str]
-
-
-class RankedTable(NamedTuple):
-    """
-    Risk table open for one pass, worst pair first.
-
-    Attributes
-    ----------
-    file : ParquetFile
-        The open file.
-    columns : list of str or None
-        Columns that are read; None: all.
-    """
-
-    file: pq.ParquetFile
-    columns: list[str] | None
-
-    @property
-    def pairs(self) -> int:
-        """Return the number of pairs."""
-        return int(self.file.metadata.num_rows)
-
-    def pieces(self) -> Iterator[pd.DataFrame]:
-        """Yield the rows in pieces; columns that the table lacks are left out."""
-        for batch in self.file.iter_batches(ROWS, columns=self.columns):
-            yield batch.to_pandas()
-
-    def first(self, count: int, columns: Sequence[str]) -> pd.DataFrame:
-        """Return the first rows with the named columns that the table has."""
-        known = set(self.file.schema_arrow.names)
-        names = [name for name in dict.fromkeys(columns) if name in known]
-        empty = self.file.schema_arrow.empty_table().select(names)
-        batch = next(self.file.iter_batches(count, columns=names), empty)
-        found: pd.DataFrame = batch.to_pandas()
-        return found
-
-    def row(self, index: int) -> pd.Series:
-        """Return one row, counted from 0, with all columns."""
-        for group in range(self.file.num_row_groups):
-            count = self.file.metadata.row_group(group).num_rows
-            if index < count:
-                rows = self.file.read_row_group(group).slice(index, 1)
-                row: pd.Series = rows.to_pandas().iloc[0]
-                return row
-            index -= count
-        raise IndexError(f"the table has no row {index} more")
 
 
 def write_risk(
@@ -111,14 +63,19 @@ def write_risk(
     """
     names = ("risk.parquet", "risk.csv", "risk.columns.csv")
     table, text, columns = files = [folder / name for name in names]
-    # Schema of the whole, with the rank before the other columns
+    # Schema of the parts, and of the table
     schema = joined_schema(parts)
-    statement = json.dumps({"version": version("per_obspy"), **facts})
-    whole = pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
+    whole = ranked_schema(schema, facts)
     with written_whole(table) as part, written_whole(text) as lines:
         states, stations = _write_rows(_ranked_rows(parts, schema, whole), part, lines, csv_rows)
     write_columns(whole.names, columns)
     return RiskFiles(files, states, stations)
+
+
+def ranked_schema(schema: pa.Schema, facts: Mapping[str, str]) -> pa.Schema:
+    """Return the schema of a ranked table: the rank before the other columns, and its facts."""
+    statement = json.dumps({"version": version("per_obspy"), **facts})
+    return pa.schema([("rank", pa.int64()), *schema], metadata={"per_obspy": statement})
 
 
 def _write_rows(
@@ -134,19 +91,13 @@ def _write_rows(
     ):
         for piece in chain([first], rows):
             writer.write_table(piece)
-            _count(piece["state"], states)
-            _count(piece["station"], stations)
+            count_values(piece["state"], states)
+            count_values(piece["station"], stations)
             # Rows whose rank is at most the number of rows of the text
             before = piece["rank"][0].as_py() - 1
             if before < csv_rows:
                 _append_csv(database, rounded_arrow(piece.slice(0, csv_rows - before)), text)
     return states, stations
-
-
-def _count(column: pa.ChunkedArray, counter: Counter[str]) -> None:
-    """Count the values of a column."""
-    for value, count in zip(*column.value_counts().flatten(), strict=True):
-        counter[value.as_py()] += count.as_py()
 
 
 def _ranked_rows(parts: Sequence[Path], schema: pa.Schema, whole: pa.Schema) -> Iterator[pa.Table]:
@@ -177,32 +128,26 @@ def _append_csv(database: duckdb.DuckDBPyConnection, rows: pa.Table, path: Path)
 
 def write_worst(table: Path, rows: int, path: Path) -> None:
     """Write the first rows of a ranked Parquet table as CSV, all of whose columns are computed."""
-    with (
-        bounded_database(path.parent) as database,
-        pq.ParquetFile(table.absolute(), pre_buffer=False) as file,
-        written_whole(path) as part,
-    ):
-        part.write_text(header(file.schema_arrow.names), encoding="utf-8")
-        # Piece by piece until the rows are written
-        for batch in file.iter_batches(ROWS):
-            piece = pa.Table.from_batches([batch]).slice(0, rows)
-            rows -= piece.num_rows
-            if piece.num_rows:
-                _append_csv(database, rounded_arrow(piece, piece.column_names), part)
+    with ranked_table([table]) as ranked:
+        write_worst_rows(ranked, rows, path, ranked.schema.names)
 
 
-@contextmanager
-def ranked_table(path: Path, columns: Sequence[str] | None = None) -> Iterator[RankedTable]:
+def write_worst_rows(table: RankedTable, rows: int, path: Path, own: Collection[str] = ()) -> None:
     """
-    Open a risk table for one pass.
+    Write the worst rows of a ranked table as CSV.
 
     Parameters
     ----------
+    table : RankedTable
+        The table.
+    rows : int
+        Largest number of rows.
     path : Path
-        Parquet file of the risk table.
-    columns : sequence of str, optional
-        Columns that are read, all if not given; those that the table lacks are left out.
+        The file.
+    own : collection of str
+        Columns of numbers that are rounded besides those that the package defines.
     """
-    # Buffers that are read ahead stay in memory until the end of the file
-    with pq.ParquetFile(path.absolute(), pre_buffer=False) as file:
-        yield RankedTable(file, None if columns is None else list(columns))
+    with bounded_database(path.parent) as database, written_whole(path) as part:
+        part.write_text(header(table.schema.names), encoding="utf-8")
+        for piece in table.ranked(rows):
+            _append_csv(database, rounded_arrow(piece, own), part)

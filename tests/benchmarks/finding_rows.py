@@ -3,8 +3,8 @@ Memory and processor time of finding rows of buildings, as tables grow.
 
 Run: ``python tests/benchmarks/finding_rows.py RISK COPIES...``, where RISK is a ``risk.parquet``
 with identifiers of buildings. Each number of copies is measured in a process of its own, whose
-copies have names of their own. Memory is the largest resident size; the slope between two numbers of
-copies is that of a further pair.
+copies have names of their own. Memory is the largest resident size; the slope between two numbers
+of copies is that of a further pair.
 """
 
 import resource
@@ -45,7 +45,7 @@ def write_copies(risk: Path, copies: int, path: Path) -> None:
 def measured(path: Path) -> None:
     """Find the rows of a table, and print pairs, rows, processor time and memory."""
     before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
-    with tempfile.TemporaryDirectory() as room, pair_columns(path) as pairs:
+    with tempfile.TemporaryDirectory() as room, pair_columns([path]) as pairs:
         found = all_rows(pairs, Rows(), None, Path(room))
         disk = found.file.stat().st_size / 1e6
     after, used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time() - start

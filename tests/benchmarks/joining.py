@@ -1,10 +1,11 @@
 """
 Time and memory of joining and ranking the parts of a risk table.
 
-Run: ``python tests/benchmarks/joining.py [PARTS ROWS NUMBERS]``: parts, rows of each, and columns
-of numbers in addition to those of the order. Prints seconds of processor, the largest memory of
-this process, and bytes on disk of parts and table. Parts are made up: names and values differ in
-every row.
+Run: ``python tests/benchmarks/joining.py [PARTS ROWS NUMBERS [CELL]]``: parts, rows of each, and
+columns of numbers in addition to those of the order; with the width of a cell in degrees the table
+is a dataset by cell, in this process too. Prints seconds of processor, the largest memory of this
+process, and bytes on disk of parts and table. Parts are made up: names and values differ in every
+row, and every part has rows in all cells of 10 by 10 degrees.
 """
 
 import resource
@@ -16,13 +17,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from per_obspy.files import file_hash
+from per_obspy.jobs.chunk import Part
+from per_obspy.jobs.risk_cells import Means, write_cells, write_texts
+from per_obspy.progress import silent
+from per_obspy.resume import write_status
 from per_obspy.screening.ranking import in_order
 from per_obspy.tables.parts import write_part
+from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.tables.risk import write_risk
 
 
-def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Path:
-    """Write one part and return its file."""
+def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Part:
+    """Write one part and its status, and return it."""
     draw = np.random.default_rng(number)
     first = number * rows
     table = pd.DataFrame(
@@ -33,15 +40,29 @@ def write_made_up(folder: Path, number: int, rows: int, numbers: int) -> Path:
             "probability": draw.random(rows),
             "expected_impact_velocity": draw.random(rows),
             "expected_amplification": draw.random(rows),
+            "longitude": draw.random(rows) * 10.0,
+            "latitude": draw.random(rows) * 10.0,
         }
     )
     others = pd.DataFrame(draw.random((rows, numbers)), columns=[f"x{i}" for i in range(numbers)])
     path = folder / f"{number:06}.parquet"
     write_part(in_order(pd.concat([table, others], axis=1)), number, path)
-    return path
+    status = path.with_suffix(".json")
+    write_status(status, "made up", {path.name: file_hash(path)}, {"rejected": []})
+    return Part(number, rows, path, status, resumed=False)
 
 
-def main(parts: int, rows: int, numbers: int) -> None:
+def write_table(parts: list[Part], folder: Path, cell: float) -> None:
+    """Write the risk table in one file, or by cell."""
+    facts = {"name": "made up"}
+    if not cell:
+        write_risk([part.path for part in parts if part.path], folder, facts, 100_000)
+        return
+    write_cells(parts, folder, facts, cell, Means(1, None, silent))
+    write_texts(table_files(folder), folder, 100_000)
+
+
+def main(parts: int, rows: int, numbers: int, cell: float) -> None:
     """Print one line."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room)
@@ -49,19 +70,21 @@ def main(parts: int, rows: int, numbers: int) -> None:
         chunks.mkdir()
         files = [write_made_up(chunks, number, rows, numbers) for number in range(parts)]
         before, start = resource.getrusage(resource.RUSAGE_SELF), time.process_time()
-        write_risk(files, folder, {"name": "made up"}, 100_000)
+        write_table(files, folder, cell)
         seconds = time.process_time() - start
         used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         disk = [
             sum(path.stat().st_size for path in some) / 1e9
-            for some in (files, [folder / "risk.parquet"])
+            for some in ([part.path for part in files if part.path], table_files(folder))
         ]
     print(
-        f"{parts * rows:.0e} pairs in {parts} parts, {numbers + 6} columns: {seconds:.1f} s "
+        f"{parts * rows:.0e} pairs in {parts} parts, {numbers + 8} columns: {seconds:.1f} s "
         f"processor, {used:.2f} GB ({before.ru_maxrss / 1e6:.2f} before), parts {disk[0]:.2f} GB, "
         f"table {disk[1]:.2f} GB"
     )
 
 
 if __name__ == "__main__":
-    main(*(map(int, sys.argv[1:]) if len(sys.argv) > 1 else (100, 10_000, 90)))
+    given = [float(text) for text in sys.argv[1:]]
+    counts = [int(number) for number in [*given[:3], *(100, 10_000, 90)[len(given) :]]]
+    main(*counts, cell=given[3] if len(given) > 3 else 0.0)

@@ -1,7 +1,8 @@
 """A watcher and a service on loopback, by a clock of the test: every result is kept.
 
-Tests ``per_obspy.operation.events.event_feed``, ``per_obspy.operation.events.event_run``,
-``per_obspy.operation.events.failures`` and ``per_obspy.operation.events.open_events`` as well.
+Tests ``per_obspy.operation.polling``, ``per_obspy.operation.events.event_feed``,
+``per_obspy.operation.events.event_run``, ``per_obspy.operation.events.failures`` and
+``per_obspy.operation.events.open_events`` as well.
 """
 
 import errno

@@ -16,7 +16,7 @@ from per_obspy.errors import CatalogError
 from per_obspy.pipeline import report as report_stage
 from per_obspy.pipeline.report import Report, _region, _summary
 from per_obspy.pipeline.run import report, run
-from per_obspy.tables import risk
+from per_obspy.tables.ranked import ranked_table
 
 from .small_run import InProcess, real_reports, write_configuration
 
@@ -63,7 +63,7 @@ def test_a_report_needs_a_finished_run(copied):
 
 
 def summary(folder):
-    settings, table = load(folder / "run.toml", Run), folder / "out" / "risk.parquet"
+    settings, table = load(folder / "run.toml", Run), [folder / "out" / "risk.parquet"]
     return _summary(
         settings, table, folder, _region(settings, True, None, folder / "out"), Report([], [])
     )
@@ -72,7 +72,7 @@ def summary(folder):
 @pytest.mark.parametrize("size", [1, 7, 1000])
 def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
     # would catch rows lost between pieces, and a worst pair of a later piece
-    monkeypatch.setattr(risk, "ROWS", size)
+    monkeypatch.setattr(ranked_table, "ROWS", size)
     found = summary(copied)
     table = pd.read_parquet(copied / "out" / "risk.parquet")
     named = table[table["station"] != ""].iloc[0]
@@ -87,7 +87,7 @@ def test_pieces_change_nothing_of_the_report(copied, monkeypatch, size):
 
 def test_a_large_table_is_shown_in_equal_steps(copied, monkeypatch):
     monkeypatch.setattr(report_stage, "SHOWN", 20)
-    monkeypatch.setattr(risk, "ROWS", 7)
+    monkeypatch.setattr(ranked_table, "ROWS", 7)
     count = parquet.read_metadata(copied / "out" / "risk.parquet").num_rows
     step = -(-count // 20)
     assert summary(copied).shown["rank"].tolist() == list(range(1, count + 1, step))
@@ -182,7 +182,7 @@ def test_a_picture_that_fails_leaves_the_tables(copied, call, monkeypatch, faili
     # would catch a traceback after all the work, totals of some rows, and an old picture
     text = (copied / "run.toml").read_text()
     (copied / "run.toml").write_text("geopackage = true\n" + text)
-    monkeypatch.setattr(risk, "ROWS", 25)
+    monkeypatch.setattr(ranked_table, "ROWS", 25)
     assert call("report", copied / "run.toml")[0] == 0
     totals = (copied / "out" / "totals.csv").read_bytes()
 

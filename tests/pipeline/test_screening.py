@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from per_obspy import read_pairs, risk_table
 from per_obspy.errors import CatalogError
 from per_obspy.jobs import chunk
+from per_obspy.pipeline.results.shown_pair import find_pair
 from per_obspy.pipeline.run import report, run, screen
 from per_obspy.screening.ground_motion.site_motion import HYPOCENTRE
 from per_obspy.spectra.storage import read_spectra
@@ -84,6 +85,54 @@ def test_results_do_not_depend_on_chunks(copied, monkeypatch, size):
     shutil.rmtree(copied / "out" / "chunks")
     assert screened(copied)["chunks"] == -(-60 // size)  # 61 lines, one of them no row
     assert results(copied) == before
+
+
+def set_dataset(folder, pairs):
+    """Let the ranked table be a dataset by cell from so many pairs on."""
+    lines = f'dataset_from = {pairs}\ndataset_cell = 0.1\n[pairs]\nfile = "pairs.csv"\n'
+    write_configuration(folder, lines)
+
+
+def test_a_dataset_by_cell_gives_the_same_results(copied, call):
+    # would catch a reader that takes the first cell for the worst pairs, or totals of one cell
+    before, out = results(copied), copied / "out"
+    one = pd.read_parquet(out / "risk.parquet")
+    read_from_it = {name: (out / name).read_bytes() for name in ("risk.kml", "summary.txt")}
+    set_dataset(copied, len(one))
+    record = run(copied / "run.toml", executor=InProcess()).record
+    cells = sorted(path.relative_to(out).as_posix() for path in (out / "risk").iterdir())
+    assert len(cells) > 1
+    assert set(cells) <= set(record["outputs"])
+    whole = pd.concat([pd.read_parquet(out / name) for name in cells])
+    pd.testing.assert_frame_equal(whole.sort_values("rank", ignore_index=True), one)
+    # everything that is made of it
+    (out / "risk.parquet").write_bytes(before["risk.parquet"])
+    assert results(copied) == before
+    (out / "risk.parquet").unlink()
+    assert {name: (out / name).read_bytes() for name in read_from_it} == read_from_it
+    # again from the dataset alone
+    totals = (out / "totals.csv").read_bytes()
+    report(copied / "run.toml")
+    assert (out / "totals.csv").read_bytes() == totals
+    assert find_pair("#2", out).row["pair_id"] == one["pair_id"][1]
+    status, said, _ = call("info", out)
+    assert status == 0
+    assert one["pair_id"][0] in said
+    # a cell that has changed is found out
+    (out / cells[0]).write_bytes(b"PAR1")
+    with pytest.raises(CatalogError, match="has changed since the run wrote it"):
+        report(copied / "run.toml")
+
+
+def test_fewer_pairs_are_one_file_again(copied):
+    before, out = results(copied), copied / "out"
+    pairs = len(pd.read_parquet(out / "risk.parquet"))
+    (out / "risk").mkdir()
+    (out / "risk" / "lat0_lon0.parquet").write_bytes(before["risk.parquet"])
+    set_dataset(copied, pairs + 1)
+    screened(copied)
+    assert results(copied) == before
+    assert not (out / "risk").exists()
 
 
 def test_results_do_not_depend_on_workers(copied, monkeypatch):

@@ -93,7 +93,13 @@ def test_an_onset_without_a_pick_moves_with_the_earthquake(picked):
 
 @pytest.mark.parametrize(
     "damage",
-    [{"onset": 5}, {"onset": 5, "place": [0, 0], "picks": {}, "method": ""}, {}, {"highpass": 3}],
+    [
+        {"onset": 5},
+        {"onset": 5, "place": [0, 0], "picks": {}, "method": ""},
+        {},
+        {"highpass": 3},
+        {"onset": 5, "picks": []},
+    ],
 )
 def test_damaged_decisions_are_no_decisions(damage):
     assert not same_decisions([damage], HERE, SETTINGS)

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
 
-from per_obspy.screening.values import at_contact, both, chosen, components, joined, values
+from per_obspy.screening.values import at_contact, both, chosen, components, joined, only, values
 
 TABLE = {
     "per_1": np.array([1.0, 2.0, 3.0]),
@@ -56,3 +56,10 @@ def test_a_single_horizontal_counts_as_north():
     assert north.tolist() == [1.0, 2.0]
     assert east.tolist() == [0.0, 0.0]
     assert interval == 0.01
+
+
+@pytest.mark.parametrize("table", [TABLE, pd.DataFrame(TABLE)])
+def test_only_the_named_columns_are_kept_as_far_as_there_are_any(table):
+    some = only(table, ("name", "per_2", "gap"))
+    assert list(some) == ["name", "per_2"]
+    assert some["per_2"].tolist() == [4.0, 5.0, 6.0]

@@ -41,7 +41,7 @@ def tables():
 def _written(tables, folder, csv_rows=1000, yearly=True):
     for number, table in enumerate(tables.values()):
         table.to_parquet(folder / f"{number}.parquet", index=False)
-    files = {name: folder / f"{number}.parquet" for number, name in enumerate(tables)}
+    files = {name: [folder / f"{number}.parquet"] for number, name in enumerate(tables)}
     # Rates, of which that of the first is twice the other
     scenarios = Scenarios(files, dict.fromkeys(tables, 0.01) | {"near": 0.02}, yearly)
     (folder / "out").mkdir()
@@ -128,7 +128,7 @@ def test_pieces_do_not_change_a_bit(tables, tmp_path, monkeypatch):
 def test_a_scenario_without_a_result_leaves_no_pair(tables, tmp_path):
     tables["near"].to_parquet(tmp_path / "near.parquet")
     scenarios = Scenarios(
-        {"near": tmp_path / "near.parquet", "far": None}, {"near": 1.0, "far": 1.0}, yearly=False
+        {"near": [tmp_path / "near.parquet"], "far": []}, {"near": 1.0, "far": 1.0}, yearly=False
     )
     assert write_ensemble(scenarios, tmp_path, {}, 10)[1] == {
         "pairs": 0,
@@ -136,5 +136,5 @@ def test_a_scenario_without_a_result_leaves_no_pair(tables, tmp_path):
     }
     assert len(pd.read_parquet(tmp_path / "ensemble.parquet")) == 0
     # no scenario has a result
-    nothing = Scenarios({"near": None, "far": None}, {"near": 1.0, "far": 1.0}, yearly=False)
+    nothing = Scenarios({"near": [], "far": []}, {"near": 1.0, "far": 1.0}, yearly=False)
     assert write_ensemble(nothing, tmp_path, {}, 10)[1] == {"pairs": 0, "rejected_pair": 0}

@@ -77,7 +77,7 @@ def test_memory_does_not_grow_with_the_number_of_parts(tmp_path, monkeypatch):
     # would catch every part held open with its rows: 200 parts here, of a world 10 000
     monkeypatch.setattr(parts, "MOST_PARTS", 4)
     held, most = set(), []
-    take = parts._Rows.take
+    take = parts.WaitingRows.take
 
     def counted(rows, number):
         held.add(rows)
@@ -88,7 +88,7 @@ def test_memory_does_not_grow_with_the_number_of_parts(tmp_path, monkeypatch):
         held.clear()
         yield from merged(files, schema, size)
 
-    monkeypatch.setattr(parts._Rows, "take", counted)
+    monkeypatch.setattr(parts.WaitingRows, "take", counted)
     monkeypatch.setattr(parts, "_merged", begun)
     whole = table(60, seed=3)
     pieces = [whole.iloc[first : first + 2] for first in range(0, 60, 2)]

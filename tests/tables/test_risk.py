@@ -8,14 +8,16 @@ import duckdb
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from pyarrow import parquet
 
 from per_obspy.inventory.files.reading import read_pairs
 from per_obspy.screening.ranking import KEYS, in_order
 from per_obspy.tables import risk
 from per_obspy.tables.parts import write_part
-from per_obspy.tables.risk import ranked_table, write_risk, write_worst
+from per_obspy.tables.ranked import ranked_table as ranked_tables
+from per_obspy.tables.ranked.ranked_table import ranked_table
+from per_obspy.tables.risk import write_risk, write_worst
 
 COUNT = 300
 FACTS = {"name": "a run", "simulated": "true"}
@@ -61,7 +63,7 @@ def test_the_whole_is_ranked_and_counted(parts, expected, tmp_path):
     pd.testing.assert_frame_equal(table, expected, check_dtype=False)
     assert written.states == expected["state"].value_counts().to_dict()
     # its facts, and the meaning of every column
-    metadata = parquet.read_schema(tmp_path / "risk.parquet").metadata
+    metadata = pq.read_schema(tmp_path / "risk.parquet").metadata
     assert FACTS.items() <= json.loads(metadata[b"per_obspy"]).items()
     columns = pd.read_csv(tmp_path / "risk.columns.csv")
     assert set(table) <= set(columns["name"])
@@ -80,6 +82,7 @@ def test_text_of_the_worst_rows_does_not_depend_on_pieces(
     # would catch a row too many, a header in the middle, and numbers in other digits than those of
     # the database that reads the whole table
     monkeypatch.setattr(risk, "ROWS", size)
+    monkeypatch.setattr(ranked_tables, "ROWS", size)
     write_risk(parts, tmp_path, FACTS, csv_rows)
     path = tmp_path / "risk.parquet"
     # Numbers of five digits, by Python's own formatting
@@ -102,9 +105,9 @@ def test_text_of_the_worst_rows_does_not_depend_on_pieces(
 
 def test_the_table_is_read_in_pieces(parts, expected, tmp_path, monkeypatch):
     write_risk(parts, tmp_path, FACTS, COUNT)
-    monkeypatch.setattr(risk, "ROWS", 11)
+    monkeypatch.setattr(ranked_tables, "ROWS", 11)
     columns = ["rank", "state", "no such column"]
-    with ranked_table(tmp_path / "risk.parquet", columns) as table:
+    with ranked_table([tmp_path / "risk.parquet"], columns) as table:
         pieces = list(table.pieces())
     assert max(map(len, pieces)) == 11
     whole = pd.concat(pieces, ignore_index=True)
@@ -115,13 +118,13 @@ def test_a_row_is_found_in_whichever_group_it_is(parts, expected, tmp_path, monk
     monkeypatch.setattr(risk, "ROWS", 50)
     write_risk(parts, tmp_path, FACTS, COUNT)
     # first and last rows of groups
-    with ranked_table(tmp_path / "risk.parquet", ["rank"]) as table:
+    with ranked_table([tmp_path / "risk.parquet"], ["rank"]) as table:
         assert table.pairs == COUNT
-        assert table.file.num_row_groups == COUNT // 50
-        for index in (0, 49, 50, 299):
-            assert table.row(index)["pair_id"] == expected["pair_id"][index]
+        assert pq.read_metadata(tmp_path / "risk.parquet").num_row_groups == COUNT // 50
+        for rank in (1, 50, 51, 300):
+            assert table.row(rank)["pair_id"] == expected["pair_id"][rank - 1]
         with pytest.raises(IndexError):
-            table.row(COUNT)
+            table.row(COUNT + 1)
 
 
 #: Names of folders that are patterns, addresses or worse to one library or another.
@@ -140,7 +143,7 @@ def test_names_of_folders_are_literal(rows, expected, tmp_path, monkeypatch, nam
     write_part(in_order(rows), 0, folder / "000000.parquet")
     write_risk([folder / "000000.parquet"], folder, FACTS, csv_rows=COUNT)
     write_worst(folder / "risk.parquet", COUNT, folder / "again.csv")
-    with ranked_table(folder / "risk.parquet", ["pair_id"]) as table:
+    with ranked_table([folder / "risk.parquet"], ["pair_id"]) as table:
         pairs = pd.concat(table.pieces())["pair_id"].tolist()
     assert pairs == expected["pair_id"].tolist()
     assert (folder / "again.csv").read_bytes() == (folder / "risk.csv").read_bytes()

@@ -16,10 +16,7 @@ import numpy as np
 from per_obspy.checks import FloatArray
 from per_obspy.inventory.building_rows.contacts import BoolArray, Contacts, IntArray
 from per_obspy.inventory.building_rows.joints import Joints
-
-#: Contacts of a chain beyond which it is halved before anything else: the other cuts take one part
-#: at a time, and a damaged table may make one chain of all its pairs.
-HALVED = 1000
+from per_obspy.inventory.building_rows.walks import HALVED, Walks, stays_whole, walks_of
 
 #: One contact of a chain: its pair, and whether building 1 of the pair is the later one.
 Link = tuple[int, bool]
@@ -102,16 +99,8 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         In the order of the smallest name of a pair of each row; every pair that repeats no other
         is in one of them.
     """
-    walks = _walks(contacts, joints.joined)
-    whole = _stays(contacts, walks, angle, longest)
-    # Few chains are cut, one by one
-    cutter = _Cutter(contacts, angle, longest)
-    others = chain(walks.links(~whole), _others(contacts, joints.joined, walks.ends // 2))
-    cut = _flat(chain.from_iterable(map(cutter.pieces, others)))
-    kept = walks.ends[np.repeat(whole, walks.sizes)], walks.sizes[whole]
-    ends, sizes = (np.concatenate(both) for both in zip(kept, cut, strict=False))
-    codes = np.concatenate([np.zeros(kept[1].size, dtype=np.int64), cut[2]])
-    pair, turned, first, codes = _by_name(ends, sizes, codes, contacts.order)
+    rows = _rows(contacts, joints.joined, angle, longest)
+    pair, turned, first, codes = _by_name(*rows, contacts.order)
     # Along the axis, whose azimuth is below 180 degrees
     azimuth, backwards = _axes(contacts.azimuth[pair] + 180.0 * turned, first)
     pair, turned = _reversed(pair, turned, first, backwards)
@@ -123,6 +112,31 @@ def chains_of(contacts: Contacts, joints: Joints, angle: float, longest: int) ->
         if raised.size:
             flags[name] |= np.logical_or.reduceat(raised, first[:-1])
     return Chains(pair, turned, first, azimuth, flags)
+
+
+def _rows(
+    contacts: Contacts, joined: IntArray, angle: float, longest: int
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the end at which each contact is entered, and sizes and flags of the rows."""
+    walks = walks_of(contacts, joined)
+    whole = stays_whole(contacts, walks, angle, longest)
+    # Few chains are cut, one by one
+    cutter = _Cutter(contacts, angle, longest)
+    others = chain(_pieces_of(walks, ~whole), _others(contacts, joined, walks.ends // 2))
+    cut = _flat(chain.from_iterable(map(cutter.pieces, others)))
+    # Rows of both kinds; those that are not cut have no flag
+    ends = np.concatenate([walks.ends[np.repeat(whole, walks.sizes)], cut[0]])
+    sizes = np.concatenate([walks.sizes[whole], cut[1]])
+    codes = np.concatenate([np.zeros(int(whole.sum()), dtype=np.int64), cut[2]])
+    return ends, sizes, codes
+
+
+def _pieces_of(walks: Walks, some: BoolArray) -> Iterator[_Piece]:
+    """Yield some of the chains."""
+    starts = np.cumsum(walks.sizes) - walks.sizes
+    for start, size in zip(starts[some].tolist(), walks.sizes[some].tolist(), strict=True):
+        ends = walks.ends[start : start + size].tolist()
+        yield _Piece([(end // 2, end % 2 == 1) for end in ends], frozenset())
 
 
 def _flat(rows: Iterable[_Piece]) -> tuple[IntArray, IntArray, IntArray]:
@@ -148,86 +162,6 @@ def _by_name(
     source = np.repeat(starts[order] - first[:-1], sizes[order]) + np.arange(ends.size)
     found = ends[source]
     return found // 2, found % 2 == 1, first, codes[order]
-
-
-class _Walks(NamedTuple):
-    """
-    Chains that are followed side by side, one contact of each at a time.
-
-    Attributes
-    ----------
-    ends : (n_contacts,) ndarray of int
-        End at which each contact is entered, chain after chain.
-    sizes : (n_chains,) ndarray of int
-        Contacts of each chain.
-    turning : (n_chains,) ndarray
-        Range of the azimuths along each chain, degrees.
-    """
-
-    ends: IntArray
-    sizes: IntArray
-    turning: FloatArray
-
-    def links(self, some: BoolArray) -> Iterator[_Piece]:
-        """Yield some of the chains."""
-        starts = np.cumsum(self.sizes) - self.sizes
-        for start, size in zip(starts[some].tolist(), self.sizes[some].tolist(), strict=True):
-            ends = self.ends[start : start + size].tolist()
-            yield _Piece([(end // 2, end % 2 == 1) for end in ends], frozenset())
-
-
-def _walks(contacts: Contacts, joined: IntArray) -> _Walks:
-    """Follow all chains of limited length that have a free end, from the first of both by name."""
-    starts = np.flatnonzero((joined < 0) & ~np.repeat(contacts.repeated, 2))
-    azimuth = np.stack([contacts.azimuth, contacts.azimuth + 180.0], axis=1).ravel()
-    along, low, high = (np.zeros(starts.size) for _ in range(3))
-    last = np.full(starts.size, -1, dtype=np.int64)
-    chains, ends, steps = np.arange(starts.size), starts, list[tuple[IntArray, IntArray]]()
-    while ends.size and len(steps) < HALVED:
-        steps.append((chains, ends))
-        behind = joined[ends ^ 1]
-        goes_on = behind >= 0
-        last[chains[~goes_on]] = ends[~goes_on] ^ 1
-        before, chains, ends = ends[goes_on], chains[goes_on], behind[goes_on]
-        # At its end 1 a contact is entered at building 2
-        turns = azimuth[ends] - azimuth[before]
-        along[chains] += (turns + 180.0) % 360.0 - 180.0
-        low[chains], high[chains] = (
-            limit(bound[chains], along[chains])
-            for limit, bound in ((np.minimum, low), (np.maximum, high))
-        )
-    # A chain has two free ends, and is followed once from each
-    name = 2 * np.repeat(contacts.order, 2) + np.tile([0, 1], contacts.order.size)
-    chosen = (last >= 0) & (name[starts] <= name[last])
-    return _chosen_walks(steps, chosen, high - low)
-
-
-def _chosen_walks(
-    steps: list[tuple[IntArray, IntArray]], chosen: BoolArray, turning: FloatArray
-) -> _Walks:
-    """Return some chains, contact after contact, from the first contacts of all, the second..."""
-    number = np.concatenate([chains for chains, _ in steps] or [np.empty(0, dtype=np.int64)])
-    ends = np.concatenate([ends for _, ends in steps] or [np.empty(0, dtype=np.int64)])
-    kept = chosen[number]
-    number, ends = number[kept], ends[kept]
-    sizes = np.bincount(number, minlength=chosen.size)[chosen]
-    return _Walks(ends[np.argsort(number, kind="stable")], sizes, turning[chosen])
-
-
-def _stays(contacts: Contacts, walks: _Walks, angle: float, longest: int) -> BoolArray:
-    """Return which chains are rows as they are: straight, not too long, no building twice."""
-    # Rounding alone cuts no row
-    stays = (walks.turning <= angle + 1e-9) & (walks.sizes < longest)
-    number = np.repeat(np.arange(walks.sizes.size), walks.sizes)
-    buildings = contacts.buildings.ravel()
-    first = np.cumsum(walks.sizes) - walks.sizes
-    # The first building of each chain, then the one behind each contact
-    visited = np.concatenate([buildings[walks.ends[first]], buildings[walks.ends ^ 1]])
-    number = np.concatenate([np.arange(first.size), number])
-    visits = np.sort(number * (contacts.names.size + 1) + visited)
-    again = visits[1:][visits[1:] == visits[:-1]] // (contacts.names.size + 1)
-    stays[again] = False
-    return np.asarray(stays | (walks.sizes == 1))
 
 
 def _others(contacts: Contacts, joined: IntArray, followed: IntArray) -> Iterator[_Piece]:

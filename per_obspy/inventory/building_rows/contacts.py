@@ -100,17 +100,15 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
     pair_id = found_names[order]
     codes, identifiers = _identified(pairs)
     is_ambiguous, rejected = _ambiguous(pairs, codes, identifiers)
-    places = [(code,) for code in np.flatnonzero(is_ambiguous).tolist()]
     buildings, names = _numbered(pair_id, codes, identifiers, is_ambiguous)
     # Contacts that are described twice
     azimuth, gap = numbers_in(pairs, "azimuth"), numbers_in(pairs, "gap")
-    sorted_rows = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
-    repeated, again, found = _repeated(pair_id, buildings, azimuth, gap, sorted_rows, angle)
-    ends = [tuple(pair) for pair in np.sort(buildings[again], axis=1).tolist()]
+    by_ends = np.lexsort([order, gap, buildings.max(axis=1), buildings.min(axis=1)])
+    repeated, found = _repeated(pair_id, buildings, azimuth, gap, by_ends, angle)
     return Contacts(
         buildings=buildings,
         names=names,
-        named=np.arange(names.size) < len(identifiers),
+        named=np.arange(names.size) < identifiers.size,
         azimuth=azimuth,
         gap=gap,
         facing_length=_facing(pairs),
@@ -118,10 +116,16 @@ def contacts_of(pairs: pd.DataFrame, angle: float) -> Contacts:
         pair_id=pair_id,
         order=order,
         repeated=repeated,
-        ambiguous=np.asarray(is_ambiguous[codes].any(axis=1)),
+        ambiguous=np.logical_or(*is_ambiguous[codes].T),
         rejected=(*rejected, *found),
-        places=(*places, *ends),
+        places=_places(is_ambiguous, buildings[by_ends[repeated[by_ends]]]),
     )
+
+
+def _places(is_ambiguous: BoolArray, again: IntArray) -> tuple[tuple[int, ...], ...]:
+    """Return the buildings of each rejection: ambiguous ones, then those of repeated contacts."""
+    both = [tuple(row) for row in np.sort(again, axis=1).tolist()]
+    return (*((code,) for code in np.flatnonzero(is_ambiguous).tolist()), *both)
 
 
 def _facing(pairs: pd.DataFrame) -> FloatArray:
@@ -150,9 +154,7 @@ def _numbered(
 
 def _identified(pairs: pd.DataFrame) -> tuple[IntArray, NDArray[np.object_]]:
     """Return a code per pair and side, -1 without an identifier, and the identifiers, sorted."""
-    sides = []
-    for name in ("building_id_1", "building_id_2"):
-        sides.append(identifiers_of(pairs, name))
+    sides = [identifiers_of(pairs, name) for name in ("building_id_1", "building_id_2")]
     # Sorted, so that numbers do not depend on the order of the table
     codes, names = _sorted_codes(pd.concat(sides, ignore_index=True))
     # No identifier is the first of all texts
@@ -238,12 +240,12 @@ def _repeated(
     gap: FloatArray,
     order: NDArray[np.intp],
     angle: float,
-) -> tuple[BoolArray, list[int], tuple[Rejection, ...]]:
-    """Return which pairs repeat a contact with at most their gap, these in order, and why."""
+) -> tuple[BoolArray, tuple[Rejection, ...]]:
+    """Return which pairs repeat the contact of another one with at most their gap, and why."""
     ends = np.sort(buildings, axis=1)[order]
     same = (ends[1:] == ends[:-1]).all(axis=1)
     repeated = np.zeros(gap.size, dtype=bool)
-    reasons, again, kept = [], list[int](), list[int]()
+    reasons, kept = [], list[int]()
     # The narrowest gap comes first; only few pairs have the buildings of another
     for place in np.flatnonzero(same).tolist():
         # A new group of pairs of the same buildings, or one more of it
@@ -255,9 +257,8 @@ def _repeated(
             kept.append(row)
             continue
         repeated[row] = True
-        again.append(row)
         reasons.append(_repetition(pair_id, gap, row, twin[0]))
-    return repeated, again, tuple(reasons)
+    return repeated, tuple(reasons)
 
 
 def _one_axis(first: float, second: float, angle: float) -> bool:

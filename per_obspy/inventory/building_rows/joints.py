@@ -61,7 +61,8 @@ class _Candidates(NamedTuple):
 
     def chosen(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "_Candidates":
         """Return some of them."""
-        return _Candidates(*(column[rows] for column in self))
+        ends = self.first[rows], self.second[rows]
+        return _Candidates(*ends, self.step[rows], self.bend[rows])
 
 
 def joints_of(contacts: Contacts, given: Mapping[str, FloatArray], angle: float) -> Joints:
@@ -144,6 +145,7 @@ def _agreement(
         # NaN means unknown and contradicts no value
         limit = AGREEMENT * np.maximum(np.abs(first), np.abs(second))
         differs = np.abs(first - second) > limit
+        # Each contradiction with the numbers of its property, step and building
         for row in np.flatnonzero(differs).tolist():
             numbers = float(first[row]), float(second[row])
             rejected.append(_contradiction(contacts, found, row, name, numbers))

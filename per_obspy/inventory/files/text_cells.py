@@ -61,14 +61,21 @@ def arrow_cells(table: pa.Table) -> pa.Table:
     """Return a table whose texts are those of :func:`cell`; names stay."""
     for position, field in enumerate(table.schema):
         if pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
-            column = pc.replace_substring_regex(table[position], _UNPRINTABLE, " ")
-            # A mark of text before formulas that are no numbers
-            is_formula = pc.match_substring_regex(column, FORMULA)
-            is_number = pc.match_substring_regex(column, NUMBER)
-            marked = pc.binary_join_element_wise("'", column, "")
-            chosen = pc.and_not(is_formula, is_number)
-            table = table.set_column(position, field.name, pc.if_else(chosen, marked, column))
+            # Texts repeat: each is looked at once
+            coded = table[position].combine_chunks().dictionary_encode()
+            column = _arrow_texts(coded.dictionary).take(coded.indices)
+            table = table.set_column(position, field.name, column)
     return table
+
+
+def _arrow_texts(texts: pa.StringArray) -> pa.StringArray:
+    """Return texts as those of :func:`cell`."""
+    column = pc.replace_substring_regex(texts, _UNPRINTABLE, " ")
+    # A mark of text before formulas that are no numbers
+    is_formula = pc.match_substring_regex(column, FORMULA)
+    is_number = pc.match_substring_regex(column, NUMBER)
+    marked = pc.binary_join_element_wise("'", column, "")
+    return pc.if_else(pc.and_not(is_formula, is_number), marked, column)
 
 
 def header(names: Iterable[str]) -> str:

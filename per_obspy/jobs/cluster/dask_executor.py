@@ -103,6 +103,7 @@ class DaskExecutor(ElasticExecutor):
             If there is no scheduler, or no fit worker within the time that is configured.
         """
         self._engine = engine
+        # A new folder of results is often made by its first file only
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
         with temporary_folder(folder) as shared:

@@ -31,6 +31,7 @@ from per_obspy.pipeline.run import run
 from per_obspy.records.contents.file_list import files_below
 from per_obspy.records.contents.growing import file_states, growing_files
 from per_obspy.records.fdsn.cache import Fetched, fetched_stations
+from per_obspy.tables.ranked.ranked_files import table_outputs
 
 
 class Done(NamedTuple):
@@ -149,7 +150,7 @@ def arrivals_of(settings: Run) -> str:
 def _published(folder: Path, state: EventState, result: Result, occasion: tuple[Task, str]) -> Done:
     """Make a revision of the results of a run, if they differ from those of the newest one."""
     record, newest = result.record, newest_revision(folder)
-    if "risk.parquet" not in record["outputs"]:
+    if not table_outputs(record["outputs"]):
         return Done(state, "no pair could be screened: see work/rejected.csv", result)
     # Unchanged results are no new revision
     shown = content_of(record, file_hash(folder / "event.xml"))

@@ -166,6 +166,7 @@ def looked(watcher: Watcher, state: EventState) -> tuple[EventState, bool]:
     state = changed(state, looked=iso(now))
     if not done:
         return state, False
+    # What is there is in the cache: only the rest is requested
     folder = event_folder(watcher.folder, state.event_id)
     settings = settings_of_event(watcher.settings, folder, state, done[-1])
     return state, records_hash(fetched_for(watcher, settings)) != state.fetched

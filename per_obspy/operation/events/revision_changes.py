@@ -11,6 +11,7 @@ import pyarrow as pa
 from per_obspy.files import written_whole
 from per_obspy.inventory.files.text_cells import cell
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
+from per_obspy.tables.ranked.ranked_files import table_files
 
 #: Name of the table in a revision.
 CHANGES = "changes.csv"
@@ -23,8 +24,8 @@ EVENT_FACTS = ("time", "latitude", "longitude", "depth", "magnitude", "magnitude
 
 #: kind -> table, column of names, columns whose changes are listed
 TABLES = {
-    "pair": ("risk.parquet", "pair_id", ("state", "risk_class")),
-    "building": ("buildings.parquet", "building_id", ("risk_class",)),
+    "pair": ("risk", "pair_id", ("state", "risk_class")),
+    "building": ("buildings", "building_id", ("risk_class",)),
 }
 
 #: Rows that are written at once.
@@ -63,8 +64,8 @@ def _all_changes(before: Path | None, after: Path, facts: Mapping[str, Any]) -> 
     if before is None:
         return
     for kind, (name, identifier, quantities) in TABLES.items():
-        tables = (before / name, after / name)
-        if all(table.is_file() for table in tables):
+        tables = (table_files(before, name), table_files(after, name))
+        if all(tables):
             yield from _table_changes(kind, tables, identifier, quantities)
 
 
@@ -103,13 +104,13 @@ def _station_states(table: Path) -> dict[str, str]:
 
 
 def _table_changes(
-    kind: str, tables: tuple[Path, Path], identifier: str, quantities: tuple[str, ...]
+    kind: str, tables: tuple[list[Path], list[Path]], identifier: str, quantities: tuple[str, ...]
 ) -> Iterator[Row]:
     """Yield the changes between two tables, by name, in bounded memory."""
     # Named so that the database finds them
     columns = [identifier, *quantities]
-    old, new = (parquet_rows([table], columns) for table in tables)
-    with bounded_database(tables[1].parent) as database:
+    old, new = (parquet_rows(table, columns) for table in tables)
+    with bounded_database(tables[1][0].parent) as database:
         database.register("old", old)
         database.register("new", new)
         for quantity in quantities:

@@ -22,6 +22,7 @@ from per_obspy.names import inside
 from per_obspy.operation.events.revision_changes import CHANGES, write_changes
 from per_obspy.pipeline.provenance import CONFIGURATION
 from per_obspy.resume import Status, StatusError, read_status, write_status
+from per_obspy.tables.ranked.ranked_files import table_outputs
 
 #: Folder of the revisions, link to the newest, and description of each.
 REVISIONS, LATEST, REVISION = "revisions", "latest", "revision.json"
@@ -29,8 +30,8 @@ REVISIONS, LATEST, REVISION = "revisions", "latest", "revision.json"
 #: Folder in which the runs of an earthquake work.
 WORK = "work"
 
-#: Results by which a revision differs from the one before.
-COMPARED = ("risk.parquet", "stations.csv", "rows.parquet", "buildings.parquet", "totals.csv")
+#: Results by which a revision differs from the one before, besides the risk table.
+COMPARED = ("stations.csv", "rows.parquet", "buildings.parquet", "totals.csv")
 
 #: Name of the folder of a revision.
 _NAME = re.compile(r"[0-9]{4,9}")
@@ -66,6 +67,7 @@ def content_of(record: Mapping[str, Any], event_hash: str) -> str:
         Of the QuakeML that was screened.
     """
     tables = {name: record["outputs"].get(name, "") for name in COMPARED}
+    tables |= table_outputs(record["outputs"])
     return content_hash({"tables": tables, "event": event_hash})
 
 

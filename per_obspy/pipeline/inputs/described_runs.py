@@ -9,10 +9,11 @@ from per_obspy.config import Design, Ensemble, Run, Simulation, load
 from per_obspy.config.commented import effective_content
 from per_obspy.errors import CatalogError
 from per_obspy.inventory.catalogue import stored_inventories
-from per_obspy.pipeline.inputs.described_tables import risk_table_facts
+from per_obspy.pipeline.inputs.described_tables import ranked_table_facts
 from per_obspy.pipeline.inputs.facts import Facts, Places, some
 from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.resume import StatusError, read_status
+from per_obspy.tables.ranked.ranked_files import listed_outputs, table_files
 
 #: Keys of a configuration that are listed.
 MOST_KEYS = 12
@@ -87,10 +88,10 @@ def result_facts(folder: Path) -> Facts:
     # Facts of run.json
     counts = record.get("counts") or {}
     # The risk table has states, worst pairs and places
-    risk = folder / "risk.parquet"
-    table = risk_table_facts(risk) if risk.is_file() else None
+    risk = table_files(folder)
+    table = ranked_table_facts(risk) if risk else None
     lines = [*_record_lines(record, counts), *(table.lines if table else [])]
-    lines.append(("files", some(sorted([*record["outputs"], file.name]), 12)))
+    lines.append(("files", some(listed_outputs([*record["outputs"], file.name]), 12)))
     places = (table.places if table else {}) | _stations(folder / "stations.csv")
     title = f"{counts.get('stations', 0)} stations, {counts.get('pairs', 0)} pairs"
     return Facts(Kind.RESULT, title, lines, places, record)

@@ -16,6 +16,7 @@ from per_obspy.pipeline.inputs.facts import Facts, Places, some, span
 from per_obspy.pipeline.inputs.input_kinds import Kind
 from per_obspy.screening.ranking import EVERY_STATE, STATES
 from per_obspy.tables.parts import parquet_rows
+from per_obspy.tables.ranked.ranked_table import ranked_table
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -123,14 +124,28 @@ def _outline_centres(outlines: "pa.Array") -> Places:
     return east, north
 
 
+#: Columns of a risk table that are shown.
+_RISK_COLUMNS = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
+
+
 def risk_table_facts(path: Path) -> Facts:
     """Return the facts of a risk table, CSV or Parquet, by its first rows if it is large."""
     # Only the shown columns are read
-    names = ["pair_id", "state", "longitude_1", "latitude_1", "longitude_2", "latitude_2"]
     if path.suffix.lower() == ".csv":
-        table = pd.read_csv(path, nrows=MOST_ROWS, usecols=lambda name: name in names)
+        table = pd.read_csv(path, nrows=MOST_ROWS, usecols=lambda name: name in _RISK_COLUMNS)
     else:
-        table = parquet_rows([path], names).head(MOST_ROWS).to_pandas()
+        table = parquet_rows([path], _RISK_COLUMNS).head(MOST_ROWS).to_pandas()
+    return _risk_facts(table)
+
+
+def ranked_table_facts(files: Sequence[Path]) -> Facts:
+    """Return the facts of a risk table in one file or one per cell, by its worst rows."""
+    with ranked_table(files) as table:
+        return _risk_facts(table.first(MOST_ROWS, _RISK_COLUMNS))
+
+
+def _risk_facts(table: pd.DataFrame) -> Facts:
+    """Return the facts of the worst rows of a risk table."""
     # States, and the first rows, which are the worst
     states = {state: int((table["state"] == state).sum()) for state in EVERY_STATE}
     worst = some([str(name) for name in table["pair_id"]], 5)

@@ -34,7 +34,7 @@ from per_obspy.report.page.tally import PAGE_PAIRS, PairTally
 from per_obspy.report.page.texts import LANGUAGES, Language
 from per_obspy.report.summary.statements import event_sentences, station_sentences
 from per_obspy.report.summary.wording import WORDING
-from per_obspy.tables.risk import RankedTable
+from per_obspy.tables.ranked.ranked_table import RankedTable
 from per_obspy.tables.totals import areas_of
 
 
@@ -42,7 +42,7 @@ def worst_pairs(table: RankedTable, settings: Run) -> pd.DataFrame:
     """Return the worst pairs of a risk table with all columns and their areas."""
     # The leading columns are those of the package, those of the inventory follow
     area = [settings.totals.area] if settings.totals.area else []
-    names = table.file.schema_arrow.names[: 2 * MOST_COLUMNS]
+    names = table.schema.names[: 2 * MOST_COLUMNS]
     worst = table.first(PAGE_PAIRS, [*names, *area])
     return worst.assign(area=areas_of(worst, settings.totals, settings.totals.area or ""))
 

@@ -22,6 +22,7 @@ from per_obspy.report.summary.statements import LISTED, SummaryFacts, place_text
 from per_obspy.report.summary.wording import WORDING
 from per_obspy.report.words import name_text
 from per_obspy.screening.columns import column_table, known_column
+from per_obspy.tables.ranked.ranked_files import table_name
 from per_obspy.tables.station_summary import COLUMNS as STATION_COLUMNS
 
 
@@ -136,7 +137,8 @@ def _extent(screening: Screening, notes: Notes, most: int) -> str:
     pairs = notes.counts.pairs
     if pairs <= most:
         return f"All {pairs} pairs."
-    return f"The worst {most} of {pairs} pairs; all of them are in {screening.stem}.parquet."
+    table = table_name(screening.folder, screening.stem)
+    return f"The worst {most} of {pairs} pairs; all of them are in {table}."
 
 
 def _sheets(

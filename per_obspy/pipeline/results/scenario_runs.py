@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from per_obspy.config import Run, Totals
@@ -13,7 +14,8 @@ from per_obspy.pipeline.results.station_facts import HISTORIES, pair_histories, 
 from per_obspy.pipeline.stations import stations_of_earlier_run
 from per_obspy.report.page.drawn_histories import HISTORY_COLUMNS
 from per_obspy.tables.parts import batches, bounded_database, parquet_rows
-from per_obspy.tables.risk import ROWS
+from per_obspy.tables.ranked.ranked_files import table_files
+from per_obspy.tables.ranked.ranked_table import ROWS
 
 #: Columns of a risk table that do not depend on the motion.
 OF_BUILDINGS = (
@@ -42,9 +44,9 @@ class ScenarioRun(NamedTuple):
     folder: Path
 
     @property
-    def risk(self) -> Path:
-        """Return the path of the risk table, which is missing if no pair is usable."""
-        return self.folder / "risk.parquet"
+    def risk(self) -> list[Path]:
+        """Return the files of the risk table, none if no pair is usable."""
+        return table_files(self.folder)
 
 
 class ScenarioRuns:
@@ -58,7 +60,7 @@ class ScenarioRuns:
     """
 
     def __init__(self, runs: Mapping[str, ScenarioRun]) -> None:
-        self.runs = {name: run for name, run in runs.items() if run.risk.is_file()}
+        self.runs = {name: run for name, run in runs.items() if run.risk}
 
     @property
     def first(self) -> ScenarioRun | None:
@@ -91,7 +93,7 @@ class ScenarioRuns:
             database.register("pairs", parquet_rows([table]))
             # Pairs of both tables have the same names
             if self.first is not None and columns:
-                database.register("known", parquet_rows([self.first.risk], ["pair_id", *columns]))
+                database.register("known", parquet_rows(self.first.risk, ["pair_id", *columns]))
                 named = ", ".join(f'known."{name}"' for name in columns)
                 query = f"SELECT pairs.*, {named} FROM pairs LEFT JOIN known USING (pair_id)"
             for batch in batches(database, f"{query} ORDER BY rank", ROWS):
@@ -103,7 +105,7 @@ class ScenarioRuns:
             return []
         area = self.first.settings.totals.area
         wanted = dict.fromkeys([*OF_BUILDINGS, "flags", *([area] if area else [])])
-        known = set(pq.read_schema(self.first.risk.absolute()).names)
+        known = set(pq.read_schema(self.first.risk[0].absolute()).names)
         # Names with a quotation mark are not quoted twice
         return [name for name in wanted if name in known and '"' not in name]
 
@@ -143,14 +145,14 @@ def _stations(run: ScenarioRun) -> Sequence[Any]:
     return [station for station in stations_of_earlier_run(run.folder) if station.shard]
 
 
-def _rows_of(risk: Path, names: Sequence[str]) -> pd.DataFrame:
+def _rows_of(risk: Sequence[Path], names: Sequence[str]) -> pd.DataFrame:
     """Return the rows of some pairs with the columns for a history, except the rank."""
     wanted = [name for name in ("pair_id", *HISTORY_COLUMNS) if name != "rank"]
-    known = set(pq.read_schema(risk.absolute()).names)
-    columns = [name for name in wanted if name in known]
-    found: pd.DataFrame = pq.read_table(
-        risk.absolute(), columns=columns, filters=[("pair_id", "in", names)], use_threads=False
-    ).to_pandas()
+    # Columns that a run may lack are left out
+    known = set(pq.read_schema(risk[0].absolute()).names)
+    rows = parquet_rows(risk, [name for name in wanted if name in known])
+    named = rows.to_table(filter=pc.field("pair_id").isin(names), use_threads=False)
+    found: pd.DataFrame = named.to_pandas()
     return found
 
 

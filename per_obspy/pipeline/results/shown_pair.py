@@ -11,9 +11,10 @@ from per_obspy.report.pair_figure import draw_pair_alone, draw_record_to_pair
 from per_obspy.resume import StatusError, read_status
 from per_obspy.spectra.storage import read_spectra
 from per_obspy.tables.parts import bounded_database, parquet_rows
+from per_obspy.tables.ranked.ranked_files import table_files
 
 #: Tables of results that have one row per pair.
-TABLES = ("risk.parquet", "design.parquet", "ensemble.parquet")
+TABLES = ("risk", "design", "ensemble")
 
 
 class ShownPair(NamedTuple):
@@ -51,22 +52,23 @@ def find_pair(name: str, folder: Path) -> ShownPair:
     CatalogError
         If the folder holds no results, or they have no such pair.
     """
-    tables = [folder / table for table in TABLES if (folder / table).is_file()]
-    if not tables:
-        raise CatalogError(str(folder), f"no results here: none of {', '.join(TABLES)}")
+    table = next(filter(None, (table_files(folder, name) for name in TABLES)), None)
+    if table is None:
+        files = ", ".join(f"{name}.parquet" for name in TABLES)
+        raise CatalogError(str(folder), f"no results here: none of {files}")
     # By name or by rank
     column, value = ("rank", name[1:]) if name.startswith("#") else ("pair_id", name)
     with bounded_database(folder) as database:
-        database.register("found", parquet_rows(tables[:1]))
+        database.register("found", parquet_rows(table))
         # A value is a parameter: no name is part of the query
         query = f"SELECT * FROM found WHERE CAST({column} AS VARCHAR) = $value LIMIT 1"
         try:
             rows = database.execute(query, {"value": value}).df()
         except duckdb.Error as error:
-            raise CatalogError(str(tables[0]), f"cannot be read: {error}") from error
+            raise CatalogError(str(table[0]), f"cannot be read: {error}") from error
     if rows.empty:
         reason = f"no pair {shortened(name, 80)!r}: name a pair_id of the table, or a rank as #1"
-        raise CatalogError(str(tables[0]), reason)
+        raise CatalogError(str(table[0]), reason)
     return ShownPair(rows.iloc[0], folder, _simulated(folder))
 
 

@@ -19,7 +19,7 @@ COLUMNS = (
 
 class Notes:
     """
-    Counts of a table that is read in pieces, worst first, and its worst rows.
+    Counts of a ranked table that is read in pieces, in any order, and its worst rows.
 
     Parameters
     ----------
@@ -29,15 +29,12 @@ class Notes:
 
     def __init__(self, classes: Sequence[str]) -> None:
         self.tally = PairTally(classes)
-        self._worst, self._rows = list[pd.DataFrame](), 0
+        self._worst = list[pd.DataFrame]()
 
     def add(self, piece: pd.DataFrame) -> None:
-        """Take the next rows."""
+        """Take some rows."""
         self.tally.add(piece)
-        # The first rows are the worst
-        if self._rows < ROWS:
-            self._worst.append(piece.head(ROWS - self._rows).copy())
-            self._rows += len(self._worst[-1])
+        self._worst.append(piece[piece["rank"] <= ROWS])
 
     @property
     def counts(self) -> Counts:
@@ -49,7 +46,9 @@ class Notes:
     @property
     def worst(self) -> pd.DataFrame:
         """Return the worst rows, as many as a workbook has."""
-        return pd.concat(self._worst, ignore_index=True) if self._worst else pd.DataFrame()
+        if not self._worst:
+            return pd.DataFrame()
+        return pd.concat(self._worst).sort_values("rank", ignore_index=True)
 
 
 def needed_columns(more: Sequence[str]) -> list[str]:

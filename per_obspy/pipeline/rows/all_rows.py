@@ -6,7 +6,7 @@ one pair only are numbered after those with an identifier, in the order of the p
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -44,6 +44,9 @@ OF_CHUNKS = ("pair_id", "longitude", "latitude", *NEEDED)
 
 #: Columns of few texts, which many contacts share.
 SHARED = ("station", "state", "derived", "flags")
+
+#: Columns of pairs that are not needed any more when rows are found.
+FOR_FINDING = {*FINDING, *PLACING} - {"rank", *OF_CHUNKS, *OF_PAIRS}
 
 _ORDER = "SELECT * FROM found ORDER BY station, row_id, interface"
 
@@ -87,27 +90,37 @@ def all_rows(pairs: PairColumns, rows: Rows, area: str | None, room: Path) -> Al
     room : Path
         Folder for the file.
     """
-    carried = list(dict.fromkeys(["rank", *OF_CHUNKS, *OF_PAIRS]))
-    columns = {name: name for name in (*FINDING, *PLACING, *carried)}
-    if area:
-        carried, columns[AREA] = [*carried, AREA], area
+    # Both passes over the pairs: numbers of buildings, then pieces of connected pairs
     noted = _Noted([], [], [], Counter())
     found, ordered = room / "found.parquet", room / "contacts.parquet"
     with small_database(room) as database:
         numbers = building_numbers(pairs, database)
         piece = piece_numbers(numbers, PIECE)
+        columns = _columns(area)
         pieces = pieces_of(pairs, numbers, piece, columns, database)
+        carried = [name for name in columns if name not in FOR_FINDING]
         parts = (found_rows(some, rows, carried) for some in pieces)
         _write((noted.add(part) for part in parts), found)
-    ends = np.sort(np.concatenate(noted.own))
-    with small_database(room) as database, stored_rows(found) as stored:
-        database.register("found", stored)
-        tables = _completed(batches(database, _ORDER, PIECE), numbers.count, ends)
-        contacts = _write(tables, ordered)
-    found.unlink()
+    contacts = _write_ordered(found, numbers.named, np.sort(np.concatenate(noted.own)), ordered)
+    # Rejections as if there was one piece
     rejected = sorted(noted.rejected, key=lambda one: one[0])
     reasons = tuple(rejection for _, rejection in rejected)
     return AllRows(ordered, contacts, sum(noted.rows), reasons, noted.served)
+
+
+def _write_ordered(found: Path, named: int, ends: IntArray, path: Path) -> int:
+    """Write contacts in their order of computation, and return their number."""
+    with small_database(path.parent) as database, stored_rows(found) as stored:
+        database.register("found", stored)
+        count = _write(_completed(batches(database, _ORDER, PIECE), named, ends), path)
+    found.unlink()
+    return count
+
+
+def _columns(area: str | None) -> dict[str, str]:
+    """Return new name and name of the columns of pairs that are read."""
+    names = dict.fromkeys((*FINDING, *PLACING, *OF_CHUNKS, *OF_PAIRS))
+    return {name: name for name in names} | ({AREA: area} if area else {})
 
 
 class _Noted(NamedTuple):
@@ -129,6 +142,7 @@ class _Noted(NamedTuple):
 
 def _write(tables: Iterator[pa.Table], path: Path) -> int:
     """Write rows to a file that is read few times and removed, and return their number."""
+    # The first rows have the columns of all
     first = next(tables)
     texts = [name for name in SHARED if name in first.column_names]
     fast = {"compression": "lz4", "use_dictionary": texts, "write_statistics": False}
@@ -140,9 +154,7 @@ def _write(tables: Iterator[pa.Table], path: Path) -> int:
     return count
 
 
-def _completed(
-    found: Iterable[pa.RecordBatch], named: int, ends: IntArray
-) -> Iterator[pa.Table]:
+def _completed(found: Iterable[pa.RecordBatch], named: int, ends: IntArray) -> Iterator[pa.Table]:
     """Yield contacts with the numbers of all buildings, of the rows and of the chunks."""
     chunks, row, chunk = ChunkNumbers(CHUNK), -1, 0
     for batch in found:
@@ -152,6 +164,7 @@ def _completed(
         some = table.filter(pa.array(begins)).select(["buildings", "station"])
         sizes = some["buildings"].to_numpy() - 1
         numbers = chunks.add(sizes.tolist(), some["station"].to_pylist())
+        # Place of each contact among the rows that begin here, 0 for the row before
         place = np.cumsum(begins)
         columns = {
             "row": place + row,
@@ -166,6 +179,7 @@ def _completed(
 def _numbered(table: pa.Table, named: int, ends: IntArray) -> pa.Table:
     """Return contacts with numbers of the buildings that belong to one pair only."""
     turned = table["turned"].to_numpy().astype(np.int64)
+    # The left building of a turned pair is its building 2
     first = 2 * (table["rank"].to_numpy() - 1)
     for side, end in (("left", first + turned), ("right", first + 1 - turned)):
         name = f"building_number_{side}"

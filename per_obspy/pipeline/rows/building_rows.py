@@ -23,6 +23,7 @@ from per_obspy.pipeline.rows.pair_columns import PairColumns, pair_columns
 from per_obspy.progress import Progress
 from per_obspy.tables.building_rows import write_rows
 from per_obspy.tables.buildings import BuildingWays, write_buildings
+from per_obspy.tables.ranked.ranked_files import table_files
 from per_obspy.threads import usable_processors
 
 
@@ -71,7 +72,7 @@ def building_rows(
     settings : Run
         Settings of the run.
     folder : Path
-        Of the results, with ``risk.parquet``.
+        Of the results, with the risk table.
     ground : GroundFiles
         The stations.
     facts : mapping of str to str
@@ -81,7 +82,7 @@ def building_rows(
     progress : callable
         Called for every chunk.
     """
-    with pair_columns(folder / "risk.parquet") as pairs, temporary_folder(folder) as room:
+    with pair_columns(table_files(folder)) as pairs, temporary_folder(folder) as room:
         if not _enabled(settings.rows, pairs):
             return NO_ROWS
         found = all_rows(pairs, settings.rows, settings.totals.area, room)
@@ -110,6 +111,7 @@ def _parts(
         parts.append(part)
         done += part.rows
         progress("rows", done, found.contacts)
+    # Parts of an earlier table would be taken for parts of this one
     _remove_others(folder / "rows", parts)
     return sorted(parts, key=lambda part: part.number)
 
@@ -146,9 +148,7 @@ def _enabled(rows: Rows, pairs: PairColumns) -> bool:
     return set(IDENTIFIERS) <= set(pairs.names)
 
 
-def _jobs(
-    settings: Run, folder: Path, ground: GroundFiles, found: AllRows
-) -> Iterator[RowsJob]:
+def _jobs(settings: Run, folder: Path, ground: GroundFiles, found: AllRows) -> Iterator[RowsJob]:
     """Yield one job per chunk of rows."""
     exact = settings.screening.exact if settings.rows.exact is None else settings.rows.exact
     stations = {station.name: station for station in ground.stations}
@@ -164,6 +164,7 @@ def _chunks(file: Path) -> Iterator[tuple[int, pa.Table]]:
     with pq.ParquetFile(file, pre_buffer=False) as contacts:
         names = [name for name in (*OF_ROWS, *OF_CHUNKS) if name in contacts.schema_arrow.names]
         waiting = contacts.schema_arrow.empty_table().select(["chunk", *names])
+        # Some thousands at a time
         for group in range(contacts.num_row_groups):
             rows = contacts.read_row_group(group, columns=["chunk", *names], use_threads=False)
             waiting = pa.concat_tables([waiting, rows.select(waiting.column_names)])

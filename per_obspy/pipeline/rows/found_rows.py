@@ -5,8 +5,7 @@ Pairs that share a building with others of a piece are in that piece: every row,
 that is known of a building, is found in one piece. Only connected pairs are never divided.
 """
 
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -96,6 +95,7 @@ def pieces_of(
     database : DuckDBPyConnection
         Of bounded memory.
     """
+    # The first batch has the columns of all
     source = _numbered(pairs, numbers, piece, columns)
     first = next(source)
     numbered = pa.RecordBatchReader.from_batches(first.schema, _chained(first, source))
@@ -133,6 +133,7 @@ def _numbered(
     for batch in pairs.batches(list(dict.fromkeys(known.values()))):
         place = slice(before, before + batch.num_rows)
         before += batch.num_rows
+        # Numbers of the buildings and of the piece are columns too
         added = {"code_1": numbers.codes[place, 0], "code_2": numbers.codes[place, 1]}
         arrays = [pa.array(np.ascontiguousarray(column)) for column in added.values()]
         yield pa.RecordBatch.from_arrays(
@@ -161,20 +162,29 @@ def found_rows(pairs: pa.Table, rows: Rows, carried: Sequence[str]) -> FoundRows
     placing = read(PLACING)
     placed = placed_rows(chains, placing)
     # Numbers of identifiers among those of all pieces
-    codes = np.stack([pairs[f"code_{i}"].to_numpy() for i in (1, 2)], axis=1)
-    known = np.unique(codes[codes >= 0])
+    codes = _codes(pairs)
     is_own = ~contacts.named[contacts.buildings]
-    first = np.flatnonzero(np.diff(placed.contacts["row"].to_numpy(), prepend=-1))
-    table = _table(pairs, placed, contacts, np.where(is_own, -1, codes), carried)
-    # Name and flags of each row at every contact of it
-    row = placed.contacts["row"].to_numpy()
-    names = pa.array(_row_names(placed, contacts, first)).take(pa.array(row))
-    flags = pa.array(joined_names(_raised(chains, placed, first)), pa.string())
-    table = table.append_column("row_id", names).append_column("flags", flags.take(pa.array(row)))
-    rank = placing["rank"].to_numpy(np.int64)
-    ends = np.stack([2 * rank - 2, 2 * rank - 1], axis=1)[is_own]
+    # All columns of the contacts
+    table = _of_pairs(pairs, placed, carried)
+    columns = _of_rows(placed, chains, contacts)
+    columns |= _of_sides(placed, contacts, np.where(is_own, -1, codes))
+    for name, column in columns.items():
+        table = table.append_column(name, column)
+    ends = _ends(placing["rank"])[is_own]
     served = served_buildings(placing["station"], contacts.buildings)
-    return FoundRows(table, first.size, ends, served, _rejections(contacts, joints, known))
+    rejected = _rejections(contacts, joints, np.unique(codes[codes >= 0]))
+    return FoundRows(table, placed.order.size, ends, served, rejected)
+
+
+def _codes(pairs: pa.Table) -> IntArray:
+    """Return the numbers of both buildings of pairs, (n, 2); -1 without an identifier."""
+    codes: IntArray = np.stack([pairs[f"code_{i}"].to_numpy() for i in (1, 2)], axis=1)
+    return codes
+
+
+def _ends(rank: pd.Series) -> IntArray:
+    """Return the numbers of both ends of pairs, (n, 2)."""
+    return 2 * (rank.to_numpy(np.int64)[:, None] - 1) + np.arange(2)
 
 
 def _frame(pairs: pa.Table, names: Sequence[str]) -> pd.DataFrame:
@@ -184,29 +194,39 @@ def _frame(pairs: pa.Table, names: Sequence[str]) -> pd.DataFrame:
     return found
 
 
-def _table(
-    pairs: pa.Table,
-    placed: PlacedRows,
-    contacts: Contacts,
-    codes: IntArray,
-    carried: Sequence[str],
-) -> pa.Table:
-    """Return the contacts with the columns that are carried, and their buildings on both sides."""
-    pair, turned = (placed.contacts[name].to_numpy() for name in ("pair", "turned"))
+def _of_pairs(pairs: pa.Table, placed: PlacedRows, carried: Sequence[str]) -> pa.Table:
+    """Return the columns of the pairs that the contacts keep."""
     kept = pairs.select([name for name in carried if name in pairs.column_names])
-    table = kept.take(pa.array(pair))
-    for name in ("turned", "interface", "buildings", "azimuth"):
-        table = table.append_column(name, pa.array(placed.contacts[name].to_numpy()))
+    return kept.take(pa.array(placed.contacts["pair"].to_numpy()))
+
+
+def _of_rows(placed: PlacedRows, chains: Chains, contacts: Contacts) -> dict[str, pa.Array]:
+    """Return the columns of the rows at each of their contacts."""
+    # Whole numbers of stations, of which there are few
+    names = ("turned", "interface", "buildings", "azimuth")
+    columns = {name: pa.array(placed.contacts[name].to_numpy()) for name in names}
     station = placed.contacts["station"].cat
-    names = pa.DictionaryArray.from_arrays(station.codes.to_numpy(), list(station.categories))
-    table = table.append_column("station", names.cast(pa.string()))
+    texts = pa.DictionaryArray.from_arrays(station.codes.to_numpy(), list(station.categories))
+    # Name and flags of each row at every contact of it
+    row = placed.contacts["row"].to_numpy()
+    first = np.flatnonzero(np.diff(row, prepend=-1))
+    flags = pa.array(joined_names(_raised(chains, placed, first)), pa.string())
+    row_id = pa.array(_row_names(placed, contacts, first), pa.string())
+    columns |= {"row_id": row_id.take(pa.array(row)), "flags": flags.take(pa.array(row))}
+    return columns | {"station": texts.cast(pa.string())}
+
+
+def _of_sides(placed: PlacedRows, contacts: Contacts, codes: IntArray) -> dict[str, pa.Array]:
+    """Return number and identifier of the buildings on both sides of each contact."""
+    pair = placed.contacts["pair"].to_numpy()
+    turned = placed.contacts["turned"].to_numpy().astype(np.int64)
+    columns = dict[str, pa.Array]()
     # The left building of a turned pair is its building 2
-    for side, number in (("left", turned.astype(np.int64)), ("right", 1 - turned.astype(np.int64))):
-        chosen = contacts.buildings[pair, number]
-        identifiers = pa.array(contacts.names[chosen].astype(object), pa.string())
-        table = table.append_column(f"building_number_{side}", pa.array(codes[pair, number]))
-        table = table.append_column(f"building_id_{side}", identifiers)
-    return table
+    for side, number in (("left", turned), ("right", 1 - turned)):
+        names = contacts.names[contacts.buildings[pair, number]].astype(object)
+        columns[f"building_number_{side}"] = pa.array(codes[pair, number])
+        columns[f"building_id_{side}"] = pa.array(names, pa.string())
+    return columns
 
 
 def _rejections(
@@ -256,9 +276,7 @@ def _raised(chains: Chains, placed: PlacedRows, first: IntArray) -> dict[str, Bo
     }
 
 
-def _row_names(
-    placed: PlacedRows, contacts: Contacts, first: IntArray
-) -> NDArray[np.object_]:
+def _row_names(placed: PlacedRows, contacts: Contacts, first: IntArray) -> NDArray[np.object_]:
     """Return the name of each row: that of its first pair in alphabetical order."""
     order = contacts.order[placed.contacts["pair"]]
     smallest = np.minimum.reduceat(order, first)

@@ -42,19 +42,17 @@ class BuildingNumbers(NamedTuple):
     ----------
     codes : (n_pairs, 2) ndarray of int
         Place of the identifiers of each pair in their alphabetical order; -1 without one.
-    count : int
+    named : int
         Number of identifiers.
     """
 
     codes: NDArray[np.int32]
-    count: int
+    named: int
 
 
-def building_numbers(
-    pairs: PairColumns, database: duckdb.DuckDBPyConnection
-) -> BuildingNumbers:
+def building_numbers(pairs: PairColumns, database: duckdb.DuckDBPyConnection) -> BuildingNumbers:
     """
-    Number the buildings of all pairs by their identifiers.
+    Return numbers of the buildings of all pairs, by their identifiers.
 
     Parameters
     ----------
@@ -63,9 +61,10 @@ def building_numbers(
     database : DuckDBPyConnection
         Of bounded memory.
     """
-    codes = np.full((pairs.count, 2), -1, dtype=np.int32)
+    codes = np.full((pairs.pairs, 2), -1, dtype=np.int32)
     if not set(IDENTIFIERS) & set(pairs.names):
         return BuildingNumbers(codes, 0)
+    # Identifiers are sorted once, and looked up for both sides
     texts = pa.RecordBatchReader.from_batches(_TEXTS, _texts(pairs))
     database.register("texts", texts)
     database.execute("CREATE TABLE ends AS SELECT * FROM texts")
@@ -125,6 +124,7 @@ def _connected(numbers: BuildingNumbers) -> tuple[NDArray[np.int32], int]:
     from scipy.sparse.csgraph import connected_components
 
     codes, count = numbers
+    # Buildings are joined by the pairs that have two of them
     first, second = codes[:, 0], codes[:, 1]
     both = (first >= 0) & (second >= 0)
     edges = first[both], second[both]

@@ -25,7 +25,7 @@ UNKNOWN_DEPTH = 10
 #: Digits after the point of a computed P time, s: its error is that of the origin and the model.
 P_DIGITS = 1
 
-#: Traces whose picks are tried in turn: P moves the vertical most.
+#: Traces whose picks are tried in turn.
 DIRECTIONS = ("vertical", "horizontal")
 
 
@@ -172,19 +172,18 @@ def _onset(
     computed = _rounded(p_arrival(stream[0], source)) if source and stream else None
     picks = dict[str, list[UTCDateTime]]()
 
+    # Horizontals are picked only where the vertical does not decide
     def picked(direction: str) -> list[UTCDateTime]:
         group = [trace for trace in stream if is_horizontal(trace) == (direction == "horizontal")]
         return picks.setdefault(direction, _picked_times(group))
 
     onset, method = first_wave(picked, computed, tolerance)
+    # With its causes, from which an update of the event is judged
     if source is not None and computed is not None and onset is not None:
         place = stream[0].stats.coordinates
-        source.note(
-            place=[float(place.latitude), float(place.longitude)],
-            picks={name: [time.ns for time in times] for name, times in picks.items()},
-            onset=onset.ns,
-            method=method,
-        )
+        known = {name: list(map(_ns, times)) for name, times in picks.items()}
+        where = [float(place.latitude), float(place.longitude)]
+        source.note(place=where, picks=known, onset=onset.ns, method=method)
     return onset, method
 
 
@@ -203,6 +202,7 @@ def first_wave(
     tolerance : float
         Between a pick and the computed P, s.
     """
+    # The vertical first: P moves it most
     for direction in DIRECTIONS:
         times = picked(direction)
         if computed is not None:
@@ -234,10 +234,16 @@ def same_onset(decision: Mapping[str, Any], source: Source, tolerance: float) ->
         If traces would decide of which there were no picks.
     """
     picks = {name: list(map(_of_ns, times)) for name, times in decision["picks"].items()}
+    # The same picks, with the P of the event now
     latitude, longitude = decision["place"]
     computed = _rounded(p_arrival_at(latitude, longitude, source))
     onset, method = first_wave(picks.__getitem__, computed, tolerance)
     return onset is not None and (onset.ns, method) == (decision["onset"], decision["method"])
+
+
+def _ns(time: UTCDateTime) -> int:
+    """Return a time as ns after 1970."""
+    return int(time.ns)
 
 
 def _of_ns(number: int) -> UTCDateTime:

@@ -108,10 +108,7 @@ def fetch(
     ServiceError
         If services fail and the cache has no station at all, or the window is not over yet.
     """
-    pool = _pool(request)
-    if pauses is not None:
-        # A pause counts from the next fetch on: requests under way are not called off
-        pool = pool._replace(resting=dict(pauses), demanded=pauses)
+    pool = _pool(request, pauses)
     fetched = _requested(pool, request, event)
 
     # A complete request is answered from the cache
@@ -137,10 +134,13 @@ def fetch(
     return fetched
 
 
-def _pool(request: config.Fdsn) -> WebPool:
-    """Return connections with the patience of a request."""
+def _pool(request: config.Fdsn, pauses: dict[str, float] | None) -> WebPool:
+    """Return connections with the patience of a request, and the pauses that services demand."""
     limits = (request.longest_answer, request.largest_answer)
     pool = web_pool(request.timeout, request.retries, request.wait, *limits)
+    # A pause counts from the next fetch on: requests under way are not called off
+    if pauses is not None:
+        pool = pool._replace(resting=dict(pauses), demanded=pauses)
     pause = request.longest_pause
     return pool if pause is None else pool._replace(longest_pause=pause)
 

@@ -44,8 +44,8 @@ class PairTally:
         self._distances: list[pd.Series] = []
 
     def add(self, piece: pd.DataFrame) -> None:
-        """Count a piece of the risk table, of which the worst pairs come first."""
-        before, self.pairs = self.pairs, self.pairs + len(piece)
+        """Count a piece of the risk table; the pieces come in any order."""
+        self.pairs += len(piece)
         # Counts add up, whatever the pieces
         self.states.update(_counts(piece, "state"))
         self.classes.update(_counts(piece, "risk_class"))
@@ -58,7 +58,7 @@ class PairTally:
             self.expected += float(np.nansum(piece["probability"]))
         if "distance" in piece:
             self._distances.append(piece["distance"].dropna().copy())
-        others = piece.iloc[max(PAGE_PAIRS - before, 0) :]
+        others = piece[piece["rank"] > PAGE_PAIRS]
         if len(others) and {"longitude", "latitude", "risk_class", "state"} <= set(piece):
             self.cells.add(others)
 

@@ -294,7 +294,7 @@ ENGLISH: dict[str, str] = {
     "head_reasons": "reasons",
     "made_with": "made with",
     "files": "files next to this page",
-    "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (inputs with their hashes)",
+    "files_list": "risk.parquet or risk/, stations.csv, rejected.csv, run.json (input hashes)",
     "configuration": "configuration",
     "station_used": "used",
     "station_rejected": "rejected",

@@ -1,7 +1,7 @@
 """
 Station of each row, and the order of computation of rows: station by station.
 
-Rows are placed a piece of the table at a time; chunks are numbered when all rows are in their order.
+Rows are placed a piece of the table at a time; chunks are numbered when all rows are in order.
 """
 
 from collections.abc import Sequence

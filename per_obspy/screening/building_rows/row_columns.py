@@ -60,7 +60,7 @@ ROWS: tuple[Column, ...] = (
         "interface",
         "number of the interface; 1 is between the first and the second building of the row",
     ),
-    _text("pair_id", "pair of this interface in risk.parquet"),
+    _text("pair_id", "pair of this interface in the risk table"),
     _truth("turned", "whether building 1 of the pair is the one on the right"),
     *_SIDES,
     _number(

@@ -12,13 +12,23 @@ from numpy.typing import NDArray
 from per_obspy.checks import FloatArray
 from per_obspy.screening.by_record.exact import exact_demand, furthest_azimuth
 from per_obspy.screening.by_record.station_motion import StationMotion
-from per_obspy.screening.values import Table, both, chosen, values
+from per_obspy.screening.values import Table, both, chosen, only, values
 
 #: Step of the scan over the added damping, fraction of critical.
 SCAN_STEP = 0.04
 
 #: The step before the first damping that is enough is halved so many times: to 4e-5.
 HALVINGS = 10
+
+#: Columns from which the exact demand follows.
+NEEDED = (
+    *("azimuth", "gap"),
+    *(
+        f"{name}_{i}"
+        for name in ("period", "damping", "participation", "per", "yield_displacement", "hardening")
+        for i in (1, 2)
+    ),
+)
 
 #: Largest damping of a building that still vibrates, fraction of critical.
 NEARLY_CRITICAL = 0.99
@@ -42,6 +52,7 @@ def least_exact_damping(station: StationMotion, table: Table, largest: float) ->
     (n_pairs,) ndarray
         Fraction of critical, enough itself; NaN where none up to the largest is enough.
     """
+    table = only(table, NEEDED)
     # As far as both buildings still vibrate
     limit = NEARLY_CRITICAL - np.maximum(*both(table, "damping"))
     most = np.minimum(largest, limit)

@@ -62,7 +62,7 @@ from per_obspy.screening.uncertainty.site_demand import (
     median_at_site,
     site_demand,
 )
-from per_obspy.screening.values import Columns, Table, both, chosen, values
+from per_obspy.screening.values import Columns, Table, both, chosen, only, values
 
 #: Nodes of pairs in which a building can yield, whose demand takes fifty times as long.
 YIELDING_NODES = 32
@@ -93,6 +93,21 @@ PAIR = (
 
 #: Columns of one building, besides those at nodes, from which the exact demand follows.
 BUILDING = ("participation", "yield_displacement", "hardening", "per", "contact_mass")
+
+#: Columns of one building from which a population follows.
+NEEDED_OF_BUILDING = (
+    *BUILDING,
+    *("period", "damping", "period_log_std", "damping_log_std", "amplification_exact"),
+    *("equivalent_period", "equivalent_damping", "equivalent_per"),
+)
+
+#: Columns from which a population follows.
+NEEDED = (
+    *PAIR,
+    *("gap_std", "assumed_gap", "absolute_gap", "demand_rule", "demand_exact"),
+    *("correlation", "correlation_record", "correlation_linearized", "impact_velocity_exact"),
+    *(f"{name}_{i}" for name in NEEDED_OF_BUILDING for i in (1, 2)),
+)
 
 
 class _Block(NamedTuple):
@@ -132,6 +147,7 @@ def record_population(station: StationMotion, table: Table, screening: Screening
         ``population.COLUMNS``. Where the exact demand decides without uncertain inputs, the
         results of the exact history.
     """
+    table = only(table, NEEDED)
     exact = is_exact(table)
     result: Columns = {name: np.empty(exact.size) for name in COLUMNS}
     # estimates, which show too which pairs of derived periods may touch

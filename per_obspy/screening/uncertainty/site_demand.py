@@ -200,10 +200,17 @@ def _radius_at_site(
 ) -> FloatArray:
     """Return the radius of building i at contact height at the site, from stored spectra, m."""
     oscillator = log_oscillator(table, i)
-    along = stored_log(station.per, row, *oscillator)
-    median = stored_log(station.per_rotd50, np.zeros_like(row), *oscillator)
+    # known azimuths take the median over all, the others the record's worst; few tables have both
+    stored = np.empty(row.size)
+    for mask, spectra, rows in (
+        (given, station.per_rotd50, np.zeros_like(row)),
+        (~given, station.per, row),
+    ):
+        if mask.all():
+            stored = stored_log(spectra, rows, *oscillator)
+        elif mask.any():
+            some = (column[mask] for column in oscillator)
+            stored[mask] = stored_log(spectra, rows[mask], *some)
     ln_ratio, _ = motion_at_site(table, i)
-    radius: FloatArray = values(table, f"participation_{i}") * np.exp(
-        np.where(given, median, along) + ln_ratio
-    )
+    radius: FloatArray = values(table, f"participation_{i}") * np.exp(stored + ln_ratio)
     return radius

@@ -1,4 +1,8 @@
-"""Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row."""
+"""
+Rows of buildings: chains, rings, bends, cuts; every pair is in exactly one row.
+
+Tested here as well: per_obspy.inventory.building_rows.walks.
+"""
 
 import time
 from itertools import pairwise

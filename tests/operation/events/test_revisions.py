@@ -71,6 +71,22 @@ def test_changes_of_pairs_stations_and_the_earthquake(event):
     ]
 
 
+def test_changes_of_a_table_by_cell(tmp_path):
+    # a table that has grown beyond one file, and pairs that are in another cell than before
+    before, after = tmp_path / "before", tmp_path / "after"
+    for folder, pairs in ((before, {"P1": "yes", "P2": "no"}), (after, {"P1": "no", "P2": "no"})):
+        folder.mkdir()
+        write_tables(folder, pairs, {})
+    (after / "risk").mkdir()
+    table = pd.read_parquet(after / "risk.parquet")
+    for row in (0, 1):
+        table.iloc[[row]].to_parquet(after / "risk" / f"lat{row}_lon0.parquet")
+    (after / "risk.parquet").unlink()
+    write_changes(before, after, {})
+    with (after / "changes.csv").open(newline="") as file:
+        assert list(csv.reader(file))[1:] == [["pair", "P1", "state", "yes", "no"]]
+
+
 def test_names_are_no_formulas_to_a_spreadsheet(tmp_path):
     before, after = tmp_path / "before", tmp_path / "after"
     for folder, state in ((before, "no"), (after, "yes")):

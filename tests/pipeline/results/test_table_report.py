@@ -27,7 +27,7 @@ from per_obspy.pipeline.results.result_files import Screening, write_results
 from per_obspy.pipeline.results.run_facts import event_of_run
 from per_obspy.pipeline.results.table_notes import Notes
 from per_obspy.report.overview import Region
-from per_obspy.tables.risk import ranked_table
+from per_obspy.tables.ranked.ranked_table import ranked_table
 from per_obspy.tables.totals import piece_totals
 
 from ...report.page.made_up import CLASSES, pair_table
@@ -234,9 +234,10 @@ def test_pieces_leave_no_memory_behind(tmp_path):
     table = pd.concat([pair_table(4000), more], axis=1)
     parquet.write_table(pa.Table.from_pandas(table), tmp_path / "risk.parquet")
     notes, totals, before = Notes(CLASSES), [], []
-    for _ in range(4):
-        with ranked_table(tmp_path / "risk.parquet") as file:
+    for number in range(4):
+        with ranked_table([tmp_path / "risk.parquet"]) as file:
             for piece in file.pieces():
+                piece["rank"] += number * len(table)
                 notes.add(piece)
                 totals.append(piece_totals(piece, Totals(), CLASSES))
         del piece
@@ -249,6 +250,7 @@ def test_pieces_leave_no_memory_behind(tmp_path):
 def test_notes_do_not_depend_on_pieces():
     table = pd.DataFrame(
         {
+            "rank": [1, 2, 3],
             "state": ["yes", "unknown", "no"],
             "risk_class": ["severe", "gap unknown", "low"],
             "probability": [0.9, np.nan, 0.1],
@@ -256,7 +258,7 @@ def test_notes_do_not_depend_on_pieces():
             "derived": ["mass_1", "", ""],
         }
     )
-    for pieces in ([table], [table[:1], table[1:]]):
+    for pieces in ([table], [table[:1], table[1:]], [table[1:], table[:1]]):
         notes = Notes(["severe"])
         for piece in pieces:
             notes.add(piece)

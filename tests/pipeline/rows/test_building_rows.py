@@ -2,7 +2,8 @@
 Rows of buildings in a run: the same bytes however it is cut, resumed, or shared between processes.
 
 The modules of its tables are tested here as well: per_obspy.tables.building_rows and
-per_obspy.tables.buildings.
+per_obspy.tables.buildings; and its steps: per_obspy.pipeline.rows.all_rows,
+per_obspy.pipeline.rows.found_rows and per_obspy.pipeline.rows.pair_columns.
 """
 
 import json

@@ -94,6 +94,14 @@ def test_the_field_lets_expect_the_critical_gap_of_its_radii(record, station, ta
     assert_allclose(np.exp(unknown.ln_field), gap / 1.16, rtol=1e-6)
 
 
+def test_known_and_unknown_azimuths_of_one_block_do_not_mix(record, table):
+    # would catch a row of another azimuth, or RotD50, taken by a pair of the other kind
+    known = table.assign(**SITE, azimuth_used=np.arange(20.0, 20.0 + 30.0 * len(table), 30.0))
+    mixed = known.assign(azimuth=np.where(np.arange(len(known)) % 2, np.nan, 70.0))
+    alone = [site_demand(record, mixed.iloc[[i]], SCREENING).ln_field for i in range(len(mixed))]
+    assert_array_equal(site_demand(record, mixed, SCREENING).ln_field, np.concatenate(alone))
+
+
 def test_buildings_in_the_other_order_have_the_same_motion(record, table):
     at_site = table.assign(**SITE)
     site, other = (site_demand(record, some, SCREENING) for some in (at_site, _exchanged(at_site)))

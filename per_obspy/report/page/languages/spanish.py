@@ -280,7 +280,7 @@ SPANISH: dict[str, str] = {
     "head_reasons": "razones",
     "made_with": "hecho con",
     "files": "archivos junto a esta página",
-    "files_list": "risk.parquet, stations.csv, rejected.csv, run.json (entradas con sus huellas)",
+    "files_list": "risk.parquet o risk/, stations.csv, rejected.csv, run.json (con huellas)",
     "configuration": "configuración",
     "station_used": "usada",
     "station_rejected": "rechazada",
