@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
-from per_obspy.kernels.relative.relative_samples import STATE_PEAKS, frame_of
+from per_obspy.kernels._jit import kernel, lean
+from per_obspy.kernels.relative.relative_samples import STATE_PEAKS, shift_of
 from per_obspy.kernels.spectra.tile_search import TILE
 
 
@@ -55,7 +55,7 @@ def strongest_inputs(inputs):
     return strongest
 
 
-@kernel
+@lean
 def largest_radii(pair, table, lane, inputs):
     """Return the largest radii of both structures, and of D, before any tile so far."""
     peak = abs(pair[6]) * inputs[0, 0] + abs(pair[7]) * inputs[0, 1]
@@ -64,7 +64,7 @@ def largest_radii(pair, table, lane, inputs):
     return radius_1, radius_2, math.sqrt(table[STATE_PEAKS + 2, lane])
 
 
-@kernel
+@lean
 def present_radii(pair, motion):
     """Return the radii of both structures, and of D, in a state ``u, z`` of 1, then of 2."""
     u1, z1, u2, z2 = motion
@@ -73,7 +73,7 @@ def present_radii(pair, motion):
     return math.hypot(u1, z1), math.hypot(u2, z2), math.hypot(distance, slope)
 
 
-@kernel
+@lean
 def tile_margins(pair, dt, radii, inputs):
     """Return :func:`between_sample_margins` over a tile, from its strongest motion (3, 2)."""
     # Strongest motion along the pair's azimuth
@@ -84,7 +84,7 @@ def tile_margins(pair, dt, radii, inputs):
     return between_sample_margins(pair, dt, TILE * dt, radii, (peak, rate, integral))
 
 
-@kernel
+@lean
 def between_sample_margins(pair, dt, duration, radii, ground):
     """
     Return bounds of how far the relative displacement exceeds its samples, and their cubics.
@@ -113,7 +113,7 @@ def between_sample_margins(pair, dt, duration, radii, ground):
     return dt**2 / 8.0 * second, dt**4 / 384.0 * fourth
 
 
-@kernel
+@lean
 def differences(pair):
     """Return the sizes of q1 - q2, q2 (c1 - c2) and q2 (k1 - k2) of two structures."""
     # c = 2 xi omega, k = omega²
@@ -122,15 +122,15 @@ def differences(pair):
     return abs(pair[2] - pair[5]), pair[5] * viscosity, pair[5] * stiffness
 
 
-@kernel
+@lean
 def _radius(body, table, lane, peak):
     """Return the largest radius of a structure before a tile."""
-    scale, _, _, shift_u, shift_z = frame_of(body, table, lane)
+    shift_u, shift_z = shift_of(body, table, lane)
     shifted = math.sqrt(table[STATE_PEAKS + body, lane])
-    return scale * shifted + math.hypot(shift_u, shift_z) * peak
+    return shifted + math.hypot(shift_u, shift_z) * peak
 
 
-@kernel
+@lean
 def _derivatives(omega, damping, radius, force, force_rate, force_bend):
     """Return bounds of an oscillator's second to fourth derivative, from radius and force."""
     viscosity = 2.0 * damping * omega
@@ -141,7 +141,7 @@ def _derivatives(omega, damping, radius, force, force_rate, force_bend):
     return second, third, fourth
 
 
-@kernel
+@lean
 def may_grow(pair, motion, largest):
     """
     Return whether a free vibration may exceed one of the largest values.

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import kernel, lean
 from per_obspy.kernels.relative.bounds import (
     largest_radii,
     may_grow,
@@ -220,14 +220,13 @@ def _drop_settled(steps, dt, block, table, moving, best):
 @kernel
 def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
     """Raise the largest values to those of the tiles, samples and peaks between them."""
-    highest = _raise_velocities(block, checkpoints, inputs.shape[0], first, windows, best)
+    highest = _raise_velocities(dt, checkpoints, inputs.shape[0], first, windows, best)
     # The tiles of the largest bounds first: few others remain
     for lane in range(PAIR_LANES):
         for side in range(2):
             tile = highest[side, lane]
             if tile >= 0:
-                part = ground[:, tile * TILE : (tile + 1) * TILE + 1]
-                _search(part, dt, block[lane], table, lane, checkpoints[tile], inputs[tile], best)
+                _search(ground, dt, block, table, lane, checkpoints, inputs, tile, best)
     # Limits of the bounds of tiles that need no search, from margins over all tiles
     limits = np.empty((2, PAIR_LANES))
     strongest = strongest_inputs(inputs)
@@ -243,13 +242,12 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
             near += high or -checkpoints[tile, LEAST, lane] > limits[1, lane]
         if near:
             # Pair by pair
-            part = ground[:, tile * TILE : (tile + 1) * TILE + 1]
-            now = checkpoints[tile], inputs[tile], first + tile
-            _search_lanes(part, dt, block, table, now, windows, limits, best)
+            now = tile, first + tile
+            _search_lanes(ground, dt, block, table, checkpoints, inputs, now, windows, limits, best)
 
 
 @kernel
-def _raise_velocities(block, checkpoints, tiles, first, windows, best):
+def _raise_velocities(dt, checkpoints, tiles, first, windows, best):
     """
     Raise the largest velocities to the samples of the tiles that count.
 
@@ -276,35 +274,37 @@ def _raise_velocities(block, checkpoints, tiles, first, windows, best):
             sampled[0, lane] = max(sampled[0, lane], high)
             sampled[1, lane] = max(sampled[1, lane], low)
             sampled[2, lane] = max(sampled[2, lane], part * checkpoints[tile, APPROACH, lane])
-    # Velocities are over the frequency of structure 1
+    # A reach is a third of what a velocity adds per step
     for lane in range(PAIR_LANES):
-        best[lane, 2] = max(best[lane, 2], block[lane, 0] * sampled[2, lane])
+        best[lane, 2] = max(best[lane, 2], 3.0 / dt * sampled[2, lane])
     return highest.astype(np.int64)
 
 
-@kernel
-def _search_lanes(ground, dt, block, table, now, windows, limits, best):
-    """Search a tile (checkpoint, inputs, number) of all pairs whose bounds are above limits."""
-    checkpoint, inputs, tile = now  # the tile
+@lean
+def _search_lanes(ground, dt, block, table, checkpoints, inputs, now, windows, limits, best):
+    """Search a tile (place, number) of all pairs whose bounds are above limits."""
+    tile, number = now
     for lane in range(PAIR_LANES):
-        near = checkpoint[GREATEST, lane] > limits[0, lane]
-        near |= -checkpoint[LEAST, lane] > limits[1, lane]
-        if near and windows[0, lane] <= tile <= windows[1, lane]:
-            _search(ground, dt, block[lane], table, lane, checkpoint, inputs, best)
+        near = checkpoints[tile, GREATEST, lane] > limits[0, lane]
+        near |= -checkpoints[tile, LEAST, lane] > limits[1, lane]
+        if near and windows[0, lane] <= number <= windows[1, lane]:
+            _search(ground, dt, block, table, lane, checkpoints, inputs, tile, best)
 
 
-@kernel
-def _search(ground, dt, pair, table, lane, checkpoint, inputs, best):
+@lean
+def _search(ground, dt, block, table, lane, checkpoints, inputs, tile, best):
     """Raise the largest values of a pair to its peaks in a tile, if they may exceed them."""
+    pair, checkpoint, first = block[lane], checkpoints[tile], tile * TILE
     # States of both structures before the tile
-    acceleration = pair[6] * ground[0, 0] + pair[7] * ground[1, 0]
+    acceleration = pair[6] * ground[0, first] + pair[7] * ground[1, first]
     u1, z1 = state_of(0, table, lane, checkpoint[0, lane], checkpoint[1, lane], acceleration)
     u2, z2 = state_of(1, table, lane, checkpoint[2, lane], checkpoint[3, lane], acceleration)
     before = (u1, z1, u2, z2)
     # The bound of this tile alone
-    _, margin = tile_margins(pair, dt, present_radii(pair, before), inputs)
+    _, margin = tile_margins(pair, dt, present_radii(pair, before), inputs[tile])
     high = checkpoint[GREATEST, lane] + margin > best[lane, 0]
     if high or margin - checkpoint[LEAST, lane] > best[lane, 1]:
-        search_pair_tile(pair, dt, ground[0], ground[1], before, margin, best[lane])
+        north, east = ground[0, first : first + TILE + 1], ground[1, first : first + TILE + 1]
+        search_pair_tile(pair, dt, north, east, before, margin, best[lane])
         # It is not searched again
         checkpoint[GREATEST, lane], checkpoint[LEAST, lane] = -np.inf, np.inf

@@ -2,7 +2,7 @@
 
 import math
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import lean
 from per_obspy.kernels.oscillator.exact_step import state_after, step_coefficients
 from per_obspy.kernels.relative.bounds import between_sample_margins, present_radii
 from per_obspy.kernels.spectra.tile_search import TILE
@@ -17,7 +17,7 @@ NEWTON_STEPS = 4
 SETTLED_SHIFT = 1e-9
 
 
-@kernel
+@lean
 def search_pair_tile(pair, dt, north, east, state, margin, largest):
     """
     Raise the largest values (2,) of a pair by the peaks between the samples of a tile.
@@ -58,7 +58,7 @@ def search_pair_tile(pair, dt, north, east, state, margin, largest):
                 _search_step(pair, dt, before, start, end, ends, own, largest)
 
 
-@kernel
+@lean
 def _step_margin(pair, dt, state, start, end):
     """Return how far the relative displacement exceeds the cubic of a step at most."""
     integral = 0.5 * (abs(start) + abs(end)) * dt
@@ -67,7 +67,7 @@ def _step_margin(pair, dt, state, start, end):
     return margin
 
 
-@kernel
+@lean
 def _stepped(c, u, z, start, end):
     """Return the state of a structure after a step."""
     u_end = c[0] * u + c[1] * z + (c[4] * start + c[5] * end)
@@ -75,7 +75,7 @@ def _stepped(c, u, z, start, end):
     return u_end, z_end
 
 
-@kernel
+@lean
 def _search_step(pair, dt, state, start, end, ends, margin, largest):
     """Raise the largest values to the peaks in one step, cut so that cubics resolve them."""
     parts = math.ceil(max(pair[0], pair[3]) * dt / LONGEST_PHASE)
@@ -107,7 +107,7 @@ def _search_step(pair, dt, state, start, end, ends, margin, largest):
         slope_0 = slope_1
 
 
-@kernel
+@lean
 def _climb(pair, state, time, dt, acceleration, rate, largest):
     """Raise the largest values to the stationary value near a time of the step."""
     # Newton's method for the root of the relative velocity
@@ -122,7 +122,7 @@ def _climb(pair, state, time, dt, acceleration, rate, largest):
     largest[1] = max(largest[1], -distance)
 
 
-@kernel
+@lean
 def _relative_motion(pair, state, time, acceleration, rate):
     """Return relative displacement, velocity and acceleration at a time after the step's start."""
     distance = slope = bend = 0.0

@@ -1,39 +1,49 @@
 r"""
-Relative motion of a block of pairs at the samples: 26 multiply-adds and comparisons per step.
+Relative motion of a block of pairs at the samples: 18 multiply-adds per step.
 
-Time runs outside, pairs inside, four steps at a time. The relative displacement ``q1 u1 - q2 u2``
-and the relative velocity are linear forms of the shifted states of both structures and the
-acceleration. A pair starts at rest before the tile from which its motion counts.
+Time runs outside, pairs inside, four steps at a time. The state of a structure is shifted by its
+part that follows the acceleration at the end of a step, so that the acceleration at the start is
+the only input, and counted in what it adds to the relative displacement ``q1 u1 - q2 u2`` and to a
+third of its change per step: both are differences of states and a multiple of the acceleration.
+A pair starts at rest before the tile from which its motion counts.
 
 The cubic through values d and slopes v at the ends of a step is bounded by its Bernstein
 coefficients, ``d + dt v / 3`` at its start and ``d - dt v / 3`` at its end; near a peak these
 exceed it by a third of what the peak exceeds the samples at most.
 """
 
-import numpy as np
-
-from per_obspy.kernels._jit import inlined, kernel
-from per_obspy.kernels.oscillator.exact_step import shifted_rest, shifted_step, unshifted
+from per_obspy.kernels._aligned import aligned
+from per_obspy.kernels._jit import inlined, kernel, vectorised
+from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
 
 #: Pairs next to each other: a constant trip count, which the compiler turns into vectors.
 PAIR_LANES = 32
+#: Instead of a participation of zero, by which states could not be divided.
+SMALLEST_SHARE = 1e-60
 
-#: Rows of a block's table, one column per pair: two step matrices; the direction; the forms of the
-#: relative displacement, and of the relative velocity over the frequency of structure 1; both
-#: states and the acceleration; the largest and smallest Bernstein coefficients of the relative
-#: displacement and the largest relative velocity of a tile; the squares of the largest states, and
-#: of relative displacement and velocity, before tiles; a third of a step, as phase of structure 1;
-#: the frame of each structure. One table, because the compiler would have to prove of several
-#: arrays that they do not overlap.
-DIRECTION, DISTANCE, SLOPE, STATE, EXTREMES, STATE_PEAKS = 8, 10, 15, 20, 25, 28
-THIRD, FRAME = 31, 32
-PAIR_ROWS = 42
-#: Rows that a step uses.
-LOCAL = FRAME
+#: Rows of a block's table, one column per pair: matrix and input of a step of structure 1, then of
+#: 2; the direction; what the acceleration adds to relative displacement and reach, a third of the
+#: displacement's change per step; both states and the acceleration; the largest and smallest
+#: Bernstein coefficients of the relative displacement and the largest reach of a tile; the squares
+#: of the largest states, and of relative displacement and velocity over the frequency of structure
+#: 1, before tiles; whether a tile counts; the latter over the reach; displacement and velocity of
+#: structure 1 and 2 over those of the state; the shift of each structure. One table, because the
+#: compiler would have to prove of several arrays that they do not overlap.
+STEP_ROWS, DIRECTION, FOLLOWED, STATE, EXTREMES, STATE_PEAKS = 6, 12, 14, 16, 21, 24
+COUNTS, PER_REACH, UNITS, SHIFT, PAIR_ROWS = 27, 28, 29, 33, 37
+#: Rows that a step uses, and where each begins in one line of memory: it needs one pointer.
+LOCAL = SHIFT
+A11, A12, A21, A22, A1, A2 = (row * PAIR_LANES for row in range(STEP_ROWS))
+B11, B12, B21, B22, B1, B2 = (row * PAIR_LANES for row in range(STEP_ROWS, DIRECTION))
+NORTH, EAST, OF_DISTANCE, OF_REACH = (row * PAIR_LANES for row in range(DIRECTION, STATE))
+U, Z, W, Y, P = (row * PAIR_LANES for row in range(STATE, EXTREMES))
+HIGH, LOW, FAST = (row * PAIR_LANES for row in range(EXTREMES, STATE_PEAKS))
+SQUARE_1, SQUARE_2, SQUARE, COUNTED = (row * PAIR_LANES for row in range(STATE_PEAKS, PER_REACH))
+PER, U_UNIT, Z_UNIT, W_UNIT, Y_UNIT = (row * PAIR_LANES for row in range(PER_REACH, SHIFT))
 #: Rows of a tile's checkpoint: the states before the tile (0 to 3), the largest and the smallest
-#: Bernstein coefficient of the relative displacement, and the largest relative velocity over the
-#: frequency of structure 1.
+#: Bernstein coefficient of the relative displacement, and the largest reach: relative velocity
+#: times a third of a step.
 GREATEST, LEAST, APPROACH, PAIR_CHECKPOINT_ROWS = 4, 5, 6, 7
 
 
@@ -45,61 +55,42 @@ def pack_pair(pair, dt, table, lane):
     ``pair`` (8,): circular frequency, damping and participation of structure 1, then of 2; cosine
     and sine of the azimuth.
     """
-    table[THIRD, lane] = pair[0] * dt / 3.0
-    table[DIRECTION, lane] = pair[6]
-    table[DIRECTION + 1, lane] = pair[7]
-    table[DISTANCE + 4, lane] = table[SLOPE + 4, lane] = 0.0
+    table[DIRECTION, lane], table[DIRECTION + 1, lane] = pair[6], pair[7]
+    table[PER_REACH, lane] = 3.0 / (pair[0] * dt)
+    table[FOLLOWED, lane] = table[FOLLOWED + 1, lane] = 0.0
     for body in range(2):
-        # Step matrix and frame of the shifted states
-        matrix, frame = shifted_step(pair[3 * body], pair[3 * body + 1], dt)
-        scale, c, s, shift_u, shift_z = frame
-        for row in range(4):
-            table[4 * body + row, lane] = matrix[row]
-        for row in range(5):
-            table[FRAME + 5 * body + row, lane] = frame[row]
-        # Relative displacement, q1 u1 - q2 u2, as a form of the shifted states
-        weight = pair[3 * body + 2] * (1.0 - 2.0 * body)
-        table[DISTANCE + 2 * body, lane] = weight * scale * c
-        table[DISTANCE + 2 * body + 1, lane] = -weight * scale * s
-        table[DISTANCE + 4, lane] += weight * shift_u
-        # Relative velocity over the frequency of structure 1
-        slope = weight * pair[3 * body] / pair[0]
-        table[SLOPE + 2 * body, lane] = slope * scale * s
-        table[SLOPE + 2 * body + 1, lane] = slope * scale * c
-        table[SLOPE + 4, lane] += slope * shift_z
+        omega, share = pair[3 * body], max(pair[3 * body + 2], SMALLEST_SHARE)
+        # Displacement and velocity over frequency in the relative displacement and reach
+        along, across = share, share * omega * dt / 3.0
+        a11, a12, a21, a22, b11, b12, b21, b22 = step_coefficients(omega, pair[3 * body + 1], dt)
+        row = STEP_ROWS * body
+        table[row, lane], table[row + 1, lane] = a11, a12 * along / across
+        table[row + 2, lane], table[row + 3, lane] = a21 * across / along, a22
+        # The shifted state is driven by the acceleration at the start only
+        table[row + 4, lane] = along * (a11 * b12 + a12 * b22 + b11)
+        table[row + 5, lane] = across * (a21 * b12 + a22 * b22 + b21)
+        # Its shift, and what this adds to the relative motion
+        table[SHIFT + 2 * body, lane], table[SHIFT + 2 * body + 1, lane] = b12, b22
+        table[UNITS + 2 * body, lane] = 1.0 / along
+        table[UNITS + 2 * body + 1, lane] = 1.0 / across
+        sign = 1.0 - 2.0 * body
+        table[FOLLOWED, lane] += sign * along * b12
+        table[FOLLOWED + 1, lane] += sign * across * b22
 
 
 @kernel
-def frame_of(body, table, lane):
-    """Return scale, rotation and shift of a structure."""
-    row = FRAME + 5 * body
-    return (
-        table[row, lane],
-        table[row + 1, lane],
-        table[row + 2, lane],
-        table[row + 3, lane],
-        table[row + 4, lane],
-    )
-
-
-@kernel
-def start_pairs_at_rest(north, east, tile, windows, table, local):
-    """Fill the shifted states of the structures that are at rest before a tile."""
-    for lane in range(PAIR_LANES):
-        if tile != windows[0, lane]:
-            continue
-        # Acceleration along the pair's azimuth
-        acceleration = table[DIRECTION, lane] * north + table[DIRECTION + 1, lane] * east
-        for body in range(2):
-            along, across = shifted_rest(frame_of(body, table, lane), acceleration)
-            local[STATE + 2 * body, lane] = along
-            local[STATE + 2 * body + 1, lane] = across
+def shift_of(body, table, lane):
+    """Return displacement and velocity over frequency that follow an acceleration of 1."""
+    return table[SHIFT + 2 * body, lane], table[SHIFT + 2 * body + 1, lane]
 
 
 @kernel
 def state_of(body, table, lane, along, across, acceleration):
     """Return displacement and velocity over frequency of a structure from its shifted state."""
-    return unshifted(frame_of(body, table, lane), along, across, acceleration)
+    shift_u, shift_z = shift_of(body, table, lane)
+    u = table[UNITS + 2 * body, lane] * along + shift_u * acceleration
+    z = table[UNITS + 2 * body + 1, lane] * across + shift_z * acceleration
+    return u, z
 
 
 @kernel
@@ -111,51 +102,81 @@ def run_pair_tiles(north, east, first_tile, windows, table, checkpoints):
     ``first_tile``; ``windows`` (2, lanes): the tile before which each pair is at rest, and the last
     one that counts; ``checkpoints`` (tile, row, lane).
     """
-    local = np.empty((LOCAL, PAIR_LANES))  # of a size that the compiler knows: it makes vectors
-    local[:] = table[:LOCAL]
+    local = aligned(1, LOCAL * PAIR_LANES)[0]
+    local[:] = table[:LOCAL].ravel()
     for first in range(0, north.size - 1, TILE):
         # Pairs that start here, and the states before the tile
-        tile = first_tile + first // TILE
-        start_pairs_at_rest(north[first], east[first], tile, windows, table, local)
-        _open_tile(north[first], east[first], tile, windows, local, checkpoints[first // TILE])
+        tile, place = first_tile + first // TILE, first // TILE
+        if _count_lanes(tile, windows, local):
+            _start_at_rest(north[first], east[first], tile, windows, table, local)
+        _open_tile(north[first], east[first], local)
+        _copy_rows(local, STATE, 4, checkpoints[place, :GREATEST])
         _run_tile(north, east, first, local)
+        # Its largest values
+        _copy_rows(local, EXTREMES, 3, checkpoints[place, GREATEST:])
+    _copy_rows(local, STATE, COUNTS - STATE, table[STATE:COUNTS])
+
+
+@vectorised
+def _count_lanes(tile, windows, local):
+    """Fill whether a tile counts; return the number of pairs that are at rest before it."""
+    starts = 0
+    for lane in range(PAIR_LANES):
+        begins, ends = windows[0, lane], windows[1, lane]
+        local[COUNTED + lane] = 1.0 if (begins <= tile) & (tile <= ends) else 0.0
+        starts += 1 if begins == tile else 0
+    return starts
+
+
+@vectorised
+def _start_at_rest(north, east, tile, windows, table, local):
+    """Fill the shifted states of the structures that are at rest before a tile."""
+    for lane in range(PAIR_LANES):
+        if tile != windows[0, lane]:
+            continue
+        # Acceleration along the pair's azimuth
+        acceleration = table[DIRECTION, lane] * north + table[DIRECTION + 1, lane] * east
+        for row in range(4):
+            rest = -table[SHIFT + row, lane] / table[UNITS + row, lane] * acceleration
+            local[(STATE + row) * PAIR_LANES + lane] = rest
+
+
+@vectorised
+def _copy_rows(local, first, count, rows):
+    """Copy some rows of a block's line of memory."""
+    for row in range(count):
         for lane in range(PAIR_LANES):
-            checkpoints[first // TILE, GREATEST, lane] = local[EXTREMES, lane]
-            checkpoints[first // TILE, LEAST, lane] = local[EXTREMES + 1, lane]
-            checkpoints[first // TILE, APPROACH, lane] = local[EXTREMES + 2, lane]
-    table[:LOCAL] = local
+            rows[row, lane] = local[(first + row) * PAIR_LANES + lane]
 
 
-@kernel
-def _open_tile(north, east, tile, windows, t, checkpoint):
-    """Store the states before a tile, and start its largest and smallest values with theirs."""
+@inlined
+def _open_tile(north, east, t):
+    """Start the largest and smallest values of a tile with those of the states before it."""
     for lane in range(PAIR_LANES):
         # Shifted states of structures 1 (u, z) and 2 (w, y); denormal numbers become zero
-        u, z = _flushed(t[20, lane]), _flushed(t[21, lane])
-        w, y = _flushed(t[22, lane]), _flushed(t[23, lane])
-        # Relative displacement and velocity at the first sample
-        p = t[8, lane] * north + t[9, lane] * east
-        distance = (t[10, lane] * u + t[11, lane] * z) + (
-            t[12, lane] * w + (t[13, lane] * y + t[14, lane] * p)
-        )
-        slope = (t[15, lane] * u + t[16, lane] * z) + (
-            t[17, lane] * w + (t[18, lane] * y + t[19, lane] * p)
-        )
-        # Start of the tile: states, acceleration, first Bernstein coefficient, velocity
-        t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p
-        first = distance + t[31, lane] * slope
-        t[25, lane], t[26, lane], t[27, lane] = max(distance, first), min(distance, first), slope
+        u, z = _flushed(t[U + lane]), _flushed(t[Z + lane])
+        w, y = _flushed(t[W + lane]), _flushed(t[Y + lane])
+        # Relative displacement and reach at the first sample
+        p = t[NORTH + lane] * north + t[EAST + lane] * east
+        distance = (u - w) + t[OF_DISTANCE + lane] * p
+        reach = (z - y) + t[OF_REACH + lane] * p
+        # Start of the tile: states, acceleration, first Bernstein coefficient, reach
+        t[U + lane], t[Z + lane], t[W + lane], t[Y + lane], t[P + lane] = u, z, w, y, p
+        first = distance + reach
+        t[HIGH + lane], t[LOW + lane] = max(distance, first), min(distance, first)
+        t[FAST + lane] = reach
         # Squares of the largest states before tiles that count, for the bounds
-        counts = 1.0 if windows[0, lane] <= tile <= windows[1, lane] else 0.0
-        t[28, lane] = max(t[28, lane], counts * (u * u + z * z))
-        t[29, lane] = max(t[29, lane], counts * (w * w + y * y))
-        t[30, lane] = max(t[30, lane], counts * (distance * distance + slope * slope))
-        # Checkpoint
-        checkpoint[0, lane], checkpoint[1, lane] = u, z
-        checkpoint[2, lane], checkpoint[3, lane] = w, y
+        counts = t[COUNTED + lane]
+        u, z = t[U_UNIT + lane] * u, t[Z_UNIT + lane] * z
+        w, y = t[W_UNIT + lane] * w, t[Y_UNIT + lane] * y
+        slope = t[PER + lane] * reach
+        t[SQUARE_1 + lane] = max(t[SQUARE_1 + lane], counts * (u * u + z * z))
+        t[SQUARE_2 + lane] = max(t[SQUARE_2 + lane], counts * (w * w + y * y))
+        square = distance * distance + slope * slope
+        t[SQUARE + lane] = max(t[SQUARE + lane], counts * square)
 
 
-@kernel
+@inlined
 def _flushed(value):
     return value if abs(value) > SMALLEST_STATE else 0.0
 
@@ -169,46 +190,44 @@ def _run_tile(north, east, first, t):
         east_1, east_2, east_3, east_4 = east[i], east[i + 1], east[i + 2], east[i + 3]
         for lane in range(PAIR_LANES):
             # Acceleration along the pair's azimuth
-            p1 = t[8, lane] * north_1 + t[9, lane] * east_1
-            p2 = t[8, lane] * north_2 + t[9, lane] * east_2
-            p3 = t[8, lane] * north_3 + t[9, lane] * east_3
-            p4 = t[8, lane] * north_4 + t[9, lane] * east_4
-            # Four steps of both structures, with their relative displacement d and velocity v
-            u, z, w, y, d1, v1 = _moved(
-                t, lane, t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane], p1
-            )
-            u, z, w, y, d2, v2 = _moved(t, lane, u, z, w, y, p1, p2)
-            u, z, w, y, d3, v3 = _moved(t, lane, u, z, w, y, p2, p3)
-            u, z, w, y, d4, v4 = _moved(t, lane, u, z, w, y, p3, p4)
-            t[20, lane], t[21, lane], t[22, lane], t[23, lane], t[24, lane] = u, z, w, y, p4
+            p1 = t[NORTH + lane] * north_1 + t[EAST + lane] * east_1
+            p2 = t[NORTH + lane] * north_2 + t[EAST + lane] * east_2
+            p3 = t[NORTH + lane] * north_3 + t[EAST + lane] * east_3
+            p4 = t[NORTH + lane] * north_4 + t[EAST + lane] * east_4
+            # Four steps of both structures, with their relative displacement d and reach s
+            u, z, w, y = t[U + lane], t[Z + lane], t[W + lane], t[Y + lane]
+            u, z, w, y, d1, s1 = _moved(t, lane, u, z, w, y, t[P + lane], p1)
+            u, z, w, y, d2, s2 = _moved(t, lane, u, z, w, y, p1, p2)
+            u, z, w, y, d3, s3 = _moved(t, lane, u, z, w, y, p2, p3)
+            u, z, w, y, d4, s4 = _moved(t, lane, u, z, w, y, p3, p4)
+            t[U + lane], t[Z + lane], t[W + lane], t[Y + lane], t[P + lane] = u, z, w, y, p4
+            # Largest reach
+            early, late = max(s1, s2), max(s3, s4)
+            t[FAST + lane] = max(t[FAST + lane], early, late)
             # Distance of the Bernstein coefficients from the samples
-            s1, s2 = abs(t[31, lane] * v1), abs(t[31, lane] * v2)
-            s3, s4 = abs(t[31, lane] * v3), abs(t[31, lane] * v4)
+            s1, s2, s3, s4 = abs(s1), abs(s2), abs(s3), abs(s4)
             # Largest of them
             early = max(d1 + s1, d2 + s2)
             late = max(d3 + s3, d4 + s4)
-            t[25, lane] = max(t[25, lane], early, late)
+            t[HIGH + lane] = max(t[HIGH + lane], early, late)
             # Smallest of them
             early = min(d1 - s1, d2 - s2)
             late = min(d3 - s3, d4 - s4)
-            t[26, lane] = min(t[26, lane], early, late)
-            # Largest relative velocity
-            early = max(v1, v2)
-            late = max(v3, v4)
-            t[27, lane] = max(t[27, lane], early, late)
+            t[LOW + lane] = min(t[LOW + lane], early, late)
 
 
 @inlined
 def _moved(t, lane, u, z, w, y, start, end):
-    """Return the states after one step and their relative displacement and velocity."""
+    """Return the states after one step and their relative displacement and reach."""
     # Shifted steps of structures 1 (u, z) and 2 (w, y)
-    u, z = t[0, lane] * u + (t[1, lane] * z + start), t[2, lane] * u + t[3, lane] * z
-    w, y = t[4, lane] * w + (t[5, lane] * y + start), t[6, lane] * w + t[7, lane] * y
-    # Their forms q1 u1 - q2 u2 and q1 v1 - q2 v2
-    distance = (t[10, lane] * u + t[11, lane] * z) + (
-        t[12, lane] * w + (t[13, lane] * y + t[14, lane] * end)
+    u, z = (
+        t[A11 + lane] * u + (t[A12 + lane] * z + t[A1 + lane] * start),
+        t[A21 + lane] * u + (t[A22 + lane] * z + t[A2 + lane] * start),
     )
-    slope = (t[15, lane] * u + t[16, lane] * z) + (
-        t[17, lane] * w + (t[18, lane] * y + t[19, lane] * end)
+    w, y = (
+        t[B11 + lane] * w + (t[B12 + lane] * y + t[B1 + lane] * start),
+        t[B21 + lane] * w + (t[B22 + lane] * y + t[B2 + lane] * start),
     )
-    return u, z, w, y, distance, slope
+    distance = (u - w) + t[OF_DISTANCE + lane] * end
+    reach = (z - y) + t[OF_REACH + lane] * end
+    return u, z, w, y, distance, reach
