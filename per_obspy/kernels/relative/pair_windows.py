@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from per_obspy.kernels._jit import kernel
+from per_obspy.kernels._jit import kernel, lean
 from per_obspy.kernels.relative.relative_samples import PAIR_LANES
 
 #: Tiles of a group, whose bounds are computed together.
@@ -77,7 +77,8 @@ def _rates(duration, block):
     for lane in range(PAIR_LANES):
         for body in range(2):
             # Structure of the pair, and phase of a group
-            omega, damping, share = block[lane, 3 * body : 3 * body + 3]
+            row = 3 * body
+            omega, damping, share = block[lane, row], block[lane, row + 1], block[lane, row + 2]
             phase = omega * duration
             # Decay over a group, and gains from the largest acceleration and from the integral of
             # the size, of the root of V over that of 1 - xi
@@ -124,9 +125,15 @@ def find_pair_windows(duration, block, bounds, floors, forgotten, windows):
             reached = distance >= floors[0, lane] or speed >= floors[1, lane]
             first[lane] = min(first[lane], this if reached else np.inf)
             last[lane] = this if reached else last[lane]
-    # Back to where the motion before is forgotten
+    _fill_windows(first, last, duration, block, bounds, floors, forgotten, windows)
+
+
+@lean
+def _fill_windows(first, last, duration, block, bounds, floors, forgotten, windows):
+    """Fill windows that begin where the motion before is forgotten; widen those that are wide."""
+    number = bounds.shape[1]
     for lane in range(PAIR_LANES):
-        negligible = forgotten * floors[:, lane]
+        negligible = forgotten * floors[0, lane], forgotten * floors[1, lane]
         start = _start(int(first[lane]), duration, block[lane], bounds[:, :, lane], negligible)
         windows[0, lane], windows[1, lane] = start, int(last[lane])
         # A wide window becomes the whole record
@@ -135,7 +142,7 @@ def find_pair_windows(duration, block, bounds, floors, forgotten, windows):
             floors[:, lane] = 0.0
 
 
-@kernel
+@lean
 def _start(first, duration, pair, bounds, negligible):
     """Return the last group before which the motion is forgotten by the first one that counts."""
     decay_1 = math.exp(-pair[1] * pair[0] * duration)

@@ -91,8 +91,7 @@ def relative_maxima(north, east, dt, pairs, forgotten, both_sides, largest):
         for first in range(0, pending.size, PAIR_LANES):
             # Fill the block, the last one with copies of its last pair
             chosen = pending[first : first + PAIR_LANES]
-            for lane in range(PAIR_LANES):
-                block[lane] = pairs[:, chosen[min(lane, chosen.size - 1)]]
+            _fill_block(pairs, chosen, block)
             bound_motion(groups, GROUP * TILE * dt, block, bounds)
             expected_motion(block, bounds, EXPECTED, floors)
             if again:
@@ -101,15 +100,15 @@ def relative_maxima(north, east, dt, pairs, forgotten, both_sides, largest):
             best[:, 1] = unwanted
             limits = floors, forgotten
             _run_block(ground, dt, block, chosen.size, inputs, bounds, limits, checkpoints, best)
-            for lane in range(chosen.size):
-                largest[:, chosen[lane]] = best[lane]
-                if not again and _is_short(best[lane], floors[:, lane]):
+            _store(best, chosen, largest)
+            for lane in range(0 if again else chosen.size):
+                if _is_short(best, floors, lane):
                     short[count] = chosen[lane]
                     count += 1
         pending = short[:count]
 
 
-@kernel
+@lean
 def _reached(largest, chosen, floors):
     """Lower the floors of a block to what its pairs are known to reach."""
     for lane in range(PAIR_LANES):
@@ -120,10 +119,26 @@ def _reached(largest, chosen, floors):
         floors[1, lane] = min(floors[1, lane], REACHED * largest[2, index])
 
 
-@kernel
-def _is_short(best, floors):
+@lean
+def _fill_block(pairs, chosen, block):
+    """Fill a block with pairs (8, n), of which it takes those chosen and copies of the last one."""
+    for lane in range(PAIR_LANES):
+        for row in range(8):
+            block[lane, row] = pairs[row, chosen[min(lane, chosen.size - 1)]]
+
+
+@lean
+def _store(best, chosen, largest):
+    """Store the largest values of a block."""
+    for lane in range(chosen.size):
+        for row in range(3):
+            largest[row, chosen[lane]] = best[lane, row]
+
+
+@lean
+def _is_short(best, floors, lane):
     """Return whether a pair does not reach what was expected of it in either direction."""
-    return min(best[0], best[1]) < floors[0] or best[2] < floors[1]
+    return min(best[lane, 0], best[lane, 1]) < floors[0, lane] or best[lane, 2] < floors[1, lane]
 
 
 @kernel
@@ -132,8 +147,7 @@ def _run_block(ground, dt, block, count, inputs, bounds, limits, checkpoints, be
     table = np.zeros((PAIR_ROWS, PAIR_LANES))
     windows = np.empty((2, PAIR_LANES), np.int64)
     moving = np.empty(PAIR_LANES, np.bool_)
-    for lane in range(PAIR_LANES):
-        pack_pair(block[lane], dt, table, lane)
+    _pack(block, dt, table)
     floors, forgotten = limits
     find_pair_windows(GROUP * TILE * dt, block, bounds, floors, forgotten, windows)
     # From groups to tiles; copies are not counted
@@ -146,6 +160,13 @@ def _run_block(ground, dt, block, count, inputs, bounds, limits, checkpoints, be
     for lane in range(PAIR_LANES):
         moving[lane] = windows[1, lane] == tiles - 1
     _ring_down(dt, tiles, block, table, checkpoints, moving, best)
+
+
+@lean
+def _pack(block, dt, table):
+    """Fill the rows of a block of pairs."""
+    for lane in range(PAIR_LANES):
+        pack_pair(block[lane], dt, table, lane)
 
 
 @kernel
@@ -200,7 +221,7 @@ def _ring_down(dt, tile, block, table, checkpoints, moving, best):
         steps += TILE
 
 
-@kernel
+@lean
 def _drop_settled(steps, dt, block, table, moving, best):
     """Drop the pairs that cannot exceed their largest values any more; return if any remains."""
     any_moving = False
@@ -230,10 +251,7 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
     # Limits of the bounds of tiles that need no search, from margins over all tiles
     limits = np.empty((2, PAIR_LANES))
     strongest = strongest_inputs(inputs)
-    for lane in range(PAIR_LANES):
-        radii = largest_radii(block[lane], table, lane, strongest)
-        _, margin = tile_margins(block[lane], dt, radii, strongest)
-        limits[0, lane], limits[1, lane] = best[lane, 0] - margin, best[lane, 1] - margin
+    _fill_limits(block, dt, table, strongest, best, limits)
     # Tiles whose bounds come close enough to the largest values
     for tile in range(inputs.shape[0]):
         near = 0
@@ -244,6 +262,15 @@ def _raise(ground, dt, block, table, checkpoints, inputs, first, windows, best):
             # Pair by pair
             now = tile, first + tile
             _search_lanes(ground, dt, block, table, checkpoints, inputs, now, windows, limits, best)
+
+
+@lean
+def _fill_limits(block, dt, table, strongest, best, limits):
+    """Fill the bounds above which a tile may hold larger values than those that are known."""
+    for lane in range(PAIR_LANES):
+        radii = largest_radii(block[lane], table, lane, strongest)
+        _, margin = tile_margins(block[lane], dt, radii, strongest)
+        limits[0, lane], limits[1, lane] = best[lane, 0] - margin, best[lane, 1] - margin
 
 
 @kernel

@@ -13,7 +13,7 @@ exceed it by a third of what the peak exceeds the samples at most.
 """
 
 from per_obspy.kernels._aligned import aligned
-from per_obspy.kernels._jit import inlined, kernel, vectorised
+from per_obspy.kernels._jit import inlined, kernel, lean, vectorised
 from per_obspy.kernels.oscillator.exact_step import step_coefficients
 from per_obspy.kernels.spectra.tile_search import SMALLEST_STATE, TILE
 
@@ -47,7 +47,7 @@ PER, U_UNIT, Z_UNIT, W_UNIT, Y_UNIT = (row * PAIR_LANES for row in range(PER_REA
 GREATEST, LEAST, APPROACH, PAIR_CHECKPOINT_ROWS = 4, 5, 6, 7
 
 
-@kernel
+@lean
 def pack_pair(pair, dt, table, lane):
     """
     Fill the rows of a pair.
@@ -78,13 +78,13 @@ def pack_pair(pair, dt, table, lane):
         table[FOLLOWED + 1, lane] += sign * across * b22
 
 
-@kernel
+@lean
 def shift_of(body, table, lane):
     """Return displacement and velocity over frequency that follow an acceleration of 1."""
     return table[SHIFT + 2 * body, lane], table[SHIFT + 2 * body + 1, lane]
 
 
-@kernel
+@lean
 def state_of(body, table, lane, along, across, acceleration):
     """Return displacement and velocity over frequency of a structure from its shifted state."""
     shift_u, shift_z = shift_of(body, table, lane)
