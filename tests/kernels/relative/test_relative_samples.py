@@ -5,8 +5,8 @@ import pytest
 
 from per_obspy.kernels.relative.relative_samples import (
     APPROACH,
-    DISTANCE,
     EXTREMES,
+    FOLLOWED,
     GREATEST,
     LEAST,
     PAIR_CHECKPOINT_ROWS,
@@ -21,13 +21,14 @@ from per_obspy.kernels.spectra.tile_search import TILE
 DT, LANE = 0.1, 7
 
 
+@pytest.mark.parametrize("share", [0.9, 0.0])
 @pytest.mark.parametrize("period", [0.5, 3.0, 0.1, 0.05, 0.025])
-def test_shifted_states_are_the_states(period, plain_states):
-    # mutation: shift, rotation or scale not undone; at 0.1 s / k the undamped input vanishes and
-    # cannot be scaled
+def test_shifted_states_are_the_states(period, share, plain_states):
+    # mutation: shift or unit not undone; a structure of participation 0 adds nothing, although its
+    # states are counted in what they add
     ground = np.random.default_rng(2).standard_normal((2, 2 * TILE + 1))
     damping = 0.05 if period > DT else 0.0
-    pair = np.array([2 * np.pi / period, damping, 1.2, 5.0, 0.02, 0.9, 0.8, 0.6])
+    pair = np.array([2 * np.pi / period, damping, 1.2, 5.0, 0.02, share, 0.8, 0.6])
     table = np.zeros((PAIR_ROWS, PAIR_LANES))
     checkpoints = np.empty((2, PAIR_CHECKPOINT_ROWS, PAIR_LANES))
     for lane in range(PAIR_LANES):
@@ -50,7 +51,8 @@ def test_shifted_states_are_the_states(period, plain_states):
         assert least[k] <= min(distance[tile].min(), inner.min()) + tolerance
         assert greatest[k] <= (distance + abs(reach))[tile].max() + tolerance
         assert least[k] >= (distance - abs(reach))[tile].min() - tolerance
-    tiles = slope[: TILE + 1], slope[TILE:]
+    # velocities are stored as what they add in a third of a step
+    tiles = reach[: TILE + 1], reach[TILE:]
     fastest = checkpoints[:, APPROACH, LANE]
     np.testing.assert_allclose(fastest, [tile.max() for tile in tiles], atol=tolerance)
     for body in range(2):
@@ -58,4 +60,4 @@ def test_shifted_states_are_the_states(period, plain_states):
         found = state_of(body, table, LANE, *shifted, along[TILE])
         np.testing.assert_allclose(found, states[body][TILE], atol=tolerance)
     assert table[EXTREMES, LANE] == checkpoints[1, GREATEST, LANE]
-    assert table[DISTANCE, LANE] != 0.0
+    assert table[FOLLOWED, LANE] != 0.0
