@@ -117,11 +117,12 @@ def find_pair_windows(duration, block, bounds, floors, forgotten, windows):
     for group in range(number):
         this = float(group)
         for lane in range(PAIR_LANES):
-            # Whether a bound reaches its floor
+            # Bounds of displacement and velocity in the group
             distance = bounds[2, group, lane] + bounds[3, group, lane]
             speed = (
                 block[lane, 0] * bounds[2, group, lane] + block[lane, 3] * bounds[3, group, lane]
             )
+            # Whether one reaches its floor
             reached = distance >= floors[0, lane] or speed >= floors[1, lane]
             first[lane] = min(first[lane], this if reached else np.inf)
             last[lane] = this if reached else last[lane]

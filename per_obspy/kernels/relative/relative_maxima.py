@@ -314,6 +314,7 @@ def _search_lanes(ground, dt, block, table, checkpoints, inputs, now, windows, l
     for lane in range(PAIR_LANES):
         near = checkpoints[tile, GREATEST, lane] > limits[0, lane]
         near |= -checkpoints[tile, LEAST, lane] > limits[1, lane]
+        # Only pairs of which the tile counts
         if near and windows[0, lane] <= number <= windows[1, lane]:
             _search(ground, dt, block, table, lane, checkpoints, inputs, tile, best)
 
