@@ -53,7 +53,7 @@ def records(tmp_path_factory):
 def test_a_command_works_on_a_cluster_and_names_its_dashboard(
     command, kind, places, records, tmp_path, call
 ):
-    configuration = write_smallest_configuration(tmp_path, "workers = 1\n")
+    configuration = write_smallest_configuration(tmp_path)
     (tmp_path / "ensemble.toml").write_text(ENSEMBLE)
     arguments = {
         "run": (configuration,),

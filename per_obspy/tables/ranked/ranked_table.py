@@ -92,14 +92,14 @@ class RankedTable:
 
     def _between(self, first: int, last: int, names: Sequence[str]) -> pa.Table:
         """Return the rows from one rank to another, in their order."""
-        # An empty table has the columns if no file has such a row
-        read = list(dict.fromkeys(["rank", *names]))
-        found = [self.schema.remove_metadata().empty_table().select(read)]
+        read, found = list(dict.fromkeys(["rank", *names])), list[pa.Table]()
         for path in self._files:
             with self._opened(path) as file:
                 found += _rows_between(file, (first, last), read)
-        rows = pa.concat_tables(found)
-        return rows.select(list(names)).take(np.argsort(rows["rank"].to_numpy()))
+        # An empty table has the columns if no file has such a row
+        rows = found or [self.schema.remove_metadata().empty_table()]
+        # By pyarrow alone: a finished run is shown without waiting for other libraries
+        return pa.concat_tables(rows).sort_by("rank").select(list(names))
 
 
 def _opened(path: Path) -> pq.ParquetFile:
@@ -117,8 +117,8 @@ def _rows_between(
         if known is not None and (known.max < ranks[0] or known.min > ranks[1]):
             continue
         rows = file.read_row_group(group, columns=names, use_threads=False)
-        # Ranks rise in every file
-        rank = rows["rank"].to_numpy()
+        # Ranks rise in every file; other ways from Arrow to NumPy wait for pandas
+        rank = np.concatenate([np.from_dlpack(chunk) for chunk in rows["rank"].chunks])
         before, after = np.searchsorted(rank, ranks[0]), np.searchsorted(rank, ranks[1], "right")
         yield rows.select(names).slice(before, after - before).replace_schema_metadata()
 
