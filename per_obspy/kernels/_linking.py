@@ -29,13 +29,23 @@ class KernelLibrary(JITCodeLibrary):
         if isinstance(library, FunctionLibrary):
             self._linking_libraries += library._linking_libraries
 
+    def finalize(self) -> None:
+        """Link each library after all that call it, then generate machine code."""
+        self._linking_libraries = self._callers_first()
+        super().finalize()
+
+    def _callers_first(self) -> list[Any]:
+        """Return the libraries once each, callers first: code that is not called yet is left out."""
+        # every mention of a library is followed by one of each that it calls
+        return list(dict.fromkeys(reversed(self._linking_libraries)))[::-1]
+
 
 class FunctionLibrary(KernelLibrary):
     """Intermediate code of a function and of those that it calls, optimised."""
 
     def finalize(self) -> None:
         """Link and optimise; no machine code is generated."""
-        for library in dict.fromkeys(self._linking_libraries):
+        for library in self._callers_first():
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._linking_libraries.clear()
         self._optimize_final_module()

@@ -92,3 +92,33 @@ def test_a_call_that_has_no_types_is_an_error_of_the_caller():
 
     with pytest.raises(TypingError, match="missing"):
         outer(1.0)
+
+
+@_jit.lean
+def _limited(value):
+    return min(value, 2.0)
+
+
+@_jit.lean
+def _limited_product(values):
+    return _limited(values[0]) * _limited(values[1])
+
+
+@_jit.lean
+def _limited_sum(values):
+    return _limited(values[0]) + _limited(values[1])
+
+
+@_jit.kernel
+def _of_one_round(values):
+    total = 0.0
+    for number in range(1):
+        # left out by the compiler; the first call of a function that the other one calls too
+        if number:
+            total += _limited_sum(values)
+        total += _limited_product(values)
+    return total
+
+
+def test_a_function_is_linked_though_its_first_caller_is_left_out():
+    assert _of_one_round(VALUES) == 2.0
