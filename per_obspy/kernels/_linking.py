@@ -35,8 +35,9 @@ class KernelLibrary(JITCodeLibrary):
         super().finalize()
 
     def _callers_first(self) -> list[Any]:
-        """Return the libraries once each, callers first: code that is not called yet is left out."""
-        # every mention of a library is followed by one of each that it calls
+        """Return the libraries, once each, those that call before those that are called."""
+        # Code that is not called yet is left out when it is linked. Every mention of a library is
+        # followed by one of each library that it calls.
         return list(dict.fromkeys(reversed(self._linking_libraries)))[::-1]
 
 
