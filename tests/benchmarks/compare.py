@@ -4,9 +4,9 @@ Name the figures that became worse by more than a tenth from one file of benchma
     python tests/benchmarks/compare.py OLD NEW
 
 Exit code 1 if there are any, 2 if the files cannot be compared: one is damaged, they have no figure
-in common, or they are of different machines, whose ratios are printed all the same. Peers are left
-out. Only files of one machine in the same state compare: the load before each script is printed
-with its figures.
+in common, or they have no machine in common, where ratios are printed all the same. Figures of
+machines that only one file has are left out otherwise, and peers always. Only figures of a machine
+in the same state compare: the load before each script is printed with its figures.
 """
 
 import sys
@@ -18,15 +18,26 @@ from figures import LESS_IS_BETTER, Damaged, Figure, read
 WORSE = 1.1
 
 
+def common_machines(old: list[Figure], new: list[Figure]) -> set[str]:
+    """Return the machines on which figures of both files were measured."""
+    return {one["machine"] for one in old} & {one["machine"] for one in new}
+
+
+def _key(figure: Figure, machines: set[str]) -> tuple[str, str, str]:
+    """Return machine, script and name of a figure; no machine if the files share none."""
+    return figure["machine"] if machines else "", figure["script"], figure["name"]
+
+
 def worse(old: list[Figure], new: list[Figure]) -> tuple[list[str], int]:
     """Return a line per figure that became worse or is missing, and how many were compared."""
-    later = {(one["script"], one["name"]): one for one in new}
+    machines = common_machines(old, new)
+    later = {_key(one, machines): one for one in new}
     lines, compared = [], 0
     for one in old:
-        if one["peer"]:
+        if one["peer"] or (machines and one["machine"] not in machines):
             continue
         place = f"{one['script']}: {one['name']}"
-        other = later.get((one["script"], one["name"]))
+        other = later.get(_key(one, machines))
         if other is None or other["unit"] != one["unit"]:
             lines.append(f"{place}: not in the new file")
             continue
@@ -48,12 +59,13 @@ def main(old: Path, new: Path) -> int:
     except Damaged as damaged:
         print(damaged, file=sys.stderr)
         return 2
-    machines = {one["machine"] for one in before + after}
-    if len(machines) > 1:
+    are_alike = bool(common_machines(before, after))
+    if not are_alike:
+        machines = {one["machine"] for one in before + after}
         print(f"different machines: {'; '.join(sorted(machines))}")
     lines, compared = worse(before, after)
     print("\n".join([*lines, f"{compared} figures compared"]))
-    if not compared or len(machines) > 1:
+    if not compared or not are_alike:
         return 2
     return int(bool(lines))
 

@@ -3,8 +3,9 @@ Figures of all benchmarks: one JSON file, and ``docs/benchmarks.md`` made of it.
 
     python tests/benchmarks/figures.py JSON [SCRIPT...]
 
-runs the benchmarks (or only some scripts, whose figures replace those in the file) and writes the
-page. A script calls `note` for every figure; run alone, it only prints.
+runs the benchmarks (or only some scripts) and writes the page. Their figures replace those of the
+same machine in the file; those of other machines stay. A script calls `note` for every figure; run
+alone, it only prints.
 """
 
 import json
@@ -161,11 +162,18 @@ def digits(value: float) -> str:
     return f"{float(f'{value:.3g}'):.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
-def table(figures: list[Figure], script: str) -> str:
-    """Return the figures of a script as a table, after machine, date and versions."""
+def tables(figures: list[Figure], script: str) -> str:
+    """Return the figures of a script as a table for every machine, the last measured first."""
     own = [figure for figure in figures if figure["script"] == script]
     if not own:
         return "*Not measured in this run.*"
+    machines = dict.fromkeys(figure["machine"] for figure in reversed(own))
+    parts = ([one for one in own if one["machine"] == machine] for machine in machines)
+    return "\n\n".join(map(_table, parts))
+
+
+def _table(own: list[Figure]) -> str:
+    """Return the figures of a script on one machine, after machine, date and versions."""
     values = {figure["name"]: figure["value"] for figure in own}
     rows = ["| figure | value | relative to ours | remark |", "|---|---|---|---|"]
     for one in own:
@@ -181,16 +189,19 @@ def table(figures: list[Figure], script: str) -> str:
 
 def page(figures: list[Figure], template: str) -> str:
     """Return the page: the template, whose lines ``{{script}}`` become tables."""
-    return re.sub(r"^\{\{(\w+)\}\}$", lambda name: table(figures, name[1]), template, flags=re.M)
+    return re.sub(r"^\{\{(\w+)\}\}$", lambda name: tables(figures, name[1]), template, flags=re.M)
 
 
 def main(path: Path, scripts: list[str]) -> None:
     """Measure, write the JSON file, and the page."""
     # A damaged file is found before hours of measurements
-    kept = read(path) if scripts and path.is_file() else []
+    kept = read(path) if path.is_file() else []
     found = measured(scripts or SCRIPTS, path.with_suffix(".lines"))
-    again = {figure["script"] for figure in found}
-    figures = [figure for figure in kept if figure["script"] not in again] + found
+    again = {(figure["machine"], figure["script"]) for figure in found}
+    if not scripts:
+        # none of this machine is left from an earlier run
+        again |= {(machine(), figure["script"]) for figure in kept}
+    figures = [one for one in kept if (one["machine"], one["script"]) not in again] + found
     path.write_text(json.dumps({"figures": figures}, indent=1) + "\n", "utf-8")
     PAGE.write_text(page(figures, TEMPLATE.read_text("utf-8")), "utf-8")
 

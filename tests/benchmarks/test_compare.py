@@ -78,6 +78,15 @@ def test_two_machines_do_not_compare(files, capsys):
     assert "2.00 times worse" in out
 
 
+def test_each_machine_compares_with_itself(files, capsys):
+    old = [{}, {"machine": "another core", "value": 20.0}, {"machine": "a third", "value": 1.0}]
+    new = [{"machine": "another core", "value": 21.0}, {"value": 12.0}]
+    assert main(*files(old, new)) == 1
+    out, _ = capsys.readouterr()
+    assert out.startswith("spectra: PER: 10 -> 12 ms, 1.20 times worse")
+    assert out.endswith("\n2 figures compared\n")
+
+
 def test_files_without_a_common_figure_do_not_compare(files):
     assert main(*files([], [{}])) == 2
 

@@ -55,10 +55,25 @@ def test_a_script_becomes_figures_and_a_table(place):
 
 def test_one_script_again_keeps_the_figures_of_all_others(place):
     file = place / "all.json"
-    old = [FIGURE | {"script": "slow"}, FIGURE | {"script": "quick", "name": "older"}]
+    here = {"machine": figures.machine()}
+    old = [FIGURE | here | {"script": "slow"}, FIGURE | here | {"script": "quick", "name": "older"}]
     file.write_text(json.dumps({"figures": old}))
     figures.main(file, ["quick"])
     assert [one["name"] for one in figures.read(file)] == ["PER", "ours", "theirs"]
+
+
+def test_figures_of_other_machines_stay_and_have_their_own_table(place, monkeypatch):
+    file = place / "all.json"
+    here = {"machine": figures.machine(), "script": "quick"}
+    old = [FIGURE | {"script": "quick"}, FIGURE | here | {"name": "older"}]
+    file.write_text(json.dumps({"figures": old}))
+    monkeypatch.setattr(figures, "SCRIPTS", ["quick"])
+    figures.main(file, [])
+    found = [(one["machine"], one["name"]) for one in figures.read(file)]
+    assert found == [("a core", "PER"), *((here["machine"], name) for name in ("ours", "theirs"))]
+    page = (place / "benchmarks.md").read_text()
+    # the last measured first
+    assert 0 < page.index("| ours |") < page.index("*a core; ") < page.index("| PER |")
 
 
 def test_a_damaged_file_is_not_written_over(place):
