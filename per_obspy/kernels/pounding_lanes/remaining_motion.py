@@ -12,8 +12,8 @@ impacts there are; the rate of the structure of larger ``xi omega`` leaves ``2 e
 - e) / (omega² - e²)`` of w² at most.
 
 A pair with a gap is followed as two structures that do not touch. That holds as long as the sum of
-both displacements stays below the gap. Two equal linear structures that touch and have the same state
-move as one without any contact force: each is followed alone, and there is no impact.
+both displacements stays below the gap. Two equal linear structures with the same state move as one
+without any contact force: each is followed alone, and there is no impact.
 """
 
 import math
