@@ -113,16 +113,21 @@ def _next_change_of_stiffness(row, i, span, terms):
         return first_fall(row, i, EVENT_FUNCTION, terms - 1, side, 0.0, span, 0.0), REVERSAL
     # an elastic one yields when its distance to either side falls to zero; -1 if it does not
     earliest = -1.0
+    size, _ = size_and_curvature(row, i, TAYLOR, terms, span)
     for sign in (1, -1):
         # just after unloading the first derivatives of this distance are zero: divide by t**order
         order = max(0, int(sign * row[i, UNLOADING]))
+        distance = row[i, YIELD] - sign * (row[i, U] - row[i, PLASTIC])
+        rounding = GAP_ROUNDING * (row[i, YIELD] + abs(row[i, U]))
+        # too far from this side to reach it
+        if order == 0 and distance > size + rounding:
+            continue
         for n in range(order, terms):
             row[i, EVENT_FUNCTION + n - order] = -sign * row[i, TAYLOR + n]
-        rounding = 0.0
         if order == 0:
-            distance = row[i, YIELD] - sign * (row[i, U] - row[i, PLASTIC])
             row[i, EVENT_FUNCTION] = distance
-            rounding = GAP_ROUNDING * (row[i, YIELD] + abs(row[i, U]))
+        else:
+            rounding = 0.0
         time = first_fall(row, i, EVENT_FUNCTION, terms - order, 1.0, 0.0, span, rounding)
         if time >= 0.0:
             earliest = time

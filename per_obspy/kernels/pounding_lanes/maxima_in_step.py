@@ -92,18 +92,29 @@ def may_exceed_maxima(pair, row, i, start, end):
     The states are at most a step apart. The radius grows with the angle by the power p = u'' +
     omega² u at most, which in a step is within its chord and its error bound: by ``growth`` from a
     root to the nearer end. And its square by growth (2 r + growth), with r below |u| + |z|.
+
+    Most motion is far below its maxima. No displacement exceeds the radius, and the power changes
+    by ``2 r + 2 strength`` at most, with the larger radius r and the larger acceleration of both
+    ends: that bounds ``growth`` from above.
     """
     first = i * STRUCTURE_ROWS
     u0, z0, y0 = start
     u1, z1, y1 = end
     strength = max(abs(y0), abs(y1))
+    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
+    # far below the maxima
+    quarter = 0.25 * pair[first + ANGLE]
+    widening = 1.0 + quarter
+    by_strength = quarter * (1.0 + 4.0 * pair[first + POWER_ERROR])
+    room = row[i, LARGEST_DISPLACEMENT] - by_strength * strength
+    if (room > 0.0) & (widening * widening * radius_squared < room * room):
+        return False
     # growth of the radius between the states
     power_change = abs((u1 + y1) - (u0 + y0))
     power_error = 8.0 * pair[first + POWER_ERROR] * strength
-    growth = 0.125 * pair[first + ANGLE] * (power_change + power_error)
+    growth = 0.5 * quarter * (power_change + power_error)
     # maxima at the states
     reach = max(abs(u0), abs(u1))
-    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
     largest = max(row[i, LARGEST_DISPLACEMENT], reach)
     largest_squared = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
     row[i, LARGEST_DISPLACEMENT] = largest

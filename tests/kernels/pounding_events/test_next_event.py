@@ -62,6 +62,18 @@ class TestFindEvent:
         assert row[0, motion.PHASE] == 0.0
         assert_allclose(row[0, motion.PLASTIC], side * plastic, rtol=1e-12)
 
+    @pytest.mark.parametrize("side", [1, -1])
+    @pytest.mark.parametrize("reaches", [False, True])
+    def test_yielding_at_the_end_of_a_short_piece(self, side, reaches):
+        # catches: a bound of the motion in a piece that is too small
+        row = row_of(1.0, Structure(1.0, 0.0, 1.0, 0.03, 0.0))
+        amplitude = (1.001 if reaches else 0.999) * 0.03 / math.sin(0.02 * OMEGA)
+        row[0, motion.V] = side * amplitude * OMEGA
+        span, kind, _ = next_event.find_event(row, SEGMENT, 0.08)
+        assert kind == (next_event.YIELDING if reaches else next_event.SEGMENT_END)
+        expected = math.asin(0.03 / amplitude) / OMEGA if reaches else 0.02
+        assert_allclose(span, expected, rtol=1e-12)
+
     def test_release(self):
         # in contact u = u0 cos(W t) + v0 / W sin(W t); the force is m1 (W² - omega1²) u
         row = row_of(0.0, Structure(1.0, 0.0, 1.0), Structure(0.8, 0.0, 1.0))

@@ -65,6 +65,31 @@ def test_maxima_are_those_of_the_sampled_motion(damping):
     assert raised > 10
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+@pytest.mark.parametrize("strength", [0.0, 10.0, 1000.0])
+def test_no_motion_just_above_the_maxima_is_far_below_them(damping, strength):
+    # catches: the growth of the radius inside a step left out, by itself or by the acceleration
+    pair, row = pair_of(Structure(0.2, damping, 1.0))
+    inside_only = 0
+    for u, z, first, last in np.random.default_rng(1).normal(size=(300, 4)):
+        ground, after = strength * first, strength * last
+        start = inside.complete_state(pair, 0, u, z, ground)
+        end = inside.state_after_step(pair, 0, start, ground, after)
+        displacement, squared = sampled(pair, row, start, after - ground)
+        inside_only += squared.max() > 1.0001 * squared[[0, -1]].max()
+        # maxima just below those of the step: of the radius, then of the displacement
+        for largest in (np.sqrt(squared.max()), displacement.max()):
+            row[0, motion.LARGEST_DISPLACEMENT] = (1.0 - 1e-9) * largest
+            row[0, motion.LARGEST_RADIUS_SQUARED] = (1.0 - 1e-9) ** 2 * squared.max()
+            before = row[0, motion.LARGEST_RADIUS_SQUARED]
+            assert (
+                inside.may_exceed_maxima(pair, row, 0, start, end)
+                or row[0, motion.LARGEST_RADIUS_SQUARED] > before
+                or row[0, motion.LARGEST_DISPLACEMENT] > (1.0 - 1e-9) * largest
+            )
+    assert inside_only > 10 or strength < 1000.0
+
+
 class TestYielding:
     def yields(self, start, end, phase=0.0):
         """Return whether a structure may yield or unload between two states."""
