@@ -72,7 +72,7 @@ def remains_still(row, cosine, sine, sizes, duration, group):
 
 
 @lean
-def _norm(row, i, centre, rate):
+def norm_of(row, i, centre, rate):
     """Return the root of the norm of structure i about a centre, over the root of its mass, m/s."""
     u = row[i, U] - centre
     v = row[i, V]
@@ -115,7 +115,7 @@ def _touching_pair_remains_still(row, direction, sizes, duration, group):
         hidden = rate * rate / row[i, STIFFNESS]
         if mass == math.inf or hidden > 0.5:
             return False
-        norm = _norm(row, i, 0.0, rate)
+        norm = norm_of(row, i, 0.0, rate)
         total += mass * norm * norm
         force += mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
         slowness += 1.0 / (mass * (1.0 - hidden))
@@ -157,14 +157,14 @@ def _free_pair_remains_still(row, direction, sizes, duration, group):
         return False
     left, limit = _free_limits(row, 0)
     right, other_limit = _free_limits(row, 1)
-    norm = _norm(row, 0, left, row[0, DAMPING_RATE])
-    other_norm = _norm(row, 1, right, row[1, DAMPING_RATE])
+    norm = norm_of(row, 0, left, row[0, DAMPING_RATE])
+    other_norm = norm_of(row, 1, right, row[1, DAMPING_RATE])
     # clearance at rest
     room = CERTAIN * (row[0, GAP] - left + right)
     if not (norm < limit and other_norm < other_limit and room > 0.0):
         return False
     # displacement over the clearance, by the norm
-    shares = _reach_by_norm(row, 0) / room, _reach_by_norm(row, 1) / room
+    shares = _reach_bynorm_of(row, 0) / room, _reach_bynorm_of(row, 1) / room
     decays = (
         math.exp(-row[0, DAMPING_RATE] * duration),
         math.exp(-row[1, DAMPING_RATE] * duration),
@@ -175,6 +175,6 @@ def _free_pair_remains_still(row, direction, sizes, duration, group):
 
 
 @lean
-def _reach_by_norm(row, i):
+def _reach_bynorm_of(row, i):
     """Return the largest displacement of structure i from its centre over its norm, s."""
     return 1.0 / math.sqrt(row[i, STIFFNESS] - row[i, DAMPING_RATE] * row[i, DAMPING_RATE])

@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
+from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 from per_obspy.pounding.history.pair_histories import SHORTEST_BOUNCE
 from per_obspy.pounding.history.row_history import SPEED_SHARE
 from per_obspy.pounding.history.rows.row_blocks import run_row_blocks
@@ -207,6 +209,7 @@ def _lines_at_rest(
     lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap
     lines[:, columns.RESTITUTION] = rows.restitution
+    lines[:, COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
 
     # Bouncing ends in contact below a separation speed, a duration, or after many impacts
