@@ -92,18 +92,28 @@ def may_exceed_maxima(pair, row, i, start, end):
     The states are at most a step apart. The radius grows with the angle by the power p = u'' +
     omega² u at most, which in a step is within its chord and its error bound: by ``growth`` from a
     root to the nearer end. And its square by growth (2 r + growth), with r below |u| + |z|.
+
+    Most motion is far below its maxima. From the nearer end, half a step away at most, the radius
+    grows by the largest power, at most ``r + (1 + error) strength`` for the larger radius r of both
+    ends and the larger acceleration; and no displacement exceeds the radius.
     """
     first = i * STRUCTURE_ROWS
     u0, z0, y0 = start
     u1, z1, y1 = end
     strength = max(abs(y0), abs(y1))
+    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
+    # far below the maxima
+    half_angle = 0.5 * pair[first + ANGLE]
+    widening = 1.0 + half_angle
+    room = row[i, LARGEST_DISPLACEMENT] - half_angle * (1.0 + pair[first + POWER_ERROR]) * strength
+    if (room > 0.0) & (widening * widening * radius_squared < room * room):
+        return False
     # growth of the radius between the states
     power_change = abs((u1 + y1) - (u0 + y0))
     power_error = 8.0 * pair[first + POWER_ERROR] * strength
-    growth = 0.125 * pair[first + ANGLE] * (power_change + power_error)
+    growth = 0.25 * half_angle * (power_change + power_error)
     # maxima at the states
     reach = max(abs(u0), abs(u1))
-    radius_squared = max(u0 * u0 + z0 * z0, u1 * u1 + z1 * z1)
     largest = max(row[i, LARGEST_DISPLACEMENT], reach)
     largest_squared = max(row[i, LARGEST_RADIUS_SQUARED], radius_squared)
     row[i, LARGEST_DISPLACEMENT] = largest

@@ -12,7 +12,8 @@ impacts there are; the rate of the structure of larger ``xi omega`` leaves ``2 e
 - e) / (omega² - e²)`` of w² at most.
 
 A pair with a gap is followed as two structures that do not touch. That holds as long as the sum of
-both displacements stays below the gap.
+both displacements stays below the gap. Two equal linear structures with the same state move as one
+without any contact force: each is followed alone, and there is no impact.
 """
 
 import math
@@ -66,9 +67,24 @@ def remains_still(row, cosine, sine, sizes, duration, group):
         True is certain.
     """
     direction = abs(cosine), abs(sine)
-    if row[0, GAP] == 0.0 and row[0, YIELD] == math.inf and row[1, YIELD] == math.inf:
-        return _touching_pair_remains_still(row, direction, sizes, duration, group)
-    return _free_pair_remains_still(row, direction, sizes, duration, group)
+    if row[0, YIELD] == math.inf and row[1, YIELD] == math.inf:
+        if _moves_as_one(row):
+            return _free_pair_remains_still(row, direction, sizes, duration, group, math.inf)
+        if row[0, GAP] == 0.0:
+            return _touching_pair_remains_still(row, direction, sizes, duration, group)
+    return _free_pair_remains_still(row, direction, sizes, duration, group, row[0, GAP])
+
+
+@lean
+def _moves_as_one(row):
+    """Return whether both linear structures have the same equation and the same state."""
+    return (
+        (row[0, STIFFNESS] == row[1, STIFFNESS])
+        & (row[0, DAMPING_RATE] == row[1, DAMPING_RATE])
+        & (row[0, PARTICIPATION] == row[1, PARTICIPATION])
+        & (row[0, U] == row[1, U])
+        & (row[0, V] == row[1, V])
+    )
 
 
 @lean
@@ -151,8 +167,8 @@ def _free_limits(row, i):
 
 
 @lean
-def _free_pair_remains_still(row, direction, sizes, duration, group):
-    """Return whether a pair never touches or yields again, nor exceeds its maxima."""
+def _free_pair_remains_still(row, direction, sizes, duration, group, gap):
+    """Return whether a pair never closes a gap or yields again, nor exceeds its maxima."""
     if row[0, PHASE] != 0.0 or row[1, PHASE] != 0.0:
         return False
     left, limit = _free_limits(row, 0)
@@ -160,7 +176,7 @@ def _free_pair_remains_still(row, direction, sizes, duration, group):
     norm = norm_of(row, 0, left, row[0, DAMPING_RATE])
     other_norm = norm_of(row, 1, right, row[1, DAMPING_RATE])
     # clearance at rest
-    room = CERTAIN * (row[0, GAP] - left + right)
+    room = CERTAIN * (gap - left + right)
     if not (norm < limit and other_norm < other_limit and room > 0.0):
         return False
     # displacement over the clearance, by the norm

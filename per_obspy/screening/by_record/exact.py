@@ -36,6 +36,9 @@ EXACT_COLUMNS = (
     "amplification_exact_2",
 )
 
+#: Share of the gap below which a demand without contact, known to 1e-9, leaves the pair apart.
+CERTAINLY_APART = 1.0 - 1e-6
+
 #: Periods and dampings of 1 and 2, azimuth, participations.
 Oscillators = tuple[
     FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray
@@ -137,17 +140,43 @@ def exact_outcome(station: StationMotion, table: Table, azimuth: FloatArray) -> 
     free = _without_contact(station, table, azimuth)
     # building 2 may be on either side of 1 where the pair's azimuth is unknown: the worse one
     turned = np.isnan(values(table, "azimuth")) & (free.away > free.towards)
-    history = _pounding_maxima(station, table, np.where(turned, azimuth + 180.0, azimuth))
+    demand = np.where(turned, free.away, free.towards)
     axis = values(table, "azimuth_used")
-    # impacts amplify the radius that the same oscillator has without contact
     return {
         "azimuth_used": np.where(turned, (axis + 180.0) % 360.0, axis),
-        "demand_exact": np.where(turned, free.away, free.towards),
+        "demand_exact": demand,
         "demand_two_sided": np.maximum(free.towards, free.away),
-        "impacts": history.impacts,
-        "impact_velocity_exact": history.impact_velocity,
-        "amplification_exact_1": _ratio(history.per[0], free.per_1),
-        "amplification_exact_2": _ratio(history.per[1], free.per_2),
+    } | _pounding_columns(
+        station, table, np.where(turned, azimuth + 180.0, azimuth), demand, (free.per_1, free.per_2)
+    )
+
+
+def _pounding_columns(
+    station: StationMotion,
+    table: Table,
+    azimuth: FloatArray,
+    demand: FloatArray,
+    radii: tuple[FloatArray, FloatArray],
+) -> Columns:
+    """
+    Return the columns of the pounding histories; ``radii`` are those of the pairs without contact.
+
+    Pairs whose demand without contact stays below their gap have no impact, and their radii are
+    those without contact: they need no history.
+    """
+    meets = ~(demand < CERTAINLY_APART * values(table, "gap"))
+    impacts, velocity = np.zeros(demand.size, dtype=np.int64), np.zeros(demand.size)
+    amplification = np.ones((2, demand.size))
+    if meets.any():
+        history = _pounding_maxima(station, chosen(table, meets), azimuth[meets])
+        impacts[meets], velocity[meets] = history.impacts, history.impact_velocity
+        # impacts amplify the radius that the same oscillator has without contact
+        amplification[:, meets] = _ratio(history.per, np.stack(radii)[:, meets])
+    return {
+        "impacts": impacts,
+        "impact_velocity_exact": velocity,
+        "amplification_exact_1": amplification[0],
+        "amplification_exact_2": amplification[1],
     }
 
 

@@ -38,13 +38,8 @@ def _pairs(count, rng):
     return draws
 
 
-@pytest.mark.parametrize("wall", [False, True])
-def test_histories_are_the_same_bits_as_through_the_whole_record(monkeypatch, wall):
-    # mutation: a ground that is taken for quiet
-    rng = np.random.default_rng(20 + wall)
-    record, pairs = _record(rng), _pairs(24, rng)
-    if wall:
-        pairs["mass_2"] = np.inf
+def _short_and_whole(monkeypatch, record, pairs):
+    """Return the maxima of histories, and those of histories that are never left early."""
     short = pounding_histories(record, DT, **pairs)
 
     def never_still(*arguments):
@@ -54,7 +49,17 @@ def test_histories_are_the_same_bits_as_through_the_whole_record(monkeypatch, wa
 
     pair_blocks_records = pair_blocks.records_in_steps
     monkeypatch.setattr(pair_blocks, "records_in_steps", never_still)
-    whole = pounding_histories(record, DT, **pairs)
+    return short, pounding_histories(record, DT, **pairs)
+
+
+@pytest.mark.parametrize("wall", [False, True])
+def test_histories_are_the_same_bits_as_through_the_whole_record(monkeypatch, wall):
+    # mutation: a ground that is taken for quiet
+    rng = np.random.default_rng(20 + wall)
+    record, pairs = _record(rng), _pairs(24, rng)
+    if wall:
+        pairs["mass_2"] = np.inf
+    short, whole = _short_and_whole(monkeypatch, record, pairs)
     for name in whole._fields:
         assert_array_equal(getattr(short, name), getattr(whole, name), err_msg=name)
     assert (whole.impacts > 0).sum() > 8
@@ -73,6 +78,13 @@ def _row(displacement, largest=0.1, fastest=1.0, gap=0.0):
     return row
 
 
+def _equal_pair(displacement):
+    """Return two equal structures that touch, displaced together, before any impact."""
+    row = _row(displacement, fastest=0.0)
+    row[1] = row[0]
+    return row
+
+
 def test_a_quiet_pair_is_still_and_an_excited_one_is_not():
     quiet, late = np.zeros((2, 40)), np.zeros((2, 40))
     late[0, 30] = 0.1
@@ -85,6 +97,36 @@ def test_a_quiet_pair_is_still_and_an_excited_one_is_not():
         assert remains_still(row, 0.0, 1.0, strong, 1.28, 0)
         assert remains_still(row, 1.0, 0.0, strong, 1.28, 31)
         assert not remains_still(_row(0.2, gap=gap), 1.0, 0.0, quiet, 1.28, 0)
+
+
+def test_equal_structures_with_one_state_move_as_one():
+    # catches: an impact that is possible, because equation or state of one differs a little
+    quiet = np.zeros((2, 40))
+    assert not remains_still(_equal_pair(0.2), 1.0, 0.0, quiet, 1.28, 0)
+    for column in (
+        columns.STIFFNESS, columns.DAMPING_RATE, columns.PARTICIPATION, columns.U, columns.V
+    ):  # fmt: skip
+        other = _equal_pair(5e-3)
+        assert remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
+        other[1, column] += 1e-9
+        assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
+    # one that yields is no linear structure
+    other = _equal_pair(5e-3)
+    other[0, columns.YIELD] = 0.01
+    assert not remains_still(other, 1.0, 0.0, quiet, 1.28, 0)
+
+
+def test_equal_structures_that_touch_are_the_same_bits_as_through_the_whole_record(monkeypatch):
+    # catches: rounding that sets equal structures apart
+    rng = np.random.default_rng(3)
+    pairs = _pairs(24, rng) | {"gap": 0.0}
+    for name in ("period", "damping", "participation"):
+        pairs[f"{name}_2"] = pairs[f"{name}_1"]
+    pairs["yield_displacement_1"] = np.inf
+    short, whole = _short_and_whole(monkeypatch, _record(rng), pairs)
+    for name in whole._fields:
+        assert_array_equal(getattr(short, name), getattr(whole, name), err_msg=name)
+    assert not whole.impact_velocity.any()
 
 
 def test_impacts_that_count_keep_a_touching_pair_going():

@@ -9,8 +9,10 @@ import per_obspy
 from per_obspy.config import Building
 from per_obspy.inventory.completion import completed_pairs
 from per_obspy.pounding.history.relative_yielding import yielding_relative_displacement
+from per_obspy.screening.by_record import exact
 from per_obspy.screening.by_record.exact import (
     EXACT_COLUMNS,
+    _pounding_maxima,
     exact_decides,
     exact_outcome,
     furthest_azimuth,
@@ -72,6 +74,43 @@ def test_without_impacts_radii_are_not_amplified(station, record):
     # the history and the spectra locate peaks to 1e-9 each
     assert_allclose(outcome["amplification_exact_1"], 1.0, rtol=1e-8)
     assert_allclose(outcome["amplification_exact_2"], 1.0, rtol=1e-8)
+
+
+class TestPairsThatStayApart:
+    #: Linear and yielding pairs, with gaps around their demands and far from them.
+    ROWS = ({}, {"period_1": 0.31}, {"yield_displacement_1": 0.01, "hardening_1": 0.05})
+
+    def _at_gaps(self, station, record, shares):
+        table = table_of(station, self.ROWS * len(shares))
+        azimuth = values(table, "azimuth_used")
+        demand = exact_outcome(record, table, azimuth)["demand_exact"]
+        table = dict(table) | {"gap": np.repeat(shares, len(self.ROWS)) * demand}
+        return table, azimuth
+
+    def test_have_the_outcome_of_their_histories(self, station, record):
+        # catches: a margin in the wrong direction, and pairs whose columns are mixed up
+        shares = (0.0, 0.5, 0.999, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.0 + 2e-6, 1.5, 9.0)
+        table, azimuth = self._at_gaps(station, record, shares)
+        outcome = exact_outcome(record, table, azimuth)
+        history = _pounding_maxima(record, table, azimuth)
+        assert_array_equal(outcome["impacts"], history.impacts)
+        assert_array_equal(outcome["impact_velocity_exact"], history.impact_velocity)
+        free = _pounding_maxima(record, dict(table) | {"gap": np.full(azimuth.size, 99.0)}, azimuth)
+        ratios = np.stack([outcome["amplification_exact_1"], outcome["amplification_exact_2"]])
+        assert_allclose(ratios, history.per / free.per, rtol=1e-8)
+        assert ratios.max() > 1.01
+
+    def test_need_no_history(self, station, record, monkeypatch):
+        table, azimuth = self._at_gaps(station, record, (0.5, 1.5))
+        pairs = []
+
+        def counted(station, table, azimuth):
+            pairs.append(azimuth.size)
+            return _pounding_maxima(station, table, azimuth)
+
+        monkeypatch.setattr(exact, "_pounding_maxima", counted)
+        exact_outcome(record, table, azimuth)
+        assert pairs == [len(self.ROWS)]
 
 
 def test_both_sides_demand_at_least_as_much_as_one(station, record):
