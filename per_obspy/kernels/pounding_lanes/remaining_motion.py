@@ -180,7 +180,7 @@ def _free_pair_remains_still(row, direction, sizes, duration, group, gap):
     if not (norm < limit and other_norm < other_limit and room > 0.0):
         return False
     # displacement over the clearance, by the norm
-    shares = _reach_bynorm_of(row, 0) / room, _reach_bynorm_of(row, 1) / room
+    shares = _reach_by_norm(row, 0) / room, _reach_by_norm(row, 1) / room
     decays = (
         math.exp(-row[0, DAMPING_RATE] * duration),
         math.exp(-row[1, DAMPING_RATE] * duration),
@@ -191,6 +191,6 @@ def _free_pair_remains_still(row, direction, sizes, duration, group, gap):
 
 
 @lean
-def _reach_bynorm_of(row, i):
+def _reach_by_norm(row, i):
     """Return the largest displacement of structure i from its centre over its norm, s."""
     return 1.0 / math.sqrt(row[i, STIFFNESS] - row[i, DAMPING_RATE] * row[i, DAMPING_RATE])

@@ -9,7 +9,8 @@ acceleration times the root of ``sum m q²`` at most, with participations q, and
 t)``, less what the larger rates may take from it.
 
 Groups are followed as if they did not touch each other. That holds as long as the displacements on
-both sides of a gap together stay below it.
+both sides of a gap together stay below it. Equal buildings of a group that have the same state move
+as one, without an impact.
 """
 
 import math
@@ -26,6 +27,8 @@ from per_obspy.kernels.pounding_events.motion import (
     PARTICIPATION,
     STIFFNESS,
     YIELD,
+    U,
+    V,
 )
 from per_obspy.kernels.pounding_lanes.remaining_motion import CERTAIN, norm_of
 
@@ -97,25 +100,26 @@ def _write_bounds(row, bounds, first, last, duration):
     rate = math.inf
     for i in range(first, last + 1):
         rate = min(rate, row[i, DAMPING_RATE])
+    is_one = _moves_as_one(row, first, last)
     # norm, force over acceleration, and limits
     total = force = excess = 0.0
     limit = math.inf
     for i in range(first, last + 1):
         mass = row[i, MASS]
-        # share of the velocity that the product e u v may hide
-        hidden = rate * rate / row[i, STIFFNESS]
+        hidden = _hidden_share(row, i, rate)
         if mass == math.inf or row[i, YIELD] < math.inf or hidden > 0.5:
             return False
-        norm = norm_of(row, i, 0.0, rate)
-        total += mass * norm * norm
+        total += mass * norm_of(row, i, 0.0, rate) ** 2
         force += mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
         excess = max(excess, (row[i, DAMPING_RATE] - rate) * hidden / (1.0 - hidden))
-        bounds[i, REACH] = 1.0 / math.sqrt(mass * (row[i, STIFFNESS] - rate * rate))
         # largest displacement, and with it the largest radius
+        bounds[i, REACH] = 1.0 / math.sqrt(mass * (row[i, STIFFNESS] - rate * rate))
         reach = row[i, LARGEST_DISPLACEMENT] * math.sqrt(row[i, STIFFNESS])
         limit = min(limit, reach * math.sqrt(mass * (1.0 - math.sqrt(hidden))))
-        if i < last:
+        # impacts
+        if i < last and not is_one:
             limit = min(limit, _slow_norm(row, i, rate))
+    # all of the group, in its first line
     bounds[first, NORM] = math.sqrt(total)
     bounds[first, LIMIT] = CERTAIN * limit
     bounds[first, DECAY] = math.exp(-(rate - 0.5 * excess) * duration)
@@ -124,12 +128,31 @@ def _write_bounds(row, bounds, first, last, duration):
 
 
 @lean
+def _hidden_share(row, i, rate):
+    """Return the share of the velocity of a building that the product e u v may hide."""
+    return rate * rate / row[i, STIFFNESS]
+
+
+@lean
+def _moves_as_one(row, first, last):
+    """Return whether all buildings of a group have the same equation and the same state."""
+    is_one = True
+    # the others against the first
+    for i in range(first + 1, last + 1):
+        is_one &= row[i, STIFFNESS] == row[first, STIFFNESS]
+        is_one &= row[i, DAMPING_RATE] == row[first, DAMPING_RATE]
+        is_one &= row[i, PARTICIPATION] == row[first, PARTICIPATION]
+        is_one &= (row[i, U] == row[first, U]) & (row[i, V] == row[first, V])
+    return is_one
+
+
+@lean
 def _slow_norm(row, j, rate):
     """Return the norm below which no impact of an interface counts, and none is its fastest."""
     slowness = 0.0
     for i in range(j, j + 2):
-        hidden = rate * rate / row[i, STIFFNESS]
-        slowness += 1.0 / (row[i, MASS] * (1.0 - hidden))
+        slowness += 1.0 / (row[i, MASS] * (1.0 - _hidden_share(row, i, rate)))
+    # the slower limit of both
     fastest = row[j, APPROACH]
     speed = min(fastest, max(row[j, COUNTED_SPEED], COUNTED_SHARE * fastest))
     return speed / math.sqrt(slowness)
