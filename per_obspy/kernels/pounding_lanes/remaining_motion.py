@@ -88,7 +88,7 @@ def _moves_as_one(row):
 
 
 @lean
-def _norm(row, i, centre, rate):
+def norm_of(row, i, centre, rate):
     """Return the root of the norm of structure i about a centre, over the root of its mass, m/s."""
     u = row[i, U] - centre
     v = row[i, V]
@@ -131,7 +131,7 @@ def _touching_pair_remains_still(row, direction, sizes, duration, group):
         hidden = rate * rate / row[i, STIFFNESS]
         if mass == math.inf or hidden > 0.5:
             return False
-        norm = _norm(row, i, 0.0, rate)
+        norm = norm_of(row, i, 0.0, rate)
         total += mass * norm * norm
         force += mass * row[i, PARTICIPATION] * row[i, PARTICIPATION]
         slowness += 1.0 / (mass * (1.0 - hidden))
@@ -173,8 +173,8 @@ def _free_pair_remains_still(row, direction, sizes, duration, group, gap):
         return False
     left, limit = _free_limits(row, 0)
     right, other_limit = _free_limits(row, 1)
-    norm = _norm(row, 0, left, row[0, DAMPING_RATE])
-    other_norm = _norm(row, 1, right, row[1, DAMPING_RATE])
+    norm = norm_of(row, 0, left, row[0, DAMPING_RATE])
+    other_norm = norm_of(row, 1, right, row[1, DAMPING_RATE])
     # clearance at rest
     room = CERTAIN * (gap - left + right)
     if not (norm < limit and other_norm < other_limit and room > 0.0):

@@ -9,13 +9,19 @@ import math
 
 from per_obspy.kernels._jit import inlined, lean
 from per_obspy.kernels.polynomial_roots import fall_within
-from per_obspy.kernels.pounding_events.contact import resolve_contact
+from per_obspy.kernels.pounding_events.contact import (
+    apply_impact,
+    is_lingering,
+    is_touching,
+    resolve_contact,
+)
 from per_obspy.kernels.pounding_events.motion import (
     BOUNCE_LIMIT,
     CLEARANCE_ORDER,
     EVENT_FUNCTION,
     IN_CONTACT,
     LARGEST_DISPLACEMENT,
+    PHASE,
     STICKING_SPEED,
     TERM_COUNT,
     UNLOADING,
@@ -32,6 +38,7 @@ from per_obspy.kernels.pounding_lanes.free_impacts import (
     locate_impact,
     predict_clearance,
     state_inside_step,
+    states_inside_step,
 )
 from per_obspy.kernels.pounding_lanes.lanes import (
     CONTACT_FUNCTION,
@@ -144,6 +151,9 @@ def _exact_closing_share(members, row, states, j, elapsed, segment):
 @lean
 def _closing_share(members, row, states, j, elapsed, segment):
     """Return the share of the step at which an open interface closes, infinite if it does not."""
+    # far enough from each other at both ends
+    if not may_meet_or_part(members, row, states, j, 0.0, 0.0):
+        return math.inf
     left = state(states, j, START)
     right = state(states, j + 1, START)
     next_left = state(states, j, END)
@@ -225,6 +235,53 @@ def _read_from_row(members, row, states, elapsed, segment, is_moved):
                 states[i - 1, NEXT_HIT] = UNKNOWN
 
 
+@inlined
+def _is_alone(row, hit):
+    """Return whether the two buildings that hit each other are elastic and touch no other."""
+    is_alone = (row[hit, PHASE] == 0.0) & (row[hit + 1, PHASE] == 0.0)
+    if hit > 0:
+        is_alone &= not is_touching(row, hit - 1)
+    if hit < row.shape[0] - 2:
+        is_alone &= not is_touching(row, hit + 1)
+    return is_alone
+
+
+@lean
+def _passes_single_impact(members, row, log, states, elapsed, segment, hit):
+    """
+    Apply an impact in which no other building takes part; return whether both then part.
+
+    It is ``resolve_contact`` where bouncing goes on, as after most impacts; all else is left to it.
+    """
+    if elapsed >= 1.0 or not _is_alone(row, hit):
+        return False
+    # the impact
+    change = segment.slope * segment.duration
+    ground = segment.acceleration + elapsed * change
+    apply_impact(row, log, hit, elapsed * segment.duration)
+    if is_lingering(row, hit, ground):
+        return False
+    row[hit, CLEARANCE_ORDER] = 1.0
+    # states of both now and at the end of the step
+    for i in (hit, hit + 1):
+        z = row[i, V] / members[i, OMEGA]
+        set_state(states, i, START, complete_state(members[i], 0, row[i, U], z, ground))
+    left, right = states_inside_step(
+        members[hit],
+        row[hit : hit + 2],
+        state(states, hit, START),
+        state(states, hit + 1, START),
+        change,
+        1.0 - elapsed,
+    )
+    set_state(states, hit, END, left)
+    set_state(states, hit + 1, END, right)
+    # their interfaces close at another time
+    for j in range(max(hit - 1, 0), hit + 2):
+        states[j, NEXT_HIT] = UNKNOWN
+    return True
+
+
 @lean
 def _pass_event(row, log, segment, elapsed):
     """Carry the row to its next event by the event code; return the share reached."""
@@ -233,6 +290,15 @@ def _pass_event(row, log, segment, elapsed):
     time = time + span if kind else segment.duration
     finish_piece(row, log, segment, time, span, kind, index)
     return time / segment.duration if time < segment.duration else 1.0
+
+
+@lean
+def _finish_step(members, row, states, change, share):
+    """Raise the maxima of every building to the end of the step, where no clearance is zero."""
+    raise_maxima(members, row, states, END, change, share)
+    for i in range(row.shape[0]):
+        row[i, CLEARANCE_ORDER] = 0.0
+        row[i, UNLOADING] = 0.0
 
 
 @lean
@@ -270,10 +336,7 @@ def run_row_impacts(members, row, log, states, segment):
             share, hit = _find_hit(members, row, states, elapsed, segment)
         # no further impact: the end of the step
         if share == math.inf:
-            raise_maxima(members, row, states, END, change, 1.0 - elapsed)
-            for i in range(row.shape[0]):
-                row[i, CLEARANCE_ORDER] = 0.0
-                row[i, UNLOADING] = 0.0
+            _finish_step(members, row, states, change, 1.0 - elapsed)
             return True
         is_hit = share != UNKNOWN
         if is_hit:
@@ -282,6 +345,8 @@ def run_row_impacts(members, row, log, states, segment):
                 _advance_to_hit(members, row, states, share - elapsed, change)
             elapsed = share
             is_hit = row[hit, V] - row[hit + 1, V] > row[0, STICKING_SPEED]
+        if is_hit and _passes_single_impact(members, row, log, states, elapsed, segment, hit):
+            continue
         if is_hit:
             resolve_contact(row, log, segment, elapsed * segment.duration, hit)
         else:

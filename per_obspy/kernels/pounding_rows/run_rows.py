@@ -25,10 +25,12 @@ from per_obspy.kernels.pounding_lanes.lanes import (
 )
 from per_obspy.kernels.pounding_lanes.maxima_in_step import search_tile
 from per_obspy.kernels.pounding_lanes.pair_rows import rest_pair
-from per_obspy.kernels.pounding_lanes.run_block import SETTLING_STEPS
+from per_obspy.kernels.pounding_lanes.remaining_motion import GROUP_SAMPLES
+from per_obspy.kernels.pounding_lanes.run_block import GROUPS_BETWEEN_CHECKS, SETTLING_STEPS
 from per_obspy.kernels.pounding_rows.building_lanes import sweep_tile
 from per_obspy.kernels.pounding_rows.last_impacts import is_over
 from per_obspy.kernels.pounding_rows.member_phases import load_row, write_constants
+from per_obspy.kernels.pounding_rows.remaining_row_motion import row_remains_still
 from per_obspy.kernels.pounding_rows.row_steps import step_row_through_tile
 
 
@@ -131,12 +133,82 @@ def _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
             # at rest from now on
             if elapsed >= free_steps[number] or is_settled(row) or is_over(row):
                 free_steps[number] = -1
-                for lane in range(first, end):
-                    rest_pair(members[lane])
-                    write_lane(lanes, lane, members[lane])
+                _rest_row(lanes, members, first, end)
             else:
                 active += 1
     return active
+
+
+@lean
+def _rest_row(lanes, members, first, end):
+    """Set the lanes of a row to rest for good."""
+    for lane in range(first, end):
+        rest_pair(members[lane])
+        write_lane(lanes, lane, members[lane])
+
+
+@lean
+def _retire_still_rows(lanes, memory, firsts, cosine, sine, record, grounds, free_steps, group):
+    """
+    Rest the rows whose result no longer changes in the rest of the record.
+
+    Return the number of the others.
+    """
+    members, lines, _, states, deferred = memory
+    duration = GROUP_SAMPLES * record.refinement * record.duration
+    active = 0
+    for number in range(firsts.size - 1):
+        if free_steps[number] >= 0:
+            first = firsts[number]
+            end = firsts[number + 1]
+            # the state as a row
+            for lane in range(first, end):
+                read_lane(lanes, lane, members[lane])
+            load_row(members[first:end], lines[first:end])
+            # maxima of deferred tiles are larger still: a row that is over is over with them
+            if row_remains_still(
+                lines[first:end],
+                states[first:end],
+                cosine[number],
+                sine[number],
+                record.sizes,
+                duration,
+                group,
+            ):
+                for lane in range(first, end):
+                    own = members[lane], lines[lane : lane + 1], deferred[lane : lane + 1]
+                    _search_deferred(lanes, lane, own, record, grounds[1])
+                free_steps[number] = -1
+                _rest_row(lanes, members, first, end)
+            else:
+                active += 1
+    return active
+
+
+@lean
+def _advance_rows(lanes, flags, memory, firsts, record, grounds, step, last):
+    """Carry all rows from a step to the last one; return whether all got through."""
+    members, lines, logs, states, deferred = memory
+    is_through = True
+    while step < last:
+        # all lanes side by side through one tile
+        fill_ground(record, step, grounds[0])
+        count = min(TILE_STEPS, last - step)
+        if sweep_tile(lanes, flags, grounds[0], count):
+            # flagged rows one by one
+            for number in range(firsts.size - 1):
+                first = firsts[number]
+                end = firsts[number + 1]
+                own = (
+                    members[first:end],
+                    lines[first:end],
+                    logs[number],
+                    states[first:end],
+                    deferred[first:end],
+                )
+                is_through &= _treat_row(lanes, flags, first, own, record, grounds, step, count)
+        step += count
+    return is_through
 
 
 @lean
@@ -172,32 +244,26 @@ def run_rows(record, lanes, flags, grounds, memory, firsts, cosine, sine, free_s
     bool
         Whether all rows got through: no step had too many events.
     """
-    members, lines, logs, states, deferred = memory
+    members, lines, _, _, _ = memory
     _prepare(lanes, members, lines, firsts, cosine, sine, record.duration)
-    is_through = True
-    step = elapsed = 0
-    # the record, then free vibration until every row is settled
+    # the record, as far as any row needs it
     last = (record.components.shape[1] - 1) * record.refinement
-    while True:
-        while step < last:
-            # all lanes side by side through one tile
-            fill_ground(record, step, grounds[0])
-            count = min(TILE_STEPS, last - step)
-            if sweep_tile(lanes, flags, grounds[0], count):
-                # flagged rows one by one
-                for number in range(firsts.size - 1):
-                    first = firsts[number]
-                    end = firsts[number + 1]
-                    own = (
-                        members[first:end],
-                        lines[first:end],
-                        logs[number],
-                        states[first:end],
-                        deferred[first:end],
-                    )
-                    is_through &= _treat_row(lanes, flags, first, own, record, grounds, step, count)
-            step += count
-        if not _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
-            return is_through
+    group = 0
+    is_through = True
+    active = firsts.size - 1
+    while active and group < record.sizes.shape[1]:
+        step = group * GROUP_SAMPLES * record.refinement
+        group = min(group + GROUPS_BETWEEN_CHECKS, record.sizes.shape[1])
+        end = min(group * GROUP_SAMPLES * record.refinement, last)
+        is_through &= _advance_rows(lanes, flags, memory, firsts, record, grounds, step, end)
+        active = _retire_still_rows(
+            lanes, memory, firsts, cosine, sine, record, grounds, free_steps, group
+        )
+    # free vibration, until every row is settled
+    elapsed = 0
+    while _retire(lanes, memory, firsts, record, grounds, free_steps, elapsed):
+        step = last
         last += SETTLING_STEPS * record.refinement
+        is_through &= _advance_rows(lanes, flags, memory, firsts, record, grounds, step, last)
         elapsed += SETTLING_STEPS
+    return is_through

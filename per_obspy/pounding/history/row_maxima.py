@@ -8,9 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from per_obspy import checks
 from per_obspy.checks import FloatArray
 from per_obspy.kernels.pounding_events import motion as columns
+from per_obspy.kernels.pounding_events.contact import SLOWEST_COUNTED
+from per_obspy.kernels.pounding_rows.remaining_row_motion import COUNTED_SPEED
 from per_obspy.pounding.history.pair_histories import SHORTEST_BOUNCE
 from per_obspy.pounding.history.row_history import SPEED_SHARE
 from per_obspy.pounding.history.rows.row_blocks import run_row_blocks
+from per_obspy.pounding.history.rows.row_parts import parts_of, run_in_parts
 from per_obspy.pounding.history.rows.row_tables import (
     BUILDING_FIELDS,
     RowScales,
@@ -30,14 +33,14 @@ from per_obspy.pounding.history.tables import (
 from per_obspy.spectra.per_pair import azimuth_maxima
 
 #: Bouncing ends in contact after this many impacts per interface in one step. Chatter at one
-#: interface disturbs that at the others; with 25, as for pairs, maxima of rows that touch from the
-#: start change by 1e-6.
-BOUNCES_OF_ROWS = 100
+#: interface disturbs that at the others: with 100, maxima of one row in a hundred that touch from
+#: the start change by 1e-4, with 400 by less than 1e-7.
+BOUNCES_OF_ROWS = 400
 
 #: Rows of which the kernels' lines are held at a time.
 PART = 4096
-#: Columns of these lines that hold the results.
-RESULTS = [columns.LARGEST_RADIUS_SQUARED, columns.LARGEST_DISPLACEMENT, columns.APPROACH]
+#: Displacement, radius, impact velocity and impacts of a building.
+MAXIMA = 4
 
 
 class RowMaxima(NamedTuple):
@@ -82,8 +85,8 @@ def row_maxima(
     an impulse ``J`` at the interface after building k changes its modal velocity by ``-a J / m``
     and that of its neighbour by ``b J / m``, with the participations ``a`` (right) and ``b``
     (left). Bouncing ends in contact when a bounce would last less than a thousandth of a sampling
-    interval, or after 100 impacts per interface in one. The result of a row does not depend on the
-    other rows, nor on the number of threads.
+    interval, or after 400 impacts per interface in one step. The result of a row does not depend on
+    the other rows, nor on the number of threads.
 
     Parameters
     ----------
@@ -120,63 +123,59 @@ def row_maxima(
     if free_vibration:
         ground = closed_record(ground)
 
-    # Rows of plain structures; the lines of the kernels hold squares of the largest radii
-    scales = row_scales(checked)
-    results, impacts = _run(ground, step, checked, scales, free_vibration)
-    radius_squared, displacement, approach = results.T
-    return RowMaxima(
-        radius=np.sqrt(radius_squared) / scales.displacement,
-        free_radius=_free_radius(ground, step, checked, free_vibration),
-        displacement=displacement / scales.displacement,
-        impacts=impacts,
-        impact_velocity=approach / scales.clearance,
-    )
+    # Every building alone, then every part of a row whose gaps may close
+    maxima = np.zeros((checked.period.size, MAXIMA))
+    maxima[:, :2] = _alone(ground, step, checked, free_vibration)
+    free_radius = maxima[:, 1].copy()
+    run_in_parts(checked, maxima, lambda parts: _run(ground, step, parts, free_vibration))
+    displacement, radius, impact_velocity, impacts = maxima.T
+    return RowMaxima(radius, free_radius, displacement, impacts.astype(np.int64), impact_velocity)
 
 
-def _free_radius(
-    ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
-) -> FloatArray:
-    """Return the largest radius of every building alone."""
-    # Elastic ones from the record directly
-    sizes = np.diff(rows.first)
-    azimuth = np.repeat(rows.azimuth, sizes)
-    radius = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth).per
-    # A building that may yield is a separate row
-    yielding = np.flatnonzero(np.isfinite(rows.yield_displacement))
-    if yielding.size:
-        fields = {
-            name: values[yielding] for name, values in zip(BUILDING_FIELDS, rows[1:-1], strict=True)
-        }
-        alone = BuildingRows(np.arange(yielding.size + 1), **fields, azimuth=azimuth[yielding])
-        ones = RowScales(np.ones(yielding.size), np.ones(yielding.size))
-        results, _ = _run(ground, dt, alone, ones, free_vibration)
-        radius[yielding] = np.sqrt(results[:, 0])
-    return radius
+def _alone(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool) -> FloatArray:
+    """Return the largest displacement and radius of every building alone, (n_buildings, 2)."""
+    # Elastic ones from the record directly, with the free vibration after it
+    azimuth = np.repeat(rows.azimuth, np.diff(rows.first))
+    found = azimuth_maxima(ground[0], ground[1], dt, rows.period, rows.damping, azimuth)
+    maxima = np.stack([found.sd, found.per], axis=1)
+    # Others are rows of one building
+    followed = np.isfinite(rows.yield_displacement) | (not free_vibration)
+    if followed.any():
+        every = np.ones(followed.size, dtype=bool)
+        alone = parts_of(rows, every, followed)
+        maxima[followed] = _run(ground, dt, alone, free_vibration)[:, :2]
+    return maxima
 
 
-def _run(
-    ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return results (n_buildings, 3) by RESULTS, and impacts that count, part by part."""
-    results = np.empty((rows.period.size, len(RESULTS)))
-    counts = np.empty(rows.period.size, dtype=np.int64)
-
+def _run(ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool) -> FloatArray:
+    """Return the maxima of rows, some rows at a time."""
+    maxima = np.empty((rows.period.size, MAXIMA))
     # The lines of the kernels take 900 bytes per building
     for begin in range(0, rows.azimuth.size, PART):
         end = min(begin + PART, rows.azimuth.size)
         place = slice(rows.first[begin], rows.first[end])
         fields = {name: getattr(rows, name)[place] for name in BUILDING_FIELDS}
-
         # Rows of this part, counted from its first building
         first = rows.first[begin : end + 1] - rows.first[begin]
         part = BuildingRows(first, **fields, azimuth=rows.azimuth[begin:end])
-        own = RowScales(*(values[place] for values in scales))
-        lines, counts[place] = _run_part(ground, dt, part, own, free_vibration)
-        results[place] = lines[:, RESULTS]
-    return results, counts
+        maxima[place] = _run_part(ground, dt, part, free_vibration)
+    return maxima
 
 
 def _run_part(
+    ground: FloatArray, dt: float, rows: BuildingRows, free_vibration: bool
+) -> FloatArray:
+    """Return the maxima of some rows."""
+    scales = row_scales(rows)
+    lines, counts = _lines_at_end(ground, dt, rows, scales, free_vibration)
+    # The lines hold squares of the largest radii
+    displacement = lines[:, columns.LARGEST_DISPLACEMENT] / scales.displacement
+    radius = np.sqrt(lines[:, columns.LARGEST_RADIUS_SQUARED]) / scales.displacement
+    approach = lines[:, columns.APPROACH] / scales.clearance
+    return np.stack([displacement, radius, approach, counts], axis=1)
+
+
+def _lines_at_end(
     ground: FloatArray, dt: float, rows: BuildingRows, scales: RowScales, free_vibration: bool
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return the lines of all buildings at the end, and impacts that count."""
@@ -210,6 +209,7 @@ def _lines_at_rest(
     lines[:, :6] = table
     lines[:, columns.GAP] = scales.clearance * rows.gap
     lines[:, columns.RESTITUTION] = rows.restitution
+    lines[:, COUNTED_SPEED] = scales.clearance * SLOWEST_COUNTED
     lines[:, columns.IN_CONTACT] = rows.gap <= 0.0
 
     # Bouncing ends in contact below a separation speed, a duration, or after many impacts

@@ -8,10 +8,11 @@ from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.kernels.pounding_events.contact import LOG_COLUMNS
 from per_obspy.kernels.pounding_lanes.deferred_maxima import DEFERRED_COLUMNS, Record
 from per_obspy.kernels.pounding_lanes.lanes import LANE_ROWS, PAIR_LANES, TILE_STEPS
+from per_obspy.kernels.pounding_lanes.run_block import run_block
 from per_obspy.kernels.pounding_rows.row_by_events import count_row_impacts, run_row_by_events
 from per_obspy.kernels.pounding_rows.row_impacts import STATE_COLUMNS
 from per_obspy.kernels.pounding_rows.run_rows import run_rows
-from per_obspy.pounding.history.pair_blocks import aligned, records_in_steps
+from per_obspy.pounding.history.pair_blocks import aligned, records_in_steps, run_blocks
 from per_obspy.threads import map_in_threads
 
 IntArray = NDArray[np.int64]
@@ -20,7 +21,7 @@ IntArray = NDArray[np.int64]
 FIRST_ROOM = 1 << 16
 
 
-def packed_rows(first: IntArray, parts: IntArray) -> list[IntArray]:
+def packed_rows(first: IntArray, parts: IntArray, some: IntArray) -> list[IntArray]:
     """
     Return the rows of each block: of equal refinement, 32 buildings at most in all.
 
@@ -30,6 +31,8 @@ def packed_rows(first: IntArray, parts: IntArray) -> list[IntArray]:
         First building of each row, then the number of buildings.
     parts : (n_rows,) ndarray of int
         Steps of a sampling interval.
+    some : (n,) ndarray of int
+        Numbers of the rows that are packed.
 
     Returns
     -------
@@ -38,10 +41,10 @@ def packed_rows(first: IntArray, parts: IntArray) -> list[IntArray]:
     """
     sizes = np.diff(first)
     blocks = []
-    for part in np.unique(parts):
+    for part in np.unique(parts[some]):
         block: list[int] = []
         used = 0
-        for number in np.flatnonzero(parts == part).tolist():
+        for number in some[parts[some] == part].tolist():
             # The next block begins where a row has no room
             if used + sizes[number] > PAIR_LANES and block:
                 blocks.append(np.array(block))
@@ -92,29 +95,57 @@ def run_row_blocks(
     RuntimeError
         If a step has more events than any record causes.
     """
-    # Impacts that count, building by building
     counts = np.zeros(len(lines), dtype=np.int64)
+    sizes = np.diff(first)
+    # Rows of two are pairs, of which a block has more
+    pairs = np.flatnonzero(sizes == 2)
+    steps = parts[pairs], free_steps[pairs], azimuth[pairs]
+    counts[first[pairs]] = _run_pairs(ground, dt, first[pairs], lines, steps)
     records = records_in_steps(ground, parts, dt)
 
     def run(block: IntArray) -> None:
-        """Run the rows of one block."""
-        # Its buildings, one row after the other
-        record = records[int(parts[block[0]])]
+        """Run the rows of one block, and write their results to their places."""
+        # Blocks do not depend on each other
         members = np.concatenate([np.arange(first[k], first[k + 1]) for k in block])
-        starts = np.concatenate([[0], np.cumsum(np.diff(first)[block])])
-        own, logs = run_logged_block(
-            record, lines[members], starts, azimuth[block], free_steps[block]
-        )
+        record = records[int(parts[block[0]])]
+        others = azimuth[block], free_steps[block]
+        found = _counted_block(record, lines[members], sizes[block], others, scale[members])
+        lines[members], counts[members] = found
 
-        # Results, to the places of the rows
-        lines[members] = own
-        for begin, end, log in zip(starts[:-1], starts[1:], logs, strict=True):
-            part = members[begin:end]
-            counts[part] = count_row_impacts(own[begin:end], log, scale[part])
-
-    # Blocks do not depend on each other
-    map_in_threads(run, packed_rows(first, parts))
+    map_in_threads(run, packed_rows(first, parts, np.flatnonzero(sizes != 2)))
     return counts
+
+
+def _run_pairs(
+    ground: FloatArray,
+    dt: float,
+    left: IntArray,
+    lines: FloatArray,
+    steps: tuple[IntArray, IntArray, FloatArray],
+) -> IntArray:
+    """Carry rows of two from their left buildings through a record; return impacts that count."""
+    both = left[:, np.newaxis] + np.arange(2)
+    rows = lines[both]
+    counts = run_blocks(run_block, LANE_ROWS, ground, dt, rows, *steps)
+    lines[both] = rows
+    return counts
+
+
+def _counted_block(
+    record: Record,
+    start: FloatArray,
+    sizes: IntArray,
+    others: tuple[FloatArray, IntArray],
+    scale: FloatArray,
+) -> tuple[FloatArray, IntArray]:
+    """Return the buildings of one block at the end, and impacts that count."""
+    firsts = np.concatenate([[0], np.cumsum(sizes)])
+    own, logs = run_logged_block(record, start, firsts, *others)
+    # Row by row
+    counts = []
+    for begin, end, log in zip(firsts[:-1], firsts[1:], logs, strict=True):
+        counts.append(count_row_impacts(own[begin:end], log, scale[begin:end]))
+    return own, np.concatenate(counts)
 
 
 def run_logged_block(

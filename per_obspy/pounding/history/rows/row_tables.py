@@ -98,12 +98,8 @@ def checked_rows(rows: BuildingRows) -> BuildingRows:
         if values.shape != (expected,):
             raise ValueError(f"{name} must have the shape ({expected},), got {values.shape}")
 
-    # Terms of missing neighbours are not used
-    fields["participation_left"] = _replaced(fields["participation_left"], first[:-1])
-    for name in ("participation_right", "gap", "restitution"):
-        fields[name] = _replaced(fields[name], first[1:] - 1)
-    _check_ranges(fields)
-    checked = BuildingRows(first, **fields, azimuth=azimuth)
+    checked = with_ends(BuildingRows(first, **fields, azimuth=azimuth))
+    _check_ranges(checked)
     _refuse_pressed_walls(checked)
     return checked
 
@@ -122,23 +118,28 @@ def _checked_first(first: ArrayLike) -> IntArray:
     return starts
 
 
-def _replaced(values: FloatArray, index: IntArray) -> FloatArray:
-    """Return a copy with 1 at an index."""
-    copy = values.copy()
-    copy[index] = 1.0
-    return copy
+def with_ends(rows: BuildingRows) -> BuildingRows:
+    """Return rows with 1 in place of every term of a neighbour that a row does not have."""
+    begins, ends = rows.first[:-1], rows.first[1:] - 1
+    # Buildings of these terms
+    index = dict.fromkeys(("participation_right", "gap", "restitution"), ends)
+    index["participation_left"] = begins
+    columns = {name: getattr(rows, name).copy() for name in index}
+    for name, column in columns.items():
+        column[index[name]] = 1.0
+    return rows._replace(**columns)
 
 
-def _check_ranges(fields: dict[str, FloatArray]) -> None:
+def _check_ranges(rows: BuildingRows) -> None:
     """Refuse values of buildings and interfaces that are out of range."""
     for name in ("period", "participation_left", "participation_right"):
-        checks.positive(name, fields[name])
+        checks.positive(name, getattr(rows, name))
     for name in ("mass", "yield_displacement"):
-        checks.positive_or_infinite(name, fields[name])
+        checks.positive_or_infinite(name, getattr(rows, name))
     for name in ("damping", "hardening"):
-        checks.fraction_of_critical(name, fields[name])
-    checks.not_negative("gap", fields["gap"])
-    checks.between("restitution", fields["restitution"], 0.0, 1.0)
+        checks.fraction_of_critical(name, getattr(rows, name))
+    checks.not_negative("gap", rows.gap)
+    checks.between("restitution", rows.restitution, 0.0, 1.0)
 
 
 def _refuse_pressed_walls(rows: BuildingRows) -> None:

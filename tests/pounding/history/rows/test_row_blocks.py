@@ -9,15 +9,21 @@ from numpy.testing import assert_allclose, assert_array_equal
 from per_obspy.kernels.pounding_events import contact as log_columns
 from per_obspy.kernels.pounding_events import motion as columns
 from per_obspy.pounding.history.pair_blocks import records_in_steps
-from per_obspy.pounding.history.rows.row_blocks import packed_rows, run_logged_block
+from per_obspy.pounding.history.rows.row_blocks import (
+    packed_rows,
+    run_logged_block,
+    run_row_blocks,
+)
+from per_obspy.spectra.per_pair import azimuth_maxima
 
 
 @given(st.lists(st.tuples(st.integers(1, 40), st.sampled_from([1, 2])), min_size=1, max_size=60))
 def test_every_row_is_in_one_block_that_has_room(rows):
     # catches: a lost last block, a long row that is cut, rows of different steps together
     sizes, parts = (np.array(numbers) for numbers in zip(*rows, strict=True))
-    blocks = packed_rows(np.append(0, np.cumsum(sizes)), parts)
-    assert_array_equal(np.sort(np.concatenate(blocks)), np.arange(len(rows)))
+    some = np.flatnonzero(sizes != 2)
+    blocks = packed_rows(np.append(0, np.cumsum(sizes)), parts, some)
+    assert_array_equal(np.sort(np.concatenate([[], *blocks])), some)
     for block in blocks:
         assert sizes[block].sum() <= 32 or block.size == 1
         assert np.unique(parts[block]).size == 1
@@ -96,3 +102,34 @@ def test_a_log_that_is_too_short_grows(monkeypatch):
     _, grown = run_logged_block(*arguments)
     assert used > 3
     assert_array_equal(grown[0, :used], logs[0, :used])
+
+
+def test_lanes_without_contact_give_the_spectrum():
+    # catches: contact with a building of another row, free vibration that ends too early
+    start, firsts = rows_at_rest([1, 4, 2], 9.0, seed=5)
+    noise = np.convolve(np.random.default_rng(6).normal(size=400), np.ones(5) / 5, mode="same")
+    ground = np.stack([np.append(noise, 0.0), np.zeros(401)])
+    record, many = records_in_steps(ground, [1], 0.02)[1], np.full(3, 4096)
+    lines, _ = run_logged_block(record, start, firsts, np.zeros(3), many)
+    period = 2 * np.pi / np.sqrt(start[:, columns.STIFFNESS])
+    expected = azimuth_maxima(*ground, 0.02, period, 0.05, 0.0)
+    assert not lines[:, columns.IMPACTS].any()
+    # both are exact
+    assert_allclose(lines[:, columns.LARGEST_DISPLACEMENT], expected.sd, rtol=1e-9)
+    assert_allclose(np.sqrt(lines[:, columns.LARGEST_RADIUS_SQUARED]), expected.per, rtol=1e-9)
+
+
+def test_rows_of_two_in_lanes_of_rows_and_of_pairs():
+    # catches: rows of two that only one of both blocks follows exactly
+    start, firsts = rows_at_rest([2] * 12, 0.004, seed=8)
+    start[:12, columns.GAP], start[:12, columns.IN_CONTACT] = 0.0, 1.0
+    noise = np.convolve(np.random.default_rng(9).normal(size=400), np.ones(5) / 5, mode="same")
+    ground = np.stack([np.append(4.0 * noise, 0.0), np.zeros(401)])
+    ones, free = np.ones(12, dtype=np.int64), np.full(12, 320)
+    lines, _ = run_logged_block(
+        records_in_steps(ground, [1], 0.02)[1], start, firsts, np.zeros(12), free
+    )
+    motion = ground, 0.02, firsts, start, ones, free, np.zeros(12)
+    assert run_row_blocks(*motion, np.ones(24)).sum() > 300
+    index = [columns.LARGEST_DISPLACEMENT, columns.LARGEST_RADIUS_SQUARED, columns.APPROACH]
+    assert_allclose(start[:, index], lines[:, index], rtol=1e-9)
